@@ -499,7 +499,7 @@ typedef struct dem2d_convexity {
 } dem2d_convexity;
 
 /// Convex hull of count points (Andrew's monotone chain), counter-clockwise, no collinear points.
-/// hull has room for count points. Errors: TOO_FEW_POINTS (also for a hull below 3), NOT_FINITE,
+/// hull has room for count points. Errors: TOO_FEW_POINTS, NOT_FINITE, ZERO_AREA (all on one line),
 /// OUT_OF_MEMORY.
 DEM2D_API dem2d_result dem2d_polygon_hull(const dem2d_env *env, const dem2d_vec *points,
                                           int count, dem2d_vec *hull, int *hull_count);
@@ -1167,7 +1167,7 @@ static dem2d_result dem2di_check_points(const dem2d_env *env, const char *name,
                                         const dem2d_vec *points, int count, int least) {
     if (points == NULL) return dem2di_fail_null(env, name);
     if (count < least)
-        return dem2di_fail(env, DEM2D_TOO_FEW_POINTS, count, "%s: %d given, %d needed", name,
+        return dem2di_fail(env, DEM2D_TOO_FEW_POINTS, -1, "%s: %d given, %d needed", name,
                            count, least);
     for (int i = 0; i < count; i++)
         if (!dem2di_vec_finite(points[i]))
@@ -1235,7 +1235,7 @@ DEM2D_API dem2d_result dem2d_polygon_hull(const dem2d_env *env, const dem2d_vec 
     qsort(sorted, (size_t)count, sizeof *sorted, dem2di_compare_points);
     int length = dem2di_monotone_chain(sorted, count, chain);
     if (length < 3) {
-        result = dem2di_fail(env, DEM2D_TOO_FEW_POINTS, length, "points are on one line");
+        result = dem2di_fail(env, DEM2D_ZERO_AREA, -1, "the points are on one line");
     } else {
         memcpy(hull, chain, (size_t)length * sizeof *hull);
         *hull_count = length;
@@ -1801,7 +1801,7 @@ static dem2d_vec dem2di_outline_point(const dem2d_shape *shape, int i, int count
         if (shape->type == DEM2D_BEZIER)
             return dem2di_arc_point(&shape->arcs[k], (double)(place % count) / count);
         if (shape->rounding == 0) return dem2di_along(shape->corners[k], t, shape->ends[k]);
-        if (each >= 2) return dem2di_rounded_point(shape, k, i - first, each);
+        if (count >= 2 * n) return dem2di_rounded_point(shape, k, i - first, each);
     }
     dem2d_rot z = dem2d_rot_make(2 * DEM2DI_PI * i / count);
     return dem2di_support(shape, dem2di_vec(z.c, z.s), NULL);
@@ -2050,52 +2050,71 @@ static void dem2di_bound_arc(dem2di_arc_bounds *bounds, const dem2di_arc *arc, i
     dem2di_bound_arc(bounds, &right, depth - 1);
 }
 
-/* Tangents at the ends of an arc: the first difference that is not zero. */
-static bool dem2di_arc_tangents(const dem2di_arc *arc, dem2d_vec *start, dem2d_vec *end) {
+/* Tangents at the ends of an arc: the first difference that is longer than rounding. */
+static bool dem2di_arc_tangents(const dem2di_arc *arc, double rounding, dem2d_vec *start,
+                                dem2d_vec *end) {
     const dem2d_vec *d[3] = {&arc->d0, &arc->d1, &arc->d2};
-    bool found = false;
-    for (int i = 0; i < 3 && !found; i++) found = dem2di_unit(*d[i], start);
-    for (int i = 2, done = 0; i >= 0 && !done; i--) done = dem2di_unit(*d[i], end);
-    return found;
+    int first = 0, last = 2;
+    while (first < 3 && dem2di_length(*d[first]) <= rounding) first++;
+    while (last >= 0 && dem2di_length(*d[last]) <= rounding) last--;
+    return first < 3 && dem2di_unit(*d[first], start) && dem2di_unit(*d[last], end);
+}
+
+/* Rounding of the difference of two control points. */
+static double dem2di_control_rounding(double size) {
+    return 8 * DBL_EPSILON * size;
+}
+
+/* Does b turn left of a, to rounding, and not back? Differences within rounding have no
+   direction. */
+static bool dem2di_turns_left(dem2d_vec a, dem2d_vec b, double rounding) {
+    double la = dem2di_length(a), lb = dem2di_length(b), turn = dem2di_cross(a, b);
+    if (la <= rounding || lb <= rounding) return true;
+    return turn >= -rounding * (la + lb) &&
+           (turn > rounding * (la + lb) || dem2di_dot(a, b) > 0);
 }
 
 /* Convex, turning left by at most pi: every turn of the control polygon is to the left, and so
-   is the whole turn. `rounding` is for products of two control differences. */
+   is the whole turn. */
 static bool dem2di_arc_convex(const dem2di_arc *arc, dem2d_vec start, dem2d_vec end,
                               double rounding) {
-    double turn01 = dem2di_cross(arc->d0, arc->d1), turn12 = dem2di_cross(arc->d1, arc->d2);
-    double turn02 = dem2di_cross(arc->d0, arc->d2), turn = dem2di_cross(start, end);
-    if (turn01 < -rounding || turn12 < -rounding || turn02 < -rounding) return false;
-    if (turn01 <= rounding && dem2di_dot(arc->d0, arc->d1) < 0) return false;
-    if (turn12 <= rounding && dem2di_dot(arc->d1, arc->d2) < 0) return false;
-    return turn >= -4 * DBL_EPSILON;
+    double lengths = dem2di_length(arc->d0) + dem2di_length(arc->d2);
+    return dem2di_turns_left(arc->d0, arc->d1, rounding) &&
+           dem2di_turns_left(arc->d1, arc->d2, rounding) &&
+           dem2di_cross(arc->d0, arc->d2) >= -rounding * lengths &&
+           dem2di_cross(start, end) >= -4 * DBL_EPSILON;
 }
 
 /* A joint may turn by this much to be called smooth: coordinates written with seven digits. */
 #define DEM2DI_SMOOTH 1e-6
 
+/* The half of a unit tangent; horizontal within the smoothness is horizontal, so that a joint
+   along the border of the halves is not counted twice. */
+static bool dem2di_upper_tangent(dem2d_vec tangent) {
+    if (fabs(tangent.y) <= DEM2DI_SMOOTH) tangent.y = 0;
+    return dem2di_upper(tangent);
+}
+
 /* All arcs convex, joints G1, one turn in all. */
 static dem2d_result dem2di_check_arcs(const dem2d_env *env, const dem2di_arc *arcs, int count,
                                       double size) {
     int entries = 0;
-    dem2d_vec start, end, before, first, last;
-    if (!dem2di_arc_tangents(&arcs[count - 1], &first, &last))
+    double rounding = dem2di_control_rounding(size);
+    dem2d_vec start, end, before;
+    if (!dem2di_arc_tangents(&arcs[count - 1], rounding, &start, &before))
         return dem2di_fail(env, DEM2D_DUPLICATE_POINT, count - 1, "arc %d is a point", count - 1);
-    before = last;
     for (int k = 0; k < count; k++) {
-        if (!dem2di_arc_tangents(&arcs[k], &start, &end))
+        if (!dem2di_arc_tangents(&arcs[k], rounding, &start, &end))
             return dem2di_fail(env, DEM2D_DUPLICATE_POINT, k, "arc %d is a point", k);
-        double lengths = dem2di_length(arcs[k].d0) + dem2di_length(arcs[k].d1) +
-                         dem2di_length(arcs[k].d2);
-        if (!dem2di_arc_convex(&arcs[k], start, end, 8 * DBL_EPSILON * size * lengths))
+        if (!dem2di_arc_convex(&arcs[k], start, end, rounding))
             return dem2di_fail(env, DEM2D_NOT_CONVEX, k, "arc %d is not convex", k);
         double kink = dem2di_cross(before, start);
         if (fabs(kink) > DEM2DI_SMOOTH || dem2di_dot(before, start) < 0)
             return dem2di_fail(env, DEM2D_NOT_SMOOTH, k,
                                "the tangents at the start of arc %d differ by a sine of %g", k,
                                kink);
-        entries += (!dem2di_upper(before) && dem2di_upper(start)) +
-                   (!dem2di_upper(start) && dem2di_upper(end));
+        entries += (!dem2di_upper_tangent(before) && dem2di_upper_tangent(start)) +
+                   (!dem2di_upper_tangent(start) && dem2di_upper_tangent(end));
         before = end;
     }
     if (entries != 1)
@@ -2120,8 +2139,9 @@ static void dem2di_arcs_from_control(const dem2d_vec *control, int count, bool r
 }
 
 /* Everything about a polybezier but its arcs. */
-static void dem2di_finish_bezier(dem2d_shape *shape) {
+static void dem2di_finish_bezier(dem2d_shape *shape, double size) {
     dem2d_vec start;
+    double rounding = dem2di_control_rounding(size);
     for (int pass = 0; pass < 2; pass++) { /* the second makes the moments central */
         dem2d_mass mass = dem2di_bezier_mass(shape->arcs, shape->count);
         for (int k = 0; k < shape->count; k++)
@@ -2138,7 +2158,7 @@ static void dem2di_finish_bezier(dem2d_shape *shape) {
     /* 1e-9 of the size is below any tolerance of a contact; 40 halvings are beyond doubles */
     bounds.tolerance = 1e-9 * sqrt(shape->mass.area);
     for (int k = 0; k < shape->count; k++) {
-        (void)dem2di_arc_tangents(&shape->arcs[k], &start, &shape->ends[k]);
+        (void)dem2di_arc_tangents(&shape->arcs[k], rounding, &start, &shape->ends[k]);
         dem2di_bound_arc(&bounds, &shape->arcs[k], 40);
     }
     shape->circumscribed = bounds.outer;
@@ -2151,7 +2171,7 @@ DEM2D_API dem2d_result dem2d_shape_create_bezier(const dem2d_env *env, const dem
                                                  int arcs, dem2d_shape **shape) {
     if (shape == NULL) return dem2di_fail_null(env, "shape");
     if (arcs < 2 || arcs > INT_MAX / 3)
-        return dem2di_fail(env, DEM2D_TOO_FEW_POINTS, arcs, "arcs = %d, 2 needed", arcs);
+        return dem2di_fail(env, DEM2D_TOO_FEW_POINTS, -1, "arcs = %d, 2 needed", arcs);
     dem2d_result result = dem2di_check_points(env, "control", control, 3 * arcs, 6);
     if (result != DEM2D_OK) return result;
     double area = 0, size = dem2di_coordinate_size(control, 3 * arcs), extent = 0;
@@ -2169,7 +2189,7 @@ DEM2D_API dem2d_result dem2d_shape_create_bezier(const dem2d_env *env, const dem
         dem2d_shape_destroy(made);
         return result;
     }
-    dem2di_finish_bezier(made);
+    dem2di_finish_bezier(made, size);
     *shape = made;
     return DEM2D_OK;
 }
@@ -2191,9 +2211,7 @@ static dem2d_result dem2di_check_series(const dem2d_env *env, const double *a, c
         if (n > 0 && !dem2di_finite(b[n]))
             return dem2di_fail(env, DEM2D_NOT_FINITE, n, "b[%d] = %g is not finite", n, b[n]);
     }
-    if (a[0] < 0)
-        return dem2di_fail(env, DEM2D_OUT_OF_RANGE, 0, "a[0] = %g is negative", a[0]);
-    if (a[0] == 0) return dem2di_fail(env, DEM2D_ZERO_AREA, 0, "a[0] = 0");
+    if (!(a[0] > 0)) return dem2di_fail(env, DEM2D_ZERO_AREA, 0, "a[0] = %g", a[0]);
     return DEM2D_OK;
 }
 
@@ -2297,9 +2315,9 @@ DEM2D_API dem2d_result dem2d_shape_create_custom(const dem2d_env *env,
     made->circumscribed = sqrt(x * x + y * y);
     made->inscribed = dem2di_min(desc->inscribed, dem2di_min(x, y));
     made->rho_min = desc->rho_min;
-    if (!dem2di_finite(made->circumscribed) || !dem2di_finite(made->mass.polar_moment))
+    if (!dem2di_finite(made->mass.area))
         result = dem2di_fail(env, DEM2D_NOT_FINITE, -1, "support gives a non-finite point");
-    else if (!(made->mass.area > 0 && made->mass.polar_moment > 0))
+    else if (!(made->mass.area > 0 && made->mass.polar_moment > 0 && x > 0 && y > 0))
         result = dem2di_fail(env, DEM2D_ZERO_AREA, -1, "support gives an area of %g",
                              made->mass.area);
     if (result != DEM2D_OK) {
@@ -2431,7 +2449,7 @@ static dem2d_result dem2di_outline_make(const dem2d_env *env, const dem2d_vec *p
     result = dem2d_polygon_hull(env, points, count, outline->hull, &outline->hull_count);
     if (result != DEM2D_OK) {
         dem2di_outline_release(env, outline);
-        return result == DEM2D_TOO_FEW_POINTS ? DEM2D_ZERO_AREA : result;
+        return result;
     }
     dem2d_mass mass = dem2di_polygon_mass(outline->hull, outline->hull_count);
     outline->centre = mass.centroid;
@@ -3118,13 +3136,9 @@ static void dem2di_polytope_start(dem2di_pair *pair, dem2di_search *search,
 }
 
 static int dem2di_nearest_edge(const dem2di_polytope *polytope) {
-    int best = -1;
-    double least = polytope->floor;
-    for (int i = 0; i < polytope->edges; i++)
-        if (polytope->edge[i].distance < least) {
-            least = polytope->edge[i].distance;
-            best = i;
-        }
+    int best = 0;
+    for (int i = 1; i < polytope->edges; i++)
+        if (polytope->edge[i].distance < polytope->edge[best].distance) best = i;
     return best;
 }
 
@@ -3137,21 +3151,15 @@ static void dem2di_epa(dem2di_pair *pair, dem2di_polytope *polytope, double tole
     if (cap > DEM2DI_EPA_ITERATIONS) cap = DEM2DI_EPA_ITERATIONS;
     for (int iteration = 0;; iteration++) {
         int nearest = dem2di_nearest_edge(polytope);
-        if (nearest < 0) {
-            search->lower = dem2di_min(polytope->floor, search->upper);
-            break;
-        }
         dem2di_edge edge = polytope->edge[nearest];
-        search->lower = dem2di_min(edge.distance, search->upper);
-        if (search->upper - search->lower <= tolerance) {
-            dem2di_witness(search, &polytope->vertex[edge.from], &polytope->vertex[edge.to]);
-            break;
-        }
+        search->lower = dem2di_min(search->upper, dem2di_min(edge.distance, polytope->floor));
         if (iteration == cap) return;
         search->iterations++;
         dem2di_vertex v = dem2di_look(pair, search, edge.normal);
-        if (dem2di_dot(v.w, edge.normal) - edge.distance <= tolerance) {
-            search->upper = dem2di_min(search->upper, dem2di_dot(v.w, edge.normal));
+        double h = dem2di_dot(v.w, edge.normal);
+        if (h - edge.distance <= tolerance) { /* normal and witness points of this edge */
+            search->upper = h;
+            search->normal = edge.normal;
             dem2di_witness(search, &polytope->vertex[edge.from], &polytope->vertex[edge.to]);
             break;
         }
@@ -3241,6 +3249,7 @@ static bool dem2di_warm_bracket(dem2di_pair *pair, dem2d_vec u, const dem2di_ver
         dem2di_bracket(pair, search, u, v, angles, 5, &polytope);
         if (polytope.floor < search->upper - tolerance) return false;
     }
+    if (polytope.edges == 0) return false;
     dem2di_epa(pair, &polytope, tolerance, cap, search);
     return search->state != DEM2D_UNRESOLVED && search->upper - search->lower <= tolerance;
 }
@@ -3821,6 +3830,7 @@ typedef struct dem2di_wall_state {
     dem2d_vec point, velocity;
     dem2d_vec force;  /* of the particles on it */
     double stiffness; /* of its contacts */
+    double drift;     /* servo: mean speed along the normal that holds the force */
 } dem2di_wall_state;
 
 /* Pairs in the order of their keys, and the contact of each now and after the step. */
@@ -4341,7 +4351,7 @@ DEM2D_API dem2d_result dem2d_world_drive_particle(dem2d_world *world, dem2d_part
     world->now[id.index].v = velocity;
     world->now[id.index].w = angular_velocity;
     world->bodies[id.index].motion = motion;
-    world->list_stale = true; /* pairs of two that do not move freely are not listed */
+    world->list_stale = true; /* pairs of two fixed ones are not listed */
     return DEM2D_OK;
 }
 
@@ -4393,6 +4403,7 @@ static void dem2di_wall_place(dem2d_world *world, int slot, const dem2d_wall_des
     dem2di_wall_state *now = &world->wall_now[slot];
     now->point = desc->point;
     now->velocity = desc->mode == DEM2D_WALL_MOVING ? desc->velocity : dem2di_vec(0, 0);
+    if (desc->mode != DEM2D_WALL_SERVO) now->drift = 0;
     world->wall_before[slot] = *now;
     world->list_stale = true;
 }
@@ -4538,7 +4549,7 @@ static bool dem2di_find_pairs(dem2d_world *world) {
         dem2di_disc *disc = &world->discs[i];
         disc->centre = world->now[i].x;
         disc->reach = body->shape != NULL ? body->radius + body->skin : -1;
-        disc->fixed = body->motion != DEM2D_FREE;
+        disc->fixed = body->motion == DEM2D_FIXED;
     }
     if (!dem2di_grid_pairs(&world->env, &world->grid, world->discs, world->body_count, found) ||
         !dem2di_list_reserve(world, &world->pairs, found->count))
@@ -4554,7 +4565,7 @@ static bool dem2di_find_touches(dem2d_world *world) {
     spare->count = 0;
     for (int i = 0; i < world->body_count; i++) {
         const dem2di_body *body = &world->bodies[i];
-        if (body->shape == NULL || body->motion != DEM2D_FREE) continue;
+        if (body->shape == NULL || body->motion == DEM2D_FIXED) continue;
         double reach = body->radius + body->skin + world->wall_skin;
         for (int j = 0; j < world->wall_count; j++) {
             const dem2di_wall *wall = &world->walls[j];
@@ -4712,17 +4723,26 @@ static void dem2di_sum_pass(dem2d_world *world) {
    behind the wall's own yield as well. */
 #define DEM2DI_SERVO_GAIN 0.8
 
-/* v = gain (target - force) / (K dt) along the normal; without a contact, at full speed. */
+/* Weight of one step in the drift: its memory of about a hundred steps is long against the
+   vibration of contacts (20 to 60 steps) and short against any loading. */
+#define DEM2DI_SERVO_MEMORY 0.01
+
+/* v = drift + gain (target - force) / (K dt) along the normal; without a contact, at full speed.
+   The drift follows v: without it the force would stay off by v K dt / gain as long as the
+   grains behind the wall spread at v. */
 static dem2d_vec dem2di_servo_velocity(const dem2d_world *world, int j) {
     const dem2d_wall_desc *desc = &world->walls[j].desc;
-    const dem2di_wall_state *wall = &world->wall_next[j];
+    dem2di_wall_state *wall = &world->wall_next[j];
     double target = desc->stress * dem2di_wall_length(world, world->wall_now, j);
     double missing = target + dem2di_dot(wall->force, desc->normal);
     double speed = missing > 0 ? desc->max_speed : missing < 0 ? -desc->max_speed : 0;
-    if (wall->stiffness > 0) {
-        double wanted = DEM2DI_SERVO_GAIN * missing / (wall->stiffness * world->time_step);
-        speed = dem2di_max(-desc->max_speed, dem2di_min(desc->max_speed, wanted));
+    if (!(wall->stiffness > 0)) {
+        wall->drift = 0;
+        return dem2di_scale(desc->normal, speed);
     }
+    double step = DEM2DI_SERVO_GAIN * missing / (wall->stiffness * world->time_step);
+    speed = dem2di_max(-desc->max_speed, dem2di_min(desc->max_speed, wall->drift + step));
+    if (speed == wall->drift + step) wall->drift += DEM2DI_SERVO_MEMORY * step;
     return dem2di_scale(desc->normal, speed);
 }
 
@@ -4839,9 +4859,10 @@ DEM2D_API dem2d_result dem2d_world_time_step_bounds(const dem2d_world *world, do
     int particle = -1, unused = -1;
     double slowest = dem2di_stiffest(world, pairs, touches, 1, &particle);
     double stiffest = dem2di_stiffest(world, pairs, touches, 2, &unused);
-    for (int i = 0; i < world->body_count; i++) { /* one contact each, with its own kind */
+    for (int i = 0; i < world->body_count; i++) { /* the loose: one contact with their own kind */
         const dem2di_body *body = &world->bodies[i];
-        if (body->shape == NULL || body->motion != DEM2D_FREE) continue;
+        const dem2di_stiffness *k = &world->stiffness[i];
+        if (body->shape == NULL || body->motion != DEM2D_FREE || k->xx + k->yy > 0) continue;
         const dem2d_pair_desc *law = dem2di_law(world, body->material, body->material);
         double arm = body->radius * body->radius / body->inertia;
         double kt = law->friction > 0 ? law->tangential_stiffness : 0;
@@ -4971,6 +4992,8 @@ DEM2D_API dem2d_result dem2d_world_particles(const dem2d_world *world, dem2d_par
                                              int capacity, int *count) {
     if (world == NULL || count == NULL) return DEM2D_NULL_ARGUMENT;
     if (ids == NULL && capacity > 0) return dem2di_fail_null(&world->env, "ids");
+    if (capacity < 0)
+        return dem2di_fail(&world->env, DEM2D_OUT_OF_RANGE, -1, "capacity = %d", capacity);
     int alive = 0;
     for (int i = 0; i < world->body_count; i++) {
         if (world->bodies[i].shape == NULL) continue;
@@ -5006,6 +5029,8 @@ DEM2D_API dem2d_result dem2d_world_contacts(const dem2d_world *world,
                                             int *count) {
     if (world == NULL || count == NULL) return DEM2D_NULL_ARGUMENT;
     if (contacts == NULL && capacity > 0) return dem2di_fail_null(&world->env, "contacts");
+    if (capacity < 0)
+        return dem2di_fail(&world->env, DEM2D_OUT_OF_RANGE, -1, "capacity = %d", capacity);
     int open = 0;
     for (int wall = 0; wall < 2; wall++) {
         const dem2di_list *list = wall ? &world->touches : &world->pairs;
