@@ -904,13 +904,14 @@ DEM2D_API dem2d_result dem2d_world_write_svg(const dem2d_world *world, const dem
 #error "dem2d.h: 80-bit arithmetic; on 32-bit x86 compile with -msse2 -mfpmath=sse"
 #endif
 
-/* a * b + c must be two rounded operations everywhere, or runs differ between compilers. */
+/* a * b + c must be two rounded operations everywhere, or runs differ between compilers. gcc 12
+   forms fused a * b +- c from pairs of statements in its basic-block vectoriser even so. */
 #if defined(__clang__)
 #pragma float_control(push)
 #pragma clang fp contract(off)
 #elif defined(__GNUC__)
 #pragma GCC push_options
-#pragma GCC optimize("fp-contract=off")
+#pragma GCC optimize("fp-contract=off", "no-tree-slp-vectorize")
 #endif
 
 #if defined(__GNUC__)

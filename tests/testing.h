@@ -1,0 +1,237 @@
+/* testing.h - what the tests share: comparisons that print, numbers that repeat, an allocator that
+   counts and fails on demand, a log that is kept. Include it after dem2d.h. */
+#ifndef TESTING_H
+#define TESTING_H
+
+#include <math.h>
+#include <setjmp.h>
+#include <stdarg.h>
+#include <stdbool.h>
+#include <stddef.h>
+#include <stdint.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include <cmocka.h>
+
+#if defined(__GNUC__)
+#define TEST_HELPER static __attribute__((unused))
+#else
+#define TEST_HELPER static
+#endif
+
+#define TEST_PI 3.14159265358979323846264338327950288L
+#define COUNT_OF(array) ((int)(sizeof(array) / sizeof((array)[0])))
+
+/* --- comparisons ---------------------------------------------------------------------------- */
+
+/* |actual - expected| <= tolerance; a NaN anywhere fails. */
+TEST_HELPER void test_within(long double actual, long double expected, long double tolerance,
+                             const char *what, const char *file, int line) {
+    const long double error = fabsl(actual - expected);
+    if (error <= tolerance || actual == expected) return;
+    print_error("%s: %.21Lg, expected %.21Lg, off by %.3Lg, allowed %.3Lg\n", what, actual,
+                expected, error, tolerance);
+    _fail(file, line);
+}
+
+/* lower <= actual <= upper. */
+TEST_HELPER void test_between(long double actual, long double lower, long double upper,
+                              const char *what, const char *file, int line) {
+    if (actual >= lower && actual <= upper) return;
+    print_error("%s: %.21Lg, expected from %.21Lg to %.21Lg\n", what, actual, lower, upper);
+    _fail(file, line);
+}
+
+TEST_HELPER void test_result(dem2d_result actual, dem2d_result expected, const char *what,
+                             const char *file, int line) {
+    if (actual == expected) return;
+    print_error("%s: \"%s\", expected \"%s\"\n", what, dem2d_result_text(actual),
+                dem2d_result_text(expected));
+    _fail(file, line);
+}
+
+/* Tolerance relative to the expected value: for numbers that can't be near zero. */
+#define assert_near(actual, expected, relative)                                           \
+    test_within((actual), (expected), (relative)*fabsl((long double)(expected)), #actual, \
+                __FILE__, __LINE__)
+/* Tolerance relative to a size that the caller names. */
+#define assert_within(actual, expected, tolerance) \
+    test_within((actual), (expected), (tolerance), #actual, __FILE__, __LINE__)
+#define assert_between(actual, lower, upper) \
+    test_between((actual), (lower), (upper), #actual, __FILE__, __LINE__)
+#define assert_result(call, expected) test_result((call), (expected), #call, __FILE__, __LINE__)
+#define assert_ok(call) assert_result(call, DEM2D_OK)
+
+/* The same bits: also tells 0 from -0. */
+#define assert_same_bits(actual, expected)                                 \
+    do {                                                                   \
+        const double test_a = (actual), test_b = (expected);               \
+        if (memcmp(&test_a, &test_b, sizeof test_a) != 0) {                \
+            print_error("%s: %a, expected %a\n", #actual, test_a, test_b); \
+            fail();                                                        \
+        }                                                                  \
+    } while (0)
+
+/* --- numbers that repeat --------------------------------------------------------------------- */
+
+typedef struct test_random {
+    uint64_t state; /* any start will do */
+} test_random;
+
+/* splitmix64 */
+TEST_HELPER uint64_t test_next(test_random *random) {
+    uint64_t z = (random->state += 0x9e3779b97f4a7c15u);
+    z = (z ^ (z >> 30)) * 0xbf58476d1ce4e5b9u;
+    z = (z ^ (z >> 27)) * 0x94d049bb133111ebu;
+    return z ^ (z >> 31);
+}
+
+/* Uniform in [lower, upper). */
+TEST_HELPER double test_uniform(test_random *random, double lower, double upper) {
+    return lower + (upper - lower) * ((double)(test_next(random) >> 11) * 0x1p-53);
+}
+
+/* Uniform in 0 .. count - 1. */
+TEST_HELPER int test_below(test_random *random, int count) {
+    return (int)(test_next(random) % (uint64_t)count);
+}
+
+/* --- vectors and poses ----------------------------------------------------------------------- */
+
+TEST_HELPER dem2d_vec vec(double x, double y) {
+    return (dem2d_vec){x, y};
+}
+
+TEST_HELPER dem2d_vec direction(double angle) {
+    return (dem2d_vec){cos(angle), sin(angle)};
+}
+
+/* No move, no turn, size 1. */
+TEST_HELPER dem2d_pose still(void) {
+    return (dem2d_pose){{0, 0}, {1, 0}, 1};
+}
+
+/* --- log ------------------------------------------------------------------------------------- */
+
+typedef struct test_log {
+    dem2d_result result; /* of the last message */
+    int index;           /* of the last message; -2 when there was none */
+    int count;           /* of messages */
+    char text[512];      /* of the last message */
+} test_log;
+
+/* --- allocator ------------------------------------------------------------------------------- */
+
+typedef struct test_env {
+    dem2d_env env; /* hand &env to the library; do not move the struct after test_env_init */
+    test_log log;  /* what the log callback got */
+    size_t bytes;  /* in use */
+    size_t peak;   /* most that was in use */
+    int blocks;    /* in use */
+    int calls;     /* of allocate since test_env_init or test_env_fail */
+    int fail_at;   /* this call of allocate fails, counted from 1; 0: none */
+    int bad_frees; /* releases with a wrong size, or of something else */
+} test_env;
+
+/* In front of each block, padded so that the block is aligned as malloc would. */
+typedef union test_block {
+    struct {
+        size_t size;
+        uint64_t mark;
+    } info;
+    long double align;
+    char pad[32];
+} test_block;
+
+#define TEST_MARK 0x6d656d2d64323464u
+
+TEST_HELPER void *test_allocate(void *user, size_t size) {
+    test_env *env = user;
+    if (++env->calls == env->fail_at) return NULL;
+    test_block *block = malloc(sizeof *block + size);
+    if (!block) abort();
+    block->info.size = size, block->info.mark = TEST_MARK;
+    memset(block + 1, 0xa5, size); /* memory is not zero: whoever relies on it is found */
+    env->bytes += size, env->blocks++;
+    if (env->bytes > env->peak) env->peak = env->bytes;
+    return block + 1;
+}
+
+TEST_HELPER void test_release(void *user, void *memory, size_t size) {
+    test_env *env = user;
+    if (!memory) return;
+    test_block *block = (test_block *)memory - 1;
+    if (block->info.mark != TEST_MARK || block->info.size != size) {
+        env->bad_frees++;
+        if (block->info.mark != TEST_MARK) return;
+    }
+    env->bytes -= block->info.size, env->blocks--;
+    block->info.mark = 0;
+    free(block);
+}
+
+TEST_HELPER void test_keep_log(void *user, dem2d_result result, int index, const char *text) {
+    test_log *log = &((test_env *)user)->log;
+    log->result = result, log->index = index, log->count++;
+    snprintf(log->text, sizeof log->text, "%s", text ? text : "(NULL)");
+}
+
+TEST_HELPER void test_log_clear(test_env *env) {
+    memset(&env->log, 0, sizeof env->log);
+    env->log.index = -2;
+}
+
+TEST_HELPER void test_env_init(test_env *env) {
+    memset(env, 0, sizeof *env);
+    env->env.user = env;
+    env->env.allocate = test_allocate;
+    env->env.release = test_release;
+    env->env.log = test_keep_log;
+    test_log_clear(env);
+}
+
+/* From now on the call'th allocation fails (1 is the next one; 0: none). */
+TEST_HELPER void test_env_fail(test_env *env, int call) {
+    env->calls = 0, env->fail_at = call;
+}
+
+/* Nothing is left, and every release named the size that was asked for. */
+TEST_HELPER void test_env_clean(const test_env *env, const char *file, int line) {
+    if (env->bytes == 0 && env->blocks == 0 && env->bad_frees == 0) return;
+    print_error("memory: %zu bytes in %d blocks left, %d bad releases\n", env->bytes, env->blocks,
+                env->bad_frees);
+    _fail(file, line);
+}
+#define assert_clean(env) test_env_clean((env), __FILE__, __LINE__)
+
+/* Whether a text holds a word as a whole: "radius" is not found in "radii", nor "a" in "area". */
+TEST_HELPER bool test_has_word(const char *text, const char *word) {
+    const char *const letters = "abcdefghijklmnopqrstuvwxyzABCDEFGHIJKLMNOPQRSTUVWXYZ0123456789_";
+    const size_t length = strlen(word);
+    for (const char *at = strstr(text, word); at; at = strstr(at + 1, word)) {
+        const bool starts = at == text || !strchr(letters, at[-1]);
+        if (starts && (at[length] == 0 || !strchr(letters, at[length]))) return true;
+    }
+    return false;
+}
+
+/* The last message is about this result and index, and its text holds a word as a whole (or word
+   is NULL). */
+TEST_HELPER void test_logged(const test_env *env, dem2d_result result, int index, const char *word,
+                             const char *file, int line) {
+    const test_log *log = &env->log;
+    if (log->count > 0 && log->result == result && log->index == index &&
+        (!word || test_has_word(log->text, word)))
+        return;
+    print_error("log: %d messages, last \"%s\" (index %d): \"%s\"; expected \"%s\" (index %d) "
+                "with the word \"%s\"\n",
+                log->count, dem2d_result_text(log->result), log->index, log->text,
+                dem2d_result_text(result), index, word ? word : "");
+    _fail(file, line);
+}
+#define assert_logged(env, result, index, word) \
+    test_logged((env), (result), (index), (word), __FILE__, __LINE__)
+
+#endif
