@@ -131,7 +131,7 @@ CONCEPTS
     Angles      Radians, counter-clockwise. Outlines are counter-clockwise; clockwise is turned.
     Support     For a unit direction u the support point s(u) is the point of the shape farthest
                 along u, h(u) = s.u the support value, rho(u) the radius of curvature there (0 at
-                a corner, infinite on a flat).
+                a corner). Of the points of an edge one end is taken.
     Template    A shape is created once, recentred on its centroid, and used at many poses. A
                 pose is position of the centroid, rotation, and a size scale.
     Contact     The normal points from A to B. depth = min over u of h_A(u) + h_B(-u) - d.u with
@@ -408,7 +408,7 @@ typedef struct dem2d_support {
     dem2d_vec point;     ///< m, farthest point
     dem2d_vec direction; ///< the unit direction
     double value;        ///< m, point . direction, relative to the pose's position
-    double rho;          ///< m, radius of curvature; 0 at a corner, HUGE_VAL on a flat
+    double rho;          ///< m, radius of curvature at the point; 0 at a corner
 } dem2d_support;
 
 /// Circle. radius > 0. Errors: NOT_FINITE, ZERO_AREA (radius 0), OUT_OF_RANGE (negative).
@@ -426,7 +426,7 @@ DEM2D_API dem2d_result dem2d_shape_create_polygon(const dem2d_env *env, const de
 /// Closed chain of cubic Bezier arcs: control[3 * arcs], arc i uses points 3i .. 3i + 3 (cyclic).
 /// arcs >= 2; each arc convex, turning by at most pi, neighbours with one tangent (G1), one turn
 /// in all. Clockwise is turned. Errors: NOT_FINITE, TOO_FEW_POINTS, NOT_CONVEX, NOT_SMOOTH,
-/// ZERO_AREA. ([P] sec. 2; M3 = M4 = 0 allowed.)
+/// DUPLICATE_POINT (an arc that is a point), ZERO_AREA. ([P] sec. 2; M3 = M4 = 0 allowed.)
 DEM2D_API dem2d_result dem2d_shape_create_bezier(const dem2d_env *env, const dem2d_vec *control,
                                                  int arcs, dem2d_shape **shape);
 /// Support function p(t) = a[0]/2 + sum over n = 1..order of a[n] cos nt + b[n] sin nt; a and b
@@ -452,8 +452,8 @@ DEM2D_API dem2d_result dem2d_shape_support(const dem2d_shape *shape, dem2d_pose 
 DEM2D_API dem2d_result dem2d_shape_aabb(const dem2d_shape *shape, dem2d_pose pose,
                                         dem2d_box *box);
 /// count >= 3 points on the boundary, counter-clockwise: smooth shapes by uniform directions,
-/// polybeziers by uniform parameter, polygons by uniform length. Errors: TOO_FEW_POINTS,
-/// NOT_FINITE, OUT_OF_RANGE.
+/// polybeziers by uniform parameter, polygons by corners and, with points to spare, equal parts of
+/// edges (rounded ones of the rounding). Errors: TOO_FEW_POINTS, NOT_FINITE, OUT_OF_RANGE.
 DEM2D_API dem2d_result dem2d_shape_outline(const dem2d_shape *shape, dem2d_pose pose, int count,
                                            dem2d_vec *points);
 

@@ -219,7 +219,8 @@ static void check_bounds(const pair *p, const dem2d_contact *c, real truth) {
                 c->state == DEM2D_PENETRATING || c->state == DEM2D_UNRESOLVED);
     if (c->state == DEM2D_SEPARATED) assert_true(truth <= slack);
     if (c->state == DEM2D_PENETRATING) assert_true(truth >= -slack);
-    if (c->state == DEM2D_TOUCHING) assert_true(fabsl(truth) <= 4 * slack);
+    if (c->state == DEM2D_TOUCHING) /* not told from a touch */
+        assert_true(fabsl(truth) <= c->error + 4 * slack);
 }
 
 /* Second derivative of the support value along the normal that was found: rho - h. */
@@ -284,13 +285,21 @@ static dem2d_contact check_pair(const pair *p, const dem2d_contact_desc *desc, r
     return contact;
 }
 
+/* Numbers are drawn one by one: C leaves the order of arguments to the compiler. */
+static dem2d_vec random_vec(test_random *random, double reach) {
+    const double x = test_uniform(random, -reach, reach);
+    return vec(x, test_uniform(random, -reach, reach));
+}
+
 static dem2d_pose random_pose(test_random *random, double reach) {
-    return dem2d_pose_make(test_uniform(random, -reach, reach), test_uniform(random, -reach, reach),
-                           test_uniform(random, -4, 4), test_uniform(random, 0.5, 2));
+    const dem2d_vec at = random_vec(random, reach);
+    const double angle = test_uniform(random, -4, 4);
+    return dem2d_pose_make(at.x, at.y, angle, test_uniform(random, 0.5, 2));
 }
 
 static pair random_pair(test_random *random, int a, int b) {
-    return (pair){a, b, random_pose(random, 1), random_pose(random, 1)};
+    const dem2d_pose pose_a = random_pose(random, 1);
+    return (pair){a, b, pose_a, random_pose(random, 1)};
 }
 
 /* Places B so that the pair's support value along u is delta, with slope zero. */
@@ -595,8 +604,7 @@ static void test_unequal_sizes(void **state) {
         p.pose_b.scale = ratios[i / (KINDS * KINDS)];
         const double reach = 0.4 * fmax(1, p.pose_b.scale);
         p.pose_a.position = vec(0, 0);
-        p.pose_b.position =
-            vec(test_uniform(&random, -reach, reach), test_uniform(&random, -reach, reach));
+        p.pose_b.position = random_vec(&random, reach);
         if (i % 4 == 0) check_pair(&p, NULL, scan(&p)); /* the scan is slow */
         const dem2d_vec u = direction(test_uniform(&random, -3.2, 3.2));
         place(&p, u, -0.01 * p.pose_a.scale);
@@ -736,9 +744,10 @@ static real lattice_depth(const lattice *hull, int count) {
 
 static int random_lattice(test_random *random, lattice *hull) {
     lattice points[7];
-    const int count = 3 + test_below(random, 5), span = 2 + test_below(random, 5);
+    const int count = 3 + test_below(random, 5);
+    const int span = 2 + test_below(random, 5);
     for (int i = 0; i < count; i++)
-        points[i] = (lattice){test_below(random, span), test_below(random, span)};
+        points[i].x = test_below(random, span), points[i].y = test_below(random, span);
     return lattice_hull(points, count, hull);
 }
 
@@ -762,7 +771,8 @@ static void test_lattice(void **state) {
         lattice a[14], b[14], differences[49], hull[98];
         const int na = random_lattice(&random, a), nb = random_lattice(&random, b);
         if (!na || !nb) continue;
-        const lattice shift = {test_below(&random, 9) - 4, test_below(&random, 9) - 4};
+        lattice shift;
+        shift.x = test_below(&random, 9) - 4, shift.y = test_below(&random, 9) - 4;
         for (int i = 0; i < na * nb; i++) {
             differences[i].x = a[i / nb].x - b[i % nb].x - shift.x;
             differences[i].y = a[i / nb].y - b[i % nb].y - shift.y;
@@ -935,7 +945,7 @@ static void test_walls(void **state) {
         const dem2d_pose pose = random_pose(&random, 2);
         const dem2d_vec u = direction(test_uniform(&random, -3.2, 3.2));
         const double length = pow(10, test_uniform(&random, -3, 3));
-        const dem2d_vec on = vec(test_uniform(&random, -2, 2), test_uniform(&random, -2, 2));
+        const dem2d_vec on = random_vec(&random, 2);
         dem2d_contact c;
         assert_ok(
             dem2d_wall_contact(samples[kind].shape, pose, on, vec(length * u.x, length * u.y), &c));
@@ -977,7 +987,8 @@ static void test_wall_along_face(void **state) {
 /* Aligned, concentric, equal, far apart, tiny: by chance, often together. */
 static pair degenerate_pair(test_random *random) {
     static const double scales[] = {1, 1, 0.5, 1e-6, 1e6};
-    pair p = random_pair(random, test_below(random, KINDS), test_below(random, KINDS));
+    const int a = test_below(random, KINDS);
+    pair p = random_pair(random, a, test_below(random, KINDS));
     if (test_below(random, 3) == 0) p.pose_b.rotation = p.pose_a.rotation;
     if (test_below(random, 3) == 0) p.pose_b.scale = scales[test_below(random, 5)];
     if (test_below(random, 4) == 0) p.pose_a.rotation = (dem2d_rot){1, 0};

@@ -352,11 +352,13 @@ static dem2d_shape *random_shape(test_random *random) {
     const double a[4] = {0.1, 0, 0.004, 0.001}, b[4] = {0, 0, -0.003, 0.001};
     const dem2d_vec corners[5] = {{0, 0}, {0.06, -0.01}, {0.09, 0.03}, {0.05, 0.07}, {-0.01, 0.04}};
     dem2d_shape *shape;
+    double length;
     switch (test_below(random, 4)) {
     case 0:
         return disc(test_uniform(random, 0.03, 0.06));
     case 1:
-        return ellipse(test_uniform(random, 0.03, 0.06), test_uniform(random, 0.02, 0.06));
+        length = test_uniform(random, 0.03, 0.06);
+        return ellipse(length, test_uniform(random, 0.02, 0.06));
     case 2:
         assert_ok(dem2d_shape_create_fourier(NULL, a, b, 3, &shape));
         return shape;
@@ -391,8 +393,8 @@ static void test_conservation(void **state) {
         for (int k = 0; k < 2; k++) {
             const dem2d_vec at = vec(0.16 * k, test_uniform(&random, -0.03, 0.03));
             const dem2d_vec v = vec(k ? -1 : 1, test_uniform(&random, -0.5, 0.5));
-            ids[k] =
-                add(&s, random_shape(&random), DEM2D_FREE, at, v, test_uniform(&random, -20, 20));
+            dem2d_shape *shape = random_shape(&random);
+            ids[k] = add(&s, shape, DEM2D_FREE, at, v, test_uniform(&random, -20, 20));
             assert_ok(dem2d_world_move_particle(s.world, ids[k], at, test_uniform(&random, -3, 3)));
         }
         long double before[3] = {0}, after[3] = {0}, size[3] = {0};
