@@ -2705,48 +2705,60 @@ static double dem2di_arc_sweep(const dem2di_arc *arc, double t0, double t1) {
     return 1.5 * half * sum;
 }
 
-/* Side of the arc's point at t of a line. */
-static double dem2di_arc_side(const dem2di_arc *arc, dem2d_vec p, dem2d_vec edge, double t) {
-    return dem2di_cross(edge, dem2di_sub(dem2di_arc_point(arc, t), p));
+/* Side of an arc's point of a line, as a cubic: its value at 0 and its control differences. */
+typedef struct dem2di_cubic {
+    double start, q0, q1, q2;
+} dem2di_cubic;
+
+static double dem2di_cubic_value(const dem2di_cubic *f, double t) {
+    return f->start + t * (3 - t * (3 - t)) * f->q0 + t * t * (3 - 2 * t) * f->q1 +
+           t * t * t * f->q2;
 }
 
-/* Parameter in (low, high) where the side changes its sign, which it does once there. */
-static double dem2di_arc_crossing(const dem2di_arc *arc, dem2d_vec p, dem2d_vec edge, double low,
-                                  double high) {
-    double at_low = dem2di_arc_side(arc, p, edge, low);
-    for (int i = 0; i < 40; i++) { /* 2^-40 of an arc is far below the fit's own error */
-        double middle = (low + high) / 2;
-        double value = dem2di_arc_side(arc, p, edge, middle);
-        if ((value < 0) == (at_low < 0))
-            low = middle;
+/* The one zero between low and high, where the values have different signs: Newton's steps, or
+   halving where they leave the bracket. 2^-40 of an arc is far below the error of any fit. */
+static double dem2di_cubic_zero(const dem2di_cubic *f, double low, double high) {
+    bool rising = dem2di_cubic_value(f, low) < 0;
+    double t = (low + high) / 2;
+    for (int i = 0; i < 60 && high - low > 1e-12; i++) {
+        double value = dem2di_cubic_value(f, t), s = 1 - t;
+        double slope = 3 * (s * s * f->q0 + 2 * s * t * f->q1 + t * t * f->q2);
+        if ((value < 0) == rising)
+            low = t;
         else
-            high = middle;
+            high = t;
+        double next = t - value / slope;
+        bool inside = next > low && next < high; /* false for a NaN */
+        if (inside && fabs(next - t) < 1e-12) return next;
+        t = inside ? next : (low + high) / 2;
     }
-    return (low + high) / 2;
+    return t;
 }
 
 /* Parameters where an arc crosses the segment p + [0, 1) edge, in the segment's order: at most
    two for a convex arc. The arc's point farthest along the line's normal separates them. */
 static int dem2di_arc_crossings(const dem2di_arc *arc, dem2d_vec p, dem2d_vec edge, double t[2]) {
-    double q[3] = {dem2di_cross(edge, arc->d0), dem2di_cross(edge, arc->d1),
-                   dem2di_cross(edge, arc->d2)};
-    double side[4], square = dem2di_dot(edge, edge), place[2];
-    side[0] = dem2di_cross(edge, dem2di_sub(arc->start, p));
-    for (int i = 0; i < 3; i++) side[i + 1] = side[i] + q[i];
+    dem2di_cubic f;
+    f.start = dem2di_cross(edge, dem2di_sub(arc->start, p));
+    f.q0 = dem2di_cross(edge, arc->d0);
+    f.q1 = dem2di_cross(edge, arc->d1);
+    f.q2 = dem2di_cross(edge, arc->d2);
+    double square = dem2di_dot(edge, edge), place[2];
+    double side[4] = {f.start, f.start + f.q0, f.start + f.q0 + f.q1,
+                      f.start + f.q0 + f.q1 + f.q2};
     bool above = side[0] > 0 && side[1] > 0 && side[2] > 0 && side[3] > 0;
     bool below = side[0] < 0 && side[1] < 0 && side[2] < 0 && side[3] < 0;
     if (above || below || square == 0) return 0;
     /* towards the line: the edge's left normal when the arc bulges there, else its right one */
     dem2d_vec normal = dem2di_perp(edge);
-    if (q[0] < 0 || q[2] > 0) normal = dem2di_negate(normal);
+    if (f.q0 < 0 || f.q2 > 0) normal = dem2di_negate(normal);
     double split = dem2di_arc_parameter(arc, normal);
     double ends[3] = {0, split, 1};
     int found = 0;
     for (int i = 0; i < 2; i++) {
-        double a = dem2di_arc_side(arc, p, edge, ends[i]);
-        double b = dem2di_arc_side(arc, p, edge, ends[i + 1]);
+        double a = dem2di_cubic_value(&f, ends[i]), b = dem2di_cubic_value(&f, ends[i + 1]);
         if ((a < 0) == (b < 0)) continue;
-        double root = dem2di_arc_crossing(arc, p, edge, ends[i], ends[i + 1]);
+        double root = dem2di_cubic_zero(&f, ends[i], ends[i + 1]);
         double along = dem2di_dot(dem2di_sub(dem2di_arc_point(arc, root), p), edge) / square;
         if (along < 0 || along >= 1) continue;
         place[found] = along;
