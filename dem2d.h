@@ -337,7 +337,7 @@ typedef struct dem2d_env {
 DEM2D_API int dem2d_version(void);
 /// One-line text of a result; never NULL.
 DEM2D_API const char *dem2d_result_text(dem2d_result result);
-/// Rotation by an angle in radians, |angle| at most 2^30; the same bits on every platform.
+/// Rotation by an angle in radians; the same bits on every platform. NaN when |angle| > 2^30.
 DEM2D_API dem2d_rot dem2d_rot_make(double angle);
 /// Angle of a rotation in (-pi, pi]; the same bits on every platform.
 DEM2D_API double dem2d_rot_angle(dem2d_rot rotation);
@@ -531,7 +531,7 @@ DEM2D_API dem2d_result dem2d_bezier_fit(const dem2d_env *env, const dem2d_vec *p
 /// What is known of a pair.
 typedef enum dem2d_contact_state {
     DEM2D_SEPARATED,   ///< a gap, above rounding
-    DEM2D_TOUCHING,    ///< gap or overlap within rounding of the sizes
+    DEM2D_TOUCHING,    ///< within rounding of the sizes, or an overlap within the error bound
     DEM2D_PENETRATING, ///< an overlap, above rounding
     DEM2D_UNRESOLVED   ///< the cap of iterations was reached; depth and error are still bounds
 } dem2d_contact_state;
@@ -1032,10 +1032,14 @@ DEM2D_API dem2d_rot dem2d_rot_make(double angle) {
     /* pi/2 in three parts of 22 bits and a rest: k times a part is exact for k < 2^31. */
     static const double part[4] = {1.570796012878418, 3.139164164167596e-07,
                                    6.223371969669989e-14, 2.0222662487959506e-21};
-    double k = floor(angle * (2 / DEM2DI_PI) + 0.5);
-    double x = angle;
+    double k = floor(angle * (2 / DEM2DI_PI) + 0.5), x = angle;
+    dem2d_rot q, turned;
+    if (!(fabs(angle) <= 1073741824.0)) {
+        q.c = q.s = (double)NAN;
+        return q;
+    }
     for (int i = 0; i < 4; i++) x -= k * part[i];
-    dem2d_rot q = dem2di_small_rot(x), turned = q;
+    q = turned = dem2di_small_rot(x);
     int quadrant = (int)(k - 4 * floor(k / 4));
     if (quadrant == 1) turned.c = -q.s, turned.s = q.c;
     if (quadrant == 2) turned.c = -q.c, turned.s = -q.s;
@@ -3384,37 +3388,36 @@ DEM2D_API dem2d_result dem2d_shape_contains(const dem2d_shape *shape, dem2d_pose
     return DEM2D_OK;
 }
 
-DEM2D_API dem2d_result dem2d_pair_overlap(const dem2d_shape *a, dem2d_pose pose_a,
-                                          const dem2d_shape *b, dem2d_pose pose_b,
-                                          const dem2d_contact_desc *desc,
-                                          dem2d_contact *contact) {
+/* GJK alone: up to the sign (`detect`) or to the distance. */
+static dem2d_result dem2di_query_gjk(const dem2d_shape *a, dem2d_pose pose_a,
+                                     const dem2d_shape *b, dem2d_pose pose_b,
+                                     const dem2d_contact_desc *desc, bool detect,
+                                     dem2d_contact *contact) {
     dem2d_contact_desc used;
     dem2d_result result = dem2di_query_prepare(a, &pose_a, b, &pose_b, desc, contact, &used);
     if (result != DEM2D_OK) return result;
     dem2di_pair pair = dem2di_pair_make(a, &pose_a, b, &pose_b);
     dem2di_search search;
-    dem2di_gjk(&pair, used.start, used.tolerance * pair.size, used.max_iterations, true, &search);
+    dem2di_gjk(&pair, used.start, used.tolerance * pair.size, used.max_iterations, detect,
+               &search);
     if (search.state == DEM2D_PENETRATING && search.upper <= DEM2DI_ROUNDING * pair.size)
         search.state = DEM2D_TOUCHING;
     dem2di_contact_report(&pair, &search, &pose_a, &pose_b, contact);
     return DEM2D_OK;
 }
 
+DEM2D_API dem2d_result dem2d_pair_overlap(const dem2d_shape *a, dem2d_pose pose_a,
+                                          const dem2d_shape *b, dem2d_pose pose_b,
+                                          const dem2d_contact_desc *desc,
+                                          dem2d_contact *contact) {
+    return dem2di_query_gjk(a, pose_a, b, pose_b, desc, true, contact);
+}
+
 DEM2D_API dem2d_result dem2d_pair_distance(const dem2d_shape *a, dem2d_pose pose_a,
                                            const dem2d_shape *b, dem2d_pose pose_b,
                                            const dem2d_contact_desc *desc,
                                            dem2d_contact *contact) {
-    dem2d_contact_desc used;
-    dem2d_result result = dem2di_query_prepare(a, &pose_a, b, &pose_b, desc, contact, &used);
-    if (result != DEM2D_OK) return result;
-    dem2di_pair pair = dem2di_pair_make(a, &pose_a, b, &pose_b);
-    dem2di_search search;
-    dem2di_gjk(&pair, used.start, used.tolerance * pair.size, used.max_iterations, false,
-               &search);
-    if (search.state == DEM2D_PENETRATING && search.upper <= DEM2DI_ROUNDING * pair.size)
-        search.state = DEM2D_TOUCHING;
-    dem2di_contact_report(&pair, &search, &pose_a, &pose_b, contact);
-    return DEM2D_OK;
+    return dem2di_query_gjk(a, pose_a, b, pose_b, desc, false, contact);
 }
 
 DEM2D_API dem2d_result dem2d_pair_contact(const dem2d_shape *a, dem2d_pose pose_a,
