@@ -227,8 +227,8 @@ ERRORS
     written only on success, and a failing call leaves everything as it was. The log callback of
     the environment gets the particulars: which field, which value, which index. A step that fails
     (non-finite state, no memory, time step too long) leaves the world before that step.
-    Contact queries return a state and never a guess: DEM2D_NOT_CONVERGED comes with the bound
-    that was reached.
+    Contact queries return a state and never a guess: DEM2D_UNRESOLVED comes with the bounds that
+    were reached.
 
 MEMORY
     All of it comes through dem2d_env (malloc and free by default); release gets the size. Nothing
@@ -277,23 +277,22 @@ extern "C" {
 #endif
 
 /* Every result and its text. */
-#define DEM2D_RESULTS(X)                                                                        \
-    X(OK, "no error")                                                                           \
-    X(NULL_ARGUMENT, "a required pointer is NULL")                                              \
-    X(NOT_FINITE, "a number is not finite")                                                     \
-    X(OUT_OF_RANGE, "a number is outside its range")                                            \
-    X(OUT_OF_MEMORY, "the allocator returned NULL")                                             \
-    X(TOO_FEW_POINTS, "too few points")                                                         \
-    X(DUPLICATE_POINT, "two neighbouring points coincide")                                      \
-    X(NOT_CONVEX, "the outline is not convex")                                                  \
-    X(ZERO_AREA, "the area is zero")                                                            \
-    X(NOT_SMOOTH, "two arcs do not share their tangent")                                        \
-    X(NEGATIVE_CURVATURE, "the radius of curvature is negative somewhere")                      \
-    X(STALE_ID, "the id does not name a living object of this world")                           \
-    X(IN_USE, "the object is still used by another")                                            \
-    X(TIME_STEP, "the time step is above the stable limit")                                     \
-    X(NOT_CONVERGED, "a contact search reached its cap of iterations")                          \
-    X(STATE, "the step would give a state that is not finite")                                  \
+#define DEM2D_RESULTS(X)                                                   \
+    X(OK, "no error")                                                      \
+    X(NULL_ARGUMENT, "a required pointer is NULL")                         \
+    X(NOT_FINITE, "a number is not finite")                                \
+    X(OUT_OF_RANGE, "a number is outside its range")                       \
+    X(OUT_OF_MEMORY, "the allocator returned NULL")                        \
+    X(TOO_FEW_POINTS, "too few points")                                    \
+    X(DUPLICATE_POINT, "two neighbouring points coincide")                 \
+    X(NOT_CONVEX, "the outline is not convex")                             \
+    X(ZERO_AREA, "the area is zero")                                       \
+    X(NOT_SMOOTH, "two arcs do not share their tangent")                   \
+    X(NEGATIVE_CURVATURE, "the radius of curvature is negative somewhere") \
+    X(STALE_ID, "the id does not name a living object of this world")      \
+    X(IN_USE, "the object is still used by another")                       \
+    X(TIME_STEP, "the time step is above the stable limit")                \
+    X(STATE, "the step would give a state that is not finite")             \
     X(IO, "writing failed")
 
 /// Result of a function that can fail: DEM2D_OK (0) or the reason.
@@ -301,7 +300,7 @@ typedef enum dem2d_result {
 #define DEM2D_RESULT_NAME(name, text) DEM2D_##name,
     DEM2D_RESULTS(DEM2D_RESULT_NAME)
 #undef DEM2D_RESULT_NAME
-    DEM2D_RESULT_COUNT ///< number of results, not a result
+        DEM2D_RESULT_COUNT ///< number of results, not a result
 } dem2d_result;
 
 /// Point or vector in the plane.
@@ -385,16 +384,16 @@ typedef struct dem2d_custom_desc {
 
 /// What a shape is, as a template (scale 1, about its centroid).
 typedef struct dem2d_shape_info {
-    dem2d_shape_type type;  ///< which model
-    int count;              ///< vertices, arcs or order; 0 otherwise
-    double rounding;        ///< m, rounding radius of a polygon
-    dem2d_mass mass;        ///< exact; the centroid is 0
-    dem2d_vec offset;       ///< m, centroid of the data given at creation
-    double circumscribed;   ///< m, radius of the bounding circle about the centroid
-    double inscribed;       ///< m, radius of the inscribed circle about the centroid
-    double rho_min;         ///< m, lower bound of the radius of curvature; 0 with corners
-    double equivalent;      ///< m, radius of the circle of equal area
-    size_t bytes;           ///< memory of the template
+    dem2d_shape_type type; ///< which model
+    int count;             ///< vertices, arcs or order; 0 otherwise
+    double rounding;       ///< m, rounding radius of a polygon
+    dem2d_mass mass;       ///< exact; the centroid is 0
+    dem2d_vec offset;      ///< m, centroid of the data given at creation
+    double circumscribed;  ///< m, radius of the bounding circle about the centroid
+    double inscribed;      ///< m, radius of the inscribed circle about the centroid
+    double rho_min;        ///< m, lower bound of the radius of curvature; 0 with corners
+    double equivalent;     ///< m, radius of the circle of equal area
+    size_t bytes;          ///< memory of the template
 } dem2d_shape_info;
 
 /// Axis-aligned box.
@@ -421,8 +420,7 @@ DEM2D_API dem2d_result dem2d_shape_create_ellipse(const dem2d_env *env, double a
 /// points on an edge (to rounding) are dropped. Errors: NOT_FINITE, TOO_FEW_POINTS,
 /// DUPLICATE_POINT, NOT_CONVEX, ZERO_AREA, OUT_OF_RANGE.
 DEM2D_API dem2d_result dem2d_shape_create_polygon(const dem2d_env *env, const dem2d_vec *points,
-                                                  int count, double rounding,
-                                                  dem2d_shape **shape);
+                                                  int count, double rounding, dem2d_shape **shape);
 /// Closed chain of cubic Bezier arcs: control[3 * arcs], arc i uses points 3i .. 3i + 3 (cyclic).
 /// arcs >= 2; each arc convex, turning by at most pi, neighbours with one tangent (G1), one turn
 /// in all. Clockwise is turned. Errors: NOT_FINITE, TOO_FEW_POINTS, NOT_CONVEX, NOT_SMOOTH,
@@ -433,8 +431,7 @@ DEM2D_API dem2d_result dem2d_shape_create_bezier(const dem2d_env *env, const dem
 /// have order + 1 elements, b[0] is not read. p + p'' must nowhere be negative. Errors:
 /// NOT_FINITE, OUT_OF_RANGE (order < 0), ZERO_AREA, NEGATIVE_CURVATURE. ([F] sec. 2)
 DEM2D_API dem2d_result dem2d_shape_create_fourier(const dem2d_env *env, const double *a,
-                                                  const double *b, int order,
-                                                  dem2d_shape **shape);
+                                                  const double *b, int order, dem2d_shape **shape);
 /// The caller's support function. Its bounding circle comes from four calls, mass from
 /// outline points unless given. Errors: NOT_FINITE, OUT_OF_RANGE, ZERO_AREA.
 DEM2D_API dem2d_result dem2d_shape_create_custom(const dem2d_env *env,
@@ -449,8 +446,7 @@ DEM2D_API dem2d_result dem2d_shape_get(const dem2d_shape *shape, dem2d_shape_inf
 DEM2D_API dem2d_result dem2d_shape_support(const dem2d_shape *shape, dem2d_pose pose,
                                            dem2d_vec direction, dem2d_support *support);
 /// Axis-aligned bounding box at a pose (exact: four support values).
-DEM2D_API dem2d_result dem2d_shape_aabb(const dem2d_shape *shape, dem2d_pose pose,
-                                        dem2d_box *box);
+DEM2D_API dem2d_result dem2d_shape_aabb(const dem2d_shape *shape, dem2d_pose pose, dem2d_box *box);
 /// count >= 3 points on the boundary, counter-clockwise: smooth shapes by uniform directions,
 /// polybeziers by uniform parameter, polygons by corners and, with points to spare, equal parts of
 /// edges (rounded ones of the rounding). Errors: TOO_FEW_POINTS, NOT_FINITE, OUT_OF_RANGE.
@@ -501,8 +497,8 @@ typedef struct dem2d_convexity {
 /// Convex hull of count points (Andrew's monotone chain), counter-clockwise, no collinear points.
 /// hull has room for count points. Errors: TOO_FEW_POINTS, NOT_FINITE, ZERO_AREA (all on one line),
 /// OUT_OF_MEMORY.
-DEM2D_API dem2d_result dem2d_polygon_hull(const dem2d_env *env, const dem2d_vec *points,
-                                          int count, dem2d_vec *hull, int *hull_count);
+DEM2D_API dem2d_result dem2d_polygon_hull(const dem2d_env *env, const dem2d_vec *points, int count,
+                                          dem2d_vec *hull, int *hull_count);
 /// FS of an outline ([F] sec. 2.3): hull, `samples` uniform support values, least squares.
 /// a and b get order + 1 values; samples > 2 order, 0 for 16 order + 64. The series may be
 /// non-convex: dem2d_fourier_reduce. Errors: TOO_FEW_POINTS, NOT_FINITE, OUT_OF_RANGE, ZERO_AREA,
@@ -564,20 +560,17 @@ DEM2D_API dem2d_result dem2d_shape_contains(const dem2d_shape *shape, dem2d_pose
 /// meaningful: depth is the least support value met and error its distance to a lower bound.
 DEM2D_API dem2d_result dem2d_pair_overlap(const dem2d_shape *a, dem2d_pose pose_a,
                                           const dem2d_shape *b, dem2d_pose pose_b,
-                                          const dem2d_contact_desc *desc,
-                                          dem2d_contact *contact);
+                                          const dem2d_contact_desc *desc, dem2d_contact *contact);
 /// Distance by GJK: gap, normal and witness points of separated shapes. Overlapping shapes get
 /// the answer of dem2d_pair_overlap. desc may be NULL.
 DEM2D_API dem2d_result dem2d_pair_distance(const dem2d_shape *a, dem2d_pose pose_a,
                                            const dem2d_shape *b, dem2d_pose pose_b,
-                                           const dem2d_contact_desc *desc,
-                                           dem2d_contact *contact);
+                                           const dem2d_contact_desc *desc, dem2d_contact *contact);
 /// Distance or depth: GJK, then EPA when they overlap. Two circles take the closed form (0
 /// support calls). desc may be NULL.
 DEM2D_API dem2d_result dem2d_pair_contact(const dem2d_shape *a, dem2d_pose pose_a,
                                           const dem2d_shape *b, dem2d_pose pose_b,
-                                          const dem2d_contact_desc *desc,
-                                          dem2d_contact *contact);
+                                          const dem2d_contact_desc *desc, dem2d_contact *contact);
 /// Shape A against a half-plane B: one support call, exact. `point` is on the wall's surface,
 /// `wall_normal` (any length but 0) points out of the wall, towards the shapes.
 DEM2D_API dem2d_result dem2d_wall_contact(const dem2d_shape *shape, dem2d_pose pose,
@@ -652,14 +645,14 @@ typedef enum dem2d_motion {
 
 /// A particle. Errors name the field.
 typedef struct dem2d_particle_desc {
-    double scale;                ///< size factor on the template, > 0
-    dem2d_shape_id shape;        ///< template
-    dem2d_material_id material;  ///< material
-    dem2d_motion motion;         ///< free, fixed or driven
-    dem2d_vec position;          ///< m, of the centroid
-    double angle;                ///< rad
-    dem2d_vec velocity;          ///< m/s, half a step before the position
-    double angular_velocity;     ///< rad/s
+    double scale;               ///< size factor on the template, > 0
+    dem2d_shape_id shape;       ///< template
+    dem2d_material_id material; ///< material
+    dem2d_motion motion;        ///< free, fixed or driven
+    dem2d_vec position;         ///< m, of the centroid
+    double angle;               ///< rad
+    dem2d_vec velocity;         ///< m/s, half a step before the position
+    double angular_velocity;    ///< rad/s
 } dem2d_particle_desc;
 
 /// State of a particle.
@@ -713,15 +706,15 @@ typedef struct dem2d_wall_info {
 
 /// One contact of the last force pass.
 typedef struct dem2d_contact_info {
-    dem2d_particle_id a;        ///< particle A
-    dem2d_particle_id b;        ///< particle B; generation 0 when B is a wall
-    dem2d_wall_id wall;         ///< wall B; generation 0 when B is a particle
-    dem2d_vec normal;           ///< unit, from A to B
-    dem2d_vec point;            ///< m, contact point
-    dem2d_vec branch;           ///< m, centre of A to centre of B (wall: to the contact point)
-    double depth;               ///< m, overlap
-    double normal_force;        ///< N/m, on B along the normal, >= 0
-    double tangential_force;    ///< N/m, on B along the normal turned by +90 degrees
+    dem2d_particle_id a;     ///< particle A
+    dem2d_particle_id b;     ///< particle B; generation 0 when B is a wall
+    dem2d_wall_id wall;      ///< wall B; generation 0 when B is a particle
+    dem2d_vec normal;        ///< unit, from A to B
+    dem2d_vec point;         ///< m, contact point
+    dem2d_vec branch;        ///< m, centre of A to centre of B (wall: to the contact point)
+    double depth;            ///< m, overlap
+    double normal_force;     ///< N/m, on B along the normal, >= 0
+    double tangential_force; ///< N/m, on B along the normal turned by +90 degrees
 } dem2d_contact_info;
 
 /// Counters of a world.
@@ -751,15 +744,13 @@ DEM2D_API dem2d_result dem2d_world_remove_shape(dem2d_world *world, dem2d_shape_
 /// The world's copy of a template; valid until it is removed. NULL for a stale id.
 DEM2D_API const dem2d_shape *dem2d_world_shape(const dem2d_world *world, dem2d_shape_id id);
 /// Add a material. At most 256. Errors: NOT_FINITE, OUT_OF_RANGE, OUT_OF_MEMORY.
-DEM2D_API dem2d_result dem2d_world_add_material(dem2d_world *world,
-                                                const dem2d_material_desc *desc,
+DEM2D_API dem2d_result dem2d_world_add_material(dem2d_world *world, const dem2d_material_desc *desc,
                                                 dem2d_material_id *id);
 /// Say how two materials (or one with itself) meet from now on.
 DEM2D_API dem2d_result dem2d_world_set_pair(dem2d_world *world, dem2d_material_id a,
                                             dem2d_material_id b, const dem2d_pair_desc *desc);
 /// Add a particle.
-DEM2D_API dem2d_result dem2d_world_add_particle(dem2d_world *world,
-                                                const dem2d_particle_desc *desc,
+DEM2D_API dem2d_result dem2d_world_add_particle(dem2d_world *world, const dem2d_particle_desc *desc,
                                                 dem2d_particle_id *id);
 /// Remove a particle and its contacts.
 DEM2D_API dem2d_result dem2d_world_remove_particle(dem2d_world *world, dem2d_particle_id id);
@@ -839,9 +830,8 @@ DEM2D_API dem2d_result dem2d_world_particles(const dem2d_world *world, dem2d_par
                                              int capacity, int *count);
 /// Contacts of the last force pass, particle pairs then walls, each in the order of their
 /// ids: up to capacity into contacts (may be NULL when capacity is 0); count gets how many.
-DEM2D_API dem2d_result dem2d_world_contacts(const dem2d_world *world,
-                                            dem2d_contact_info *contacts, int capacity,
-                                            int *count);
+DEM2D_API dem2d_result dem2d_world_contacts(const dem2d_world *world, dem2d_contact_info *contacts,
+                                            int capacity, int *count);
 /// Energies.
 DEM2D_API dem2d_result dem2d_world_energy(const dem2d_world *world, dem2d_energy *energy);
 /// Love-Weber stress (1/area) sum of f l over the contacts, walls included; area > 0, m2.
@@ -1030,8 +1020,8 @@ static dem2d_rot dem2di_small_rot(double x) {
 
 DEM2D_API dem2d_rot dem2d_rot_make(double angle) {
     /* pi/2 in three parts of 22 bits and a rest: k times a part is exact for k < 2^31. */
-    static const double part[4] = {1.570796012878418, 3.139164164167596e-07,
-                                   6.223371969669989e-14, 2.0222662487959506e-21};
+    static const double part[4] = {1.570796012878418, 3.139164164167596e-07, 6.223371969669989e-14,
+                                   2.0222662487959506e-21};
     double k = floor(angle * (2 / DEM2DI_PI) + 0.5), x = angle;
     dem2d_rot q, turned;
     if (!(fabs(angle) <= 1073741824.0)) {
@@ -1172,12 +1162,12 @@ static dem2d_result dem2di_check_points(const dem2d_env *env, const char *name,
                                         const dem2d_vec *points, int count, int least) {
     if (points == NULL) return dem2di_fail_null(env, name);
     if (count < least)
-        return dem2di_fail(env, DEM2D_TOO_FEW_POINTS, -1, "%s: %d given, %d needed", name,
-                           count, least);
+        return dem2di_fail(env, DEM2D_TOO_FEW_POINTS, -1, "%s: %d given, %d needed", name, count,
+                           least);
     for (int i = 0; i < count; i++)
         if (!dem2di_vec_finite(points[i]))
-            return dem2di_fail(env, DEM2D_NOT_FINITE, i, "%s[%d] = (%g, %g) is not finite", name,
-                               i, points[i].x, points[i].y);
+            return dem2di_fail(env, DEM2D_NOT_FINITE, i, "%s[%d] = (%g, %g) is not finite", name, i,
+                               points[i].x, points[i].y);
     return DEM2D_OK;
 }
 
@@ -1227,8 +1217,8 @@ static int dem2di_monotone_chain(const dem2d_vec *sorted, int count, dem2d_vec *
     return length;
 }
 
-DEM2D_API dem2d_result dem2d_polygon_hull(const dem2d_env *env, const dem2d_vec *points,
-                                          int count, dem2d_vec *hull, int *hull_count) {
+DEM2D_API dem2d_result dem2d_polygon_hull(const dem2d_env *env, const dem2d_vec *points, int count,
+                                          dem2d_vec *hull, int *hull_count) {
     dem2d_result result = dem2di_check_points(env, "points", points, count, 3);
     if (result != DEM2D_OK) return result;
     if (hull == NULL || hull_count == NULL) return dem2di_fail_null(env, "hull");
@@ -1253,8 +1243,7 @@ DEM2D_API dem2d_result dem2d_polygon_hull(const dem2d_env *env, const dem2d_vec 
 static double dem2di_twice_area(const dem2d_vec *points, int count) {
     double sum = 0;
     for (int i = 1; i + 1 < count; i++)
-        sum += dem2di_cross(dem2di_sub(points[i], points[0]),
-                            dem2di_sub(points[i + 1], points[0]));
+        sum += dem2di_cross(dem2di_sub(points[i], points[0]), dem2di_sub(points[i + 1], points[0]));
     return sum;
 }
 
@@ -1332,8 +1321,7 @@ static dem2d_result dem2di_clean_polygon(const dem2d_env *env, dem2d_vec *points
             return dem2di_fail(env, DEM2D_NOT_CONVEX, bad, "points[%d] is not a convex corner",
                                bad);
     } while (*count < n && *count >= 3);
-    if (*count < 3)
-        return dem2di_fail(env, DEM2D_ZERO_AREA, -1, "the points are on one line");
+    if (*count < 3) return dem2di_fail(env, DEM2D_ZERO_AREA, -1, "the points are on one line");
     if (!dem2di_turns_once(points, *count))
         return dem2di_fail(env, DEM2D_NOT_CONVEX, -1, "the polygon winds more than once");
     return DEM2D_OK;
@@ -1459,9 +1447,9 @@ typedef struct dem2di_block {
 
 struct dem2d_shape {
     dem2d_shape_type type;
-    int count;     /* vertices, arcs, order */
-    int sectors;   /* length of the sector table, a power of two, or 0 */
-    double a, b;   /* circle: radius; ellipse: squared half axes; Fourier: a0/2 */
+    int count;   /* vertices, arcs, order */
+    int sectors; /* length of the sector table, a power of two, or 0 */
+    double a, b; /* circle: radius; ellipse: squared half axes; Fourier: a0/2 */
     double rounding;
     double circumscribed, inscribed, rho_min;
     dem2d_mass mass;
@@ -1471,11 +1459,11 @@ struct dem2d_shape {
     dem2d_env env;
     size_t bytes;
     /* What follows the struct in one block of memory: */
-    dem2d_vec *corners;    /* polygon: count */
-    dem2d_vec *ends;       /* polygon: edge leaving corner k; Bezier: tangent at the end of arc k */
-    dem2di_arc *arcs;      /* Bezier: count */
-    dem2di_block *blocks;  /* Fourier: terms 1..order, padded with zeros */
-    int *sector;           /* first guess of the corner or arc for a range of directions */
+    dem2d_vec *corners;   /* polygon: count */
+    dem2d_vec *ends;      /* polygon: edge leaving corner k; Bezier: tangent at the end of arc k */
+    dem2di_arc *arcs;     /* Bezier: count */
+    dem2di_block *blocks; /* Fourier: terms 1..order, padded with zeros */
+    int *sector;          /* first guess of the corner or arc for a range of directions */
 };
 
 static int dem2di_block_count(int order) {
@@ -1626,14 +1614,18 @@ static dem2d_vec dem2di_support(const dem2d_shape *shape, dem2d_vec u, double *r
     case DEM2D_CIRCLE:
         if (rho != NULL) *rho = shape->a;
         return dem2di_scale(u, shape->a);
-    case DEM2D_ELLIPSE: return dem2di_ellipse_support(shape, u, rho);
-    case DEM2D_BEZIER: return dem2di_bezier_support(shape, u, rho);
-    case DEM2D_FOURIER: return dem2di_fourier_support(shape, u, rho);
+    case DEM2D_ELLIPSE:
+        return dem2di_ellipse_support(shape, u, rho);
+    case DEM2D_BEZIER:
+        return dem2di_bezier_support(shape, u, rho);
+    case DEM2D_FOURIER:
+        return dem2di_fourier_support(shape, u, rho);
     case DEM2D_CUSTOM:
         if (rho != NULL) *rho = 0;
         return dem2di_sub(shape->function(shape->function_user, u, rho), shape->offset);
     case DEM2D_POLYGON:
-    case DEM2D_SHAPE_TYPE_COUNT: break;
+    case DEM2D_SHAPE_TYPE_COUNT:
+        break;
     }
     if (rho != NULL) *rho = shape->rounding;
     s = dem2di_polygon_support(shape, u);
@@ -1647,9 +1639,9 @@ static dem2d_vec dem2di_support(const dem2d_shape *shape, dem2d_vec u, double *r
 
 /* Area and moments about the origin, added up piece by piece. */
 typedef struct dem2di_moments {
-    double area;      /* m2 */
-    dem2d_vec first;  /* m3: area times centroid */
-    double polar;     /* m4, about the origin */
+    double area;     /* m2 */
+    dem2d_vec first; /* m3: area times centroid */
+    double polar;    /* m4, about the origin */
 } dem2di_moments;
 
 static dem2d_mass dem2di_mass_of(const dem2di_moments *m) {
@@ -1762,9 +1754,9 @@ static dem2d_mass dem2di_bezier_mass(const dem2di_arc *arcs, int count) {
         for (int i = 0; i < 6; i++) {
             double t = 0.5 + (i < 3 ? 0.5 : -0.5) * node[i % 3], s = 1 - t;
             dem2d_vec point = dem2di_arc_point(&arcs[k], t);
-            dem2d_vec speed = dem2di_add(
-                dem2di_along(dem2di_scale(arcs[k].d0, s * s), 2 * t * s, arcs[k].d1),
-                dem2di_scale(arcs[k].d2, t * t));
+            dem2d_vec speed =
+                dem2di_add(dem2di_along(dem2di_scale(arcs[k].d0, s * s), 2 * t * s, arcs[k].d1),
+                           dem2di_scale(arcs[k].d2, t * t));
             double sweep = 1.5 * weight[i % 3] * dem2di_cross(point, speed);
             m.area += sweep / 2;
             m.first = dem2di_along(m.first, sweep / 3, point);
@@ -1799,8 +1791,8 @@ static dem2d_vec dem2di_outline_point(const dem2d_shape *shape, int i, int count
     int n = shape->count;
     if (shape->type == DEM2D_POLYGON || shape->type == DEM2D_BEZIER) {
         int64_t place = (int64_t)i * n;
-        int k = (int)(place / count);                            /* corner or arc */
-        int first = (int)(((int64_t)k * count + n - 1) / n);     /* first point on it */
+        int k = (int)(place / count);                        /* corner or arc */
+        int first = (int)(((int64_t)k * count + n - 1) / n); /* first point on it */
         int each = (int)(((int64_t)(k + 1) * count + n - 1) / n) - first;
         double t = (double)(i - first) / each;
         if (shape->type == DEM2D_BEZIER)
@@ -1956,8 +1948,7 @@ static void dem2di_polygon_radii(dem2d_shape *shape) {
 }
 
 DEM2D_API dem2d_result dem2d_shape_create_polygon(const dem2d_env *env, const dem2d_vec *points,
-                                                  int count, double rounding,
-                                                  dem2d_shape **shape) {
+                                                  int count, double rounding, dem2d_shape **shape) {
     if (shape == NULL) return dem2di_fail_null(env, "shape");
     dem2d_result result = dem2di_check_points(env, "points", points, count, 3);
     if (result == DEM2D_OK) result = dem2di_check_not_negative(env, "rounding", rounding);
@@ -1993,11 +1984,11 @@ DEM2D_API dem2d_result dem2d_shape_create_polygon(const dem2d_env *env, const de
 /* Bounds of an arc's distance from the origin and of its radius of curvature, by halving: each
    piece is bounded by its control points. */
 typedef struct dem2di_arc_bounds {
-    double outer;     /* greatest distance, never too small */
-    double inner;     /* least distance, never too large */
-    double rho;       /* least radius of curvature, never too large */
+    double outer;       /* greatest distance, never too small */
+    double inner;       /* least distance, never too large */
+    double rho;         /* least radius of curvature, never too large */
     double attained[3]; /* values met: distance, distance, radius */
-    double tolerance; /* m */
+    double tolerance;   /* m */
 } dem2di_arc_bounds;
 
 static double dem2di_segment_distance(dem2d_vec a, dem2d_vec b) {
@@ -2030,11 +2021,10 @@ static void dem2di_bound_arc(dem2di_arc_bounds *bounds, const dem2di_arc *arc, i
     double rho = dem2di_arc_rho_bound(arc), *attained = bounds->attained;
     attained[0] = dem2di_max(attained[0], dem2di_max(ends[0], ends[1]));
     attained[1] = dem2di_min(attained[1], dem2di_min(ends[0], ends[1]));
-    attained[2] = dem2di_min(attained[2], dem2di_min(dem2di_arc_rho(arc, 0),
-                                                     dem2di_arc_rho(arc, 1)));
+    attained[2] =
+        dem2di_min(attained[2], dem2di_min(dem2di_arc_rho(arc, 0), dem2di_arc_rho(arc, 1)));
     bool open = outer > attained[0] + bounds->tolerance ||
-                inner < attained[1] - bounds->tolerance ||
-                rho < attained[2] - bounds->tolerance;
+                inner < attained[1] - bounds->tolerance || rho < attained[2] - bounds->tolerance;
     if (!open || depth == 0) {
         bounds->outer = dem2di_max(bounds->outer, outer);
         bounds->inner = dem2di_min(bounds->inner, inner);
@@ -2075,8 +2065,7 @@ static double dem2di_control_rounding(double size) {
 static bool dem2di_turns_left(dem2d_vec a, dem2d_vec b, double rounding) {
     double la = dem2di_length(a), lb = dem2di_length(b), turn = dem2di_cross(a, b);
     if (la <= rounding || lb <= rounding) return true;
-    return turn >= -rounding * (la + lb) &&
-           (turn > rounding * (la + lb) || dem2di_dot(a, b) > 0);
+    return turn >= -rounding * (la + lb) && (turn > rounding * (la + lb) || dem2di_dot(a, b) > 0);
 }
 
 /* Convex, turning left by at most pi: every turn of the control polygon is to the left, and so
@@ -2222,8 +2211,7 @@ static dem2d_result dem2di_check_series(const dem2d_env *env, const double *a, c
 
 static dem2d_convexity dem2di_convexity(const double *a, const double *b, int order) {
     dem2di_series radius = dem2di_series_make(a, b, order, true, 1);
-    dem2di_bounds rho =
-        dem2di_series_minimum(&radius, DEM2DI_SERIES_TOLERANCE * radius.size);
+    dem2di_bounds rho = dem2di_series_minimum(&radius, DEM2DI_SERIES_TOLERANCE * radius.size);
     dem2d_convexity convexity;
     convexity.sufficient_margin = a[0] - radius.size; /* size holds a0/2 once */
     convexity.sufficient = convexity.sufficient_margin >= 0;
@@ -2255,15 +2243,14 @@ static void dem2di_finish_fourier(dem2d_shape *shape, const double *a, const dou
 }
 
 DEM2D_API dem2d_result dem2d_shape_create_fourier(const dem2d_env *env, const double *a,
-                                                  const double *b, int order,
-                                                  dem2d_shape **shape) {
+                                                  const double *b, int order, dem2d_shape **shape) {
     if (shape == NULL) return dem2di_fail_null(env, "shape");
     dem2d_result result = dem2di_check_series(env, a, b, order);
     if (result != DEM2D_OK) return result;
     dem2d_convexity convexity = dem2di_convexity(a, b, order);
     if (!convexity.exact)
-        return dem2di_fail(env, DEM2D_NEGATIVE_CURVATURE, -1,
-                           "the least radius of curvature is %g", convexity.rho_min_lower);
+        return dem2di_fail(env, DEM2D_NEGATIVE_CURVATURE, -1, "the least radius of curvature is %g",
+                           convexity.rho_min_lower);
     /* a1, b1 move the shape; at least order 1 is worked with, so that it can be recentred */
     int terms = order > 1 ? order + 1 : 2;
     double *copy = (double *)dem2di_allocate(env, (size_t)terms, 2 * sizeof *copy);
@@ -2299,14 +2286,12 @@ DEM2D_API dem2d_result dem2d_shape_create_custom(const dem2d_env *env,
     dem2d_result result = dem2di_check_not_negative(env, "rho_min", desc->rho_min);
     if (result == DEM2D_OK) result = dem2di_check_not_negative(env, "inscribed", desc->inscribed);
     if (result == DEM2D_OK) result = dem2di_check_not_negative(env, "mass.area", desc->mass.area);
-    if (result == DEM2D_OK)
-        result = dem2di_check_vec(env, "mass.centroid", desc->mass.centroid);
+    if (result == DEM2D_OK) result = dem2di_check_vec(env, "mass.centroid", desc->mass.centroid);
     if (result == DEM2D_OK && desc->mass.area > 0)
         result = dem2di_check_positive(env, "mass.polar_moment", desc->mass.polar_moment);
     if (result != DEM2D_OK) return result;
     int points = desc->outline_points == 0 ? 1000 : desc->outline_points;
-    if (points < 3)
-        return dem2di_fail(env, DEM2D_OUT_OF_RANGE, -1, "outline_points = %d", points);
+    if (points < 3) return dem2di_fail(env, DEM2D_OUT_OF_RANGE, -1, "outline_points = %d", points);
     dem2d_shape *made = dem2di_shape_allocate(env, DEM2D_CUSTOM, 0, 0);
     if (made == NULL) return DEM2D_OUT_OF_MEMORY;
     made->function = desc->support;
@@ -2323,8 +2308,8 @@ DEM2D_API dem2d_result dem2d_shape_create_custom(const dem2d_env *env,
     if (!dem2di_finite(made->mass.area))
         result = dem2di_fail(env, DEM2D_NOT_FINITE, -1, "support gives a non-finite point");
     else if (!(made->mass.area > 0 && made->mass.polar_moment > 0 && x > 0 && y > 0))
-        result = dem2di_fail(env, DEM2D_ZERO_AREA, -1, "support gives an area of %g",
-                             made->mass.area);
+        result =
+            dem2di_fail(env, DEM2D_ZERO_AREA, -1, "support gives an area of %g", made->mass.area);
     if (result != DEM2D_OK) {
         dem2d_shape_destroy(made);
         return result;
@@ -2364,8 +2349,8 @@ static dem2d_result dem2di_check_pose(dem2d_pose *pose) {
 }
 
 /* Support point at a pose, relative to its position. */
-static dem2d_vec dem2di_posed_support(const dem2d_shape *shape, const dem2d_pose *pose,
-                                      dem2d_vec u, double *rho) {
+static dem2d_vec dem2di_posed_support(const dem2d_shape *shape, const dem2d_pose *pose, dem2d_vec u,
+                                      double *rho) {
     dem2d_vec s = dem2di_support(shape, dem2di_turn_back(pose->rotation, u), rho);
     if (rho != NULL) *rho *= pose->scale;
     return dem2di_scale(dem2di_turn(pose->rotation, s), pose->scale);
@@ -2395,8 +2380,7 @@ static void dem2di_extents(const dem2d_shape *shape, const dem2d_pose *pose, dou
     }
 }
 
-DEM2D_API dem2d_result dem2d_shape_aabb(const dem2d_shape *shape, dem2d_pose pose,
-                                        dem2d_box *box) {
+DEM2D_API dem2d_result dem2d_shape_aabb(const dem2d_shape *shape, dem2d_pose pose, dem2d_box *box) {
     if (shape == NULL || box == NULL) return DEM2D_NULL_ARGUMENT;
     dem2d_result result = dem2di_check_pose(&pose);
     if (result != DEM2D_OK) return result;
@@ -2433,8 +2417,8 @@ typedef struct dem2di_outline {
     dem2d_vec *points; /* count */
     dem2d_vec *hull;   /* hull_count, counter-clockwise */
     int count, hull_count;
-    dem2d_vec centre;  /* what was subtracted */
-    double radius;     /* of the circle with the hull's area */
+    dem2d_vec centre; /* what was subtracted */
+    double radius;    /* of the circle with the hull's area */
 } dem2di_outline;
 
 static void dem2di_outline_release(const dem2d_env *env, dem2di_outline *outline) {
@@ -2531,8 +2515,7 @@ DEM2D_API dem2d_result dem2d_fourier_convexity(const double *a, const double *b,
     return result;
 }
 
-static bool dem2di_passes(const double *a, const double *b, int order,
-                          dem2d_convexity_test test) {
+static bool dem2di_passes(const double *a, const double *b, int order, dem2d_convexity_test test) {
     if (test == DEM2D_NO_TEST) return true;
     dem2di_series radius = dem2di_series_make(a, b, order, true, 1);
     if (a[0] - radius.size >= 0) return true;
@@ -2672,8 +2655,7 @@ static void dem2di_round_corners(const dem2di_outline *outline, dem2di_joint *jo
         dem2di_joint *before = &joints[(i + arcs - 1) % arcs], *after = &joints[(last + 1) % arcs];
         int low = before->edge && (before->corner + 1) % n == corner ? i - 1 + arcs : i;
         int high = after->edge && after->corner == corner ? last + 1 : last;
-        if (high > i || low != i)
-            dem2di_round_corner(outline, joints, arcs, i, last, low, high);
+        if (high > i || low != i) dem2di_round_corner(outline, joints, arcs, i, last, low, high);
         i = last + 1;
     }
 }
@@ -2700,9 +2682,8 @@ static double dem2di_arc_sweep(const dem2di_arc *arc, double t0, double t1) {
     double half = (t1 - t0) / 2, sum = 0;
     for (int i = -1; i <= 1; i++) {
         double t = (t0 + t1) / 2 + i * half * 0.7745966692414833770, s = 1 - t; /* sqrt(3/5) */
-        dem2d_vec speed =
-            dem2di_add(dem2di_along(dem2di_scale(arc->d0, s * s), 2 * t * s, arc->d1),
-                       dem2di_scale(arc->d2, t * t));
+        dem2d_vec speed = dem2di_add(dem2di_along(dem2di_scale(arc->d0, s * s), 2 * t * s, arc->d1),
+                                     dem2di_scale(arc->d2, t * t));
         double weight = (i == 0 ? 8.0 : 5.0) / 9;
         sum += weight * dem2di_cross(dem2di_arc_point(arc, t), speed);
     }
@@ -2748,8 +2729,7 @@ static int dem2di_arc_crossings(const dem2di_arc *arc, dem2d_vec p, dem2d_vec ed
     f.q1 = dem2di_cross(edge, arc->d1);
     f.q2 = dem2di_cross(edge, arc->d2);
     double square = dem2di_dot(edge, edge), place[2];
-    double side[4] = {f.start, f.start + f.q0, f.start + f.q0 + f.q1,
-                      f.start + f.q0 + f.q1 + f.q2};
+    double side[4] = {f.start, f.start + f.q0, f.start + f.q0 + f.q1, f.start + f.q0 + f.q1 + f.q2};
     bool above = side[0] > 0 && side[1] > 0 && side[2] > 0 && side[3] > 0;
     bool below = side[0] < 0 && side[1] < 0 && side[2] < 0 && side[3] < 0;
     if (above || below || square == 0) return 0;
@@ -2787,8 +2767,8 @@ static double dem2di_section_area(const dem2di_section *section, double f1, doub
     int place = section->from->place;
     int inner = (section->to->place - place + outline->count) % outline->count + 1;
     for (int i = 0; i <= inner; i++) { /* the outline's points, then the second joint */
-        dem2d_vec q = i < inner ? outline->points[(place + i) % outline->count]
-                                : section->to->point;
+        dem2d_vec q =
+            i < inner ? outline->points[(place + i) % outline->count] : section->to->point;
         q = dem2di_sub(q, origin);
         int found = dem2di_arc_crossings(&arc, p, dem2di_sub(q, p), t);
         for (int j = 0; j < found; j++) {
@@ -2808,8 +2788,8 @@ static double dem2di_section_area(const dem2di_section *section, double f1, doub
 /* Least area over both fractions in [0.05, 1] by compass search: eight directions, halved steps.
    0.05 keeps the tangents at the joints, 1 the control polygon convex. */
 static void dem2di_fit_section(const dem2di_section *section, double f[2]) {
-    static const int way[8][2] = {{1, 0},  {0, 1},  {-1, 0}, {0, -1},
-                                  {1, 1},  {-1, -1}, {1, -1}, {-1, 1}};
+    static const int way[8][2] = {{1, 0}, {0, 1},   {-1, 0}, {0, -1},
+                                  {1, 1}, {-1, -1}, {1, -1}, {-1, 1}};
     double best = dem2di_section_area(section, f[0], f[1]);
     for (double step = 0.2; step > 1e-4;) { /* 1e-4 of the lengths: area to second order, 1e-8 */
         bool better = false;
@@ -2836,8 +2816,7 @@ DEM2D_API dem2d_result dem2d_bezier_fit(const dem2d_env *env, const dem2d_vec *p
     dem2di_outline outline;
     dem2d_result result = dem2di_outline_make(env, points, count, &outline);
     if (result != DEM2D_OK) return result;
-    dem2di_joint *joints =
-        (dem2di_joint *)dem2di_allocate(env, (size_t)arcs, sizeof *joints);
+    dem2di_joint *joints = (dem2di_joint *)dem2di_allocate(env, (size_t)arcs, sizeof *joints);
     if (joints == NULL) {
         dem2di_outline_release(env, &outline);
         return dem2di_fail(env, DEM2D_OUT_OF_MEMORY, -1, "%d joints", arcs);
@@ -2877,9 +2856,9 @@ typedef struct dem2di_pair {
     const dem2d_shape *a, *b;
     dem2d_rot ra, rb;
     double scale_a, scale_b;
-    dem2d_vec d;  /* centre of A to centre of B */
-    double size;  /* R_A + R_B + |d|: what rounding is relative to */
-    int calls;    /* of the support function */
+    dem2d_vec d; /* centre of A to centre of B */
+    double size; /* R_A + R_B + |d|: what rounding is relative to */
+    int calls;   /* of the support function */
 } dem2di_pair;
 
 /* A point of A minus B minus d, and the two points it comes from, each from its own centre. */
@@ -2914,8 +2893,8 @@ static dem2di_pair dem2di_pair_make(const dem2d_shape *a, const dem2d_pose *pose
     pair.scale_a = pose_a->scale;
     pair.scale_b = pose_b->scale;
     pair.d = dem2di_centre_line(pose_a->position, pose_b->position);
-    pair.size = a->circumscribed * pair.scale_a + b->circumscribed * pair.scale_b +
-                dem2di_length(pair.d);
+    pair.size =
+        a->circumscribed * pair.scale_a + b->circumscribed * pair.scale_b + dem2di_length(pair.d);
     pair.calls = 0;
     return pair;
 }
@@ -3094,8 +3073,8 @@ typedef struct dem2di_polytope {
 } dem2di_polytope;
 
 /* Put an edge into a slot; one shorter than rounding has no normal and covers no direction. */
-static bool dem2di_edge_set(const dem2di_pair *pair, dem2di_polytope *polytope, int slot,
-                            int from, int to) {
+static bool dem2di_edge_set(const dem2di_pair *pair, dem2di_polytope *polytope, int slot, int from,
+                            int to) {
     dem2di_edge *edge = &polytope->edge[slot];
     dem2d_vec along = dem2di_sub(polytope->vertex[to].w, polytope->vertex[from].w);
     double length = dem2di_length(along);
@@ -3140,8 +3119,7 @@ static void dem2di_polytope_start(dem2di_pair *pair, dem2di_search *search,
         dem2di_polytope_push(pair, polytope, turn > 0 ? s[2] : s[1]);
     } else {
         dem2d_vec u = search->normal;
-        if (search->count == 2)
-            (void)dem2di_unit(dem2di_perp(dem2di_sub(s[1].w, s[0].w)), &u);
+        if (search->count == 2) (void)dem2di_unit(dem2di_perp(dem2di_sub(s[1].w, s[0].w)), &u);
         for (int i = 0; i < 4; i++) {
             bool known = search->count == 2 && i % 2 == 1; /* the ends of the segment */
             dem2di_vertex v = known ? s[i / 2] : dem2di_look(pair, search, u);
@@ -3218,8 +3196,7 @@ static double dem2di_tangent_bound(const dem2di_pair *pair, const dem2di_vertex 
     if (!(root > 0) || dem2di_dot(pair->d, normal) <= 0) return -HUGE_VAL;
     root = sqrt(root) * side;
     dem2d_vec m = dem2di_scale(dem2di_along(dem2di_scale(q, r), root, dem2di_perp(q)), 1 / square);
-    if (side * dem2di_cross(pair->d, m) < 0 || side * dem2di_cross(normal, m) < 0)
-        return -HUGE_VAL;
+    if (side * dem2di_cross(pair->d, m) < 0 || side * dem2di_cross(normal, m) < 0) return -HUGE_VAL;
     return dem2di_dot(v->w, m);
 }
 
@@ -3362,8 +3339,7 @@ static dem2d_result dem2di_query_prepare(const dem2d_shape *a, dem2d_pose *pose_
     if (result != DEM2D_OK) return result;
     memset(used, 0, sizeof *used);
     if (desc != NULL) *used = *desc;
-    if (!dem2di_finite(used->tolerance) || !dem2di_vec_finite(used->start))
-        return DEM2D_NOT_FINITE;
+    if (!dem2di_finite(used->tolerance) || !dem2di_vec_finite(used->start)) return DEM2D_NOT_FINITE;
     if (used->tolerance < 0 || used->max_iterations < 0) return DEM2D_OUT_OF_RANGE;
     if (used->tolerance == 0) used->tolerance = 1e-10;
     used->tolerance = dem2di_max(used->tolerance, DEM2DI_ROUNDING);
@@ -3389,17 +3365,15 @@ DEM2D_API dem2d_result dem2d_shape_contains(const dem2d_shape *shape, dem2d_pose
 }
 
 /* GJK alone: up to the sign (`detect`) or to the distance. */
-static dem2d_result dem2di_query_gjk(const dem2d_shape *a, dem2d_pose pose_a,
-                                     const dem2d_shape *b, dem2d_pose pose_b,
-                                     const dem2d_contact_desc *desc, bool detect,
+static dem2d_result dem2di_query_gjk(const dem2d_shape *a, dem2d_pose pose_a, const dem2d_shape *b,
+                                     dem2d_pose pose_b, const dem2d_contact_desc *desc, bool detect,
                                      dem2d_contact *contact) {
     dem2d_contact_desc used;
     dem2d_result result = dem2di_query_prepare(a, &pose_a, b, &pose_b, desc, contact, &used);
     if (result != DEM2D_OK) return result;
     dem2di_pair pair = dem2di_pair_make(a, &pose_a, b, &pose_b);
     dem2di_search search;
-    dem2di_gjk(&pair, used.start, used.tolerance * pair.size, used.max_iterations, detect,
-               &search);
+    dem2di_gjk(&pair, used.start, used.tolerance * pair.size, used.max_iterations, detect, &search);
     if (search.state == DEM2D_PENETRATING && search.upper <= DEM2DI_ROUNDING * pair.size)
         search.state = DEM2D_TOUCHING;
     dem2di_contact_report(&pair, &search, &pose_a, &pose_b, contact);
@@ -3408,22 +3382,19 @@ static dem2d_result dem2di_query_gjk(const dem2d_shape *a, dem2d_pose pose_a,
 
 DEM2D_API dem2d_result dem2d_pair_overlap(const dem2d_shape *a, dem2d_pose pose_a,
                                           const dem2d_shape *b, dem2d_pose pose_b,
-                                          const dem2d_contact_desc *desc,
-                                          dem2d_contact *contact) {
+                                          const dem2d_contact_desc *desc, dem2d_contact *contact) {
     return dem2di_query_gjk(a, pose_a, b, pose_b, desc, true, contact);
 }
 
 DEM2D_API dem2d_result dem2d_pair_distance(const dem2d_shape *a, dem2d_pose pose_a,
                                            const dem2d_shape *b, dem2d_pose pose_b,
-                                           const dem2d_contact_desc *desc,
-                                           dem2d_contact *contact) {
+                                           const dem2d_contact_desc *desc, dem2d_contact *contact) {
     return dem2di_query_gjk(a, pose_a, b, pose_b, desc, false, contact);
 }
 
 DEM2D_API dem2d_result dem2d_pair_contact(const dem2d_shape *a, dem2d_pose pose_a,
                                           const dem2d_shape *b, dem2d_pose pose_b,
-                                          const dem2d_contact_desc *desc,
-                                          dem2d_contact *contact) {
+                                          const dem2d_contact_desc *desc, dem2d_contact *contact) {
     dem2d_contact_desc used;
     dem2d_result result = dem2di_query_prepare(a, &pose_a, b, &pose_b, desc, contact, &used);
     if (result != DEM2D_OK) return result;
@@ -3464,8 +3435,8 @@ DEM2D_API dem2d_result dem2d_wall_contact(const dem2d_shape *shape, dem2d_pose p
     dem2d_vec u, support;
     if (!dem2di_unit(dem2di_negate(wall_normal), &u)) return DEM2D_OUT_OF_RANGE;
     double depth = dem2di_wall_depth(shape, &pose, point, u, &support);
-    double size = shape->circumscribed * pose.scale +
-                  fabs(dem2di_dot(dem2di_sub(pose.position, point), u));
+    double size =
+        shape->circumscribed * pose.scale + fabs(dem2di_dot(dem2di_sub(pose.position, point), u));
     double rounding = DEM2DI_ROUNDING * size;
     contact->state = depth < -rounding  ? DEM2D_SEPARATED
                      : depth > rounding ? DEM2D_PENETRATING
@@ -3499,8 +3470,8 @@ typedef struct dem2di_cell {
 
 typedef struct dem2di_disc {
     dem2d_vec centre;
-    double reach;  /* bounding radius and skin; below 0: not there */
-    bool fixed;    /* two fixed ones are no pair */
+    double reach; /* bounding radius and skin; below 0: not there */
+    bool fixed;   /* two fixed ones are no pair */
 } dem2di_disc;
 
 /* Scratch memory of the search, kept between rebuilds. */
@@ -3508,9 +3479,9 @@ typedef struct dem2di_grid {
     dem2di_cell *cells, *sorted; /* capacity */
     int *heads;                  /* table + 1, and capacity + 1 for sorting pairs */
     int cells_capacity, sorted_capacity, heads_capacity;
-    int table;           /* power of two, at least twice the number of discs */
-    double largest;      /* reach */
-    uint32_t levels;     /* bit mask of those in use */
+    int table;       /* power of two, at least twice the number of discs */
+    double largest;  /* reach */
+    uint32_t levels; /* bit mask of those in use */
 } dem2di_grid;
 
 #define DEM2DI_LEVELS 31
@@ -3611,8 +3582,7 @@ static bool dem2di_grid_visit(const dem2d_env *env, const dem2di_grid *grid,
         if (disc->fixed && other->fixed) continue;
         dem2d_vec d = dem2di_centre_line(disc->centre, other->centre);
         double reach = disc->reach + other->reach;
-        if (dem2di_dot(d, d) < reach * reach &&
-            !dem2di_keys_add(env, keys, own->disc, cell->disc))
+        if (dem2di_dot(d, d) < reach * reach && !dem2di_keys_add(env, keys, own->disc, cell->disc))
             return false;
     }
     return true;
@@ -3653,8 +3623,7 @@ static bool dem2di_grid_pairs(const dem2d_env *env, dem2di_grid *grid, const dem
             int64_t y1 = dem2di_cell_of(disc->centre.y + reach, size);
             for (int64_t x = x0; x <= x1; x++)
                 for (int64_t y = y0; y <= y1; y++)
-                    if (!dem2di_grid_visit(env, grid, discs, own, x, y, level, keys))
-                        return false;
+                    if (!dem2di_grid_visit(env, grid, discs, own, x, y, level, keys)) return false;
         }
     }
     return true;
@@ -3806,8 +3775,8 @@ static dem2di_state dem2di_move(const dem2di_state *now, double time_step) {
 }
 
 static bool dem2di_state_finite(const dem2di_state *state) {
-    return dem2di_vec_finite(state->x) && dem2di_vec_finite(state->v) &&
-           dem2di_finite(state->w) && dem2di_finite(state->q.c) && dem2di_finite(state->q.s);
+    return dem2di_vec_finite(state->x) && dem2di_vec_finite(state->v) && dem2di_finite(state->w) &&
+           dem2di_finite(state->q.c) && dem2di_finite(state->q.s);
 }
 
 /* ============================================================================================
@@ -3838,7 +3807,7 @@ typedef struct dem2di_wall {
     int span[2];          /* indices, or -1 */
     dem2d_vec listed;     /* point when the list was built */
     uint32_t generation;
-    int users;            /* walls that span to it */
+    int users; /* walls that span to it */
     bool alive;
 } dem2di_wall;
 
@@ -3863,8 +3832,8 @@ struct dem2d_world {
     dem2d_vec gravity;
     int max_iterations;
     bool check_time_step;
-    bool list_stale;   /* the list must be built before the next force pass */
-    double wall_skin;  /* how far a wall may move before that */
+    bool list_stale;  /* the list must be built before the next force pass */
+    double wall_skin; /* how far a wall may move before that */
     int64_t steps, rebuilds, calls, not_converged, slow_time_step;
 
     dem2di_template *templates;
@@ -3903,12 +3872,10 @@ static void dem2di_world_release(void *user, void *memory, size_t size) {
 
 static void dem2di_world_log(void *user, dem2d_result result, int index, const char *text) {
     dem2d_world *world = (dem2d_world *)user;
-    if (world->user_env.log != NULL)
-        world->user_env.log(world->user_env.user, result, index, text);
+    if (world->user_env.log != NULL) world->user_env.log(world->user_env.user, result, index, text);
 }
 
-static bool dem2di_grow(dem2d_world *world, void **array, int *capacity, int needed,
-                        size_t size) {
+static bool dem2di_grow(dem2d_world *world, void **array, int *capacity, int needed, size_t size) {
     return dem2di_reserve(&world->env, array, capacity, needed, size);
 }
 
@@ -4012,8 +3979,7 @@ static dem2d_result dem2di_check_world(const dem2d_env *env, const dem2d_world_d
         result = dem2di_check_count(env, "max_iterations", desc->max_iterations);
     if (result == DEM2D_OK)
         result = dem2di_check_count(env, "particle_capacity", desc->particle_capacity);
-    if (result == DEM2D_OK)
-        result = dem2di_check_count(env, "pair_capacity", desc->pair_capacity);
+    if (result == DEM2D_OK) result = dem2di_check_count(env, "pair_capacity", desc->pair_capacity);
     return result;
 }
 
@@ -4106,8 +4072,7 @@ DEM2D_API dem2d_result dem2d_world_remove_shape(dem2d_world *world, dem2d_shape_
 }
 
 DEM2D_API const dem2d_shape *dem2d_world_shape(const dem2d_world *world, dem2d_shape_id id) {
-    return world != NULL && dem2di_shape_lives(world, id) ? world->templates[id.index].shape
-                                                          : NULL;
+    return world != NULL && dem2di_shape_lives(world, id) ? world->templates[id.index].shape : NULL;
 }
 
 #define DEM2DI_MATERIALS 256 /* as declared: the table of laws has at most 256 x 256 entries */
@@ -4144,8 +4109,7 @@ static bool dem2di_widen_laws(dem2d_world *world, int side) {
     if (side <= world->laws_side) return true;
     int wider = side < 4 ? 4 : 2 * side, old = world->laws_side;
     size_t cells = (size_t)wider * (size_t)wider;
-    dem2d_pair_desc *laws =
-        (dem2d_pair_desc *)dem2di_allocate(&world->env, cells, sizeof *laws);
+    dem2d_pair_desc *laws = (dem2d_pair_desc *)dem2di_allocate(&world->env, cells, sizeof *laws);
     if (laws == NULL) return false;
     memset(laws, 0, cells * sizeof *laws);
     for (int i = 0; i < old; i++)
@@ -4156,14 +4120,13 @@ static bool dem2di_widen_laws(dem2d_world *world, int side) {
     return true;
 }
 
-DEM2D_API dem2d_result dem2d_world_add_material(dem2d_world *world,
-                                                const dem2d_material_desc *desc,
+DEM2D_API dem2d_result dem2d_world_add_material(dem2d_world *world, const dem2d_material_desc *desc,
                                                 dem2d_material_id *id) {
     if (world == NULL || desc == NULL || id == NULL) return DEM2D_NULL_ARGUMENT;
     dem2d_result result = dem2di_check_positive(&world->env, "density", desc->density);
     if (result == DEM2D_OK)
-        result = dem2di_check_law(&world->env, desc->normal_stiffness,
-                                  desc->tangential_stiffness, desc->friction);
+        result = dem2di_check_law(&world->env, desc->normal_stiffness, desc->tangential_stiffness,
+                                  desc->friction);
     if (result != DEM2D_OK) return result;
     int slot = world->material_count;
     if (slot == DEM2DI_MATERIALS)
@@ -4198,8 +4161,7 @@ DEM2D_API dem2d_result dem2d_world_set_pair(dem2d_world *world, dem2d_material_i
 static dem2d_result dem2di_check_motion(const dem2d_env *env, dem2d_motion motion,
                                         dem2d_vec velocity, double angular_velocity) {
     dem2d_result result = dem2di_check_vec(env, "velocity", velocity);
-    if (result == DEM2D_OK)
-        result = dem2di_check_finite(env, "angular_velocity", angular_velocity);
+    if (result == DEM2D_OK) result = dem2di_check_finite(env, "angular_velocity", angular_velocity);
     if (result != DEM2D_OK) return result;
     if (motion != DEM2D_FREE && motion != DEM2D_FIXED && motion != DEM2D_DRIVEN)
         return dem2di_fail(env, DEM2D_OUT_OF_RANGE, -1, "motion = %d", (int)motion);
@@ -4244,8 +4206,8 @@ static void dem2di_body_set(const dem2d_world *world, const dem2d_particle_desc 
     body->radius = shape->circumscribed * desc->scale;
     body->skin = body->radius * world->skin;
     body->mass = world->materials[body->material].density * shape->mass.area * square;
-    body->inertia = world->materials[body->material].density * shape->mass.polar_moment *
-                    square * square;
+    body->inertia =
+        world->materials[body->material].density * shape->mass.polar_moment * square * square;
     body->listed = desc->position;
 }
 
@@ -4255,8 +4217,7 @@ static int dem2di_free_body(const dem2d_world *world) {
     return slot;
 }
 
-DEM2D_API dem2d_result dem2d_world_add_particle(dem2d_world *world,
-                                                const dem2d_particle_desc *desc,
+DEM2D_API dem2d_result dem2d_world_add_particle(dem2d_world *world, const dem2d_particle_desc *desc,
                                                 dem2d_particle_id *id) {
     if (world == NULL || desc == NULL || id == NULL) return DEM2D_NULL_ARGUMENT;
     dem2d_result result = dem2di_check_particle(world, desc);
@@ -4475,8 +4436,7 @@ DEM2D_API dem2d_result dem2d_world_remove_wall(dem2d_world *world, dem2d_wall_id
 }
 
 /* Length that carries a wall's stress: between its spans, or as given. */
-static double dem2di_wall_length(const dem2d_world *world, const dem2di_wall_state *states,
-                                 int i) {
+static double dem2di_wall_length(const dem2d_world *world, const dem2di_wall_state *states, int i) {
     const dem2di_wall *wall = &world->walls[i];
     if (wall->span[0] < 0) return wall->desc.length;
     dem2d_vec across = dem2di_sub(states[wall->span[1]].point, states[wall->span[0]].point);
@@ -4609,8 +4569,7 @@ static dem2d_result dem2di_build_lists(dem2d_world *world) {
     dem2di_list_renew(&world->pairs);
     dem2di_list_renew(&world->touches);
     for (int i = 0; i < world->body_count; i++) world->bodies[i].listed = world->now[i].x;
-    for (int i = 0; i < world->wall_count; i++)
-        world->walls[i].listed = world->wall_now[i].point;
+    for (int i = 0; i < world->wall_count; i++) world->walls[i].listed = world->wall_now[i].point;
     world->list_stale = false;
     world->rebuilds++;
     return DEM2D_OK;
@@ -4769,8 +4728,7 @@ static bool dem2di_wall_pass(dem2d_world *world) {
         const dem2di_wall *wall = &world->walls[j];
         dem2di_wall_state *next = &world->wall_next[j];
         if (!wall->alive) continue;
-        if (wall->desc.mode == DEM2D_WALL_SERVO)
-            next->velocity = dem2di_servo_velocity(world, j);
+        if (wall->desc.mode == DEM2D_WALL_SERVO) next->velocity = dem2di_servo_velocity(world, j);
         next->point = dem2di_along(next->point, world->time_step, next->velocity);
         dem2d_vec moved = dem2di_sub(next->point, wall->listed);
         stale = stale || !(fabs(dem2di_dot(moved, wall->desc.normal)) <= world->wall_skin);
@@ -4780,8 +4738,8 @@ static bool dem2di_wall_pass(dem2d_world *world) {
 
 /* New velocities and positions. Returns the particle whose state is not finite, or -1. */
 static int dem2di_motion_pass(dem2d_world *world, bool *stale) {
-    dem2di_damping damping = dem2di_damping_make(world->local_damping, world->global_damping,
-                                                 world->time_step);
+    dem2di_damping damping =
+        dem2di_damping_make(world->local_damping, world->global_damping, world->time_step);
     for (int i = 0; i < world->body_count; i++) {
         const dem2di_body *body = &world->bodies[i];
         dem2di_state *next = &world->next[i];
@@ -4810,8 +4768,7 @@ static void dem2di_stiffness_list(const dem2d_world *world, const dem2di_list *l
         const dem2di_link *link = &links[i];
         if (!(link->depth > 0)) continue;
         int a = list->keys.key[i].a, b = list->keys.key[i].b;
-        int material = walls ? (int)world->walls[b].desc.material.index
-                             : world->bodies[b].material;
+        int material = walls ? (int)world->walls[b].desc.material.index : world->bodies[b].material;
         const dem2d_pair_desc *law = dem2di_law(world, world->bodies[a].material, material);
         bool both = !walls && world->bodies[a].motion == DEM2D_FREE &&
                     world->bodies[b].motion == DEM2D_FREE;
@@ -5040,9 +4997,8 @@ static dem2d_contact_info dem2di_contact_of(const dem2d_world *world, const dem2
     return info;
 }
 
-DEM2D_API dem2d_result dem2d_world_contacts(const dem2d_world *world,
-                                            dem2d_contact_info *contacts, int capacity,
-                                            int *count) {
+DEM2D_API dem2d_result dem2d_world_contacts(const dem2d_world *world, dem2d_contact_info *contacts,
+                                            int capacity, int *count) {
     if (world == NULL || count == NULL) return DEM2D_NULL_ARGUMENT;
     if (contacts == NULL && capacity > 0) return dem2di_fail_null(&world->env, "contacts");
     if (capacity < 0)
@@ -5069,8 +5025,7 @@ static void dem2di_spring_energy(const dem2d_world *world, const dem2di_list *li
         const dem2di_link *link = &list->now[i];
         if (!(link->depth > 0)) continue;
         int a = list->keys.key[i].a, b = list->keys.key[i].b;
-        int material = walls ? (int)world->walls[b].desc.material.index
-                             : world->bodies[b].material;
+        int material = walls ? (int)world->walls[b].desc.material.index : world->bodies[b].material;
         const dem2d_pair_desc *law = dem2di_law(world, world->bodies[a].material, material);
         energy->normal += link->force * link->depth / 2;
         if (law->tangential_stiffness > 0)
@@ -5243,14 +5198,14 @@ static dem2di_view dem2di_view_make(const dem2d_world *world, double width) {
 /* One particle as a path: exact corners for sharp polygons, points for all else. */
 static void dem2di_draw_particle(const dem2d_world *world, const dem2di_view *view, int points,
                                  int i, dem2di_writer *writer) {
-    static const char *const colour[] = {"#e8c468", "#8fb9d8", "#b9a3d6", "#94c99b", "#e59a83",
-                                         "#c9c9c9"};
+    static const char *const colour[] = {"#e8c468", "#8fb9d8", "#b9a3d6",
+                                         "#94c99b", "#e59a83", "#c9c9c9"};
     const dem2d_shape *shape = world->bodies[i].shape;
     dem2d_pose pose = dem2di_pose_of(world, world->before, i);
     if (shape->type == DEM2D_CIRCLE) {
         dem2d_vec c = dem2di_pixel(view, pose.position);
-        dem2di_print(writer, "<circle cx=\"%.2f\" cy=\"%.2f\" r=\"%.2f\" fill=\"%s\"/>\n", c.x,
-                     c.y, shape->a * pose.scale * view->factor, colour[shape->type]);
+        dem2di_print(writer, "<circle cx=\"%.2f\" cy=\"%.2f\" r=\"%.2f\" fill=\"%s\"/>\n", c.x, c.y,
+                     shape->a * pose.scale * view->factor, colour[shape->type]);
         return;
     }
     if (shape->type == DEM2D_POLYGON && shape->rounding == 0) points = shape->count;
@@ -5267,8 +5222,8 @@ static void dem2di_draw_particle(const dem2d_world *world, const dem2di_view *vi
 static void dem2di_draw_wall(const dem2d_world *world, const dem2di_view *view, int j,
                              dem2di_writer *writer) {
     dem2d_vec along = dem2di_perp(world->walls[j].desc.normal);
-    dem2d_vec centre = dem2di_along(view->lower, 0.5 / view->factor,
-                                    dem2di_vec(view->width, view->height));
+    dem2d_vec centre =
+        dem2di_along(view->lower, 0.5 / view->factor, dem2di_vec(view->width, view->height));
     dem2d_vec point = world->wall_before[j].point;
     point = dem2di_along(point, dem2di_dot(dem2di_sub(centre, point), along), along);
     double reach = (view->width + view->height) / view->factor; /* beyond every border */
@@ -5322,8 +5277,7 @@ static void dem2di_draw(const dem2d_world *world, const dem2d_svg_desc *desc,
                  "fill=\"white\"/>\n<g stroke=\"#333\" stroke-width=\"%.3f\">\n",
                  view.width, view.height, view.width, view.height, view.width / 1600);
     for (int i = 0; i < world->body_count && writer->good; i++)
-        if (world->bodies[i].shape != NULL)
-            dem2di_draw_particle(world, &view, points, i, writer);
+        if (world->bodies[i].shape != NULL) dem2di_draw_particle(world, &view, points, i, writer);
     dem2di_print(writer, "</g>\n");
     for (int j = 0; j < world->wall_count; j++)
         if (world->walls[j].alive) dem2di_draw_wall(world, &view, j, writer);

@@ -456,7 +456,7 @@ static bool report(const job *j, const options *o, double strain) {
     const double steps = j->steps, particles = j->plan.particles;
     const double lateral = j->lateral_sum / j->lateral_steps; // NaN without steps
     const int tail = j->block_count - j->block_count / 5;
-    /* global damping lets the spikes of single steps ring on, when grains slip or a contact opens */
+    /* weak global damping lets spikes of single steps ring on, when a contact slips or opens */
     const double worst = o->global_damping ? 15 : 5;
     double peak = 0, plateau = 0;
     for (int i = 0; i < j->block_count; i++) peak = fmax(peak, j->blocks[i]);
@@ -476,7 +476,10 @@ static bool report(const job *j, const options *o, double strain) {
         {"max_overlap_over_radius", j->max_overlap, "-", {0, 0.35}, {0, 0.45}},
         {"packed_stress_ratio", j->packed_ratio, "-", {-0.05, 0.05}, {-0.1, 0.1}},
         {"lateral_stress_mean_kpa", lateral / 1000, "kPa", {99.5, 100.5}, {97, 103}},
-        {"lateral_stress_max_error_percent", 100 * j->lateral_worst / STRESS, "%", {0, worst},
+        {"lateral_stress_max_error_percent",
+         100 * j->lateral_worst / STRESS,
+         "%",
+         {0, worst},
          {0, 15}},
         {"peak_stress_ratio", peak, "-", {0.1, 0.7}, {0.1, 0.7}},
         {"plateau_over_peak", plateau / peak, "-", {0.7, 1.01}, {0.6, 1.01}},
