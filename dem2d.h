@@ -61,6 +61,9 @@ LIMITS
     * A custom support function that is not convex can't be detected; contacts are then wrong.
     * One contact point for a pair. Where two long faces meet it moves with the last bits of the
       angle, so faces do not conserve energy exactly.
+    * Where the support value hardly changes with the direction (discs one inside the other and
+      concentric, an overlap as deep as the radius of curvature), EPA may reach its cap: the
+      answer is then UNRESOLVED, with bounds a few 1e-4 of the size apart.
     * 32-bit x86 needs SSE2 (-msse2 -mfpmath=sse): the x87 rounds differently each time.
     * -ffast-math is refused: it removes NaN checks and reorders sums.
 
@@ -230,6 +233,10 @@ ERRORS
     Contact queries return a state and never a guess: DEM2D_UNRESOLVED comes with the bounds that
     were reached.
 
+THREADS
+    No globals. Different worlds and shapes may be used by different threads at once; of one world
+    only one call at a time, queries included (they share its scratch memory).
+
 MEMORY
     All of it comes through dem2d_env (malloc and free by default); release gets the size. Nothing
     is allocated in a step once the list of pairs has stopped growing; dem2d_world_stats tells the
@@ -325,8 +332,8 @@ typedef struct dem2d_pose {
 /// Memory and messages. NULL wherever one is taken means malloc, free and silence.
 typedef struct dem2d_env {
     void *user;                                 ///< handed to the callbacks
-    void *(*allocate)(void *user, size_t size); ///< as malloc; NULL: malloc
-    /// As free, with the size that was asked for; NULL: free.
+    void *(*allocate)(void *user, size_t size); ///< as malloc; used if release is there too
+    /// As free, with the size that was asked for; without both, malloc and free are used.
     void (*release)(void *user, void *memory, size_t size);
     /// Particulars of an error or a warning; index is the offending point, arc or object, or -1.
     void (*log)(void *user, dem2d_result result, int index, const char *text);
@@ -527,7 +534,7 @@ DEM2D_API dem2d_result dem2d_bezier_fit(const dem2d_env *env, const dem2d_vec *p
 /// What is known of a pair.
 typedef enum dem2d_contact_state {
     DEM2D_SEPARATED,   ///< a gap, above rounding
-    DEM2D_TOUCHING,    ///< within rounding of the sizes, or an overlap within the error bound
+    DEM2D_TOUCHING,    ///< gap or overlap within rounding of the sizes
     DEM2D_PENETRATING, ///< an overlap, above rounding
     DEM2D_UNRESOLVED   ///< the cap of iterations was reached; depth and error are still bounds
 } dem2d_contact_state;
@@ -535,7 +542,7 @@ typedef enum dem2d_contact_state {
 /// How a pair is searched. All zero is fine.
 typedef struct dem2d_contact_desc {
     double tolerance;   ///< of R_A + R_B + |d|: stop when the error is below; 0 for 1e-10
-    int max_iterations; ///< of GJK and of EPA each; 0 for 128
+    int max_iterations; ///< of GJK and of EPA each; 0 for 128; EPA takes 250 at most
     dem2d_vec start;    ///< first direction, the last normal for instance; 0 for line of centres
 } dem2d_contact_desc;
 
@@ -581,7 +588,7 @@ DEM2D_API dem2d_result dem2d_wall_contact(const dem2d_shape *shape, dem2d_pose p
    >>api-world  Particles, walls, materials, steps
    ============================================================================================ */
 
-/// A scene. Opaque.
+/// A scene. Opaque. One call at a time.
 typedef struct dem2d_world dem2d_world;
 
 /// Handle of a template in a world. Generation 0 is never valid.
@@ -767,7 +774,8 @@ DEM2D_API dem2d_result dem2d_world_drive_particle(dem2d_world *world, dem2d_part
 /// Add a wall.
 DEM2D_API dem2d_result dem2d_world_add_wall(dem2d_world *world, const dem2d_wall_desc *desc,
                                             dem2d_wall_id *id);
-/// Replace a wall's description; its contacts stay if the point is near where it was.
+/// Replace a wall's description; its contacts stay if the normal does and the wall is within the
+/// skin of where it was.
 DEM2D_API dem2d_result dem2d_world_set_wall(dem2d_world *world, dem2d_wall_id id,
                                             const dem2d_wall_desc *desc);
 /// Remove a wall that no other wall spans to (else IN_USE).
@@ -837,8 +845,11 @@ DEM2D_API dem2d_result dem2d_world_energy(const dem2d_world *world, dem2d_energy
 /// Love-Weber stress (1/area) sum of f l over the contacts, walls included; area > 0, m2.
 DEM2D_API dem2d_result dem2d_world_stress(const dem2d_world *world, double area,
                                           dem2d_stress *stress);
-/// Coordination number, overlaps, solid area. Porosity is 1 - solid_area / area of the region.
+/// Coordination number, overlaps, solid area.
 DEM2D_API dem2d_result dem2d_world_packing(const dem2d_world *world, dem2d_packing *packing);
+/// 1 - area of the particles / area (> 0, m2) of the region that holds them all.
+DEM2D_API dem2d_result dem2d_world_porosity(const dem2d_world *world, double area,
+                                            double *porosity);
 
 /* ============================================================================================
    >>api-writers  Pictures
@@ -1101,16 +1112,21 @@ static dem2d_result dem2di_fail_null(const dem2d_env *env, const char *name) {
     return dem2di_fail(env, DEM2D_NULL_ARGUMENT, -1, "%s is NULL", name);
 }
 
+/* Both callbacks, or malloc and free: half a pair would free what the other had not made. */
+static bool dem2di_env_allocates(const dem2d_env *env) {
+    return env != NULL && env->allocate != NULL && env->release != NULL;
+}
+
 /* Memory for count elements of a size; NULL when there is none or the product overflows. */
 static void *dem2di_allocate(const dem2d_env *env, size_t count, size_t size) {
     if (count == 0 || size > (size_t)PTRDIFF_MAX / count) return NULL;
-    if (env != NULL && env->allocate != NULL) return env->allocate(env->user, count * size);
+    if (dem2di_env_allocates(env)) return env->allocate(env->user, count * size);
     return malloc(count * size);
 }
 
 static void dem2di_release(const dem2d_env *env, void *memory, size_t count, size_t size) {
     if (memory == NULL) return;
-    if (env != NULL && env->release != NULL)
+    if (dem2di_env_allocates(env))
         env->release(env->user, memory, count * size);
     else
         free(memory);
@@ -1339,7 +1355,7 @@ typedef struct dem2di_series {
     int order;
     bool radius;   /* of curvature: weight 1 - n^2 */
     double sign;   /* weight +1 or -1 */
-    double second; /* bound of the second derivative: sum n^2 |c_n| |weight| */
+    double fourth; /* bound of the fourth derivative: sum n^4 |c_n| |weight| */
     double size;   /* sum |c_n| |weight| */
 } dem2di_series;
 
@@ -1355,28 +1371,32 @@ static dem2di_series dem2di_series_make(const double *a, const double *b, int or
     s.order = order;
     s.radius = radius;
     s.sign = sign;
-    s.second = 0;
+    s.fourth = 0;
     s.size = fabs(a[0]) / 2;
     for (int n = 1; n <= order; n++) {
         double term = dem2di_length(dem2di_vec(a[n], b[n])) * fabs(dem2di_series_weight(&s, n));
         s.size += term;
-        s.second += term * n * n;
+        s.fourth += term * n * n * n * n;
     }
     return s;
 }
 
-/* Value and slope at an angle, by repeated rotation: error about n eps of each term. */
-static double dem2di_series_value(const dem2di_series *s, double t, double *slope) {
+/* Value and derivatives at an angle, by repeated rotation: error about n eps of each term. */
+static double dem2di_series_value(const dem2di_series *s, double t, double d[3]) {
     dem2d_rot z = dem2d_rot_make(t);
     dem2d_vec power = dem2di_vec(z.c, z.s);
-    double value = s->sign * s->a[0] / 2, derivative = 0;
+    double value = s->sign * s->a[0] / 2;
+    d[0] = d[1] = d[2] = 0;
     for (int n = 1; n <= s->order; n++) {
-        double weight = dem2di_series_weight(s, n);
-        value += weight * (s->a[n] * power.x + s->b[n] * power.y);
-        derivative += weight * n * (s->b[n] * power.x - s->a[n] * power.y);
+        double weight = dem2di_series_weight(s, n), square = (double)n * n;
+        double even = weight * (s->a[n] * power.x + s->b[n] * power.y);
+        double odd = weight * n * (s->b[n] * power.x - s->a[n] * power.y);
+        value += even;
+        d[0] += odd;
+        d[1] -= square * even;
+        d[2] -= square * odd;
         power = dem2di_turn(z, power);
     }
-    *slope = derivative;
     return value;
 }
 
@@ -1384,20 +1404,31 @@ typedef struct dem2di_bounds {
     double lower, upper; /* of a minimum: proved, attained */
 } dem2di_bounds;
 
-/* Minimum by branch and bound: on an interval of half width w about t the polynomial is at least
-   f - |f'| w - second w^2/2. Each interval that may undercut the best value is halved until its
-   bound is within the tolerance; 48 halvings of 2 pi reach the spacing of doubles. */
+/* Lower bound on an interval of half width w, by Taylor's formula: the least value of the
+   parabola, and the largest that the cubic and the rest can take away. */
+static double dem2di_taylor_bound(const dem2di_series *s, double value, const double d[3],
+                                  double w) {
+    double slope = fabs(d[0]), parabola = value - slope * w + d[1] * w * w / 2;
+    if (d[1] > 0 && slope < d[1] * w) parabola = value - slope * slope / (2 * d[1]);
+    return parabola - fabs(d[2]) * w * w * w / 6 - s->fourth * w * w * w * w / 24;
+}
+
+/* Minimum by branch and bound: each interval that may undercut the best value is halved until
+   its bound is within the tolerance. 48 halvings of 2 pi reach the spacing of doubles; after
+   DEM2DI_SERIES_PIECES (a second or so) the bounds of larger intervals are taken. */
+#define DEM2DI_SERIES_PIECES 1000000
+
 static dem2di_bounds dem2di_series_minimum(const dem2di_series *s, double tolerance) {
     struct {
         double centre, half;
         int depth;
     } stack[64];
-    int pieces = 4 * s->order + 4;
-    double slope, width = DEM2DI_PI / pieces;
+    int pieces = 4 * s->order + 4, budget = DEM2DI_SERIES_PIECES;
+    double d[3], width = DEM2DI_PI / pieces;
     dem2di_bounds bounds;
-    bounds.lower = bounds.upper = dem2di_series_value(s, 0, &slope);
+    bounds.upper = dem2di_series_value(s, 0, d);
     for (int i = 1; i < pieces; i++)
-        bounds.upper = dem2di_min(bounds.upper, dem2di_series_value(s, 2 * i * width, &slope));
+        bounds.upper = dem2di_min(bounds.upper, dem2di_series_value(s, 2 * i * width, d));
     bounds.lower = bounds.upper;
     for (int i = 0; i < pieces; i++) {
         int top = 0;
@@ -1407,11 +1438,11 @@ static dem2di_bounds dem2di_series_minimum(const dem2di_series *s, double tolera
         while (top >= 0) {
             double t = stack[top].centre, w = stack[top].half;
             int depth = stack[top].depth;
-            double value = dem2di_series_value(s, t, &slope);
-            double lower = value - fabs(slope) * w - s->second * w * w / 2;
+            double value = dem2di_series_value(s, t, d);
+            double lower = dem2di_taylor_bound(s, value, d, w);
             bounds.upper = dem2di_min(bounds.upper, value);
             top--;
-            if (lower >= bounds.upper - tolerance || depth == 48) {
+            if (lower >= bounds.upper - tolerance || depth == 48 || --budget < 0) {
                 bounds.lower = dem2di_min(bounds.lower, lower);
                 continue;
             }
@@ -1730,11 +1761,11 @@ static dem2d_mass dem2di_fourier_mass(const double *a, const double *b, int orde
     dem2di_moments m = {0, {0, 0}, 0};
     int points = 4 * order + 8;
     for (int i = 0; i < points; i++) {
-        double t = 2 * DEM2DI_PI * i / points, slope, unused;
-        double p = dem2di_series_value(&series, t, &slope);
-        double weight = 2 * DEM2DI_PI / points * p * dem2di_series_value(&radius, t, &unused);
+        double t = 2 * DEM2DI_PI * i / points, d[3], unused[3];
+        double p = dem2di_series_value(&series, t, d);
+        double weight = 2 * DEM2DI_PI / points * p * dem2di_series_value(&radius, t, unused);
         dem2d_rot z = dem2d_rot_make(t);
-        dem2d_vec s = dem2di_turn(z, dem2di_vec(p, slope));
+        dem2d_vec s = dem2di_turn(z, dem2di_vec(p, d[0]));
         m.area += weight / 2;
         m.first = dem2di_along(m.first, weight / 3, s);
         m.polar += weight / 4 * dem2di_dot(s, s);
@@ -1852,6 +1883,13 @@ static dem2d_shape *dem2di_shape_allocate(const dem2d_env *env, dem2d_shape_type
     return shape;
 }
 
+/* Sizes whose fourth power is not a normal number have no moments: refused. */
+static dem2d_result dem2di_check_mass(const dem2d_env *env, double area, double polar_moment) {
+    if (dem2di_finite(polar_moment) && area >= DBL_MIN && polar_moment >= DBL_MIN) return DEM2D_OK;
+    return dem2di_fail(env, DEM2D_OUT_OF_RANGE, -1, "size: area %g, polar moment %g", area,
+                       polar_moment);
+}
+
 DEM2D_API void dem2d_shape_destroy(dem2d_shape *shape) {
     if (shape == NULL) return;
     dem2d_env env = shape->env;
@@ -1869,6 +1907,16 @@ static dem2d_shape *dem2di_shape_copy(const dem2d_env *env, const dem2d_shape *s
     return copy;
 }
 
+/* The last step of creation: a shape whose moments are no normal numbers is taken back. */
+static dem2d_result dem2di_hand_out(dem2d_shape *made, dem2d_shape **shape) {
+    dem2d_result result = dem2di_check_mass(&made->env, made->mass.area, made->mass.polar_moment);
+    if (result == DEM2D_OK)
+        *shape = made;
+    else
+        dem2d_shape_destroy(made);
+    return result;
+}
+
 static double dem2di_half_width(const dem2d_shape *shape, double x, double y) {
     dem2d_vec u = dem2di_vec(x, y);
     return dem2di_dot(dem2di_support(shape, u, NULL), u);
@@ -1880,11 +1928,14 @@ DEM2D_API dem2d_result dem2d_shape_create_circle(const dem2d_env *env, double ra
     dem2d_result result = dem2di_check_not_negative(env, "radius", radius);
     if (result != DEM2D_OK) return result;
     if (radius == 0) return dem2di_fail(env, DEM2D_ZERO_AREA, -1, "radius = 0");
+    double area = DEM2DI_PI * radius * radius, polar = area * radius * radius / 2;
+    result = dem2di_check_mass(env, area, polar);
+    if (result != DEM2D_OK) return result;
     dem2d_shape *made = dem2di_shape_allocate(env, DEM2D_CIRCLE, 0, 0);
     if (made == NULL) return DEM2D_OUT_OF_MEMORY;
     made->a = made->circumscribed = made->inscribed = made->rho_min = radius;
-    made->mass.area = DEM2DI_PI * radius * radius;
-    made->mass.polar_moment = made->mass.area * radius * radius / 2;
+    made->mass.area = area;
+    made->mass.polar_moment = polar;
     *shape = made;
     return DEM2D_OK;
 }
@@ -1897,6 +1948,10 @@ DEM2D_API dem2d_result dem2d_shape_create_ellipse(const dem2d_env *env, double a
     if (result != DEM2D_OK) return result;
     if (a == 0 || b == 0)
         return dem2di_fail(env, DEM2D_ZERO_AREA, -1, "half axes a = %g, b = %g", a, b);
+    double area = DEM2DI_PI * a * b, polar = area * (a * a + b * b) / 4;
+    result = dem2di_check_mass(env, area, polar);
+    if (result == DEM2D_OK) result = dem2di_check_mass(env, a * a, b * b);
+    if (result != DEM2D_OK) return result;
     dem2d_shape *made = dem2di_shape_allocate(env, DEM2D_ELLIPSE, 0, 0);
     if (made == NULL) return DEM2D_OUT_OF_MEMORY;
     made->a = a * a;
@@ -1904,8 +1959,8 @@ DEM2D_API dem2d_result dem2d_shape_create_ellipse(const dem2d_env *env, double a
     made->circumscribed = dem2di_max(a, b);
     made->inscribed = dem2di_min(a, b);
     made->rho_min = made->inscribed * (made->inscribed / made->circumscribed);
-    made->mass.area = DEM2DI_PI * a * b;
-    made->mass.polar_moment = made->mass.area * (a * a + b * b) / 4;
+    made->mass.area = area;
+    made->mass.polar_moment = polar;
     *shape = made;
     return DEM2D_OK;
 }
@@ -1975,7 +2030,7 @@ DEM2D_API dem2d_result dem2d_shape_create_polygon(const dem2d_env *env, const de
         }
         dem2di_fill_sectors(made);
         dem2di_polygon_radii(made);
-        *shape = made;
+        result = dem2di_hand_out(made, shape);
     }
     dem2di_release(env, corners, n, size);
     return result;
@@ -2091,24 +2146,26 @@ static bool dem2di_upper_tangent(dem2d_vec tangent) {
 
 /* All arcs convex, joints G1, one turn in all. */
 static dem2d_result dem2di_check_arcs(const dem2d_env *env, const dem2di_arc *arcs, int count,
-                                      double size) {
+                                      bool reversed, double size) {
     int entries = 0;
     double rounding = dem2di_control_rounding(size);
-    dem2d_vec start, end, before;
-    if (!dem2di_arc_tangents(&arcs[count - 1], rounding, &start, &before))
-        return dem2di_fail(env, DEM2D_DUPLICATE_POINT, count - 1, "arc %d is a point", count - 1);
+    dem2d_vec start, end, before, joint;
+    if (!dem2di_arc_tangents(&arcs[count - 1], rounding, &joint, &before))
+        joint = before = arcs->d0;
     for (int k = 0; k < count; k++) {
+        int place = reversed ? count - 1 - k : k; /* in the caller's numbering */
         if (!dem2di_arc_tangents(&arcs[k], rounding, &start, &end))
-            return dem2di_fail(env, DEM2D_DUPLICATE_POINT, k, "arc %d is a point", k);
+            return dem2di_fail(env, DEM2D_DUPLICATE_POINT, place, "arc %d is a point", place);
         if (!dem2di_arc_convex(&arcs[k], start, end, rounding))
-            return dem2di_fail(env, DEM2D_NOT_CONVEX, k, "arc %d is not convex", k);
+            return dem2di_fail(env, DEM2D_NOT_CONVEX, place, "arc %d is not convex", place);
         double kink = dem2di_cross(before, start);
+        if (reversed) place = (count - k) % count;
         if (fabs(kink) > DEM2DI_SMOOTH || dem2di_dot(before, start) < 0)
-            return dem2di_fail(env, DEM2D_NOT_SMOOTH, k,
-                               "the tangents at the start of arc %d differ by a sine of %g", k,
+            return dem2di_fail(env, DEM2D_NOT_SMOOTH, place,
+                               "the tangents at the start of arc %d differ by a sine of %g", place,
                                kink);
-        entries += (!dem2di_upper_tangent(before) && dem2di_upper_tangent(start)) +
-                   (!dem2di_upper_tangent(start) && dem2di_upper_tangent(end));
+        entries += !dem2di_upper_tangent(joint) && dem2di_upper_tangent(start);
+        joint = start; /* one tangent for each joint: that of the arc that starts there */
         before = end;
     }
     if (entries != 1)
@@ -2178,14 +2235,13 @@ DEM2D_API dem2d_result dem2d_shape_create_bezier(const dem2d_env *env, const dem
         dem2di_shape_allocate(env, DEM2D_BEZIER, arcs, dem2di_sector_count(2 * arcs));
     if (made == NULL) return DEM2D_OUT_OF_MEMORY;
     dem2di_arcs_from_control(control, arcs, area < 0, made->arcs);
-    result = dem2di_check_arcs(env, made->arcs, arcs, size);
+    result = dem2di_check_arcs(env, made->arcs, arcs, area < 0, size);
     if (result != DEM2D_OK) {
         dem2d_shape_destroy(made);
         return result;
     }
     dem2di_finish_bezier(made, size);
-    *shape = made;
-    return DEM2D_OK;
+    return dem2di_hand_out(made, shape);
 }
 
 /* Rounding of rho of a series: its bound is found to 2e-14 of the sum of terms, and each of the
@@ -2272,10 +2328,12 @@ DEM2D_API dem2d_result dem2d_shape_create_fourier(const dem2d_env *env, const do
         }
         made->mass.centroid = dem2di_vec(0, 0);
         dem2di_finish_fourier(made, ca, cb, convexity.rho_min_lower);
-        *shape = made;
+        result = dem2di_hand_out(made, shape);
+    } else {
+        result = DEM2D_OUT_OF_MEMORY;
     }
     dem2di_release(env, copy, (size_t)terms, 2 * sizeof *copy);
-    return made != NULL ? DEM2D_OK : DEM2D_OUT_OF_MEMORY;
+    return result;
 }
 
 DEM2D_API dem2d_result dem2d_shape_create_custom(const dem2d_env *env,
@@ -3003,11 +3061,11 @@ static void dem2di_witness(dem2di_search *search, const dem2di_vertex *v0,
     search->b = dem2di_along(v0->b, t, dem2di_sub(v1->b, v0->b));
 }
 
-/* What is known from bounds when rounding is taken into account. */
+/* The state when the sign is known: rounding is taken into account. */
 static dem2d_contact_state dem2di_judge(const dem2di_pair *pair, const dem2di_search *search) {
     double rounding = DEM2DI_ROUNDING * pair->size;
     if (search->upper < -rounding) return DEM2D_SEPARATED;
-    return search->lower > rounding ? DEM2D_PENETRATING : DEM2D_TOUCHING;
+    return search->upper > rounding ? DEM2D_PENETRATING : DEM2D_TOUCHING;
 }
 
 /* GJK ([P] and [F] sec. 3) in the plane. With `detect` it stops at the first direction that
@@ -3020,6 +3078,8 @@ static void dem2di_gjk(dem2di_pair *pair, dem2d_vec start, double tolerance, int
     dem2d_vec u = dem2di_first_direction(pair, start);
     search->iterations = 0;
     search->upper = HUGE_VAL;
+    search->normal = u;
+    search->a = search->b = dem2di_vec(0, 0);
     search->simplex[0] = dem2di_look(pair, search, u);
     search->count = 1;
     if (detect && search->upper < -rounding) {
@@ -3143,6 +3203,8 @@ static int dem2di_nearest_edge(const dem2di_polytope *polytope) {
 static void dem2di_epa(dem2di_pair *pair, dem2di_polytope *polytope, double tolerance, int cap,
                        dem2di_search *search) {
     search->state = DEM2D_UNRESOLVED;
+    search->lower = -pair->size;
+    if (polytope->edges == 0) return; /* supports that are not finite, or all one point */
     if (cap > DEM2DI_EPA_ITERATIONS) cap = DEM2DI_EPA_ITERATIONS;
     for (int iteration = 0;; iteration++) {
         int nearest = dem2di_nearest_edge(polytope);
@@ -3243,7 +3305,6 @@ static bool dem2di_warm_bracket(dem2di_pair *pair, dem2d_vec u, const dem2di_ver
         dem2di_bracket(pair, search, u, v, angles, 5, &polytope);
         if (polytope.floor < search->upper - tolerance) return false;
     }
-    if (polytope.edges == 0) return false;
     dem2di_epa(pair, &polytope, tolerance, cap, search);
     return search->state != DEM2D_UNRESOLVED && search->upper - search->lower <= tolerance;
 }
@@ -3280,8 +3341,8 @@ static bool dem2di_contact_warm(dem2di_pair *pair, dem2d_vec u, double tolerance
                                        cap, search);
         double depth = r - h, gap = slope * slope / (sqrt(depth * depth + slope * slope) + depth);
         if (gap <= tolerance && fabs(step) <= DEM2DI_WARM_ANGLE) {
-            search->lower = h - gap;
             search->normal = dem2di_nudge(u, step);
+            search->lower = dem2di_min(h - gap, dem2di_dot(v.w, search->normal));
             search->state = dem2di_judge(pair, search);
             return true;
         }
@@ -3297,14 +3358,24 @@ static void dem2di_contact_solve(dem2di_pair *pair, const dem2d_vec *warm, dem2d
                                  double tolerance, int cap, bool detect, dem2di_search *search) {
     double absolute = dem2di_max(tolerance, DEM2DI_ROUNDING) * pair->size;
     if (warm != NULL && dem2di_contact_warm(pair, *warm, absolute, cap, search)) {
-        if (detect || search->state != DEM2D_SEPARATED) return;
-        start = search->normal;
+        if (search->state == DEM2D_SEPARATED && !detect) {
+            start = search->normal;
+        } else if (search->state == DEM2D_SEPARATED || search->lower >= 0 ||
+                   search->state == DEM2D_TOUCHING) {
+            return;
+        } /* else the sign is not sure within the tolerance: GJK decides */
     }
     dem2di_gjk(pair, start, absolute, cap, detect, search);
     if (search->state != DEM2D_PENETRATING) return;
     dem2di_polytope polytope;
     dem2di_polytope_start(pair, search, &polytope);
     dem2di_epa(pair, &polytope, absolute, cap, search);
+    if (search->state == DEM2D_UNRESOLVED) {
+        /* where h hardly bends, chords converge slowly but Newton's step does not */
+        dem2di_search retry = *search;
+        if (dem2di_contact_warm(pair, search->normal, absolute, cap, &retry)) *search = retry;
+    }
+    search->lower = dem2di_max(search->lower, dem2di_min(0, search->upper)); /* by GJK */
 }
 
 /* A circle in closed form: centres apart by d. Concentric circles get the normal (1, 0). */
@@ -3326,6 +3397,12 @@ static void dem2di_contact_report(const dem2di_pair *pair, const dem2di_search *
     contact->point_a = dem2di_add(pose_a->position, search->a);
     contact->point_b = dem2di_add(pose_b->position, search->b);
     contact->point = dem2di_scale(dem2di_add(contact->point_a, contact->point_b), 0.5);
+}
+
+/* Squares of sizes, and of their rounding, are normal numbers. */
+static bool dem2di_pair_sound(const dem2di_pair *pair) {
+    double square = pair->size * pair->size;
+    return dem2di_finite(square) && square * DEM2DI_ROUNDING * DEM2DI_ROUNDING > DBL_MIN;
 }
 
 /* What all pair queries check and prepare. */
@@ -3358,6 +3435,7 @@ DEM2D_API dem2d_result dem2d_shape_contains(const dem2d_shape *shape, dem2d_pose
     dem2d_pose there = pose;
     there.position = point;
     dem2di_pair pair = dem2di_pair_make(shape, &pose, &dot, &there);
+    if (!dem2di_pair_sound(&pair)) return DEM2D_OUT_OF_RANGE;
     dem2di_search search;
     dem2di_gjk(&pair, dem2di_vec(0, 0), 0, 128, true, &search);
     *inside = search.state != DEM2D_SEPARATED;
@@ -3372,6 +3450,7 @@ static dem2d_result dem2di_query_gjk(const dem2d_shape *a, dem2d_pose pose_a, co
     dem2d_result result = dem2di_query_prepare(a, &pose_a, b, &pose_b, desc, contact, &used);
     if (result != DEM2D_OK) return result;
     dem2di_pair pair = dem2di_pair_make(a, &pose_a, b, &pose_b);
+    if (!dem2di_pair_sound(&pair)) return DEM2D_OUT_OF_RANGE;
     dem2di_search search;
     dem2di_gjk(&pair, used.start, used.tolerance * pair.size, used.max_iterations, detect, &search);
     if (search.state == DEM2D_PENETRATING && search.upper <= DEM2DI_ROUNDING * pair.size)
@@ -3399,6 +3478,7 @@ DEM2D_API dem2d_result dem2d_pair_contact(const dem2d_shape *a, dem2d_pose pose_
     dem2d_result result = dem2di_query_prepare(a, &pose_a, b, &pose_b, desc, contact, &used);
     if (result != DEM2D_OK) return result;
     dem2di_pair pair = dem2di_pair_make(a, &pose_a, b, &pose_b);
+    if (!dem2di_pair_sound(&pair)) return DEM2D_OUT_OF_RANGE;
     dem2di_search search;
     if (a->type == DEM2D_CIRCLE && b->type == DEM2D_CIRCLE) {
         double ra = a->a * pair.scale_a, rb = b->a * pair.scale_b;
@@ -3697,9 +3777,10 @@ static void dem2di_stiffness_add(dem2di_stiffness *k, double stiffness, dem2d_ve
    polynomial are real and not negative, so Newton's iteration from their sum falls on the largest
    monotonically. */
 static double dem2di_largest_eigenvalue(const dem2di_stiffness *k, double mass, double inertia) {
-    double cross = 1 / sqrt(mass * inertia);
-    double a = k->xx / mass, b = k->yy / mass, c = k->rr / inertia;
-    double d = k->xy / mass, e = k->xr * cross, f = k->yr * cross;
+    double a = k->xx / mass, b = k->yy / mass, c = k->rr / inertia, trace = a + b + c;
+    double cross = 1 / (sqrt(mass) * sqrt(inertia) * trace); /* scaled to a trace of 1 */
+    double d = k->xy / mass / trace, e = k->xr * cross, f = k->yr * cross;
+    a /= trace, b /= trace, c /= trace;
     double p2 = a + b + c, p1 = a * b + b * c + c * a - d * d - e * e - f * f;
     double p0 = a * b * c + 2 * d * e * f - a * f * f - b * e * e - c * d * d;
     double x = p2;
@@ -3710,7 +3791,7 @@ static double dem2di_largest_eigenvalue(const dem2di_stiffness *k, double mass, 
         if (!(next < x)) break;
         x = next;
     }
-    return x;
+    return x * trace;
 }
 
 /* ============================================================================================
@@ -3842,8 +3923,8 @@ struct dem2d_world {
     dem2di_body *bodies;
     dem2di_state *before, *now, *next; /* at the last force pass, present, being made */
     dem2di_load *load, *next_load;
-    dem2di_stiffness *stiffness; /* scratch of the time step check */
-    dem2di_disc *discs;          /* scratch of the list */
+    dem2di_stiffness *stiffness; /* scratch of the time step check and of its query */
+    dem2di_disc *discs;          /* scratch of the list and of the packing query */
     dem2di_wall *walls;
     dem2di_wall_state *wall_before, *wall_now, *wall_next;
     int template_count, template_capacity, material_count, material_capacity, laws_side;
@@ -4155,6 +4236,7 @@ DEM2D_API dem2d_result dem2d_world_set_pair(dem2d_world *world, dem2d_material_i
     if (result != DEM2D_OK) return result;
     *dem2di_law(world, (int)a.index, (int)b.index) = *desc;
     *dem2di_law(world, (int)b.index, (int)a.index) = *desc;
+    world->list_stale = true; /* so that the time step is checked */
     return DEM2D_OK;
 }
 
@@ -4416,8 +4498,14 @@ DEM2D_API dem2d_result dem2d_world_set_wall(dem2d_world *world, dem2d_wall_id id
     if (!dem2di_wall_lives(world, id)) return dem2di_stale(world, "wall", id.index);
     dem2d_result result = dem2di_check_wall(world, desc);
     if (result != DEM2D_OK) return result;
-    dem2di_wall_unspan(world, &world->walls[id.index]);
+    dem2di_wall *wall = &world->walls[id.index];
+    dem2d_vec normal = wall->desc.normal;
+    dem2d_vec moved = dem2di_sub(desc->point, world->wall_now[id.index].point);
+    dem2di_wall_unspan(world, wall);
     dem2di_wall_place(world, (int)id.index, desc);
+    bool turned = normal.x != wall->desc.normal.x || normal.y != wall->desc.normal.y;
+    if (turned || fabs(dem2di_dot(moved, normal)) > world->wall_skin)
+        dem2di_forget(world, -1, (int)id.index);
     return DEM2D_OK;
 }
 
@@ -4481,8 +4569,10 @@ DEM2D_API dem2d_result dem2d_world_set_damping(dem2d_world *world, double local,
 DEM2D_API dem2d_result dem2d_world_set_time_step(dem2d_world *world, double time_step) {
     if (world == NULL) return DEM2D_NULL_ARGUMENT;
     dem2d_result result = dem2di_check_positive(&world->env, "time_step", time_step);
-    if (result == DEM2D_OK) world->time_step = time_step;
-    return result;
+    if (result != DEM2D_OK) return result;
+    world->time_step = time_step;
+    world->list_stale = true; /* so that the step is checked */
+    return DEM2D_OK;
 }
 
 /* The contact each key of the new list had in the old one: both are in the order of keys. */
@@ -4527,27 +4617,46 @@ static bool dem2di_find_pairs(dem2d_world *world) {
         disc->reach = body->shape != NULL ? body->radius + body->skin : -1;
         disc->fixed = body->motion == DEM2D_FIXED;
     }
-    if (!dem2di_grid_pairs(&world->env, &world->grid, world->discs, world->body_count, found) ||
-        !dem2di_list_reserve(world, &world->pairs, found->count))
+    if (!dem2di_grid_pairs(&world->env, &world->grid, world->discs, world->body_count, found))
         return false;
+    /* contacts of the last force pass stay listed for the queries, however far apart by now */
+    for (int i = 0; i < world->pairs.keys.count; i++) {
+        dem2di_key key = world->pairs.keys.key[i];
+        const dem2di_disc *a = &world->discs[key.a], *b = &world->discs[key.b];
+        dem2d_vec d = dem2di_centre_line(a->centre, b->centre);
+        double reach = a->reach + b->reach;
+        bool listed = dem2di_dot(d, d) < reach * reach && !(a->fixed && b->fixed);
+        if (world->pairs.now[i].depth > 0 && !listed &&
+            !dem2di_keys_add(&world->env, found, key.a, key.b))
+            return false;
+    }
+    if (!dem2di_list_reserve(world, &world->pairs, found->count)) return false;
     dem2di_keys_sort(&world->grid, world->body_count, found, world->pairs.spare.key);
     world->pairs.spare.count = found->count;
     return true;
 }
 
-/* Particles within their own and the walls' skin of a wall: into touches.spare, sorted. */
+/* Particles within their own and the walls' skin of a wall, or in contact with it in the last
+   force pass: into touches.spare, sorted. */
 static bool dem2di_find_touches(dem2d_world *world) {
     dem2di_keys *spare = &world->touches.spare;
+    const dem2di_list *list = &world->touches;
+    int old = 0;
     spare->count = 0;
     for (int i = 0; i < world->body_count; i++) {
         const dem2di_body *body = &world->bodies[i];
-        if (body->shape == NULL || body->motion == DEM2D_FIXED) continue;
+        bool listed = body->shape != NULL && body->motion != DEM2D_FIXED;
         double reach = body->radius + body->skin + world->wall_skin;
         for (int j = 0; j < world->wall_count; j++) {
             const dem2di_wall *wall = &world->walls[j];
-            if (!wall->alive) continue;
             dem2d_vec from = dem2di_sub(world->now[i].x, world->wall_now[j].point);
-            if (dem2di_dot(from, wall->desc.normal) >= reach) continue;
+            bool near = listed && wall->alive && dem2di_dot(from, wall->desc.normal) < reach;
+            if (old < list->keys.count && list->keys.key[old].a == i &&
+                list->keys.key[old].b == j) {
+                near = near || list->now[old].depth > 0;
+                old++;
+            }
+            if (!near) continue;
             if (!dem2di_reserve(&world->env, (void **)&spare->key, &spare->capacity,
                                 spare->count + 1, sizeof *spare->key))
                 return false;
@@ -4571,7 +4680,6 @@ static dem2d_result dem2di_build_lists(dem2d_world *world) {
     for (int i = 0; i < world->body_count; i++) world->bodies[i].listed = world->now[i].x;
     for (int i = 0; i < world->wall_count; i++) world->walls[i].listed = world->wall_now[i].point;
     world->list_stale = false;
-    world->rebuilds++;
     return DEM2D_OK;
 }
 
@@ -4773,7 +4881,9 @@ static void dem2di_stiffness_list(const dem2d_world *world, const dem2di_list *l
         bool both = !walls && world->bodies[a].motion == DEM2D_FREE &&
                     world->bodies[b].motion == DEM2D_FREE;
         double f = both ? shared : 1, kn = f * law->normal_stiffness;
-        double kt = law->friction > 0 ? f * law->tangential_stiffness : 0;
+        /* one that slides does not resist: it counts for the safe bound only */
+        bool sticks = fabs(link->shear) < law->friction * link->force;
+        double kt = sticks || (law->friction > 0 && shared > 1) ? f * law->tangential_stiffness : 0;
         dem2d_vec t = dem2di_perp(link->normal), arm = dem2di_sub(link->point, link->branch);
         dem2di_stiffness_add(&world->stiffness[a], kn, link->normal, link->point);
         dem2di_stiffness_add(&world->stiffness[a], kt, t, link->point);
@@ -4907,6 +5017,7 @@ static dem2d_result dem2di_step(dem2d_world *world) {
             return dem2di_fail(&world->env, DEM2D_STATE, j,
                                "wall %d would get a place that is not finite", j);
     world->list_stale = stale;
+    world->rebuilds += listed;
     world->calls += calls;
     world->not_converged += unresolved;
     world->slow_time_step += slow;
@@ -5128,6 +5239,16 @@ DEM2D_API dem2d_result dem2d_world_packing(const dem2d_world *world, dem2d_packi
     return DEM2D_OK;
 }
 
+DEM2D_API dem2d_result dem2d_world_porosity(const dem2d_world *world, double area,
+                                            double *porosity) {
+    if (world == NULL || porosity == NULL) return DEM2D_NULL_ARGUMENT;
+    dem2d_packing packing;
+    dem2d_result result = dem2di_check_positive(&world->env, "area", area);
+    if (result == DEM2D_OK) result = dem2d_world_packing(world, &packing);
+    if (result == DEM2D_OK) *porosity = 1 - packing.solid_area / area;
+    return result;
+}
+
 /* ============================================================================================
    >>writers  Pictures
    uses: config, math, memory, mass, shapes, world
@@ -5149,6 +5270,8 @@ static void dem2di_print(dem2di_writer *writer, const char *format, ...) {
     va_start(arguments, format);
     int length = vsnprintf(text, sizeof text, format, arguments);
     va_end(arguments);
+    for (int i = 0; i < length && i < (int)sizeof text; i++)
+        if (text[i] == ',') text[i] = '.'; /* a locale's decimal comma; no other is printed */
     if (length < 0 || length >= (int)sizeof text)
         writer->good = false;
     else if (writer->file != NULL)
