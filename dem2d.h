@@ -15,6 +15,7 @@ CONTENTS (search for the anchor, ">>" and the word)
     Declarations    version, results, vectors, poses, environment           >>api-types
                     shapes                                                  >>api-shapes
                     mass                                                    >>api-mass
+                    outlines of grains                                      >>api-outlines
                     fitting                                                 >>api-fitting
                     contact of two shapes                                   >>api-contact
                     world                                                   >>api-world
@@ -28,7 +29,8 @@ CONTENTS (search for the anchor, ">>" and the word)
                     support kernels                                         >>support
                     area, centroid, polar moment                            >>mass
                     creation and questions of shapes                        >>shapes
-                    templates from outlines                                 >>fitting
+                    outlines from pixels, and their measures                >>outlines
+                    templates from outlines, virtual grains                 >>fitting
                     distance: Gilbert-Johnson-Keerthi                       >>gjk
                     depth: expanding polytope                               >>epa
                     contact of two shapes, of a shape and a wall            >>contact
@@ -154,8 +156,12 @@ CONCEPTS
 HOW TO
     make a shape         dem2d_shape_create_*; give it to a world with dem2d_world_add_shape
                          (the world keeps a copy: destroy yours at any time).
-    get one from a grain dem2d_fourier_fit, dem2d_fourier_reduce, dem2d_shape_create_fourier; or
-                         dem2d_bezier_fit, dem2d_shape_create_bezier.
+    get one from a grain dem2d_outline_fit: any model, by count or by coverage, with a report.
+                         The papers' steps one by one: dem2d_fourier_fit, dem2d_fourier_reduce,
+                         dem2d_bezier_fit.
+    get one from a photo dem2d_image_outlines, then dem2d_outline_fit for each outline.
+    draw one at random   dem2d_fourier_virtual, then dem2d_shape_create_fourier.
+    measure a grain      dem2d_outline_measure; two of them: dem2d_outline_compare.
     test two shapes      dem2d_pair_overlap (yes or no), dem2d_pair_distance (gap, witness
                          points), dem2d_pair_contact (gap or depth, normal, contact point).
                          Pass the last normal as desc.start when the pair has moved little.
@@ -181,6 +187,31 @@ OPTIONS (zero means: physical zero for physical fields; "library default" where 
     dem2d_reduction_desc    test                  -      SUFFICIENT
     dem2d_reduction_desc    factor                -      0.9        0 or inside (0, 1)
     dem2d_reduction_desc    tolerance             -      1e-6       >= 0, relative to a0
+    dem2d_image_desc        pixels                -      none       required
+    dem2d_image_desc        width                 px     none       1 to 2^15
+    dem2d_image_desc        height                px     none       1 to 2^15
+    dem2d_image_desc        stride                -      width      0 or >= width
+    dem2d_image_desc        threshold             -      Otsu       0 to 255
+    dem2d_image_desc        bright                -      false
+    dem2d_image_desc        min_pixels            -      16         >= 0
+    dem2d_image_desc        max_pixels            -      no limit   >= 0
+    dem2d_image_desc        keep_border           -      false
+    dem2d_image_desc        scale                 m/px   none       > 0
+    dem2d_fit_desc          count                 -      coverage   0 to 1024; 3 for polygon, bezier
+    dem2d_fit_desc          coverage              -      none       inside (0, 1) when count is 0
+    dem2d_fit_desc          model                 -      CIRCLE     not CUSTOM
+    dem2d_fit_desc          method                -      DEFAULT    one of the model's
+    dem2d_fit_desc          scale                 -      HULL
+    dem2d_fit_desc          min_radius            -      0.1        [0, 1), of a0/2
+    dem2d_fit_desc          corners               -      false
+    dem2d_fit_desc          seed                  -      0
+    dem2d_virtual_desc      radius                m      none       > 0
+    dem2d_virtual_desc      elongation            -      0          >= 0
+    dem2d_virtual_desc      roundness             -      0          >= 0
+    dem2d_virtual_desc      roughness             -      0          >= 0
+    dem2d_virtual_desc      spectrum              -      NULL       order + 1 values >= 0
+    dem2d_virtual_desc      min_radius            -      0.1        [0, 1), of a0/2
+    dem2d_virtual_desc      seed                  -      0
     dem2d_contact_desc      tolerance             -      1e-10      >= 0, of R_A + R_B + |d|
     dem2d_contact_desc      max_iterations        -      128        >= 0
     dem2d_contact_desc      start                 -      centres    any direction
@@ -300,6 +331,7 @@ extern "C" {
     X(IN_USE, "the object is still used by another")                       \
     X(TIME_STEP, "the time step is above the stable limit")                \
     X(STATE, "the step would give a state that is not finite")             \
+    X(NOT_REACHED, "the coverage asked for was not reached")               \
     X(IO, "writing failed")
 
 /// Result of a function that can fail: DEM2D_OK (0) or the reason.
@@ -475,7 +507,86 @@ DEM2D_API dem2d_result dem2d_shape_mass_interpolated(const dem2d_shape *shape, i
                                                      dem2d_mass *mass);
 
 /* ============================================================================================
-   >>api-fitting  Templates from outlines
+   >>api-outlines  Outlines of grains: from pixels, and what can be measured of them
+   ============================================================================================ */
+
+/// Grains in a picture of one byte per pixel, row 0 on top.
+typedef struct dem2d_image_desc {
+    const uint8_t *pixels; ///< height rows of width bytes; required
+    int width;             ///< px, 1 to 2^15
+    int height;            ///< px, 1 to 2^15
+    int stride;            ///< bytes from row to row; 0 for width
+    int threshold;         ///< grains are darker than this, 1 to 255; 0 finds it (Otsu)
+    bool bright;           ///< grains are not darker than the threshold instead
+    int min_pixels;        ///< smaller grains are dropped; 0 for 16
+    int max_pixels;        ///< larger ones too; 0 for no limit
+    bool keep_border;      ///< keep grains that touch the picture's border
+    double scale;          ///< m per pixel, > 0
+} dem2d_image_desc;
+
+/// One outline of a set; points belong to the set.
+typedef struct dem2d_outline {
+    const dem2d_vec *points; ///< m, simple, counter-clockwise; y up
+    int count;               ///< of points
+    int pixels;              ///< of the grain, holes filled
+    int row;                 ///< of its topmost pixel
+    int column;              ///< of the leftmost pixel in that row
+} dem2d_outline;
+
+/// Outlines found in a picture, by topmost, then leftmost pixel. Opaque.
+typedef struct dem2d_outline_set dem2d_outline_set;
+
+/// Measures of an outline.
+typedef struct dem2d_outline_info {
+    dem2d_mass mass;            ///< area, centroid, polar moment
+    double perimeter;           ///< m
+    double feret_max;           ///< m, length: the greatest distance of two points
+    double feret_min;           ///< m, width: the least distance of two parallel tangents
+    double aspect;              ///< feret_max / feret_min
+    double sphericity;          ///< width-to-length, feret_min / feret_max
+    double circularity;         ///< 4 pi area / perimeter^2
+    double solidity;            ///< area / area of the hull
+    double roundness;           ///< Wadell: mean radius of corners / inscribed radius
+    double inscribed;           ///< m, radius of the greatest circle inside
+    dem2d_vec inscribed_at;     ///< m, its centre
+    double circumscribed;       ///< m, radius of the least circle around
+    dem2d_vec circumscribed_at; ///< m, its centre
+} dem2d_outline_info;
+
+/// How two outlines differ.
+typedef struct dem2d_difference {
+    double coverage;  ///< 1 - area / area of the reference; negative for strangers
+    double area;      ///< m2, of the symmetric difference
+    double hausdorff; ///< m, greatest distance of a corner of one from the other's boundary
+} dem2d_difference;
+
+/// Otsu's threshold of a picture: grains (or ground) are the values below it; 0 for a picture of
+/// one value. Errors: NULL_ARGUMENT, OUT_OF_RANGE.
+DEM2D_API dem2d_result dem2d_image_threshold(const dem2d_image_desc *desc, int *threshold);
+/// Outlines of the grains in a picture: threshold, 4-connected components, holes filled, boundary
+/// by linear interpolation between pixel centres. The centre of the pixel in row r, column c is at
+/// ((c + 0.5) scale, (height - r - 0.5) scale). A set may be empty, as that of a picture of one
+/// value is. Errors: NULL_ARGUMENT, OUT_OF_RANGE, NOT_FINITE, OUT_OF_MEMORY.
+DEM2D_API dem2d_result dem2d_image_outlines(const dem2d_env *env, const dem2d_image_desc *desc,
+                                            dem2d_outline_set **set);
+/// Number of outlines in a set; 0 for NULL.
+DEM2D_API int dem2d_outline_set_count(const dem2d_outline_set *set);
+/// Outline i of a set. Errors: NULL_ARGUMENT, OUT_OF_RANGE.
+DEM2D_API dem2d_result dem2d_outline_set_get(const dem2d_outline_set *set, int i,
+                                             dem2d_outline *outline);
+/// Release a set; NULL is allowed.
+DEM2D_API void dem2d_outline_set_destroy(dem2d_outline_set *set);
+/// Measures of a simple outline, either orientation. Errors: NULL_ARGUMENT, TOO_FEW_POINTS,
+/// NOT_FINITE, ZERO_AREA, OUT_OF_MEMORY.
+DEM2D_API dem2d_result dem2d_outline_measure(const dem2d_env *env, const dem2d_vec *points,
+                                             int count, dem2d_outline_info *info);
+/// Difference of two simple outlines, exact but for rounding. Errors as above.
+DEM2D_API dem2d_result dem2d_outline_compare(const dem2d_env *env, const dem2d_vec *reference,
+                                             int reference_count, const dem2d_vec *other,
+                                             int other_count, dem2d_difference *difference);
+
+/* ============================================================================================
+   >>api-fitting  Templates from outlines, virtual grains
    ============================================================================================ */
 
 /// How the coefficient reduction tests convexity.
@@ -526,6 +637,74 @@ DEM2D_API dem2d_result dem2d_fourier_reduce(double *a, double *b, int order,
 /// TOO_FEW_POINTS, NOT_FINITE, OUT_OF_RANGE, ZERO_AREA, OUT_OF_MEMORY.
 DEM2D_API dem2d_result dem2d_bezier_fit(const dem2d_env *env, const dem2d_vec *points, int count,
                                         int arcs, dem2d_vec *control);
+
+/// How a template is found. Which methods belong to which model is said there.
+typedef enum dem2d_fit_method {
+    DEM2D_FIT_DEFAULT,         ///< FOURIER: constrained; BEZIER: area; the others have one
+    DEM2D_FIT_REDUCTION,       ///< FOURIER: the paper's reduction by [F] eq. 7
+    DEM2D_FIT_REDUCTION_EXACT, ///< FOURIER: the reduction by the exact test
+    DEM2D_FIT_FEJER,           ///< FOURIER: (1 - n/(N+1)) p_n of the hull
+    DEM2D_FIT_CONSTRAINED,     ///< FOURIER: least squares with rho >= min_radius
+    DEM2D_FIT_AREA,            ///< BEZIER: least exact area to the outline
+    DEM2D_FIT_SWARM            ///< BEZIER: [P] sec. 4, particle swarm with pixel overlap
+} dem2d_fit_method;
+
+/// What the size of a fit is matched to ([F] fits that are constrained or Fejer's).
+typedef enum dem2d_fit_scale {
+    DEM2D_SCALE_HULL,  ///< area of the outline's hull: best coverage
+    DEM2D_SCALE_GRAIN, ///< area of the outline: right mass
+    DEM2D_SCALE_NONE   ///< as it comes out
+} dem2d_fit_scale;
+
+/// A fit of a template to an outline.
+typedef struct dem2d_fit_desc {
+    int count;               ///< order, arcs or vertices; 0 for the least that has the coverage
+    double coverage;         ///< to be reached, inside (0, 1), when count is 0
+    dem2d_shape_type model;  ///< circle, ellipse, polygon, bezier or fourier
+    dem2d_fit_method method; ///< DEFAULT or one of the model's
+    dem2d_fit_scale scale;   ///< FOURIER
+    double min_radius;       ///< CONSTRAINED: least radius of curvature, of a0/2; 0 for 0.1
+    bool corners;            ///< CONSTRAINED: min_radius 0 is meant
+    uint64_t seed;           ///< SWARM
+} dem2d_fit_desc;
+
+/// What came out.
+typedef struct dem2d_fit_report {
+    int count;         ///< order, arcs or vertices of the template
+    dem2d_pose pose;   ///< where the template lies on the outline
+    double coverage;   ///< 1 - difference / area of the outline
+    double difference; ///< m2, area of the symmetric difference
+    double hausdorff;  ///< m, see dem2d_difference
+    double convexity;  ///< m, proved least radius of curvature; 0 with corners
+    int iterations;    ///< steps of the method, all attempts together
+} dem2d_fit_report;
+
+/// Fit a template to a simple outline, convex or not. Errors: NULL_ARGUMENT, TOO_FEW_POINTS,
+/// NOT_FINITE, ZERO_AREA, OUT_OF_RANGE (count, coverage, a method of another model), NOT_REACHED
+/// (no count up to 64 has the coverage), OUT_OF_MEMORY. report may be NULL.
+DEM2D_API dem2d_result dem2d_outline_fit(const dem2d_env *env, const dem2d_vec *points, int count,
+                                         const dem2d_fit_desc *desc, dem2d_shape **shape,
+                                         dem2d_fit_report *report);
+/// For comparison: the radial Fourier series r(t) of an order about the centroid ([F] figs. 4-5),
+/// which is no shape here. Errors as of dem2d_outline_measure, OUT_OF_RANGE (order).
+DEM2D_API dem2d_result dem2d_radial_compare(const dem2d_env *env, const dem2d_vec *points,
+                                            int count, int order, dem2d_difference *difference);
+
+/// Virtual grains: the amplitude of each pair of coefficients relative to a0/2.
+typedef struct dem2d_virtual_desc {
+    double radius;          ///< m, of the circle of equal area, > 0
+    double elongation;      ///< amplitude of n = 2, >= 0
+    double roundness;       ///< amplitude of n = 3, falling as 1/n^2 to n = 7, >= 0
+    double roughness;       ///< amplitude of n = 8, falling as 1/n^2 beyond, >= 0
+    const double *spectrum; ///< order + 1 amplitudes instead of the three; NULL without
+    double min_radius;      ///< least radius of curvature, of a0/2; 0 for 0.1
+    uint64_t seed;          ///< same seed, same grain
+} dem2d_virtual_desc;
+
+/// Coefficients of a convex grain with random phases: amplitudes are lowered together as far as
+/// min_radius asks. a and b get order + 1 values. Errors: NULL_ARGUMENT, NOT_FINITE, OUT_OF_RANGE.
+DEM2D_API dem2d_result dem2d_fourier_virtual(const dem2d_virtual_desc *desc, int order, double *a,
+                                             double *b);
 
 /* ============================================================================================
    >>api-contact  Contact of two shapes, of a shape and a wall
@@ -2466,8 +2645,1023 @@ DEM2D_API dem2d_result dem2d_shape_outline(const dem2d_shape *shape, dem2d_pose 
 }
 
 /* ============================================================================================
-   >>fitting  Fourier series and polybeziers from outlines
-   uses: config, math, memory, hull, series, support, mass, shapes
+   >>outlines  Outlines from pixels, and their measures
+   uses: config, math, memory, hull, mass
+   ============================================================================================ */
+
+#define DEM2DI_PICTURE_SIDE 32768 /* 2^15 squared pixels: their number stays an int */
+#define DEM2DI_MIN_PIXELS 16      /* four by four: below, the outline is all staircase */
+
+/* Marks of a pixel whose left or right side is part of a grain's outer boundary. */
+#define DEM2DI_ENTRY 1
+#define DEM2DI_EXIT 2
+
+struct dem2d_outline_set {
+    dem2d_env env;
+    dem2d_outline *grains; /* capacity, count of them used */
+    int count, capacity;
+    dem2d_vec *points; /* point_count, of all grains one after the other */
+    size_t point_count;
+};
+
+static dem2d_result dem2di_check_picture(const dem2d_env *env, const dem2d_image_desc *desc) {
+    if (desc == NULL || desc->pixels == NULL) return dem2di_fail_null(env, "desc or pixels");
+    if (desc->width < 1 || desc->width > DEM2DI_PICTURE_SIDE)
+        return dem2di_fail(env, DEM2D_OUT_OF_RANGE, -1, "width = %d, from 1 to %d", desc->width,
+                           DEM2DI_PICTURE_SIDE);
+    if (desc->height < 1 || desc->height > DEM2DI_PICTURE_SIDE)
+        return dem2di_fail(env, DEM2D_OUT_OF_RANGE, -1, "height = %d, from 1 to %d", desc->height,
+                           DEM2DI_PICTURE_SIDE);
+    if (desc->stride != 0 && desc->stride < desc->width)
+        return dem2di_fail(env, DEM2D_OUT_OF_RANGE, -1, "stride = %d, 0 or at least width = %d",
+                           desc->stride, desc->width);
+    return DEM2D_OK;
+}
+
+static const uint8_t *dem2di_picture_row(const dem2d_image_desc *desc, int row) {
+    size_t stride = (size_t)(desc->stride > 0 ? desc->stride : desc->width);
+    return desc->pixels + (size_t)row * stride;
+}
+
+/* The threshold (values below against the rest) with the greatest variance between the two
+   classes. Empty grey values give a range of equally good ones: its middle, so that the boundary
+   of a binary picture is halfway between pixels. 0 when there is but one grey value. */
+static int dem2di_otsu(const dem2d_image_desc *desc) {
+    uint32_t histogram[256] = {0};
+    double all = 0, total = 0, below = 0, sum = 0, best = -1;
+    int first = 0, last = -1;
+    for (int row = 0; row < desc->height; row++) {
+        const uint8_t *line = dem2di_picture_row(desc, row);
+        for (int column = 0; column < desc->width; column++) histogram[line[column]]++;
+    }
+    for (int grey = 0; grey < 256; grey++) {
+        all += histogram[grey];
+        total += (double)grey * histogram[grey];
+    }
+    for (int t = 1; t < 256; t++) {
+        below += histogram[t - 1];
+        sum += (double)(t - 1) * histogram[t - 1];
+        if (!(below > 0) || !(below < all)) continue;
+        /* w0 w1 (m0 - m1)^2 with w0 = below / all, m0 = sum / below, but for a factor */
+        double gap = sum * all - below * total, variance = gap / below * (gap / (all - below));
+        if (variance > best) {
+            best = variance;
+            first = last = t;
+        } else if (histogram[t - 1] == 0 && last == t - 1) {
+            last = t;
+        }
+    }
+    return (first + last + 1) / 2;
+}
+
+DEM2D_API dem2d_result dem2d_image_threshold(const dem2d_image_desc *desc, int *threshold) {
+    dem2d_result result = dem2di_check_picture(NULL, desc);
+    if (result != DEM2D_OK) return result;
+    if (threshold == NULL) return DEM2D_NULL_ARGUMENT;
+    *threshold = dem2di_otsu(desc);
+    return DEM2D_OK;
+}
+
+/* A pixel of some grain? Beyond the border is ground. */
+static bool dem2di_is_grain(const dem2d_image_desc *desc, int row, int column) {
+    if (row < 0 || column < 0 || row >= desc->height || column >= desc->width) return false;
+    return (dem2di_picture_row(desc, row)[column] < desc->threshold) != desc->bright;
+}
+
+/* How far from a grain's pixel towards a ground pixel beside it the boundary is, of the distance
+   of their centres: where the grey value, interpolated linearly, is threshold - 1/2. No pixel has
+   that value, so the result is inside (0, 1). At the picture's border it is the pixel's side. */
+static double dem2di_crack_place(const dem2d_image_desc *desc, int row, int column, int next_row,
+                                 int next_column) {
+    if (next_row < 0 || next_column < 0 || next_row >= desc->height || next_column >= desc->width)
+        return 0.5;
+    int grey = dem2di_picture_row(desc, row)[column];
+    int next = dem2di_picture_row(desc, next_row)[next_column];
+    return (grey - (desc->threshold - 0.5)) / (grey - next);
+}
+
+/* Once around the outer boundary of a grain from the left side of its topmost, then leftmost
+   pixel, the grain on the left hand: one step per crack, a side between a pixel of the grain and
+   ground. Marks the pixels (marks may be NULL), counts grain->count cracks and grain->pixels
+   inside, and writes a point per crack (points may be NULL). Returns whether it met the border.
+
+   The points are those of marching squares: each lies inside a segment between two neighbouring
+   pixel centres, two that follow each other in one square of four centres. Where a square has two
+   pieces of boundary, each cuts off its own grain corner. So no points coincide and no pieces
+   cross. */
+static bool dem2di_trace(const dem2d_image_desc *desc, dem2d_outline *grain, uint8_t *marks,
+                         dem2d_vec *points) {
+    static const int down[4] = {1, 0, -1, 0}, right[4] = {0, 1, 0, -1}; /* counter-clockwise */
+    int row = grain->row, column = grain->column, heading = 0, count = 0;
+    int64_t pixels = 0;
+    bool border = false;
+    do {
+        int side = (heading + 3) % 4; /* what is on the right hand is ground */
+        int out_row = row + down[side], out_column = column + right[side];
+        if (points != NULL) {
+            double t = dem2di_crack_place(desc, row, column, out_row, out_column);
+            points[count] = dem2di_vec((column + 0.5 + t * right[side]) * desc->scale,
+                                       (desc->height - row - 0.5 - t * down[side]) * desc->scale);
+        }
+        count++;
+        if (out_row < 0 || out_column < 0 || out_row == desc->height || out_column == desc->width)
+            border = true;
+        if (heading == 0) pixels -= column; /* rows from left sides to right sides: holes count */
+        if (heading == 2) pixels += column + 1;
+        if (marks != NULL && heading % 2 == 0)
+            marks[(size_t)row * (size_t)desc->width + (size_t)column] |=
+                (uint8_t)(heading == 0 ? DEM2DI_ENTRY : DEM2DI_EXIT);
+        int ahead_row = row + down[heading], ahead_column = column + right[heading];
+        if (!dem2di_is_grain(desc, ahead_row, ahead_column)) {
+            heading = (heading + 1) % 4; /* also where two grain pixels touch by a corner */
+        } else if (!dem2di_is_grain(desc, ahead_row + down[side], ahead_column + right[side])) {
+            row = ahead_row;
+            column = ahead_column;
+        } else {
+            row = ahead_row + down[side];
+            column = ahead_column + right[side];
+            heading = side;
+        }
+    } while (row != grain->row || column != grain->column || heading != 0);
+    grain->count = count;
+    grain->pixels = (int)pixels;
+    return border;
+}
+
+/* The grains of one row that begin there. Along a row outer boundaries are entered and left by
+   turns; what is between, holes and grains in holes too, belongs to the grain. */
+static bool dem2di_scan_row(dem2d_outline_set *set, const dem2d_image_desc *desc, int row,
+                            uint8_t *marks) {
+    const uint8_t *line = dem2di_picture_row(desc, row);
+    const uint8_t *mark = marks + (size_t)row * (size_t)desc->width;
+    bool inside = false;
+    for (int column = 0; column < desc->width; column++) {
+        if (!inside && (line[column] < desc->threshold) == desc->bright) continue;
+        if (!inside && (mark[column] & DEM2DI_ENTRY) == 0) {
+            dem2d_outline grain;
+            memset(&grain, 0, sizeof grain);
+            grain.row = row;
+            grain.column = column;
+            bool border = dem2di_trace(desc, &grain, marks, NULL);
+            if ((!border || desc->keep_border) && grain.pixels >= desc->min_pixels &&
+                grain.pixels <= desc->max_pixels) {
+                void *grains = set->grains;
+                bool room = dem2di_reserve(&set->env, &grains, &set->capacity, set->count + 1,
+                                           sizeof *set->grains);
+                set->grains = (dem2d_outline *)grains;
+                if (!room) return false;
+                set->grains[set->count++] = grain;
+                set->point_count += (size_t)grain.count;
+            }
+        }
+        inside = (mark[column] & DEM2DI_EXIT) == 0;
+    }
+    return true;
+}
+
+/* Find the grains, then, knowing how many points there are, trace those that stay once more. */
+static bool dem2di_scan_picture(dem2d_outline_set *set, const dem2d_image_desc *desc) {
+    size_t size = (size_t)desc->width * (size_t)desc->height, next = 0;
+    uint8_t *marks = (uint8_t *)dem2di_allocate(&set->env, size, 1);
+    bool room = marks != NULL;
+    if (room) memset(marks, 0, size);
+    for (int row = 0; room && row < desc->height; row++)
+        room = dem2di_scan_row(set, desc, row, marks);
+    dem2di_release(&set->env, marks, size, 1);
+    if (!room || set->count == 0) return room;
+    set->points = (dem2d_vec *)dem2di_allocate(&set->env, set->point_count, sizeof *set->points);
+    if (set->points == NULL) return false;
+    for (int i = 0; i < set->count; i++) {
+        set->grains[i].points = set->points + next;
+        (void)dem2di_trace(desc, &set->grains[i], NULL, set->points + next);
+        next += (size_t)set->grains[i].count;
+    }
+    return true;
+}
+
+/* A valid picture with its defaults filled in. */
+static dem2d_result dem2di_picture_make(const dem2d_env *env, const dem2d_image_desc *desc,
+                                        dem2d_image_desc *picture) {
+    dem2d_result result = dem2di_check_picture(env, desc);
+    if (result != DEM2D_OK) return result;
+    result = dem2di_check_positive(env, "scale", desc->scale);
+    if (result != DEM2D_OK) return result;
+    if (desc->threshold < 0 || desc->threshold > 255)
+        return dem2di_fail(env, DEM2D_OUT_OF_RANGE, -1, "threshold = %d, from 0 to 255",
+                           desc->threshold);
+    if (desc->min_pixels < 0 || desc->max_pixels < 0)
+        return dem2di_fail(env, DEM2D_OUT_OF_RANGE, -1,
+                           "min_pixels = %d, max_pixels = %d must not be negative",
+                           desc->min_pixels, desc->max_pixels);
+    *picture = *desc;
+    if (picture->threshold == 0) picture->threshold = dem2di_otsu(desc);
+    if (picture->min_pixels == 0) picture->min_pixels = DEM2DI_MIN_PIXELS;
+    if (picture->max_pixels == 0) picture->max_pixels = INT_MAX;
+    return DEM2D_OK;
+}
+
+DEM2D_API dem2d_result dem2d_image_outlines(const dem2d_env *env, const dem2d_image_desc *desc,
+                                            dem2d_outline_set **set) {
+    dem2d_image_desc picture;
+    if (set == NULL) return dem2di_fail_null(env, "set");
+    dem2d_result result = dem2di_picture_make(env, desc, &picture);
+    if (result != DEM2D_OK) return result;
+    dem2d_outline_set *made = (dem2d_outline_set *)dem2di_allocate(env, 1, sizeof *made);
+    bool room = made != NULL;
+    if (room) {
+        memset(made, 0, sizeof *made);
+        if (env != NULL) made->env = *env;
+        /* a picture of one grey value has no grain, dark or bright */
+        if (picture.threshold > 0) room = dem2di_scan_picture(made, &picture);
+    }
+    if (!room) {
+        dem2d_outline_set_destroy(made);
+        return dem2di_fail(env, DEM2D_OUT_OF_MEMORY, -1, "outlines of %d by %d pixels", desc->width,
+                           desc->height);
+    }
+    *set = made;
+    return DEM2D_OK;
+}
+
+DEM2D_API int dem2d_outline_set_count(const dem2d_outline_set *set) {
+    return set != NULL ? set->count : 0;
+}
+
+DEM2D_API dem2d_result dem2d_outline_set_get(const dem2d_outline_set *set, int i,
+                                             dem2d_outline *outline) {
+    if (set == NULL) return DEM2D_NULL_ARGUMENT;
+    if (outline == NULL) return dem2di_fail_null(&set->env, "outline");
+    if (i < 0 || i >= set->count)
+        return dem2di_fail(&set->env, DEM2D_OUT_OF_RANGE, i, "outline %d of %d", i, set->count);
+    *outline = set->grains[i];
+    return DEM2D_OK;
+}
+
+DEM2D_API void dem2d_outline_set_destroy(dem2d_outline_set *set) {
+    if (set == NULL) return;
+    dem2d_env env = set->env;
+    dem2di_release(&env, set->points, set->point_count, sizeof *set->points);
+    dem2di_release(&env, set->grains, (size_t)set->capacity, sizeof *set->grains);
+    dem2di_release(&env, set, 1, sizeof *set);
+}
+
+/* --- sides of an outline ---------------------------------------------------------------------- */
+
+/* A side from a to a + e. */
+typedef struct dem2di_side {
+    dem2d_vec a, e;
+    double inverse; /* 1 / e.e */
+} dem2di_side;
+
+/* Points of a caller that enclose an area. */
+static dem2d_result dem2di_check_outline(const dem2d_env *env, const char *name,
+                                         const dem2d_vec *points, int count, dem2d_mass *mass) {
+    dem2d_result result = dem2di_check_points(env, name, points, count, 3);
+    if (result != DEM2D_OK) return result;
+    result = dem2d_polygon_mass(points, count, mass);
+    if (result != DEM2D_OK) return dem2di_fail(env, result, -1, "%s: no area", name);
+    return DEM2D_OK;
+}
+
+/* The sides that have a length, counter-clockwise, relative to an origin. */
+static int dem2di_sides_make(const dem2d_vec *points, int count, dem2d_vec origin,
+                             dem2di_side *sides) {
+    bool reversed = dem2di_twice_area(points, count) < 0;
+    int made = 0;
+    for (int i = 0; i < count; i++) {
+        int from = reversed ? count - 1 - i : i;
+        int to = reversed ? (from > 0 ? from - 1 : count - 1) : (from + 1 < count ? from + 1 : 0);
+        dem2di_side *side = &sides[made];
+        side->a = dem2di_sub(points[from], origin);
+        side->e = dem2di_sub(points[to], points[from]);
+        double square = dem2di_dot(side->e, side->e);
+        if (!(square > 0)) continue;
+        side->inverse = 1 / square;
+        made++;
+    }
+    return made;
+}
+
+/* From the nearest point of a side to p. */
+static dem2d_vec dem2di_side_offset(const dem2di_side *side, dem2d_vec p) {
+    dem2d_vec v = dem2di_sub(p, side->a);
+    double t = dem2di_dot(v, side->e) * side->inverse;
+    t = t < 0 ? 0 : (t > 1 ? 1 : t);
+    return dem2di_along(v, -t, side->e);
+}
+
+static double dem2di_side_square(const dem2di_side *side, dem2d_vec p) {
+    dem2d_vec v = dem2di_side_offset(side, p);
+    return dem2di_dot(v, v);
+}
+
+/* --- Feret diameters and the least circle around ---------------------------------------------- */
+
+/* Rotating calipers: the corner farthest from each edge of the hull moves on as the edge does. The
+   least width is at an edge; the greatest distance is between corners that are opposite at some
+   edge. ends gets those two corners. */
+static void dem2di_calipers(const dem2d_vec *hull, int count, dem2d_outline_info *info,
+                            int ends[2]) {
+    double most = 0;
+    for (int i = 0, j = 1; i < count; i++) {
+        int next = i + 1 < count ? i + 1 : 0;
+        dem2d_vec edge = dem2di_sub(hull[next], hull[i]);
+        int after = j + 1 < count ? j + 1 : 0;
+        while (dem2di_cross(edge, dem2di_sub(hull[after], hull[j])) > 0) {
+            j = after;
+            after = j + 1 < count ? j + 1 : 0;
+        }
+        double width = dem2di_cross(edge, dem2di_sub(hull[j], hull[i])) / dem2di_length(edge);
+        if (i == 0 || width < info->feret_min) info->feret_min = width;
+        for (int k = 0; k < 4; k++) { /* j and after are equally far from a parallel edge */
+            int one = k % 2 == 0 ? i : next, other = k < 2 ? j : after;
+            dem2d_vec span = dem2di_sub(hull[one], hull[other]);
+            if (!(dem2di_dot(span, span) > most)) continue;
+            most = dem2di_dot(span, span);
+            ends[0] = one;
+            ends[1] = other;
+        }
+    }
+    info->feret_max = sqrt(most);
+}
+
+/* The centre of the circle through count = 2 points (their middle) or 3; false when those are on
+   one line. */
+static bool dem2di_circle_through(const dem2d_vec *p, int count, dem2d_vec *centre) {
+    dem2d_vec b = dem2di_sub(p[1], p[0]);
+    *centre = dem2di_along(p[0], 0.5, b);
+    if (count == 2) return true;
+    dem2d_vec c = dem2di_sub(p[2], p[0]);
+    double twice = 2 * dem2di_cross(b, c), bb = dem2di_dot(b, b), cc = dem2di_dot(c, c);
+    dem2d_vec top = dem2di_vec(c.y * bb - b.y * cc, b.x * cc - c.x * bb);
+    *centre = dem2di_add(p[0], dem2di_vec(top.x / twice, top.y / twice));
+    return dem2di_vec_finite(*centre);
+}
+
+/* Square of the greatest distance of a point from the centre; *at gets its index. */
+static double dem2di_farthest_point(const dem2d_vec *points, int count, dem2d_vec centre, int *at) {
+    double most = -1;
+    for (int i = 0; i < count; i++) {
+        dem2d_vec v = dem2di_sub(points[i], centre);
+        double square = dem2di_dot(v, v);
+        if (!(square > most)) continue;
+        most = square;
+        *at = i;
+    }
+    return most;
+}
+
+/* The least circle around all of count <= 4 points that has the last on it: of the circles through
+   it and one or two others, the centre whose farthest point is nearest. The points it stands on
+   move to the front; returns their number. */
+static int dem2di_circle_update(dem2d_vec *p, int count, dem2d_vec *centre) {
+    dem2d_vec chosen[3] = {{0, 0}, {0, 0}, {0, 0}};
+    int best = 0, unused = 0, n = count - 1;
+    double least = 0;
+    for (int i = 0; i < n; i++)
+        for (int j = i; j < n; j++) { /* j = i: a circle of two points */
+            dem2d_vec through[3], c;
+            through[0] = p[n];
+            through[1] = p[i];
+            through[2] = p[j];
+            int size = j > i ? 3 : 2;
+            if (!dem2di_circle_through(through, size, &c)) continue;
+            double square = dem2di_farthest_point(p, count, c, &unused);
+            if (best > 0 && !(square < least)) continue;
+            best = size;
+            least = square;
+            *centre = c;
+            memcpy(chosen, through, sizeof chosen);
+        }
+    memcpy(p, chosen, (size_t)best * sizeof *p);
+    return best;
+}
+
+/* Least circle around the hull (Elzinga and Hearn): the circle of two or three corners grows by
+   the corner farthest outside, until there is none or rounding stops the growth. */
+static void dem2di_circumscribe(const dem2d_vec *hull, int count, const int ends[2],
+                                dem2d_outline_info *info) {
+    dem2d_vec stand[4], centre = {0, 0}, found;
+    int size = 2, at = 0;
+    stand[0] = hull[ends[0]];
+    stand[1] = hull[ends[1]];
+    (void)dem2di_circle_through(stand, 2, &centre);
+    double inner = dem2di_farthest_point(stand, 2, centre, &at);
+    double outer = dem2di_farthest_point(hull, count, centre, &at);
+    while (outer > inner) {
+        stand[size] = hull[at];
+        int next = dem2di_circle_update(stand, size + 1, &found);
+        double grown = dem2di_farthest_point(stand, next, found, &at);
+        if (!(grown > inner * (1 + 8 * DBL_EPSILON))) break; /* no more than rounding */
+        double around = dem2di_farthest_point(hull, count, found, &at);
+        size = next;
+        inner = grown;
+        centre = found;
+        outer = around;
+    }
+    info->circumscribed = sqrt(outer);
+    info->circumscribed_at = centre;
+}
+
+/* --- the greatest circle inside --------------------------------------------------------------- */
+
+/* A side seen from the centre of a cell. */
+typedef struct dem2di_view_side {
+    dem2d_vec offset; /* from its nearest point to the centre */
+    double square;    /* of the offset's length */
+    int side;
+} dem2di_view_side;
+
+typedef struct dem2di_inscribe {
+    const dem2di_side *sides;
+    int count;
+    dem2di_view_side *seen; /* the sides that matter to a cell come first */
+    double best, tolerance; /* m */
+    dem2d_vec at;
+} dem2di_inscribe;
+
+/* Is p inside, when this side is nearest? By the side alone, or, when the nearest point is a
+   corner, by both of its sides: a convex corner wants p left of both, another left of one. */
+static bool dem2di_inside_of(const dem2di_inscribe *in, int k, dem2d_vec p) {
+    const dem2di_side *side = &in->sides[k];
+    dem2d_vec v = dem2di_sub(p, side->a);
+    double t = dem2di_dot(v, side->e) * side->inverse;
+    bool left = dem2di_cross(side->e, v) > 0;
+    if (t > 0 && t < 1) return left;
+    int n = in->count, other = t > 0 ? (k + 1) % n : (k + n - 1) % n;
+    const dem2di_side *beside = &in->sides[other];
+    bool left_too = dem2di_cross(beside->e, dem2di_sub(p, beside->a)) > 0;
+    double turn = dem2di_cross(side->e, beside->e); /* in the order of the sides: */
+    bool convex = t > 0 ? turn >= 0 : turn <= 0;
+    return convex ? left && left_too : left || left_too;
+}
+
+/* Upper bound of the distance from the boundary in the disc of radius s about the centre. With v_i
+   from boundary points to the centre, weights w_i >= 0 of sum 1 and |x| <= s:
+   min |v_i + x|^2 <= sum w_i |v_i|^2 + 2 s |sum w_i v_i| + s^2. Where boundary points pull in all
+   directions the middle term can vanish, and the bound is quadratic in s: few cells are left. The
+   weights come from steps of Gilbert's method towards the least |sum w_i v_i|. *pull is that sum,
+   a way towards greater distance. */
+static double dem2di_reach(const dem2di_inscribe *in, int count, int nearest, double s,
+                           dem2d_vec *pull) {
+    dem2d_vec sum = in->seen[nearest].offset;
+    double square = in->seen[nearest].square, bound = sqrt(square) + s;
+    *pull = sum;
+    for (int step = 0; step < 6 && bound > in->best + in->tolerance; step++) {
+        double length = dem2di_length(sum), least = DBL_MAX;
+        int chosen = nearest;
+        for (int i = 0; i < count && length > 0; i++) {
+            double value =
+                in->seen[i].square + 2 * s / length * dem2di_dot(sum, in->seen[i].offset);
+            if (value < least) least = value, chosen = i;
+        }
+        dem2d_vec apart = dem2di_sub(sum, in->seen[chosen].offset);
+        double w = dem2di_dot(sum, apart) / dem2di_dot(apart, apart);
+        if (!(w > 0)) break; /* nothing lowers it; also 0 / 0 */
+        if (w > 1) w = 1;
+        sum = dem2di_along(sum, -w, apart);
+        square += w * (in->seen[chosen].square - square);
+        double lower = sqrt(square + 2 * s * dem2di_length(sum) + s * s);
+        if (!(lower < bound)) break;
+        bound = lower;
+        *pull = sum;
+    }
+    return bound;
+}
+
+/* Sides that can be nearest somewhere in the cell, to the front. */
+static int dem2di_seen_keep(dem2di_inscribe *in, int count, double limit) {
+    int kept = 0;
+    for (int i = 0; i < count; i++) {
+        if (in->seen[i].square > limit * limit) continue;
+        dem2di_view_side one = in->seen[i];
+        in->seen[i] = in->seen[kept];
+        in->seen[kept++] = one;
+    }
+    return kept;
+}
+
+/* Branch and bound in a square cell; `count` sides of the list can be nearest in it. The cells of
+   a cell permute only its part of the list. The quarter uphill comes first. */
+static void dem2di_inscribe_cell(dem2di_inscribe *in, dem2d_vec centre, double half, int count,
+                                 int depth) {
+    int nearest = 0;
+    for (int i = 0; i < count; i++) {
+        dem2di_view_side *one = &in->seen[i];
+        one->offset = dem2di_side_offset(&in->sides[one->side], centre);
+        one->square = dem2di_dot(one->offset, one->offset);
+        if (one->square < in->seen[nearest].square) nearest = i;
+    }
+    /* 1.4143 is just above the square root of 2 */
+    double distance = sqrt(in->seen[nearest].square), s = 1.4143 * half, bound = s - distance;
+    dem2d_vec uphill = dem2di_negate(in->seen[nearest].offset);
+    if (dem2di_inside_of(in, in->seen[nearest].side, centre)) {
+        if (distance > in->best) {
+            in->best = distance;
+            in->at = centre;
+        }
+        bound = dem2di_reach(in, count, nearest, s, &uphill);
+    }
+    if (bound <= in->best + in->tolerance || depth == 0) return;
+    count = dem2di_seen_keep(in, count, distance + 2 * s);
+    double x = uphill.x < 0 ? -half / 2 : half / 2, y = uphill.y < 0 ? -half / 2 : half / 2;
+    bool level = fabs(uphill.x) > fabs(uphill.y);
+    for (int k = 0; k < 4; k++) { /* last the quarter downhill, the flatter neighbour second */
+        bool flip = k == 1 || k == 3, other = k >= 2;
+        dem2d_vec c = dem2di_vec(centre.x + ((level ? other : flip) ? -x : x),
+                                 centre.y + ((level ? flip : other) ? -y : y));
+        dem2di_inscribe_cell(in, c, half / 2, count, depth - 1);
+    }
+}
+
+/* The greatest circle inside, to 1e-6 of the greatest diameter. Cells shrink to a quarter of that
+   at least: 22 halvings; a circle that is smaller is not found, the best so far is. */
+static bool dem2di_inscribed(const dem2d_env *env, const dem2di_side *sides, int count,
+                             dem2d_outline_info *info) {
+    dem2di_inscribe in;
+    dem2d_vec low = sides[0].a, high = sides[0].a;
+    in.seen = (dem2di_view_side *)dem2di_allocate(env, (size_t)count, sizeof *in.seen);
+    if (in.seen == NULL) return false;
+    for (int i = 0; i < count; i++) {
+        in.seen[i].side = i;
+        low = dem2di_vec(dem2di_min(low.x, sides[i].a.x), dem2di_min(low.y, sides[i].a.y));
+        high = dem2di_vec(dem2di_max(high.x, sides[i].a.x), dem2di_max(high.y, sides[i].a.y));
+    }
+    in.sides = sides;
+    in.count = count;
+    in.best = 0;
+    in.at = dem2di_vec(0, 0);
+    in.tolerance = 1e-6 * info->feret_max;
+    double half = dem2di_max(high.x - low.x, high.y - low.y) / 2;
+    dem2di_inscribe_cell(&in, dem2di_along(low, 0.5, dem2di_sub(high, low)), half, count, 22);
+    dem2di_release(env, in.seen, (size_t)count, sizeof *in.seen);
+    info->inscribed = in.best;
+    info->inscribed_at = dem2di_add(info->mass.centroid, in.at);
+    return true;
+}
+
+/* --- roundness -------------------------------------------------------------------------------- */
+
+/* Samples along an outline, so many for each turn of the greatest circle inside, and the passes of
+   a mean over five that smooth them: a standard deviation of sqrt(3 (25 - 1) / 12) = 2.45 samples,
+   2 pi 2.45 / 320 = 5 % of that circle's radius. On grains about 120 pixels across that is three
+   pixels: the staircase goes, the corners stay. Of 200 to 512 per turn, all of which follow the
+   published roundness of real grains as well, 320 leaves the least offset. */
+#define DEM2DI_SAMPLES_PER_TURN 320
+#define DEM2DI_SAMPLES                                                        \
+    2048 /* at most, the time grows as the square: needles get a coarser step \
+          */
+#define DEM2DI_PASSES 3
+
+/* Equal steps along the sides. */
+static void dem2di_resample(const dem2di_side *sides, int count, double perimeter,
+                            dem2d_vec *samples, int n) {
+    int k = 0;
+    double start = 0, length = dem2di_length(sides[0].e);
+    for (int i = 0; i < n; i++) {
+        double place = perimeter * i / n;
+        while (k + 1 < count && place > start + length) {
+            start += length;
+            length = dem2di_length(sides[++k].e);
+        }
+        samples[i] = dem2di_along(sides[k].a, dem2di_min((place - start) / length, 1), sides[k].e);
+    }
+}
+
+static void dem2di_smooth(dem2d_vec *samples, dem2d_vec *spare, int n) {
+    for (int pass = 0; pass < DEM2DI_PASSES; pass++) {
+        memcpy(spare, samples, (size_t)n * sizeof *spare);
+        for (int i = 0; i < n; i++) {
+            dem2d_vec sum = spare[i];
+            for (int j = 1; j <= 2; j++) {
+                sum = dem2di_add(sum, spare[i + j < n ? i + j : i + j - n]);
+                sum = dem2di_add(sum, spare[i >= j ? i - j : i - j + n]);
+            }
+            samples[i] = dem2di_scale(sum, 0.2);
+        }
+    }
+}
+
+/* Radius of the greatest disc inside that touches at sample i: through sample j, on the inner
+   normal n, it is |v|^2 / (2 n.v) with v to the sample; the least of all. At a corner that is the
+   radius of curvature, elsewhere what the opposite side leaves. Compares fractions: no division. */
+static double dem2di_touching_radius(const dem2d_vec *samples, int n, int i, dem2d_vec normal) {
+    double square = 1, across = 0;
+    for (int j = 0; j < n; j++) {
+        double x = samples[j].x - samples[i].x, y = samples[j].y - samples[i].y;
+        double s = normal.x * x + normal.y * y, d = x * x + y * y;
+        if (s * square > across * d) {
+            square = d;
+            across = s;
+        }
+    }
+    return across > 0 ? square / (2 * across) : DBL_MAX;
+}
+
+/* Wadell's roundness without a choice of corners: corners are where the touching disc is smaller
+   than the greatest one inside, and every direction that a corner turns through counts alike. A
+   corner that is an arc counts with its radius, as in Wadell's mean. samples is room for twice
+   DEM2DI_SAMPLES. */
+static double dem2di_roundness(const dem2di_side *sides, int count, double perimeter,
+                               double inscribed, dem2d_vec *samples) {
+    double sum = 0, all = 0, turns = perimeter / (2 * DEM2DI_PI * inscribed);
+    double most = (double)DEM2DI_SAMPLES / DEM2DI_SAMPLES_PER_TURN;
+    int n = turns < most ? (int)(turns * DEM2DI_SAMPLES_PER_TURN) : DEM2DI_SAMPLES;
+    if (!(inscribed > 0)) return 0; /* too thin to tell */
+    dem2di_resample(sides, count, perimeter, samples, n);
+    dem2di_smooth(samples, samples + DEM2DI_SAMPLES, n);
+    for (int i = 0; i < n; i++) {
+        dem2d_vec before = samples[i > 0 ? i - 1 : n - 1], after = samples[i + 1 < n ? i + 1 : 0];
+        dem2d_vec in = dem2di_sub(samples[i], before), out = dem2di_sub(after, samples[i]), normal;
+        dem2d_rot rotation;
+        rotation.c = dem2di_dot(in, out);
+        rotation.s = dem2di_cross(in, out);
+        if (!(rotation.s > 0)) continue; /* hollow or straight */
+        if (!dem2di_unit(dem2di_perp(dem2di_sub(after, before)), &normal)) continue;
+        double radius = dem2di_touching_radius(samples, n, i, normal);
+        if (!(radius < inscribed)) continue;
+        double turn = dem2d_rot_angle(rotation);
+        sum += turn * radius;
+        all += turn;
+    }
+    return all > 0 ? sum / all / inscribed : 1;
+}
+
+/* All but the mass; room holds count + 2 DEM2DI_SAMPLES points. */
+static dem2d_result dem2di_measure(const dem2d_env *env, const dem2d_vec *points, int count,
+                                   dem2di_side *sides, dem2d_vec *room, dem2d_outline_info *info) {
+    int corners = 0, ends[2] = {0, 0};
+    dem2d_vec *hull = room + 2 * DEM2DI_SAMPLES;
+    dem2d_result result = dem2d_polygon_hull(env, points, count, hull, &corners);
+    if (result != DEM2D_OK) return result;
+    for (int i = 0; i < corners; i++) hull[i] = dem2di_sub(hull[i], info->mass.centroid);
+    dem2di_calipers(hull, corners, info, ends);
+    dem2di_circumscribe(hull, corners, ends, info);
+    info->circumscribed_at = dem2di_add(info->circumscribed_at, info->mass.centroid);
+    info->solidity = info->mass.area / (dem2di_twice_area(hull, corners) / 2);
+    info->sphericity = info->feret_min / info->feret_max;
+    info->aspect = info->feret_max / info->feret_min;
+    int n = dem2di_sides_make(points, count, info->mass.centroid, sides);
+    for (int i = 0; i < n; i++) info->perimeter += dem2di_length(sides[i].e);
+    info->circularity = 4 * DEM2DI_PI * info->mass.area / (info->perimeter * info->perimeter);
+    if (!dem2di_inscribed(env, sides, n, info))
+        return dem2di_fail(env, DEM2D_OUT_OF_MEMORY, -1, "inscribed circle of %d sides", n);
+    info->roundness = dem2di_roundness(sides, n, info->perimeter, info->inscribed, room);
+    return DEM2D_OK;
+}
+
+DEM2D_API dem2d_result dem2d_outline_measure(const dem2d_env *env, const dem2d_vec *points,
+                                             int count, dem2d_outline_info *info) {
+    dem2d_outline_info found;
+    memset(&found, 0, sizeof found);
+    if (info == NULL) return dem2di_fail_null(env, "info");
+    dem2d_result result = dem2di_check_outline(env, "points", points, count, &found.mass);
+    if (result != DEM2D_OK) return result;
+    size_t n = (size_t)count, size = n + 2 * DEM2DI_SAMPLES;
+    dem2di_side *sides = (dem2di_side *)dem2di_allocate(env, n, sizeof *sides);
+    dem2d_vec *room = sides != NULL ? (dem2d_vec *)dem2di_allocate(env, size, sizeof *room) : NULL;
+    if (room != NULL)
+        result = dem2di_measure(env, points, count, sides, room, &found);
+    else
+        result = dem2di_fail(env, DEM2D_OUT_OF_MEMORY, -1, "measures of %d points", count);
+    dem2di_release(env, room, size, sizeof *room);
+    dem2di_release(env, sides, n, sizeof *sides);
+    if (result == DEM2D_OK) *info = found;
+    return result;
+}
+
+/* --- area of the symmetric difference --------------------------------------------------------- */
+
+/* A side that is not level, from its lower end up. */
+typedef struct dem2di_rise {
+    double y, x, top, end; /* from (x, y) to (end, top) */
+    double slope;          /* change of x over change of y */
+    int of;                /* outline 0 or 1 */
+} dem2di_rise;
+
+/* A number to sort by and what it belongs to. */
+typedef struct dem2di_level {
+    double y;
+    int rise;
+} dem2di_level;
+
+/* A rise in the slab between two levels: x on the lower and on the upper one. */
+typedef struct dem2di_strand {
+    double low, high;
+    int rise, of;
+} dem2di_strand;
+
+/* Room for two outlines of `room` points together. */
+typedef struct dem2di_slabs {
+    dem2di_rise *rises;
+    dem2di_level *levels; /* 2 room */
+    int *ends;            /* of sorted runs */
+    dem2di_strand *strands;
+    int count; /* of rises */
+    size_t room;
+} dem2di_slabs;
+
+static void dem2di_slabs_release(const dem2d_env *env, dem2di_slabs *slabs) {
+    dem2di_release(env, slabs->rises, slabs->room, sizeof *slabs->rises);
+    dem2di_release(env, slabs->levels, 2 * slabs->room, sizeof *slabs->levels);
+    dem2di_release(env, slabs->ends, slabs->room, sizeof *slabs->ends);
+    dem2di_release(env, slabs->strands, slabs->room, sizeof *slabs->strands);
+}
+
+static bool dem2di_slabs_make(const dem2d_env *env, size_t room, dem2di_slabs *slabs) {
+    memset(slabs, 0, sizeof *slabs);
+    slabs->room = room;
+    slabs->rises = (dem2di_rise *)dem2di_allocate(env, room, sizeof *slabs->rises);
+    if (slabs->rises != NULL)
+        slabs->levels = (dem2di_level *)dem2di_allocate(env, 2 * room, sizeof *slabs->levels);
+    if (slabs->levels != NULL) slabs->ends = (int *)dem2di_allocate(env, room, sizeof *slabs->ends);
+    if (slabs->ends != NULL)
+        slabs->strands = (dem2di_strand *)dem2di_allocate(env, room, sizeof *slabs->strands);
+    if (slabs->strands != NULL) return true;
+    dem2di_slabs_release(env, slabs);
+    return false;
+}
+
+/* The same side of both outlines gives the same numbers, whichever way round they are. */
+static void dem2di_slabs_add(dem2di_slabs *slabs, const dem2d_vec *points, int count,
+                             dem2d_vec origin, int of) {
+    dem2d_vec from = dem2di_sub(points[count - 1], origin);
+    for (int i = 0; i < count; i++) {
+        dem2d_vec to = dem2di_sub(points[i], origin);
+        bool up = from.y < to.y;
+        if (up || from.y > to.y) {
+            dem2di_rise *rise = &slabs->rises[slabs->count];
+            rise->x = up ? from.x : to.x;
+            rise->y = up ? from.y : to.y;
+            rise->end = up ? to.x : from.x;
+            rise->top = up ? to.y : from.y;
+            rise->slope = (rise->end - rise->x) / (rise->top - rise->y);
+            rise->of = of;
+            slabs->levels[slabs->count].y = rise->y;
+            slabs->levels[slabs->count].rise = slabs->count;
+            slabs->count++;
+        }
+        from = to;
+    }
+}
+
+/* Ends of the ascending runs; descending ones are turned first. */
+static int dem2di_level_runs(dem2di_level *levels, int count, int *ends) {
+    int runs = 0;
+    for (int i = 0; i < count;) {
+        int j = i + 1;
+        bool falls = j < count && levels[j].y < levels[i].y;
+        while (j < count && (levels[j].y < levels[j - 1].y) == falls) j++;
+        for (int a = i, b = j - 1; falls && a < b; a++, b--) {
+            dem2di_level level = levels[a];
+            levels[a] = levels[b];
+            levels[b] = level;
+        }
+        ends[runs++] = i = j;
+    }
+    return runs;
+}
+
+/* Merge sort that begins with the runs it finds: outlines go up and down only a few times. */
+static const dem2di_level *dem2di_levels_sort(dem2di_level *levels, int count, int *ends) {
+    dem2di_level *from = levels, *to = levels + count;
+    int runs = dem2di_level_runs(levels, count, ends);
+    while (runs > 1) {
+        int merged = 0, start = 0;
+        for (int r = 0; r < runs; r += 2) {
+            int middle = ends[r], end = r + 1 < runs ? ends[r + 1] : middle;
+            for (int i = start, j = middle, k = start; k < end; k++)
+                to[k] = j == end || (i < middle && from[i].y <= from[j].y) ? from[i++] : from[j++];
+            ends[merged++] = start = end;
+        }
+        runs = merged;
+        dem2di_level *swap = from;
+        from = to;
+        to = swap;
+    }
+    return from;
+}
+
+/* Length inside one outline but not the other on the lower and the upper level, in this order. */
+static dem2d_vec dem2di_strands_width(const dem2di_strand *strands, int count) {
+    dem2d_vec width = {0, 0};
+    bool in[2] = {false, false};
+    for (int i = 0; i + 1 < count; i++) {
+        in[strands[i].of] = !in[strands[i].of];
+        if (in[0] == in[1]) continue;
+        width.x += strands[i + 1].low - strands[i].low;
+        width.y += strands[i + 1].high - strands[i].high;
+    }
+    return width;
+}
+
+/* The difference in a slab of height 1. The strands are in order on its lower level; from crossing
+   to crossing the width is linear. Each crossing puts one pair into the order of the upper
+   level. */
+static double dem2di_slab_area(dem2di_strand *strands, int count) {
+    double area = 0, at = 0;
+    for (;;) {
+        int swap = -1;
+        double next = 1;
+        for (int i = 0; i + 1 < count; i++) {
+            double low = strands[i + 1].low - strands[i].low;
+            double high = strands[i + 1].high - strands[i].high;
+            if (!(high < 0)) continue;
+            double t = low / (low - high); /* rounding must not lead back */
+            t = t > at ? dem2di_min(t, 1) : at;
+            if (swap >= 0 && !(t < next)) continue;
+            swap = i;
+            next = t;
+        }
+        dem2d_vec width = dem2di_strands_width(strands, count);
+        double middle = (at + next) / 2;
+        area += (next - at) * (width.x + middle * (width.y - width.x));
+        if (swap < 0) return area;
+        dem2di_strand one = strands[swap];
+        strands[swap] = strands[swap + 1];
+        strands[swap + 1] = one;
+        at = next;
+    }
+}
+
+/* Before a slab: the strands that end there leave, the others go on from where they were. */
+static int dem2di_strands_advance(const dem2di_slabs *slabs, int count, double y) {
+    int kept = 0;
+    for (int i = 0; i < count; i++) {
+        dem2di_strand one = slabs->strands[i];
+        if (slabs->rises[one.rise].top <= y) continue;
+        one.low = one.high;
+        slabs->strands[kept++] = one;
+    }
+    return kept;
+}
+
+/* x on the upper level, then the order of the lower one: by insertion, as it is nearly there. Equal
+   ones in the wrong order for the upper level are the first crossings. */
+static void dem2di_strands_order(const dem2di_slabs *slabs, int count, double y) {
+    dem2di_strand *strands = slabs->strands;
+    for (int i = 0; i < count; i++) {
+        dem2di_strand one = strands[i];
+        const dem2di_rise *rise = &slabs->rises[one.rise];
+        one.high = y < rise->top ? rise->x + rise->slope * (y - rise->y) : rise->end;
+        int k = i;
+        for (; k > 0 && strands[k - 1].low > one.low; k--) strands[k] = strands[k - 1];
+        strands[k] = one;
+    }
+}
+
+/* Area inside just one of the outlines: between the levels of neighbouring corners all sides are
+   straight, so slab by slab it is exact. */
+static double dem2di_slabs_area(dem2di_slabs *slabs) {
+    const dem2di_level *levels = dem2di_levels_sort(slabs->levels, slabs->count, slabs->ends);
+    double area = 0;
+    int count = 0, next = 0;
+    double y = 0;
+    while (next < slabs->count || count > 0) {
+        double top = next < slabs->count ? levels[next].y : DBL_MAX;
+        if (count == 0) y = top;
+        for (; next < slabs->count && levels[next].y <= y; next++) {
+            dem2di_strand *one = &slabs->strands[count++];
+            one->rise = levels[next].rise;
+            one->of = slabs->rises[one->rise].of;
+            one->low = one->high = slabs->rises[one->rise].x;
+        }
+        top = next < slabs->count ? levels[next].y : DBL_MAX;
+        for (int i = 0; i < count; i++)
+            top = dem2di_min(top, slabs->rises[slabs->strands[i].rise].top);
+        dem2di_strands_order(slabs, count, top);
+        area += (top - y) * dem2di_slab_area(slabs->strands, count);
+        y = top;
+        count = dem2di_strands_advance(slabs, count, y);
+    }
+    return area;
+}
+
+/* --- Hausdorff distance ----------------------------------------------------------------------- */
+
+/* Sides of an outline in groups of neighbours with a box around each. */
+typedef struct dem2di_fence {
+    dem2di_side *sides;
+    dem2d_vec *boxes; /* low and high corner of each group */
+    int count;
+} dem2di_fence;
+
+/* Per group: a box costs about as much as a side, outlines have about 1000 sides, and the total is
+   least near the square root. */
+#define DEM2DI_GROUP 32
+
+static void dem2di_fence_boxes(dem2di_fence *fence) {
+    for (int i = 0; i < fence->count; i++) {
+        dem2d_vec a = fence->sides[i].a, b = dem2di_add(a, fence->sides[i].e);
+        dem2d_vec *box = &fence->boxes[2 * (i / DEM2DI_GROUP)];
+        if (i % DEM2DI_GROUP == 0) box[0] = box[1] = a;
+        box[0].x = dem2di_min(box[0].x, dem2di_min(a.x, b.x));
+        box[0].y = dem2di_min(box[0].y, dem2di_min(a.y, b.y));
+        box[1].x = dem2di_max(box[1].x, dem2di_max(a.x, b.x));
+        box[1].y = dem2di_max(box[1].y, dem2di_max(a.y, b.y));
+    }
+}
+
+/* Nearest side, if it is nearer than `square` at side k; no further once within `enough`. */
+static int dem2di_fence_nearest(const dem2di_fence *fence, dem2d_vec p, int k, double enough,
+                                double *square) {
+    for (int start = 0; *square > enough && start < fence->count; start += DEM2DI_GROUP) {
+        const dem2d_vec *box = &fence->boxes[2 * (start / DEM2DI_GROUP)];
+        double x = dem2di_max(0, dem2di_max(box[0].x - p.x, p.x - box[1].x));
+        double y = dem2di_max(0, dem2di_max(box[0].y - p.y, p.y - box[1].y));
+        if (x * x + y * y >= *square) continue;
+        int end = fence->count - start > DEM2DI_GROUP ? start + DEM2DI_GROUP : fence->count;
+        for (int i = start; i < end; i++) {
+            double found = dem2di_side_square(&fence->sides[i], p);
+            if (!(found < *square)) continue;
+            *square = found;
+            k = i;
+        }
+    }
+    return k;
+}
+
+/* Greatest of `most` and the squares of the distances of corners from a fence. The nearest side is
+   sought by walking on from the last corner's; only where that leaves the distance above `most`
+   are all sides asked. */
+static double dem2di_fence_farthest(const dem2di_fence *fence, const dem2di_side *corners,
+                                    int count, double most) {
+    int n = fence->count, k = 0;
+    for (int i = 0; i < count; i++) {
+        dem2d_vec p = corners[i].a;
+        double square = dem2di_side_square(&fence->sides[k], p);
+        for (int way = 0; way < 2; way++)
+            for (;;) {
+                int next = way == 0 ? (k + 1 < n ? k + 1 : 0) : (k > 0 ? k - 1 : n - 1);
+                double found = dem2di_side_square(&fence->sides[next], p);
+                if (!(found < square)) break;
+                square = found;
+                k = next;
+            }
+        if (square > most) k = dem2di_fence_nearest(fence, p, k, most, &square);
+        most = dem2di_max(most, square);
+    }
+    return most;
+}
+
+/* Greatest distance of a corner of one from the other. */
+static bool dem2di_hausdorff(const dem2d_env *env, const dem2d_vec *a, int a_count,
+                             const dem2d_vec *b, int b_count, double *distance) {
+    dem2di_fence fence[2];
+    size_t room = (size_t)a_count + (size_t)b_count;
+    size_t groups = 2 * (room / DEM2DI_GROUP + 2); /* each outline may have one not full */
+    dem2di_side *sides = (dem2di_side *)dem2di_allocate(env, room, sizeof *sides);
+    dem2d_vec *boxes = NULL;
+    if (sides != NULL) boxes = (dem2d_vec *)dem2di_allocate(env, groups, sizeof *boxes);
+    if (boxes != NULL) {
+        fence[0].sides = sides;
+        fence[0].boxes = boxes;
+        fence[0].count = dem2di_sides_make(a, a_count, a[0], sides);
+        fence[1].sides = sides + a_count;
+        fence[1].boxes = boxes + 2 * ((a_count - 1) / DEM2DI_GROUP + 1);
+        fence[1].count = dem2di_sides_make(b, b_count, a[0], fence[1].sides);
+        for (int i = 0; i < 2; i++) dem2di_fence_boxes(&fence[i]);
+        double most = dem2di_fence_farthest(&fence[1], fence[0].sides, fence[0].count, 0);
+        most = dem2di_fence_farthest(&fence[0], fence[1].sides, fence[1].count, most);
+        *distance = sqrt(most);
+    }
+    dem2di_release(env, boxes, groups, sizeof *boxes);
+    dem2di_release(env, sides, room, sizeof *sides);
+    return boxes != NULL;
+}
+
+DEM2D_API dem2d_result dem2d_outline_compare(const dem2d_env *env, const dem2d_vec *reference,
+                                             int reference_count, const dem2d_vec *other,
+                                             int other_count, dem2d_difference *difference) {
+    dem2d_mass mass, unused;
+    dem2di_slabs slabs;
+    dem2d_difference found = {0, 0, 0};
+    if (difference == NULL) return dem2di_fail_null(env, "difference");
+    dem2d_result result = dem2di_check_outline(env, "reference", reference, reference_count, &mass);
+    if (result != DEM2D_OK) return result;
+    result = dem2di_check_outline(env, "other", other, other_count, &unused);
+    if (result != DEM2D_OK) return result;
+    bool room = other_count < INT_MAX - reference_count &&
+                dem2di_slabs_make(env, (size_t)reference_count + (size_t)other_count, &slabs);
+    if (room) {
+        dem2di_slabs_add(&slabs, reference, reference_count, reference[0], 0);
+        dem2di_slabs_add(&slabs, other, other_count, reference[0], 1);
+        found.area = dem2di_slabs_area(&slabs);
+        dem2di_slabs_release(env, &slabs);
+        found.coverage = 1 - found.area / mass.area;
+        room =
+            dem2di_hausdorff(env, reference, reference_count, other, other_count, &found.hausdorff);
+    }
+    if (!room)
+        return dem2di_fail(env, DEM2D_OUT_OF_MEMORY, -1, "difference of %d and %d points",
+                           reference_count, other_count);
+    *difference = found;
+    return DEM2D_OK;
+}
+
+/* ============================================================================================
+   >>fitting  Templates from outlines, and virtual grains
+   uses: config, math, memory, hull, series, support, mass, shapes, outlines
    ============================================================================================ */
 
 /* An outline made ready: counter-clockwise, relative to the centroid of its hull. */
@@ -2814,16 +4008,37 @@ static int dem2di_arc_crossings(const dem2di_arc *arc, dem2d_vec p, dem2d_vec ed
     return found;
 }
 
+/* Adds the loop of the arc from t0 to t1 and the outline's sweep beside it: its area, and how that
+   changes with both fractions: the arc sweeps dB x B', of degree 5 again. */
+static void dem2di_section_loop(const dem2di_section *section, const dem2di_arc *arc, double t0,
+                                double t1, double loop, double *area, double slope[2]) {
+    double sweep = dem2di_arc_sweep(arc, t0, t1) - loop, half = (t1 - t0) / 2;
+    double sign = sweep < 0 ? -1 : 1;
+    *area += fabs(sweep);
+    for (int i = -1; i <= 1; i++) {
+        double t = (t0 + t1) / 2 + i * half * 0.7745966692414833770, s = 1 - t; /* sqrt(3/5) */
+        double weight = sign * half * (i == 0 ? 8.0 : 5.0) / 9;
+        dem2d_vec speed = dem2di_add(dem2di_along(dem2di_scale(arc->d0, s * s), 2 * t * s, arc->d1),
+                                     dem2di_scale(arc->d2, t * t));
+        slope[0] +=
+            weight * 9 * t * s * s * section->l1 * dem2di_cross(section->from->tangent, speed);
+        slope[1] -=
+            weight * 9 * t * t * s * section->l2 * dem2di_cross(section->to->tangent, speed);
+    }
+}
+
 /* Area between arc and outline: the two cross in points that cut both into loops; the area of
    each loop is the difference of two sweeps. Exact when arc and outline meet the crossings in
    one order. */
-static double dem2di_section_area(const dem2di_section *section, double f1, double f2) {
+static double dem2di_section_area(const dem2di_section *section, const double f[2],
+                                  double slope[2]) {
     const dem2di_outline *outline = section->outline;
-    dem2di_arc arc = dem2di_section_arc(section, f1, f2);
+    dem2di_arc arc = dem2di_section_arc(section, f[0], f[1]);
     dem2d_vec origin = section->from->point, p = dem2di_vec(0, 0);
     double area = 0, loop = 0, last = 0, t[2];
     int place = section->from->place;
     int inner = (section->to->place - place + outline->count) % outline->count + 1;
+    slope[0] = slope[1] = 0;
     for (int i = 0; i <= inner; i++) { /* the outline's points, then the second joint */
         dem2d_vec q =
             i < inner ? outline->points[(place + i) % outline->count] : section->to->point;
@@ -2832,7 +4047,7 @@ static double dem2di_section_area(const dem2di_section *section, double f1, doub
         for (int j = 0; j < found; j++) {
             dem2d_vec x = dem2di_arc_point(&arc, t[j]);
             loop += dem2di_cross(p, x) / 2;
-            area += fabs(dem2di_arc_sweep(&arc, last, t[j]) - loop);
+            dem2di_section_loop(section, &arc, last, t[j], loop, &area, slope);
             last = t[j];
             loop = 0;
             p = x;
@@ -2840,30 +4055,236 @@ static double dem2di_section_area(const dem2di_section *section, double f1, doub
         loop += dem2di_cross(p, q) / 2;
         p = q;
     }
-    return area + fabs(dem2di_arc_sweep(&arc, last, 1) - loop);
+    dem2di_section_loop(section, &arc, last, 1, loop, &area, slope);
+    return area;
 }
 
-/* Least area over both fractions in [0.05, 1] by compass search: eight directions, halved steps.
-   0.05 keeps the tangents at the joints, 1 the control polygon convex. */
-static void dem2di_fit_section(const dem2di_section *section, double f[2]) {
-    static const int way[8][2] = {{1, 0}, {0, 1},   {-1, 0}, {0, -1},
-                                  {1, 1}, {-1, -1}, {1, -1}, {-1, 1}};
-    double best = dem2di_section_area(section, f[0], f[1]);
-    for (double step = 0.2; step > 1e-4;) { /* 1e-4 of the lengths: area to second order, 1e-8 */
-        bool better = false;
-        for (int i = 0; i < 8; i++) {
-            double g[2];
-            for (int j = 0; j < 2; j++)
-                g[j] = dem2di_max(0.05, dem2di_min(1, f[j] + step * way[i][j]));
-            double area = dem2di_section_area(section, g[0], g[1]);
-            if (!(area < best)) continue;
-            best = area;
-            f[0] = g[0];
-            f[1] = g[1];
-            better = true;
+/* Fractions stay in [1e-4, 1]: 1e-4 keeps the tangents at the joints, 1 the control polygon
+   convex. */
+static double dem2di_fraction(double f) {
+    return dem2di_max(1e-4, dem2di_min(1, f));
+}
+
+/* One step down along -H slope, halved until the area falls; false when it does not within 2^-12.
+   A fraction at its bound that would leave stays. */
+static bool dem2di_section_descend(const dem2di_section *section, double inverse[3], double f[2],
+                                   double slope[2], double *area) {
+    double d[2], g[2], next[2];
+    d[0] = -(inverse[0] * slope[0] + inverse[1] * slope[1]);
+    d[1] = -(inverse[1] * slope[0] + inverse[2] * slope[1]);
+    for (double factor = 1; factor > 1.0 / 4096; factor /= 2) {
+        for (int j = 0; j < 2; j++) g[j] = dem2di_fraction(f[j] + factor * d[j]);
+        double value = dem2di_section_area(section, g, next);
+        if (!(value < *area)) continue;
+        /* Broyden, Fletcher, Goldfarb, Shanno: H from the change of slopes */
+        double s0 = g[0] - f[0], s1 = g[1] - f[1], y0 = next[0] - slope[0], y1 = next[1] - slope[1];
+        double sy = s0 * y0 + s1 * y1;
+        if (sy > 0) {
+            double h0 = inverse[0] * y0 + inverse[1] * y1, h1 = inverse[1] * y0 + inverse[2] * y1;
+            double scale = (1 + (y0 * h0 + y1 * h1) / sy) / sy;
+            inverse[0] += scale * s0 * s0 - 2 * s0 * h0 / sy;
+            inverse[1] += scale * s0 * s1 - (s0 * h1 + s1 * h0) / sy;
+            inverse[2] += scale * s1 * s1 - 2 * s1 * h1 / sy;
         }
-        if (!better) step /= 2;
+        memcpy(f, g, 2 * sizeof *f);
+        memcpy(slope, next, 2 * sizeof *slope);
+        *area = value;
+        return fabs(s0) + fabs(s1) > 1e-6; /* of the lengths: area to second order, 1e-12 */
     }
+    return false;
+}
+
+/* Least area over both fractions: quasi-Newton steps, begun afresh from the last place until that
+   brings nothing more. Returns the number of areas computed, about. */
+static int dem2di_fit_section(const dem2di_section *section, double f[2]) {
+    double slope[2], area = dem2di_section_area(section, f, slope);
+    int steps = 0;
+    for (int restart = 0; restart < 4; restart++) {
+        double begin = area, steep = dem2di_length(dem2di_vec(slope[0], slope[1]));
+        if (!(steep > 0)) break;
+        double inverse[3];
+        inverse[0] = inverse[2] = 0.1 / steep; /* a first step of a tenth of the lengths */
+        inverse[1] = 0;
+        for (int i = 0; i < 30; i++) {
+            steps++;
+            if (!dem2di_section_descend(section, inverse, f, slope, &area)) break;
+        }
+        if (begin - area <= 1e-6 * begin) break;
+    }
+    return steps;
+}
+
+/* ---- the paper's fit: particle swarm on the overlap of pixels ---- */
+
+/* A random number in [0, 1) from a 64-bit counter: an odd step, and two multiplications with
+   shifts between (S. Vigna's splitmix64). */
+static double dem2di_random(uint64_t *state) {
+    uint64_t x = *state += 0x9E3779B97F4A7C15u;
+    x = (x ^ (x >> 30)) * 0xBF58476D1CE4E5B9u;
+    x = (x ^ (x >> 27)) * 0x94D049BB133111EBu;
+    return (double)((x ^ (x >> 31)) >> 11) / 9007199254740992.0; /* 2^53 */
+}
+
+/* The picture of one section: pixels inside its outline closed by the chord. */
+typedef struct dem2di_raster {
+    dem2d_vec lower;     /* corner of pixel (0, 0) */
+    double pixel;        /* m */
+    int width, height;   /* px */
+    unsigned char *mask; /* height rows */
+    unsigned char *row;  /* width + 1, scratch */
+} dem2di_raster;
+
+#define DEM2DI_SWARM_PIXELS 256 /* across the circle of the grain's size, as in a photograph */
+#define DEM2DI_SWARM_POINTS 48  /* chords of an arc: flatter than a pixel at that size */
+
+/* One row of the closed polygon's picture into raster->row. */
+static void dem2di_raster_row(const dem2di_raster *raster, const dem2d_vec *points, int count,
+                              int y) {
+    double height = raster->lower.y + (y + 0.5) * raster->pixel;
+    memset(raster->row, 0, (size_t)raster->width + 1);
+    dem2d_vec p = points[count - 1];
+    for (int i = 0; i < count; i++) {
+        dem2d_vec q = points[i];
+        if ((p.y <= height) != (q.y <= height)) {
+            double x = p.x + (height - p.y) / (q.y - p.y) * (q.x - p.x);
+            double column = ceil((x - raster->lower.x) / raster->pixel - 0.5);
+            column = dem2di_max(0, dem2di_min(raster->width, column));
+            raster->row[(int)column] ^= 1;
+        }
+        p = q;
+    }
+    for (int x = 1; x <= raster->width; x++) raster->row[x] ^= raster->row[x - 1];
+}
+
+/* Pixels in which the arc's picture differs from the section's. */
+static int dem2di_raster_cost(const dem2di_raster *raster, const dem2di_arc *arc) {
+    dem2d_vec points[DEM2DI_SWARM_POINTS + 1];
+    int cost = 0;
+    for (int i = 0; i <= DEM2DI_SWARM_POINTS; i++)
+        points[i] = dem2di_arc_point(arc, (double)i / DEM2DI_SWARM_POINTS);
+    for (int y = 0; y < raster->height; y++) {
+        const unsigned char *mask = raster->mask + (size_t)y * (size_t)raster->width;
+        dem2di_raster_row(raster, points, DEM2DI_SWARM_POINTS + 1, y);
+        for (int x = 0; x < raster->width; x++) cost += raster->row[x] != mask[x];
+    }
+    return cost;
+}
+
+/* Swarm of thirty that share their best place, sixty moves; inertia and attractions by M. Clerc
+   and J. Kennedy's constriction for 2.05 + 2.05. */
+static void dem2di_swarm_search(const dem2di_section *section, const dem2di_raster *raster,
+                                uint64_t *random, double f[2]) {
+    enum { SWARM = 30, MOVES = 60 };
+    const double inertia = 0.7298437881283576, pull = 1.4961797656631331;
+    struct {
+        double x[2], v[2], best[2];
+        int cost;
+    } bird[SWARM];
+    int least = INT_MAX;
+    memset(bird, 0, sizeof bird);
+    for (int move = 0; move <= MOVES; move++)
+        for (int i = 0; i < SWARM; i++) {
+            for (int j = 0; j < 2; j++) {
+                double r1 = dem2di_random(random), r2 = dem2di_random(random), *x = bird[i].x;
+                bird[i].v[j] = inertia * bird[i].v[j] + pull * r1 * (bird[i].best[j] - x[j]) +
+                               pull * r2 * (f[j] - x[j]);
+                x[j] = dem2di_fraction(move == 0 ? r1 : x[j] + bird[i].v[j]);
+                if (move == 0) bird[i].v[j] = 0;
+            }
+            dem2di_arc arc = dem2di_section_arc(section, bird[i].x[0], bird[i].x[1]);
+            int cost = dem2di_raster_cost(raster, &arc);
+            if (move == 0 || cost < bird[i].cost) {
+                bird[i].cost = cost;
+                memcpy(bird[i].best, bird[i].x, sizeof bird[i].best);
+            }
+            if (cost < least) {
+                least = cost;
+                memcpy(f, bird[i].x, 2 * sizeof *f);
+            }
+        }
+}
+
+/* [P] sec. 4 step 4 for one section. iterations counts moves of the swarm. */
+static dem2d_result dem2di_swarm_section(const dem2d_env *env, const dem2di_section *section,
+                                         uint64_t *random, double f[2], int *iterations) {
+    const dem2di_outline *outline = section->outline;
+    int place = section->from->place;
+    int inner = (section->to->place - place + outline->count) % outline->count + 1;
+    dem2d_vec origin = section->from->point;
+    dem2d_vec corner = dem2di_scale(section->from->tangent, section->l1);
+    dem2d_vec lower = dem2di_vec(dem2di_min(0, corner.x), dem2di_min(0, corner.y));
+    dem2d_vec upper = dem2di_vec(dem2di_max(0, corner.x), dem2di_max(0, corner.y));
+    size_t count = (size_t)inner + 2;
+    dem2d_vec *points = (dem2d_vec *)dem2di_allocate(env, count, sizeof *points);
+    if (points == NULL) return dem2di_fail(env, DEM2D_OUT_OF_MEMORY, -1, "a section's picture");
+    points[0] = dem2di_vec(0, 0);
+    for (int i = 0; i <= inner; i++) {
+        dem2d_vec q =
+            i < inner ? outline->points[(place + i) % outline->count] : section->to->point;
+        points[i + 1] = q = dem2di_sub(q, origin);
+        lower = dem2di_vec(dem2di_min(lower.x, q.x), dem2di_min(lower.y, q.y));
+        upper = dem2di_vec(dem2di_max(upper.x, q.x), dem2di_max(upper.y, q.y));
+    }
+    dem2di_raster raster;
+    raster.lower = lower;
+    raster.pixel = 2 * outline->radius / DEM2DI_SWARM_PIXELS;
+    /* a needle may be much longer than the circle of its size */
+    raster.pixel =
+        dem2di_max(raster.pixel, dem2di_max(upper.x - lower.x, upper.y - lower.y) / 2048);
+    raster.width = (int)ceil((upper.x - lower.x) / raster.pixel) + 1;
+    raster.height = (int)ceil((upper.y - lower.y) / raster.pixel) + 1;
+    size_t width = (size_t)raster.width, pixels = width * (size_t)raster.height + width + 1;
+    raster.mask = (unsigned char *)dem2di_allocate(env, pixels, 1);
+    if (raster.mask != NULL) {
+        raster.row = raster.mask + width * (size_t)raster.height;
+        for (int y = 0; y < raster.height; y++) {
+            dem2di_raster_row(&raster, points, (int)count, y);
+            memcpy(raster.mask + (size_t)y * width, raster.row, width);
+        }
+        dem2di_swarm_search(section, &raster, random, f);
+        *iterations += 60;
+    }
+    dem2di_release(env, points, count, sizeof *points);
+    if (raster.mask == NULL)
+        return dem2di_fail(env, DEM2D_OUT_OF_MEMORY, -1, "a section's picture");
+    dem2di_release(env, raster.mask, pixels, 1);
+    return DEM2D_OK;
+}
+
+/* [P] sec. 4 on an outline made ready, relative to its centre. With a seed by the particle swarm,
+ * else by exact area. */
+static dem2d_result dem2di_bezier_fit(const dem2d_env *env, const dem2di_outline *outline, int arcs,
+                                      const uint64_t *seed, dem2d_vec *control, int *iterations) {
+    size_t count = (size_t)arcs;
+    dem2di_joint *joints = (dem2di_joint *)dem2di_allocate(env, count, sizeof *joints);
+    if (joints == NULL) return dem2di_fail(env, DEM2D_OUT_OF_MEMORY, -1, "%d joints", arcs);
+    dem2di_joints_make(outline, arcs, joints);
+    dem2di_round_corners(outline, joints, arcs);
+    /* start from the arc of a circle: x/l = (4/3) tan(phi/4) / tan(phi/2), phi = 2 pi/arcs */
+    dem2d_rot quarter = dem2d_rot_make(DEM2DI_PI / (2 * arcs)), half;
+    half = dem2d_rot_make(DEM2DI_PI / arcs);
+    double circle = 4.0 / 3 * (quarter.s / quarter.c) * (half.c / half.s);
+    dem2d_result result = DEM2D_OK;
+    uint64_t random = seed != NULL ? *seed : 0;
+    for (int i = 0; i < arcs && result == DEM2D_OK; i++) {
+        double f[2] = {circle, circle};
+        dem2di_section section;
+        section.outline = outline;
+        section.from = &joints[i];
+        section.to = &joints[(i + 1) % arcs];
+        dem2di_tangent_lengths(section.from, section.to, &section.l1, &section.l2);
+        if (seed != NULL)
+            result = dem2di_swarm_section(env, &section, &random, f, iterations);
+        else
+            *iterations += dem2di_fit_section(&section, f);
+        dem2di_arc arc = dem2di_section_arc(&section, f[0], f[1]);
+        dem2d_vec joint = section.from->point;
+        control[3 * i] = joint;
+        control[3 * i + 1] = dem2di_add(joint, arc.d0);
+        control[3 * i + 2] = dem2di_add(joint, dem2di_add(arc.d0, arc.d1));
+    }
+    dem2di_release(env, joints, count, sizeof *joints);
+    return result;
 }
 
 DEM2D_API dem2d_result dem2d_bezier_fit(const dem2d_env *env, const dem2d_vec *points, int count,
@@ -2872,35 +4293,719 @@ DEM2D_API dem2d_result dem2d_bezier_fit(const dem2d_env *env, const dem2d_vec *p
     if (arcs < 3 || arcs > (1 << 20))
         return dem2di_fail(env, DEM2D_OUT_OF_RANGE, arcs, "arcs = %d", arcs);
     dem2di_outline outline;
+    int iterations = 0;
     dem2d_result result = dem2di_outline_make(env, points, count, &outline);
     if (result != DEM2D_OK) return result;
-    dem2di_joint *joints = (dem2di_joint *)dem2di_allocate(env, (size_t)arcs, sizeof *joints);
-    if (joints == NULL) {
-        dem2di_outline_release(env, &outline);
-        return dem2di_fail(env, DEM2D_OUT_OF_MEMORY, -1, "%d joints", arcs);
-    }
-    dem2di_joints_make(&outline, arcs, joints);
-    dem2di_round_corners(&outline, joints, arcs);
-    /* start from the arc of a circle: x/l = (4/3) tan(phi/4) / tan(phi/2), phi = 2 pi/arcs */
-    dem2d_rot quarter = dem2d_rot_make(DEM2DI_PI / (2 * arcs)), half;
-    half = dem2d_rot_make(DEM2DI_PI / arcs);
-    double circle = 4.0 / 3 * (quarter.s / quarter.c) * (half.c / half.s);
-    for (int i = 0; i < arcs; i++) {
-        double f[2] = {circle, circle};
-        dem2di_section section;
-        section.outline = &outline;
-        section.from = &joints[i];
-        section.to = &joints[(i + 1) % arcs];
-        dem2di_tangent_lengths(section.from, section.to, &section.l1, &section.l2);
-        dem2di_fit_section(&section, f);
-        dem2di_arc arc = dem2di_section_arc(&section, f[0], f[1]);
-        dem2d_vec joint = dem2di_add(section.from->point, outline.centre);
-        control[3 * i] = joint;
-        control[3 * i + 1] = dem2di_add(joint, arc.d0);
-        control[3 * i + 2] = dem2di_add(joint, dem2di_add(arc.d0, arc.d1));
-    }
-    dem2di_release(env, joints, (size_t)arcs, sizeof *joints);
+    result = dem2di_bezier_fit(env, &outline, arcs, NULL, control, &iterations);
+    for (int i = 0; i < 3 * arcs; i++) control[i] = dem2di_add(control[i], outline.centre);
     dem2di_outline_release(env, &outline);
+    return result;
+}
+
+/* Least objective by compass search: each coordinate in turn up and down by its step; steps are
+   halved when nothing helps, until they are `least` of what they were. */
+typedef double dem2di_objective_fn(void *data, const double *x);
+
+static int dem2di_compass(dem2di_objective_fn *objective, void *data, double *x,
+                          const double *steps, int count, double least) {
+    double best = objective(data, x);
+    int calls = 1;
+    for (double factor = 1; factor > least;) {
+        bool better = false;
+        for (int i = 0; i < 2 * count; i++) {
+            double old = x[i / 2];
+            x[i / 2] += (i % 2 == 0 ? factor : -factor) * steps[i / 2];
+            double value = objective(data, x);
+            calls++;
+            if (value < best) {
+                best = value;
+                better = true;
+            } else {
+                x[i / 2] = old;
+            }
+        }
+        if (!better) factor /= 2;
+    }
+    return calls;
+}
+
+/* ---- Fourier series with rho >= margin: the nearest series in the mean square ---- */
+
+/* The coefficients of a convex polygon's support function, closed form: rho is its edge lengths
+   at the edge normals, p_n = rho_n / (1 - n^2); n = 1 is the Steiner point, an integral over the
+   normals of each corner. */
+static void dem2di_hull_series(const dem2di_outline *outline, int order, double *a, double *b) {
+    int n = outline->hull_count;
+    for (int k = 0; k <= order; k++) a[k] = b[k] = 0;
+    dem2d_vec last, unit;
+    (void)dem2di_unit(dem2di_sub(outline->hull[0], outline->hull[n - 1]), &last);
+    last = dem2di_negate(dem2di_perp(last));
+    for (int i = 0; i < n; i++) {
+        dem2d_vec corner = outline->hull[i], edge = dem2di_sub(outline->hull[(i + 1) % n], corner);
+        double length = dem2di_length(edge);
+        (void)dem2di_unit(edge, &unit);
+        dem2d_rot z, turn;
+        z.c = unit.y;
+        z.s = -unit.x; /* the edge's outward normal */
+        turn.c = last.x * z.c + last.y * z.s;
+        turn.s = last.x * z.s - last.y * z.c;
+        double angle = dem2d_rot_angle(turn);
+        double sine = z.c * z.s - last.x * last.y; /* of twice the angle, / 2 */
+        double cosine = last.x * last.x - last.y * last.y - z.c * z.c + z.s * z.s;
+        dem2d_vec power = dem2di_vec(1, 0);
+        a[0] += length / DEM2DI_PI;
+        for (int k = 1; k <= order; k++) {
+            power = dem2di_turn(z, power);
+            double weight = k == 1 ? 0 : length / DEM2DI_PI / (1 - (double)k * k);
+            a[k] += weight * power.x;
+            b[k] += weight * power.y;
+        }
+        if (order >= 1) {
+            a[1] += (corner.x * (angle + sine) + corner.y * cosine / 2) / (2 * DEM2DI_PI);
+            b[1] += (corner.x * cosine / 2 + corner.y * (angle - sine)) / (2 * DEM2DI_PI);
+        }
+        last = dem2di_vec(z.c, z.s);
+    }
+}
+
+/* The search for the nearest series: angles where rho is held at the margin, with multipliers. */
+typedef struct dem2di_nearest_series {
+    int order, count, room;
+    double margin;         /* of a0/2 */
+    const double *a0, *b0; /* unconstrained */
+    double *a, *b;
+    double *angle, *multiplier, *gap, *trial; /* room */
+    double *matrix, *factor;                  /* room x room */
+    bool *held;                               /* room: the multiplier may be above 0 */
+} dem2di_nearest_series;
+
+/* Product of the constraints at two angles: the metric is the mean square of p, in which a0/2
+   counts twice as much as the other coefficients. */
+static double dem2di_constraint_product(const dem2di_nearest_series *s, double angle) {
+    dem2d_rot z = dem2d_rot_make(angle);
+    dem2d_vec power = dem2di_vec(z.c, z.s);
+    double sum = (1 - s->margin) * (1 - s->margin) / 2;
+    for (int n = 2; n <= s->order; n++) {
+        power = dem2di_turn(z, power);
+        sum += (1 - (double)n * n) * (1 - (double)n * n) * power.x;
+    }
+    return sum;
+}
+
+/* a, b = unconstrained + sum of multipliers times constraints. */
+static void dem2di_nearest_apply(dem2di_nearest_series *s) {
+    memcpy(s->a, s->a0, ((size_t)s->order + 1) * sizeof *s->a);
+    memcpy(s->b, s->b0, ((size_t)s->order + 1) * sizeof *s->b);
+    for (int i = 0; i < s->count; i++) {
+        if (s->multiplier[i] == 0) continue;
+        dem2d_rot z = dem2d_rot_make(s->angle[i]);
+        dem2d_vec power = dem2di_vec(z.c, z.s);
+        s->a[0] += s->multiplier[i] * (1 - s->margin); /* twice the change of a0/2 */
+        for (int n = 2; n <= s->order; n++) {
+            power = dem2di_turn(z, power);
+            s->a[n] += s->multiplier[i] * (1 - (double)n * n) * power.x;
+            s->b[n] += s->multiplier[i] * (1 - (double)n * n) * power.y;
+        }
+    }
+}
+
+/* rho - margin a0/2 at an angle, and its slope. */
+static double dem2di_slack(const dem2di_nearest_series *s, const double *a, const double *b,
+                           double angle, double *slope) {
+    double d[3], value;
+    dem2di_series radius;
+    memset(&radius, 0, sizeof radius);
+    radius.a = a;
+    radius.b = b;
+    radius.order = s->order;
+    radius.radius = true;
+    radius.sign = 1;
+    value = dem2di_series_value(&radius, angle, d);
+    *slope = d[0];
+    return value - s->margin * a[0] / 2;
+}
+
+/* Multipliers of the constraints in `held` with which their slack is 0: Cholesky's factors of the
+   symmetric system, row by row. A pivot that rounding has eaten belongs to a constraint that hangs
+   on the others: it gets 0. */
+static void dem2di_nearest_equal(dem2di_nearest_series *s, const bool *held, double *x) {
+    int n = s->count, room = s->room;
+    double *factor = s->factor;
+    for (int i = 0; i < n; i++) {
+        double *row = &factor[i * room];
+        x[i] = held[i] ? -s->gap[i] : 0;
+        for (int j = 0; j <= i; j++) {
+            double sum = held[i] && held[j] ? s->matrix[i * room + j] : 0;
+            for (int k = 0; k < j; k++) sum -= row[k] * factor[j * room + k];
+            if (j < i) {
+                row[j] = factor[j * room + j] > 0 ? sum / factor[j * room + j] : 0;
+                x[i] -= row[j] * x[j];
+            } else {
+                row[i] = sum > 1e-12 * s->matrix[0] ? sqrt(sum) : 0; /* eps times a few hundred */
+                x[i] = row[i] > 0 ? x[i] / row[i] : 0;
+            }
+        }
+    }
+    for (int i = n - 1; i >= 0; i--) {
+        double sum = x[i];
+        for (int k = i + 1; k < n; k++) sum -= factor[k * room + i] * x[k];
+        x[i] = factor[i * room + i] > 0 ? sum / factor[i * room + i] : 0;
+    }
+}
+
+/* Multipliers >= 0 with which no constraint is violated (C. Lawson and R. Hanson, Solving Least
+   Squares Problems, ch. 23): hold the most violated one; where a multiplier would turn negative,
+   go as far as it allows and let go of it. */
+static void dem2di_nearest_solve(dem2di_nearest_series *s) {
+    double unused, scale = s->a0[0], *x = s->trial;
+    int n = s->count, last = -1;
+    for (int i = 0; i < n; i++) {
+        s->gap[i] = dem2di_slack(s, s->a0, s->b0, s->angle[i], &unused);
+        for (int j = 0; j <= i; j++)
+            s->matrix[i * s->room + j] = s->matrix[j * s->room + i] =
+                dem2di_constraint_product(s, s->angle[i] - s->angle[j]);
+        s->held[i] = s->multiplier[i] > 0;
+    }
+    for (int pass = 0; pass < 3 * n + 3; pass++) {
+        for (int inner = 0; inner <= n; inner++) {
+            double step = 1;
+            dem2di_nearest_equal(s, s->held, x);
+            for (int i = 0; i < n; i++)
+                if (s->held[i] && x[i] <= 0) {
+                    double way = s->multiplier[i] - x[i];
+                    step = dem2di_min(step, way > 0 ? s->multiplier[i] / way : 0);
+                }
+            for (int i = 0; i < n; i++) {
+                if (!s->held[i]) continue;
+                s->multiplier[i] += step * (x[i] - s->multiplier[i]);
+                if (x[i] > 0 || s->multiplier[i] > 1e-14 * scale) continue;
+                s->multiplier[i] = 0;
+                s->held[i] = false;
+            }
+            if (step == 1) break;
+        }
+        int worst = -1;
+        double violation = -1e-11 * scale;
+        for (int i = 0; i < n; i++) {
+            if (s->held[i]) continue;
+            double slack = s->gap[i];
+            for (int j = 0; j < n; j++) slack += s->matrix[i * s->room + j] * s->multiplier[j];
+            if (slack >= violation) continue;
+            violation = slack;
+            worst = i;
+        }
+        if (worst < 0 || worst == last) break; /* done, or let go of again at once */
+        s->held[worst] = true;
+        last = worst;
+    }
+    dem2di_nearest_apply(s);
+}
+
+/* The minimum of the slack next to a sample that is below its neighbours: halving by the slope. */
+static double dem2di_slack_minimum(const dem2di_nearest_series *s, double low, double high) {
+    double slope;
+    for (int i = 0; i < 40; i++) { /* 2^-40 of the spacing of samples */
+        double middle = (low + high) / 2;
+        (void)dem2di_slack(s, s->a, s->b, middle, &slope);
+        if (slope < 0)
+            low = middle;
+        else
+            high = middle;
+    }
+    return (low + high) / 2;
+}
+
+/* A constraint at an angle; one that is there already, within `near`, only moves. */
+static void dem2di_constrain(dem2di_nearest_series *s, double angle, double near) {
+    for (int i = 0; i < s->count; i++) {
+        double apart = fabs(s->angle[i] - angle);
+        if (dem2di_min(apart, 2 * DEM2DI_PI - apart) >= near) continue;
+        s->angle[i] = angle;
+        return;
+    }
+    if (s->count == s->room) return;
+    s->angle[s->count] = angle;
+    s->multiplier[s->count++] = 0;
+}
+
+/* Exchange of constraints: those that no longer push are dropped, the minima of rho below the
+   margin are added, until rho is nowhere below the margin by more than the tolerance. A new
+   minimum takes the place of one close by, which converges fast; where two such minima are needed
+   that would go round in circles, so later ones stand beside. */
+static int dem2di_nearest_search(dem2di_nearest_series *s) {
+    int samples = 16 * s->order + 16, round = 0;
+    double width = 2 * DEM2DI_PI / samples, slope;
+    for (; round < 40; round++) {
+        int kept = 0;
+        double worst = 0, last, here, next;
+        for (int i = 0; i < s->count; i++) {
+            if (s->multiplier[i] == 0) continue;
+            s->angle[kept] = s->angle[i];
+            s->multiplier[kept++] = s->multiplier[i];
+        }
+        s->count = kept;
+        last = dem2di_slack(s, s->a, s->b, -width, &slope);
+        here = dem2di_slack(s, s->a, s->b, 0, &slope);
+        for (int i = 0; i < samples; i++, last = here, here = next) {
+            next = dem2di_slack(s, s->a, s->b, (i + 1) * width, &slope);
+            if (here > last || here > next || here > 0.05 * s->a[0]) continue;
+            double angle = dem2di_slack_minimum(s, (i - 1) * width, (i + 1) * width);
+            double value = dem2di_slack(s, s->a, s->b, angle, &slope);
+            worst = dem2di_min(worst, value);
+            if (value < 0) dem2di_constrain(s, angle, (round < 20 ? 0.1 : 1e-3) * width);
+        }
+        if (worst >= -1e-5 * s->a[0]) break; /* the rest is made up for by a0 */
+        dem2di_nearest_solve(s);
+    }
+    return round;
+}
+
+/* The series nearest to (a, b) with rho >= margin a0/2; order >= 2. In place. */
+static dem2d_result dem2di_constrain_series(const dem2d_env *env, double *a, double *b, int order,
+                                            double margin, int *iterations) {
+    dem2di_nearest_series s;
+    s.order = order;
+    s.margin = margin;
+    s.count = 0;
+    s.room = 8 * order + 16; /* at most `order` minima, each held by a few points */
+    size_t room = (size_t)s.room, terms = (size_t)order + 1;
+    size_t cells = 2 * terms + 5 * room + 2 * room * room; /* the flags fit into the fifth */
+    double *memory = (double *)dem2di_allocate(env, cells, sizeof *memory);
+    if (memory == NULL) return dem2di_fail(env, DEM2D_OUT_OF_MEMORY, -1, "order %d", order);
+    s.a0 = memory;
+    s.b0 = memory + terms;
+    memcpy(memory, a, terms * sizeof *memory);
+    memcpy(memory + terms, b, terms * sizeof *memory);
+    s.a = a;
+    s.b = b;
+    s.angle = memory + 2 * terms;
+    s.multiplier = s.angle + room;
+    s.gap = s.multiplier + room;
+    s.trial = s.gap + room;
+    s.matrix = s.trial + room;
+    s.factor = s.matrix + room * room;
+    s.held = (bool *)(void *)(s.factor + room * room);
+    *iterations += dem2di_nearest_search(&s);
+    dem2di_release(env, memory, cells, sizeof *memory);
+    dem2di_series radius = dem2di_series_make(a, b, order, true, 1);
+    double least = dem2di_series_minimum(&radius, DEM2DI_SERIES_TOLERANCE * radius.size).lower;
+    double missing = margin * a[0] / 2 - least;
+    if (missing > 0) a[0] += 2 * missing / (1 - margin);
+    return DEM2D_OK;
+}
+
+/* ---- fits of all models, with a report ---- */
+
+/* A fit under way. */
+typedef struct dem2di_fit {
+    const dem2d_env *env;
+    const dem2d_vec *points; /* as given */
+    int point_count;
+    dem2di_outline outline;
+    dem2d_mass mass; /* of the outline, about outline.centre */
+    const dem2d_fit_desc *desc;
+    int count;            /* being tried */
+    dem2d_vec *buffer;    /* candidate outline: DEM2DI_FIT_POINTS */
+    dem2d_result trouble; /* of a comparison */
+    dem2d_shape *shape;
+    dem2d_fit_report report;
+} dem2di_fit;
+
+/* Points of a smooth candidate's outline: its area is short by (2 pi/1440)^2/6 = 3e-6. */
+#define DEM2DI_FIT_POINTS 1440
+
+static bool dem2di_fit_resize(const dem2di_fit *fit, double *a, double *b, int order) {
+    double target = fit->desc->scale == DEM2D_SCALE_GRAIN
+                        ? fit->mass.area
+                        : dem2di_twice_area(fit->outline.hull, fit->outline.hull_count) / 2;
+    if (fit->desc->scale == DEM2D_SCALE_NONE) return true;
+    double area = a[0] * a[0] / 4;
+    for (int n = 2; n <= order; n++) area += (1 - (double)n * n) * (a[n] * a[n] + b[n] * b[n]) / 2;
+    if (!(area > 0)) return false;
+    double factor = sqrt(target / (DEM2DI_PI * area));
+    for (int n = 0; n <= order; n++) {
+        if (n == 1) continue; /* about the Steiner point */
+        a[n] *= factor;
+        b[n] *= factor;
+    }
+    return true;
+}
+
+static dem2d_result dem2di_fit_fourier(dem2di_fit *fit) {
+    int order = fit->count;
+    const dem2d_fit_desc *desc = fit->desc;
+    size_t terms = (size_t)order + 1;
+    double *a = (double *)dem2di_allocate(fit->env, terms, 2 * sizeof *a), *b = a + terms;
+    if (a == NULL) return dem2di_fail(fit->env, DEM2D_OUT_OF_MEMORY, -1, "order %d", order);
+    dem2d_result result = DEM2D_OK;
+    dem2d_reduction_desc reduction = {DEM2D_SUFFICIENT, 0, 0};
+    int steps = 0;
+    if (desc->method == DEM2D_FIT_REDUCTION || desc->method == DEM2D_FIT_REDUCTION_EXACT) {
+        if (desc->method == DEM2D_FIT_REDUCTION_EXACT) reduction.test = DEM2D_EXACT;
+        result =
+            dem2d_fourier_fit(fit->env, fit->outline.points, fit->outline.count, order, 0, a, b);
+        if (result == DEM2D_OK) result = dem2d_fourier_reduce(a, b, order, &reduction, &steps);
+    } else {
+        dem2di_hull_series(&fit->outline, order, a, b);
+        double margin = desc->corners ? 0 : desc->min_radius == 0 ? 0.1 : desc->min_radius;
+        for (int n = 2; n <= order && desc->method == DEM2D_FIT_FEJER; n++) {
+            a[n] *= 1 - n / (order + 1.0);
+            b[n] *= 1 - n / (order + 1.0);
+        }
+        if (desc->method != DEM2D_FIT_FEJER && order >= 2)
+            result = dem2di_constrain_series(fit->env, a, b, order, margin, &steps);
+        if (result == DEM2D_OK) (void)dem2di_fit_resize(fit, a, b, order);
+    }
+    fit->report.iterations += steps;
+    if (result == DEM2D_OK) result = dem2d_shape_create_fourier(fit->env, a, b, order, &fit->shape);
+    dem2di_release(fit->env, a, terms, 2 * sizeof *a);
+    return result;
+}
+
+static dem2d_result dem2di_fit_bezier(dem2di_fit *fit) {
+    size_t count = 3 * (size_t)fit->count;
+    dem2d_vec *control = (dem2d_vec *)dem2di_allocate(fit->env, count, sizeof *control);
+    if (control == NULL)
+        return dem2di_fail(fit->env, DEM2D_OUT_OF_MEMORY, -1, "%d arcs", fit->count);
+    const uint64_t *seed = fit->desc->method == DEM2D_FIT_SWARM ? &fit->desc->seed : NULL;
+    dem2d_result result = dem2di_bezier_fit(fit->env, &fit->outline, fit->count, seed, control,
+                                            &fit->report.iterations);
+    if (result == DEM2D_OK)
+        result = dem2d_shape_create_bezier(fit->env, control, fit->count, &fit->shape);
+    dem2di_release(fit->env, control, count, sizeof *control);
+    return result;
+}
+
+/* Difference of a candidate's outline from the grain's. */
+static double dem2di_fit_difference(dem2di_fit *fit, const dem2d_vec *points, int count) {
+    dem2d_difference difference;
+    dem2d_result result = dem2d_outline_compare(fit->env, fit->outline.points, fit->outline.count,
+                                                points, count, &difference);
+    if (result == DEM2D_OK) return difference.area;
+    fit->trouble = result;
+    return HUGE_VAL;
+}
+
+/* x: centre, half axes, angle. A hundred and twenty points lose 5e-4 of an ellipse's area alike
+   for all candidates; the ellipse of their polygon's area is taken for the points. */
+static double dem2di_ellipse_objective(void *data, const double *x) {
+    enum { POINTS = 120 };
+    dem2di_fit *fit = (dem2di_fit *)data;
+    if (!(x[2] > 0 && x[3] > 0)) return HUGE_VAL;
+    dem2d_rot q = dem2d_rot_make(x[4]), step = dem2d_rot_make(2 * DEM2DI_PI / POINTS);
+    double swell = sqrt(2 * DEM2DI_PI / POINTS / step.s);
+    dem2d_vec z = dem2di_vec(1, 0), centre = dem2di_vec(x[0], x[1]);
+    for (int i = 0; i < POINTS; i++) {
+        dem2d_vec p = dem2di_vec(swell * x[2] * z.x, swell * x[3] * z.y);
+        fit->buffer[i] = dem2di_add(centre, dem2di_turn(q, p));
+        z = dem2di_turn(step, z);
+    }
+    return dem2di_fit_difference(fit, fit->buffer, POINTS);
+}
+
+/* From the hull's moments: half axes of the ellipse with its area and second moments. */
+static dem2d_result dem2di_fit_ellipse(dem2di_fit *fit) {
+    double xx = 0, xy = 0, yy = 0, size = fit->outline.radius;
+    const dem2d_vec *hull = fit->outline.hull;
+    for (int i = 0; i < fit->outline.hull_count; i++) {
+        dem2d_vec p = hull[i], q = hull[(i + 1) % fit->outline.hull_count];
+        double sweep = dem2di_cross(p, q) / 12;
+        xx += sweep * (p.x * p.x + p.x * q.x + q.x * q.x);
+        yy += sweep * (p.y * p.y + p.y * q.y + q.y * q.y);
+        xy += sweep * (p.x * p.y + q.x * q.y + (p.x * q.y + q.x * p.y) / 2);
+    }
+    dem2d_rot twice;
+    twice.c = xx - yy;
+    twice.s = 2 * xy;
+    double root = dem2di_length(dem2di_vec(twice.c, twice.s));
+    double ratio = sqrt(sqrt((xx + yy + root) / (xx + yy - root)));
+    double x[5] = {0, 0, size * ratio, size / ratio, dem2d_rot_angle(twice) / 2};
+    double steps[5] = {0.1 * size, 0.1 * size, 0.1 * size, 0.1 * size, 0.2};
+    fit->report.iterations += dem2di_compass(dem2di_ellipse_objective, fit, x, steps, 5, 1e-3);
+    if (fit->trouble != DEM2D_OK) return fit->trouble;
+    fit->report.pose.position = dem2di_vec(x[0], x[1]);
+    fit->report.pose.rotation = dem2d_rot_make(x[4]);
+    return dem2d_shape_create_ellipse(fit->env, x[2], x[3], &fit->shape);
+}
+
+/* Is the polygon strictly convex, counter-clockwise? */
+static bool dem2di_is_convex(const dem2d_vec *points, int count) {
+    for (int i = 0; i < count; i++) {
+        dem2d_vec a = dem2di_sub(points[(i + 1) % count], points[i]);
+        dem2d_vec b = dem2di_sub(points[(i + 2) % count], points[(i + 1) % count]);
+        double rounding = 1e-6 * dem2di_length(a) * dem2di_length(b); /* a corner of 1e-6 rad */
+        if (!(dem2di_cross(a, b) > rounding)) return false;
+    }
+    return dem2di_turns_once(points, count);
+}
+
+static double dem2di_polygon_objective(void *data, const double *x) {
+    dem2di_fit *fit = (dem2di_fit *)data;
+    for (int i = 0; i < fit->count; i++) fit->buffer[i] = dem2di_vec(x[2 * i], x[2 * i + 1]);
+    if (!dem2di_is_convex(fit->buffer, fit->count)) return HUGE_VAL;
+    return dem2di_fit_difference(fit, fit->buffer, fit->count);
+}
+
+/* Corners of the hull are dropped one by one, each time the one whose triangle with its
+   neighbours is least; the corners that are left then move to the least difference. */
+static dem2d_result dem2di_fit_polygon(dem2di_fit *fit) {
+    int n = fit->outline.hull_count, m = fit->count;
+    size_t room = 2 * (size_t)(n > m ? n : m);
+    double *x = (double *)dem2di_allocate(fit->env, room, 2 * sizeof *x), *steps = x + room;
+    if (x == NULL) return dem2di_fail(fit->env, DEM2D_OUT_OF_MEMORY, -1, "%d corners", n);
+    dem2d_vec *corners = fit->outline.hull;
+    if (n < m) { /* the hull itself has fewer corners */
+        fit->count = m = n;
+    }
+    for (int i = 0; i < n; i++) {
+        x[2 * i] = corners[i].x;
+        x[2 * i + 1] = corners[i].y;
+    }
+    while (n > m) {
+        int least = 0;
+        double area = HUGE_VAL;
+        for (int i = 0; i < n; i++) {
+            int j = (i + n - 1) % n, k = (i + 1) % n;
+            double lost = (x[2 * i] - x[2 * j]) * (x[2 * k + 1] - x[2 * j + 1]) -
+                          (x[2 * i + 1] - x[2 * j + 1]) * (x[2 * k] - x[2 * j]);
+            if (lost >= area) continue;
+            area = lost;
+            least = i;
+        }
+        n--;
+        memmove(&x[2 * least], &x[2 * least + 2], 2 * (size_t)(n - least) * sizeof *x);
+    }
+    for (int i = 0; i < 2 * m; i++) steps[i] = 0.1 * fit->outline.radius;
+    fit->report.iterations += dem2di_compass(dem2di_polygon_objective, fit, x, steps, 2 * m, 1e-3);
+    (void)dem2di_polygon_objective(fit, x);
+    dem2di_release(fit->env, x, room, 2 * sizeof *x);
+    if (fit->trouble != DEM2D_OK) return fit->trouble;
+    return dem2d_shape_create_polygon(fit->env, fit->buffer, m, 0, &fit->shape);
+}
+
+/* One template of the model with fit->count, and its report. */
+static dem2d_result dem2di_fit_once(dem2di_fit *fit) {
+    dem2d_result result = DEM2D_OUT_OF_RANGE;
+    fit->shape = NULL;
+    fit->report.pose = dem2d_pose_make(fit->mass.centroid.x, fit->mass.centroid.y, 0, 1);
+    if (fit->desc->model == DEM2D_CIRCLE)
+        result = dem2d_shape_create_circle(fit->env, sqrt(fit->mass.area / DEM2DI_PI), &fit->shape);
+    if (fit->desc->model == DEM2D_ELLIPSE) result = dem2di_fit_ellipse(fit);
+    if (fit->desc->model == DEM2D_POLYGON) result = dem2di_fit_polygon(fit);
+    if (fit->desc->model == DEM2D_BEZIER) result = dem2di_fit_bezier(fit);
+    if (fit->desc->model == DEM2D_FOURIER) result = dem2di_fit_fourier(fit);
+    if (result != DEM2D_OK) return result;
+    const dem2d_shape *shape = fit->shape;
+    bool placed = shape->type == DEM2D_CIRCLE || shape->type == DEM2D_ELLIPSE;
+    if (!placed) fit->report.pose.position = shape->offset;
+    int points = shape->type == DEM2D_POLYGON ? shape->count : DEM2DI_FIT_POINTS;
+    for (int i = 0; i < points; i++)
+        fit->buffer[i] = dem2di_place(&fit->report.pose, dem2di_outline_point(shape, i, points));
+    dem2d_difference difference;
+    result = dem2d_outline_compare(fit->env, fit->outline.points, fit->outline.count, fit->buffer,
+                                   points, &difference);
+    if (result != DEM2D_OK) {
+        dem2d_shape_destroy(fit->shape);
+        return result;
+    }
+    fit->report.count = fit->shape->count;
+    fit->report.coverage = difference.coverage;
+    fit->report.difference = difference.area;
+    fit->report.hausdorff = difference.hausdorff;
+    fit->report.convexity = shape->rho_min;
+    return DEM2D_OK;
+}
+
+#define DEM2DI_FIT_COUNT 64 /* the largest that is tried for a coverage, as declared */
+
+static dem2d_result dem2di_check_fit(const dem2d_env *env, const dem2d_fit_desc *desc) {
+    static const int least[DEM2D_SHAPE_TYPE_COUNT] = {0, 0, 3, 3, 0, 0};
+    dem2d_fit_method method = desc->method;
+    bool bezier = method == DEM2D_FIT_AREA || method == DEM2D_FIT_SWARM;
+    bool counted =
+        desc->model == DEM2D_POLYGON || desc->model == DEM2D_BEZIER || desc->model == DEM2D_FOURIER;
+    if ((int)desc->model < 0 || desc->model >= DEM2D_CUSTOM)
+        return dem2di_fail(env, DEM2D_OUT_OF_RANGE, -1, "model = %d", (int)desc->model);
+    if ((int)method < 0 || method > DEM2D_FIT_SWARM ||
+        (method != DEM2D_FIT_DEFAULT && desc->model != (bezier ? DEM2D_BEZIER : DEM2D_FOURIER)))
+        return dem2di_fail(env, DEM2D_OUT_OF_RANGE, -1, "method = %d is not one of the model's",
+                           (int)method);
+    if ((int)desc->scale < 0 || desc->scale > DEM2D_SCALE_NONE)
+        return dem2di_fail(env, DEM2D_OUT_OF_RANGE, -1, "scale = %d", (int)desc->scale);
+    dem2d_result result = dem2di_check_not_negative(env, "min_radius", desc->min_radius);
+    if (result == DEM2D_OK) result = dem2di_check_not_negative(env, "coverage", desc->coverage);
+    if (result != DEM2D_OK) return result;
+    if (desc->min_radius >= 1)
+        return dem2di_fail(env, DEM2D_OUT_OF_RANGE, -1, "min_radius = %g must be below 1",
+                           desc->min_radius);
+    if (!counted) return DEM2D_OK;
+    bool search = desc->count == 0 && desc->coverage > 0;
+    if (search && desc->coverage < 1) return DEM2D_OK;
+    if (search)
+        return dem2di_fail(env, DEM2D_OUT_OF_RANGE, -1, "coverage = %g must be below 1",
+                           desc->coverage);
+    if (desc->count >= (least[desc->model] > 1 ? least[desc->model] : 1) && desc->count <= 1024)
+        return DEM2D_OK;
+    return dem2di_fail(env, DEM2D_OUT_OF_RANGE, -1, "count = %d", desc->count);
+}
+
+/* The fit of a given count, or of the least one that has the coverage. */
+static dem2d_result dem2di_fit_counts(dem2di_fit *fit) {
+    const dem2d_fit_desc *desc = fit->desc;
+    bool counted = desc->model != DEM2D_CIRCLE && desc->model != DEM2D_ELLIPSE;
+    fit->count = desc->count;
+    if (!counted || desc->count > 0) return dem2di_fit_once(fit);
+    for (int count = desc->model == DEM2D_FOURIER ? 1 : 3; count <= DEM2DI_FIT_COUNT; count++) {
+        fit->count = count;
+        dem2d_result result = dem2di_fit_once(fit);
+        if (result != DEM2D_OK || fit->report.coverage >= desc->coverage) return result;
+        dem2d_shape_destroy(fit->shape);
+    }
+    return dem2di_fail(fit->env, DEM2D_NOT_REACHED, -1, "coverage %g: %g is the last reached",
+                       desc->coverage, fit->report.coverage);
+}
+
+DEM2D_API dem2d_result dem2d_outline_fit(const dem2d_env *env, const dem2d_vec *points, int count,
+                                         const dem2d_fit_desc *desc, dem2d_shape **shape,
+                                         dem2d_fit_report *report) {
+    if (desc == NULL || shape == NULL) return dem2di_fail_null(env, "desc or shape");
+    dem2d_result result = dem2di_check_fit(env, desc);
+    if (result != DEM2D_OK) return result;
+    dem2di_fit fit;
+    memset(&fit, 0, sizeof fit);
+    fit.env = env;
+    fit.desc = desc;
+    result = dem2di_outline_make(env, points, count, &fit.outline);
+    if (result != DEM2D_OK) return result;
+    double turn = dem2di_twice_area(fit.outline.points, count);
+    size_t room = DEM2DI_FIT_POINTS;
+    fit.buffer = (dem2d_vec *)dem2di_allocate(env, room, sizeof *fit.buffer);
+    if (fit.buffer == NULL)
+        result = dem2di_fail(env, DEM2D_OUT_OF_MEMORY, -1, "a candidate's outline");
+    else if (!(turn > DEM2DI_ROUNDING * fit.outline.radius * fit.outline.radius))
+        result = dem2di_fail(env, DEM2D_ZERO_AREA, -1, "the outline's area is %g", turn / 2);
+    if (result == DEM2D_OK) {
+        fit.mass = dem2di_polygon_mass(fit.outline.points, count);
+        result = dem2di_fit_counts(&fit);
+    }
+    if (result == DEM2D_OK) {
+        fit.report.pose.position = dem2di_add(fit.report.pose.position, fit.outline.centre);
+        fit.shape->offset = dem2di_vec(0, 0); /* the report says where it lies */
+        *shape = fit.shape;
+        if (report != NULL) *report = fit.report;
+    }
+    dem2di_release(env, fit.buffer, room, sizeof *fit.buffer);
+    dem2di_outline_release(env, &fit.outline);
+    return result;
+}
+
+/* Distance from the origin to the outermost crossing of the outline with a ray. */
+static double dem2di_ray_reach(const dem2d_vec *points, int count, dem2d_vec centre, dem2d_vec u) {
+    double reach = 0;
+    dem2d_vec p = dem2di_sub(points[count - 1], centre);
+    for (int i = 0; i < count; i++) {
+        dem2d_vec q = dem2di_sub(points[i], centre);
+        double sp = dem2di_cross(u, p), sq = dem2di_cross(u, q);
+        if ((sp <= 0) != (sq <= 0)) {
+            double along = dem2di_dot(u, p) + sp / (sp - sq) * dem2di_dot(u, dem2di_sub(q, p));
+            reach = dem2di_max(reach, along);
+        }
+        p = q;
+    }
+    return reach;
+}
+
+DEM2D_API dem2d_result dem2d_radial_compare(const dem2d_env *env, const dem2d_vec *points,
+                                            int count, int order, dem2d_difference *difference) {
+    enum { POINTS = DEM2DI_FIT_POINTS };
+    if (difference == NULL) return dem2di_fail_null(env, "difference");
+    dem2d_mass mass;
+    dem2d_result result = dem2di_check_points(env, "points", points, count, 3);
+    if (result == DEM2D_OK) result = dem2d_polygon_mass(points, count, &mass);
+    if (result != DEM2D_OK) return result;
+    if (order < 0 || 2 * order >= POINTS)
+        return dem2di_fail(env, DEM2D_OUT_OF_RANGE, order, "order = %d", order);
+    dem2d_vec *fitted = (dem2d_vec *)dem2di_allocate(env, 2 * POINTS, sizeof *fitted);
+    if (fitted == NULL) return dem2di_fail(env, DEM2D_OUT_OF_MEMORY, -1, "radial series");
+    double *r = (double *)(void *)(fitted + POINTS), *sum = r + POINTS;
+    for (int i = 0; i < POINTS; i++) {
+        dem2d_rot z = dem2d_rot_make(2 * DEM2DI_PI * i / POINTS);
+        r[i] = dem2di_ray_reach(points, count, mass.centroid, dem2di_vec(z.c, z.s));
+        sum[i] = 0;
+    }
+    for (int n = 0; n <= order; n++) {
+        dem2d_rot step = dem2d_rot_make(2 * DEM2DI_PI * n / POINTS);
+        dem2d_vec z = dem2di_vec(1, 0), c = dem2di_vec(0, 0);
+        for (int i = 0; i < POINTS; i++, z = dem2di_turn(step, z))
+            c = dem2di_along(c, r[i] * (n == 0 ? 1.0 : 2.0) / POINTS, z);
+        z = dem2di_vec(1, 0);
+        for (int i = 0; i < POINTS; i++, z = dem2di_turn(step, z)) sum[i] += dem2di_dot(c, z);
+    }
+    for (int i = 0; i < POINTS; i++) {
+        dem2d_rot z = dem2d_rot_make(2 * DEM2DI_PI * i / POINTS);
+        fitted[i] = dem2di_along(mass.centroid, dem2di_max(0, sum[i]), dem2di_vec(z.c, z.s));
+    }
+    result = dem2d_outline_compare(env, points, count, fitted, POINTS, difference);
+    dem2di_release(env, fitted, 2 * POINTS, sizeof *fitted);
+    return result;
+}
+
+/* ---- virtual grains ---- */
+
+static double dem2di_virtual_amplitude(const dem2d_virtual_desc *desc, int n) {
+    if (desc->spectrum != NULL) return desc->spectrum[n];
+    if (n == 2) return desc->elongation;
+    return n < 8 ? desc->roundness * 9 / ((double)n * n) : desc->roughness * 64 / ((double)n * n);
+}
+
+static dem2d_result dem2di_check_virtual(const dem2d_virtual_desc *desc, int order) {
+    double numbers[5];
+    numbers[0] = desc->radius;
+    numbers[1] = desc->elongation;
+    numbers[2] = desc->roundness;
+    numbers[3] = desc->roughness;
+    numbers[4] = desc->min_radius;
+    for (int i = 0; i < 5; i++) {
+        if (!dem2di_finite(numbers[i])) return DEM2D_NOT_FINITE;
+        if (numbers[i] < 0) return DEM2D_OUT_OF_RANGE;
+    }
+    if (!(desc->radius > 0) || desc->min_radius >= 1 || order < 0 || order > (1 << 20))
+        return DEM2D_OUT_OF_RANGE;
+    for (int n = 2; desc->spectrum != NULL && n <= order; n++) {
+        if (!dem2di_finite(desc->spectrum[n])) return DEM2D_NOT_FINITE;
+        if (desc->spectrum[n] < 0) return DEM2D_OUT_OF_RANGE;
+    }
+    return DEM2D_OK;
+}
+
+DEM2D_API dem2d_result dem2d_fourier_virtual(const dem2d_virtual_desc *desc, int order, double *a,
+                                             double *b) {
+    if (desc == NULL || a == NULL || b == NULL) return DEM2D_NULL_ARGUMENT;
+    dem2d_result result = dem2di_check_virtual(desc, order);
+    if (result != DEM2D_OK) return result;
+    uint64_t state = desc->seed;
+    double margin = desc->min_radius == 0 ? 0.1 : desc->min_radius;
+    for (int n = 0; n <= order; n++) {
+        dem2d_rot phase = dem2d_rot_make(2 * DEM2DI_PI * dem2di_random(&state));
+        double amplitude = n < 2 ? 0 : dem2di_virtual_amplitude(desc, n);
+        a[n] = amplitude * phase.c;
+        b[n] = n == 0 ? 0 : amplitude * phase.s;
+    }
+    /* rho - 1 without a0: its minimum times a common factor must not be below margin - 1 */
+    dem2di_series radius = dem2di_series_make(a, b, order, true, 1);
+    double least = dem2di_series_minimum(&radius, 1e-12 * radius.size).lower;
+    double factor = -least > 1 - margin ? (1 - margin) / -least : 1, area = 1;
+    for (int n = 2; n <= order; n++) {
+        a[n] *= factor;
+        b[n] *= factor;
+        area += (1 - (double)n * n) * (a[n] * a[n] + b[n] * b[n]) / 2;
+    }
+    double size = desc->radius / sqrt(area);
+    a[0] = 2 * size;
+    for (int n = 2; n <= order; n++) {
+        a[n] *= size;
+        b[n] *= size;
+    }
     return DEM2D_OK;
 }
 
@@ -5448,8 +7553,8 @@ DEM2D_API dem2d_result dem2d_world_write_svg(const dem2d_world *world, const dem
    >>licence  Changes and licence
 
    CHANGES
-     0.1.0  First version: five shape models and custom ones, fits, GJK and EPA, world,
-            measures, SVG.
+     0.1.0  First version: five shape models and custom ones, outlines from pictures, fits, GJK
+            and EPA, world, measures, SVG.
 
    LICENCE (MIT)
      Copyright (c) 2026 dem2d contributors

@@ -2,7 +2,7 @@
    the papers on polybezier and Fourier-series grains.
 
        make build && build/biaxial              (about a minute; results in out/)
-       build/biaxial --grains DIR               grains modelled on your own outlines
+       build/biaxial --grains PATH              grains modelled on your outlines or photographs
        build/biaxial --help
 
    1. Settling      Grains are placed at random without overlap in a box 1.0 x 3.0 m (higher in
@@ -28,8 +28,9 @@ static const char usage[] =
     "  --shapes SET      mixed (all five), noncircular (ellipse, polygon, bezier), or a\n"
     "                    comma-separated list of circle, ellipse, polygon, bezier, fs (mixed)\n"
     "  --damping KIND    local (Cundall, 0.7) or global (viscous, 0.7 1/s) (local)\n"
-    "  --grains DIR      bezier and fs grains from the outlines in DIR: each *.csv whose first\n"
-    "                    line is \"x,y\" (without: a few outlines made here)\n"
+    "  --grains PATH     bezier and fs grains from an image (PBM, PGM), an outline (CSV, first\n"
+    "                    line \"x,y\"), or a directory of outlines, without any of images\n"
+    "                    (without PATH: a few outlines made here)\n"
     "  --out DIR         for history.csv, packed.svg, final.svg; made if its parent exists (out)\n"
     "  --quick           a small, hasty run of 8000 steps with wider bands for the checks\n"
     "  --help            this text\n"
@@ -55,31 +56,19 @@ static options parse_options(int count, char **arguments) {
     o.seed = 1;
     o.out = "out";
     parse_shapes("mixed", o.kinds);
+    static const char *const names[] = {
+        "--quick", "--particles=", "--seed=", "--shapes=", "--damping=", "--grains=", "--out="};
+    static const char *const dampings[] = {"local", "global"};
     for (int i = 1; i < count; i++) {
-        const char *name = arguments[i];
-        if (strcmp(name, "--help") == 0) {
-            fputs(usage, stdout);
-            exit(STATUS_OK);
-        }
-        if (strcmp(name, "--quick") == 0) {
-            o.quick = true;
-            continue;
-        }
-        static const char *const known[] = {"--particles", "--seed",   "--shapes",
-                                            "--damping",   "--grains", "--out"};
-        int which = 0;
-        while (which < 6 && strcmp(name, known[which]) != 0) which++;
-        if (which == 6) fail(STATUS_BAD_INPUT, "unknown option %s (try --help)", name);
-        if (++i == count) fail(STATUS_BAD_INPUT, "%s needs a value (try --help)", name);
-        const char *value = arguments[i];
-        if (which == 0) o.particles = (int)parse_integer(name, value, 10, 1000000);
-        if (which == 1) o.seed = parse_integer(name, value, 0, UINT64_MAX);
-        if (which == 2) parse_shapes(value, o.kinds);
-        if (which == 3) o.global_damping = strcmp(value, "global") == 0;
-        if (which == 3 && !o.global_damping && strcmp(value, "local") != 0)
-            fail(STATUS_BAD_INPUT, "--damping %s: expected local or global", value);
-        if (which == 4) o.grains = value;
-        if (which == 5) o.out = value;
+        const char *name = arguments[i], *value;
+        const int which = parse_option(count, arguments, &i, usage, names, 7, &value);
+        if (which == 0) o.quick = true;
+        if (which == 1) o.particles = (int)parse_integer(name, value, 10, 1000000);
+        if (which == 2) o.seed = parse_integer(name, value, 0, UINT64_MAX);
+        if (which == 3) parse_shapes(value, o.kinds);
+        if (which == 4) o.global_damping = parse_name(name, value, dampings, 2) == 1;
+        if (which == 5) o.grains = value;
+        if (which == 6) o.out = value;
     }
     if (o.particles == 0) o.particles = o.quick ? 100 : 500;
     return o;
@@ -432,10 +421,11 @@ static double compress(job *j) {
 static void draw(const job *j, const char *out, const char *name) {
     dem2d_svg_desc picture = {0};
     picture.force_chains = true;
-    char *aside = aside_name(out, name);
+    char *path = join_text(out, "/", name), *aside = aside_name(path);
     const dem2d_result result = dem2d_world_write_svg(j->world, &picture, aside);
     if (result != DEM2D_IO) must(result, name);
     aside_finish(aside, result == DEM2D_OK);
+    free(path);
 }
 
 /* A figure for stdout; a check fails when it is outside its band. */
@@ -534,9 +524,11 @@ int main(int count, char **arguments) {
     j.seconds = clock_seconds() - j.started;
     draw(&j, o.out, "final.svg");
     if (fclose(j.history) != 0) fail(STATUS_FAILED, "out of memory");
-    write_file(o.out, "history.csv", history, history_size);
+    char *path = join_text(o.out, "/", "history.csv");
+    write_file(path, history, history_size);
 
     const bool good = report(&j, &o, strain);
+    free(path);
     free(history);
     free(j.blocks);
     dem2d_world_destroy(j.world);

@@ -98,6 +98,27 @@ static inline void *get_memory(void *memory, size_t count, size_t size) {
 
 /* ---- options ---- */
 
+/* Which of the names the argument *i is. A name that ends in "=" is written without it and takes
+   the next argument as its value. --help prints the usage and ends the program. */
+static inline int parse_option(int count, char **arguments, int *i, const char *usage,
+                               const char *const *names, int name_count, const char **value) {
+    const char *text = arguments[*i];
+    if (strcmp(text, "--help") == 0) {
+        fputs(usage, stdout);
+        exit(STATUS_OK);
+    }
+    for (int k = 0; k < name_count; k++) {
+        const size_t length = strcspn(names[k], "=");
+        if (strlen(text) != length || strncmp(text, names[k], length) != 0) continue;
+        *value = "";
+        if (names[k][length] == '\0') return k;
+        if (++*i == count) fail(STATUS_BAD_INPUT, "%s needs a value (try --help)", text);
+        *value = arguments[*i];
+        return k;
+    }
+    fail(STATUS_BAD_INPUT, "unknown option %s (try --help)", text);
+}
+
 /* A whole decimal number in [low, high]. */
 static inline uint64_t parse_integer(const char *option, const char *text, uint64_t low,
                                      uint64_t high) {
@@ -109,6 +130,28 @@ static inline uint64_t parse_integer(const char *option, const char *text, uint6
         fail(STATUS_BAD_INPUT, "%s %s: expected an integer from %llu to %llu", option, text,
              (unsigned long long)low, (unsigned long long)high);
     return value;
+}
+
+/* A finite decimal number in [low, high]. */
+static inline double parse_real(const char *option, const char *text, double low, double high) {
+    char *end;
+    const double value = strtod(text, &end);
+    const bool plain = text[strspn(text, "0123456789+-.eE")] == '\0'; // no hex, nan, blank
+    if (!plain || end == text || *end != '\0' || !(value >= low && value <= high))
+        fail(STATUS_BAD_INPUT, "%s %s: expected a number from %g to %g", option, text, low, high);
+    return value;
+}
+
+/* Index of a name among several. */
+static inline int parse_name(const char *option, const char *text, const char *const *names,
+                             int count) {
+    char all[200] = "";
+    for (int i = 0; i < count; i++) {
+        if (strcmp(text, names[i]) == 0) return i;
+        const size_t used = strlen(all);
+        snprintf(all + used, sizeof all - used, "%s%s", i == 0 ? "" : ", ", names[i]);
+    }
+    fail(STATUS_BAD_INPUT, "%s %s: expected one of %s", option, text, all);
 }
 
 /* ---- clock, random numbers, logarithm ---- */
@@ -165,9 +208,10 @@ static inline int compare_names(const void *a, const void *b) {
     return strcmp(*(char *const *)a, *(char *const *)b);
 }
 
-/* Names in a directory that match *ending (as in a shell: none that starts with a dot), in byte
-   order. Free each name and the array. */
-static inline char **list_directory(const char *path, const char *ending, int *count) {
+/* Names in a directory that are wanted (as in a shell: none that starts with a dot), in byte order.
+   Free each name and the array. */
+static inline char **list_directory(const char *path, bool (*wanted)(const char *name),
+                                    int *count) {
     DIR *directory = opendir(path);
     if (directory == NULL)
         fail(STATUS_BAD_INPUT, "cannot open directory %s: %s", path, strerror(errno));
@@ -176,9 +220,7 @@ static inline char **list_directory(const char *path, const char *ending, int *c
     const struct dirent *entry;
     errno = 0;
     while ((entry = readdir(directory)) != NULL) {
-        const size_t length = strlen(entry->d_name), tail = strlen(ending);
-        if (entry->d_name[0] == '.' || length < tail) continue;
-        if (strcmp(entry->d_name + length - tail, ending) != 0) continue;
+        if (entry->d_name[0] == '.' || !wanted(entry->d_name)) continue;
         if (found == INT_MAX - 1) fail(STATUS_BAD_INPUT, "too many files in %s", path);
         names = get_memory(names, (size_t)found + 1, sizeof *names);
         names[found++] = join_text(entry->d_name, "", "");
@@ -205,11 +247,8 @@ static inline void make_directory(const char *path) {
 
 /* Files are written under the name with ".tmp" and renamed when complete, so that a reader never
    finds half of one. `ok` tells whether writing to `aside` has succeeded; frees `aside`. */
-static inline char *aside_name(const char *directory, const char *name) {
-    char *path = join_text(directory, "/", name);
-    char *aside = join_text(path, "", ".tmp");
-    free(path);
-    return aside;
+static inline char *aside_name(const char *path) {
+    return join_text(path, "", ".tmp");
 }
 
 static inline void aside_finish(char *aside, bool ok) {
@@ -224,100 +263,407 @@ static inline void aside_finish(char *aside, bool ok) {
     free(aside);
 }
 
-static inline void write_file(const char *directory, const char *name, const char *bytes,
-                              size_t count) {
-    char *aside = aside_name(directory, name);
+static inline void write_file(const char *path, const char *bytes, size_t count) {
+    char *aside = aside_name(path);
     FILE *file = fopen(aside, "wb");
     bool ok = file != NULL && fwrite(bytes, 1, count, file) == count;
     if (file != NULL && fclose(file) != 0) ok = false;
     aside_finish(aside, ok);
 }
 
-/* ---- outlines ---- */
+/* ---- reading: whole files, CSV outlines, Netpbm images ---- */
 
 typedef struct outline {
     dem2d_vec *points;
     int count;
+    char *name; // for messages
 } outline;
 
-/* Next line without its end (LF or CRLF); false at the end of the file. A byte 0 is an error. */
-static inline bool next_line(FILE *file, const char *path, char **line, size_t *size) {
-    errno = 0;
-    const ssize_t length = getline(line, size, file);
-    if (length < 0) {
-        if (ferror(file)) fail(STATUS_BAD_INPUT, "cannot read %s: %s", path, strerror(errno));
-        return false;
-    }
-    size_t end = (size_t)length;
-    if (end > 0 && (*line)[end - 1] == '\n') (*line)[--end] = '\0';
-    if (end > 0 && (*line)[end - 1] == '\r') (*line)[--end] = '\0';
-    if (strlen(*line) != end) (*line)[0] = '\1'; // no line of ours: neither header nor numbers
-    return true;
-}
+/* Grey levels, row 0 on top. */
+typedef struct image {
+    uint8_t *pixels;
+    int width, height;
+} image;
 
-/* One finite decimal number that ends at `stop`. */
-static inline bool read_number(const char **text, char stop, double *value) {
-    const size_t length = strspn(*text, "0123456789+-.eE"); // keeps out hex, inf, nan, blanks
-    char *end;
-    *value = strtod(*text, &end);
-    if (length == 0 || end != *text + length || *end != stop || !isfinite(*value)) return false;
-    *text = end + (stop != '\0');
-    return true;
-}
-
-/* Reads an outline. False when the first line is not "x,y": some other table. A file that starts
-   like an outline and goes on otherwise ends the program. */
-static inline bool read_outline(const char *path, outline *result) {
+/* All bytes of a file; the caller frees them. The limit is that of the largest raw image. */
+static inline char *read_whole(const char *path, size_t *count) {
+    const size_t most = ((size_t)1 << 31) + ((size_t)1 << 20);
     FILE *file = fopen(path, "rb");
     if (file == NULL) fail(STATUS_BAD_INPUT, "cannot open %s: %s", path, strerror(errno));
-    char *line = NULL;
-    size_t size = 0;
-    outline made = {NULL, 0};
+    char *bytes = NULL;
+    size_t room = 0, got = 0;
+    errno = 0;
+    while (!feof(file) && !ferror(file) && got <= most) {
+        if (got == room) {
+            room = 2 * room + 65536;
+            bytes = get_memory(bytes, room, 1);
+        }
+        got += fread(bytes + got, 1, room - got, file);
+    }
+    const int reason = errno;
+    const bool bad = ferror(file) != 0;
+    fclose(file);
+    if (bad || got > most) free(bytes);
+    if (bad) fail(STATUS_BAD_INPUT, "cannot read %s: %s", path, strerror(reason));
+    if (got > most) fail(STATUS_BAD_INPUT, "%s: more than 2 GiB", path);
+    *count = got;
+    return bytes;
+}
+
+/* What is left of a buffer. The parsers below see nothing but it and answer with what is wrong, or
+   NULL; they write their result only when nothing is. */
+typedef struct rest {
+    const char *at, *end;
+} rest;
+
+static inline rest rest_make(const char *bytes, size_t count) {
+    const rest r = {bytes, bytes + count};
+    return r;
+}
+
+/* Next line without its end (LF or CRLF); false when nothing is left. */
+static inline bool next_line(rest *r, rest *line) {
+    if (r->at == r->end) return false;
+    const char *stop = memchr(r->at, '\n', (size_t)(r->end - r->at));
+    line->at = r->at;
+    line->end = stop != NULL ? stop : r->end;
+    r->at = stop != NULL ? stop + 1 : r->end;
+    if (line->end > line->at && line->end[-1] == '\r') line->end--;
+    return true;
+}
+
+/* One finite decimal number of this many characters. Hex, inf, nan and blanks are not taken. */
+static inline bool parse_decimal(const char *text, size_t length, double *value) {
+    static const char allowed[] = "0123456789+-.eE";
+    char copy[400], *end; // with an end for strtod; 1e308 in full has 309 digits
+    if (length == 0 || length >= sizeof copy) return false;
+    memcpy(copy, text, length);
+    copy[length] = '\0';
+    *value = strtod(copy, &end);
+    return strspn(copy, allowed) == length && end == copy + length && isfinite(*value);
+}
+
+static inline bool is_outline(const char *bytes, size_t count) {
+    rest r = rest_make(bytes, count), line = r;
+    return next_line(&r, &line) && line.end - line.at == 3 && memcmp(line.at, "x,y", 3) == 0;
+}
+
+/* A line "x,y", then a point on each; blank lines at the end only. *number is the offending line,
+   0 for the file as a whole. */
+static inline const char *parse_outline(const char *bytes, size_t count, outline *result,
+                                        int *number) {
+    rest r = rest_make(bytes, count), line = r;
+    outline made = {NULL, 0, NULL};
+    const char *wrong = NULL;
     bool blank = false;
-    const bool ours = next_line(file, path, &line, &size) && strcmp(line, "x,y") == 0;
-    for (int number = 2; ours && next_line(file, path, &line, &size); number++) {
-        const char *rest = line;
-        dem2d_vec point;
-        if (*line == '\0') { // allowed at the end only
+    *number = 1;
+    if (!is_outline(bytes, count)) return "expected \"x,y\"";
+    next_line(&r, &line);
+    while (wrong == NULL && next_line(&r, &line)) {
+        (*number)++;
+        if (line.at == line.end) {
             blank = true;
             continue;
         }
-        if (blank || !read_number(&rest, ',', &point.x) || !read_number(&rest, '\0', &point.y))
-            fail(STATUS_BAD_INPUT, "%s, line %d: expected two finite numbers", path, number);
-        if (made.count == 10000000) fail(STATUS_BAD_INPUT, "%s: too many points", path);
-        if ((made.count & (made.count - 1)) == 0) // at powers of 2: room for twice as many
-            made.points = get_memory(made.points, 2 * (size_t)made.count + 1, sizeof point);
-        made.points[made.count++] = point;
+        const char *comma = memchr(line.at, ',', (size_t)(line.end - line.at));
+        dem2d_vec p;
+        if (blank || comma == NULL || !parse_decimal(line.at, (size_t)(comma - line.at), &p.x) ||
+            !parse_decimal(comma + 1, (size_t)(line.end - comma) - 1, &p.y)) {
+            wrong = "expected two finite numbers";
+        } else if (made.count == 10000000) {
+            wrong = "too many points";
+        } else {
+            if ((made.count & (made.count - 1)) == 0) // at powers of 2: room for twice as many
+                made.points = get_memory(made.points, 2 * (size_t)made.count + 1, sizeof p);
+            made.points[made.count++] = p;
+        }
     }
-    free(line);
-    fclose(file);
-    if (ours && made.count < 3)
-        fail(STATUS_BAD_INPUT, "%s: an outline needs 3 points or more, here %d", path, made.count);
-    if (ours) *result = made;
-    return ours;
+    if (wrong == NULL) *number = 0;
+    if (wrong == NULL && made.count < 3) wrong = "an outline needs 3 points or more";
+    if (wrong != NULL)
+        free(made.points);
+    else
+        *result = made;
+    return wrong;
+}
+
+static inline bool is_space(char c) {
+    return c == ' ' || (c >= '\t' && c <= '\r');
+}
+
+/* Past white space and comments, which go from # to the end of the line. */
+static inline void skip_space(rest *r) {
+    for (bool comment = false; r->at < r->end; r->at++) {
+        if (*r->at == '#') comment = true;
+        if (*r->at == '\n' || *r->at == '\r') comment = false;
+        if (!comment && !is_space(*r->at)) return;
+    }
+}
+
+/* Next natural number; -1 when there is none, most + 1 when it is above `most`. */
+static inline int next_natural(rest *r, int most) {
+    int value = -1;
+    skip_space(r);
+    for (; r->at < r->end && *r->at >= '0' && *r->at <= '9'; r->at++) {
+        if (value < 0) value = 0;
+        if (value <= most) value = 10 * value + (*r->at - '0');
+        if (value > most) value = most + 1;
+    }
+    return value;
+}
+
+enum { IMAGE_SIDE = 32768 }; // px; ten times this still fits an int
+
+static inline bool is_image(const char *bytes, size_t count) {
+    return count >= 2 && bytes[0] == 'P' && bytes[1] >= '1' && bytes[1] <= '7' &&
+           (count == 2 || is_space(bytes[2]) || bytes[2] == '#');
+}
+
+/* Up to the last number; `most` is the greatest sample, 1 for bits. */
+static inline const char *parse_image_header(rest *r, int *format, image *made, int *most) {
+    if (!is_image(r->at, (size_t)(r->end - r->at))) return "not a Netpbm image";
+    *format = r->at[1] - '0';
+    if (*format == 3 || *format > 5) return "a colour image or PAM; PBM and PGM can be read";
+    r->at += 2;
+    made->width = next_natural(r, IMAGE_SIDE);
+    made->height = next_natural(r, IMAGE_SIDE);
+    if (made->width < 0 || made->height < 0) return "no width and height in the header";
+    if (made->width < 1 || made->width > IMAGE_SIDE || made->height < 1 ||
+        made->height > IMAGE_SIDE)
+        return "width and height must be from 1 to 32768";
+    *most = *format == 1 || *format == 4 ? 1 : next_natural(r, 65535);
+    if (*most < 0) return "no greatest value in the header";
+    if (*most < 1 || *most > 65535) return "the greatest value must be from 1 to 65535";
+    return NULL;
+}
+
+/* Samples written as decimal numbers, bits also without white space between them. */
+static inline const char *parse_plain_samples(rest *r, int most, bool bits, image *made) {
+    const size_t samples = (size_t)made->width * (size_t)made->height;
+    const unsigned top = (unsigned)most;
+    for (size_t i = 0; i < samples; i++) {
+        int value;
+        skip_space(r);
+        if (r->at == r->end) return "truncated: less data than the header says";
+        if (bits)
+            value = *r->at == '0' || *r->at == '1' ? *r->at++ - '0' : -1;
+        else
+            value = next_natural(r, most);
+        if (value < 0) return "a sample is not a number";
+        if (value > most) return "a sample is above the greatest value";
+        made->pixels[i] = (uint8_t)(((unsigned)value * 255 + top / 2) / top);
+        if (bits) made->pixels[i] = value == 1 ? 0 : 255; // 1 is black
+    }
+    return NULL;
+}
+
+/* Samples of one or two bytes, high byte first, or bits, high bit first, in whole bytes a row. */
+static inline const char *parse_raw_samples(rest *r, int most, bool bits, image *made) {
+    const unsigned top = (unsigned)most;
+    const uint8_t *in = (const uint8_t *)r->at;
+    uint8_t *out = made->pixels;
+    for (int row = 0; row < made->height; row++) {
+        for (int column = 0; column < made->width; column++) {
+            unsigned value;
+            if (bits) {
+                value = (unsigned)in[column / 8] >> (7 - column % 8) & 1;
+                *out++ = value == 1 ? 0 : 255; // 1 is black
+                continue;
+            }
+            value = *in++;
+            if (most > 255) value = value << 8 | *in++;
+            if (value > top) return "a sample is above the greatest value";
+            *out++ = (uint8_t)((value * 255 + top / 2) / top);
+        }
+        if (bits) in += (made->width + 7) / 8;
+    }
+    r->at = (const char *)in;
+    return NULL;
+}
+
+/* Netpbm P1, P2, P4, P5, scaled to 8 bits; black bits are 0, white ones 255. Memory is asked for
+   only when the buffer is long enough for the pixels. */
+static inline const char *parse_image(const char *bytes, size_t count, image *result) {
+    rest r = rest_make(bytes, count);
+    image made = {NULL, 0, 0};
+    int format, most;
+    const char *wrong = parse_image_header(&r, &format, &made, &most);
+    if (wrong != NULL) return wrong;
+    const size_t columns = (size_t)made.width, rows = (size_t)made.height;
+    const bool bits = format == 1 || format == 4, raw = format >= 4;
+    size_t least = bits ? columns * rows : 2 * columns * rows - 1; // plain
+    if (raw) least = bits ? (columns + 7) / 8 * rows : columns * rows * (most > 255 ? 2 : 1);
+    if (raw && r.at < r.end) { // one white space ends the header, or a comment
+        if (*r.at == '#')
+            while (r.at < r.end && *r.at != '\n' && *r.at != '\r') r.at++;
+        else if (!is_space(*r.at))
+            return "no white space after the header";
+        r.at += r.at < r.end;
+    }
+    if ((size_t)(r.end - r.at) < least) return "truncated: less data than the header says";
+    made.pixels = get_memory(NULL, columns, rows);
+    wrong =
+        raw ? parse_raw_samples(&r, most, bits, &made) : parse_plain_samples(&r, most, bits, &made);
+    skip_space(&r);
+    if (wrong == NULL && r.at < r.end) wrong = "more data than the header says";
+    if (wrong != NULL)
+        free(made.pixels);
+    else
+        *result = made;
+    return wrong;
+}
+
+/* ---- grains: from images, outlines, directories, or made here ---- */
+
+typedef struct outline_list {
+    outline *items;
+    int count;
+} outline_list;
+
+/* Puts a copy of an outline at the end; number 0 for the only one of a file. */
+static inline void list_outline(outline_list *list, const dem2d_vec *points, int count,
+                                const char *path, int number) {
+    char text[32];
+    list->items = get_memory(list->items, (size_t)list->count + 1, sizeof *list->items);
+    outline *o = &list->items[list->count++];
+    o->points = get_memory(NULL, (size_t)count, sizeof *points);
+    o->count = count;
+    memcpy(o->points, points, (size_t)count * sizeof *points);
+    snprintf(text, sizeof text, ", grain %d", number);
+    o->name = join_text(path, "", number > 0 ? text : "");
+}
+
+static inline void free_outlines(outline_list *list) {
+    for (int i = 0; i < list->count; i++) {
+        free(list->items[i].points);
+        free(list->items[i].name);
+    }
+    free(list->items);
+}
+
+/* The outlines of an image's grains; `search` has all but the pixels. */
+static inline void list_image(outline_list *list, const image *picture,
+                              const dem2d_image_desc *search, const char *path) {
+    dem2d_image_desc desc = *search;
+    dem2d_outline_set *found;
+    desc.pixels = picture->pixels;
+    desc.width = picture->width;
+    desc.height = picture->height;
+    need(dem2d_image_outlines(example_env(), &desc, &found), STATUS_BAD_INPUT, path);
+    for (int i = 0; i < dem2d_outline_set_count(found); i++) {
+        dem2d_outline o;
+        must(dem2d_outline_set_get(found, i, &o), path);
+        list_outline(list, o.points, o.count, path, i + 1);
+    }
+    dem2d_outline_set_destroy(found);
+}
+
+static inline bool ends_with(const char *name, const char *ending) {
+    const size_t length = strlen(name), tail = strlen(ending);
+    return length >= tail && strcmp(name + length - tail, ending) == 0;
+}
+
+static inline bool is_csv_name(const char *name) {
+    return ends_with(name, ".csv");
+}
+
+static inline bool is_image_name(const char *name) {
+    return ends_with(name, ".pbm") || ends_with(name, ".pgm") || ends_with(name, ".pnm");
+}
+
+/* What a file turned out to be. */
+typedef enum file_kind { FILE_OTHER, FILE_OUTLINE, FILE_IMAGE } file_kind;
+
+/* Adds the outlines of a file: of all grains of an image, or the one of a CSV file. OTHER, and
+   nothing added, for a file that starts like neither. One that starts well and goes on otherwise
+   ends the program. */
+static inline file_kind read_grains(const char *path, const dem2d_image_desc *search,
+                                    outline_list *list) {
+    size_t count;
+    char *bytes = read_whole(path, &count);
+    const char *wrong = NULL;
+    outline o;
+    image picture;
+    int line = 0;
+    file_kind kind = is_outline(bytes, count) ? FILE_OUTLINE : FILE_OTHER;
+    if (is_image_name(path) || is_image(bytes, count)) kind = FILE_IMAGE;
+    if (kind == FILE_OUTLINE) wrong = parse_outline(bytes, count, &o, &line);
+    if (kind == FILE_IMAGE) wrong = parse_image(bytes, count, &picture);
+    free(bytes);
+    if (wrong != NULL && line > 0) fail(STATUS_BAD_INPUT, "%s, line %d: %s", path, line, wrong);
+    if (wrong != NULL) fail(STATUS_BAD_INPUT, "%s: %s", path, wrong);
+    if (kind == FILE_OUTLINE) {
+        list_outline(list, o.points, o.count, path, 0);
+        free(o.points);
+    }
+    if (kind == FILE_IMAGE) {
+        list_image(list, &picture, search, path);
+        free(picture.pixels);
+    }
+    return kind;
 }
 
 /* A few grains for those who have none: r(t) = 1 + sum over n = 2..5 of c_n cos(n t + phase_n). */
 enum { SELF_MADE = 4 };
 
-static inline outline self_made_outline(int which) {
+static inline void list_self_made(outline_list *list, int which) {
     static const double size[SELF_MADE][4] = {{0.16, 0.05, 0.02, 0.010},
                                               {0.08, 0.08, 0.03, 0.015},
                                               {0.22, 0.03, 0.03, 0.005},
                                               {0.04, 0.04, 0.05, 0.020}};
     static const double phase[SELF_MADE][4] = {
         {0.0, 0.7, 1.9, 0.3}, {1.1, 2.6, 0.4, 5.0}, {2.0, 4.4, 3.1, 1.2}, {0.6, 5.7, 2.2, 3.9}};
-    outline made = {get_memory(NULL, 120, sizeof(dem2d_vec)), 120};
-    for (int i = 0; i < made.count; i++) {
-        const double angle = 6.283185307179586 * i / made.count;
+    enum { POINTS = 120 };
+    dem2d_vec points[POINTS];
+    for (int i = 0; i < POINTS; i++) {
+        const double angle = 6.283185307179586 * i / POINTS;
         double radius = 1;
         for (int n = 2; n <= 5; n++)
             radius += size[which][n - 2] * dem2d_rot_make(n * angle + phase[which][n - 2]).c;
         const dem2d_rot direction = dem2d_rot_make(angle);
-        made.points[i].x = radius * direction.c;
-        made.points[i].y = radius * direction.s;
+        points[i].x = radius * direction.c;
+        points[i].y = radius * direction.s;
     }
-    return made;
+    list_outline(list, points, POINTS, "self-made outline", which + 1);
+}
+
+/* The outlines of all CSV files in a directory; when none of them is an outline, those of the
+   grains in its images. */
+static inline void list_grains(const char *directory, const dem2d_image_desc *search,
+                               outline_list *list) {
+    int skipped = 0;
+    for (int pass = 0; pass < 2 && list->count == 0; pass++) {
+        int count;
+        char **names = list_directory(directory, pass == 0 ? is_csv_name : is_image_name, &count);
+        for (int i = 0; i < count; i++) {
+            char *path = join_text(directory, "/", names[i]);
+            if (read_grains(path, search, list) == FILE_OTHER) skipped++;
+            free(path);
+            free(names[i]);
+        }
+        free(names);
+    }
+    if (skipped > 0 && list->count > 0)
+        fprintf(stderr, "%s: skipped %d CSV file%s in %s: first line is not \"x,y\"\n",
+                example_name, skipped, skipped == 1 ? "" : "s", directory);
+}
+
+/* The grains of an image or outline, of a directory, or (NULL) self-made ones. */
+static inline outline_list load_grains(const char *path) {
+    outline_list list = {NULL, 0};
+    dem2d_image_desc search = {0};
+    struct stat status;
+    search.scale = 1;
+    for (int i = 0; path == NULL && i < SELF_MADE; i++) list_self_made(&list, i);
+    if (path == NULL) return list;
+    if (stat(path, &status) == 0 && S_ISDIR(status.st_mode))
+        list_grains(path, &search, &list);
+    else
+        read_grains(path, &search, &list);
+    if (list.count == 0)
+        fail(STATUS_BAD_INPUT,
+             "no outline (CSV, first line \"x,y\") and no grain of an image in %s", path);
+    return list;
 }
 
 /* ---- templates ---- */
@@ -349,26 +695,13 @@ static inline void parse_shapes(const char *text, bool kinds[KINDS]) {
 
 enum { FOURIER_ORDER = 8, BEZIER_ARCS = 10 };
 
-static inline dem2d_shape *fourier_template(const outline *o, const char *name) {
-    double a[FOURIER_ORDER + 1], b[FOURIER_ORDER + 1];
-    dem2d_reduction_desc reduction = {0};
-    reduction.test = DEM2D_EXACT;
-    dem2d_shape *shape = NULL;
-    const dem2d_env *env = example_env();
-    dem2d_result result = dem2d_fourier_fit(env, o->points, o->count, FOURIER_ORDER, 0, a, b);
-    if (result == DEM2D_OK) result = dem2d_fourier_reduce(a, b, FOURIER_ORDER, &reduction, NULL);
-    if (result == DEM2D_OK) result = dem2d_shape_create_fourier(env, a, b, FOURIER_ORDER, &shape);
-    need(result, STATUS_BAD_INPUT, name);
-    return shape;
-}
-
-static inline dem2d_shape *bezier_template(const outline *o, const char *name) {
-    dem2d_vec control[3 * BEZIER_ARCS];
-    dem2d_shape *shape = NULL;
-    const dem2d_env *env = example_env();
-    dem2d_result result = dem2d_bezier_fit(env, o->points, o->count, BEZIER_ARCS, control);
-    if (result == DEM2D_OK) result = dem2d_shape_create_bezier(env, control, BEZIER_ARCS, &shape);
-    need(result, STATUS_BAD_INPUT, name);
+static inline dem2d_shape *fitted_template(const outline *o, dem2d_shape_type model, int count) {
+    dem2d_fit_desc fit = {0};
+    fit.model = model;
+    fit.count = count;
+    dem2d_shape *shape;
+    need(dem2d_outline_fit(example_env(), o->points, o->count, &fit, &shape, NULL),
+         STATUS_BAD_INPUT, o->name);
     return shape;
 }
 
@@ -408,43 +741,20 @@ static inline void add_template(template_set *set, dem2d_shape *shape) {
     set->shapes[set->count++] = shape;
 }
 
-static inline void add_outline(template_set *set, outline *o, const char *name) {
-    add_template(set, fourier_template(o, name));
-    add_template(set, bezier_template(o, name));
-    set->outlines++;
-    free(o->points);
-}
-
-/* Templates of every outline in a directory, in byte order of the names; without a directory (NULL)
-   those of the self-made outlines. */
-static inline template_set load_templates(const char *directory) {
+/* Templates of the grains at a path (see load_grains). */
+static inline template_set load_templates(const char *path) {
     template_set set = {NULL, 0, 0};
     dem2d_shape *circle;
-    outline o;
+    outline_list grains = load_grains(path);
     must(dem2d_shape_create_circle(example_env(), 1, &circle), "circle");
     add_template(&set, circle);
-    for (int i = 0; directory == NULL && i < SELF_MADE; i++) {
-        o = self_made_outline(i);
-        add_outline(&set, &o, "self-made outline");
+    for (int i = 0; i < grains.count; i++) {
+        const outline *o = &grains.items[i];
+        add_template(&set, fitted_template(o, DEM2D_FOURIER, FOURIER_ORDER));
+        add_template(&set, fitted_template(o, DEM2D_BEZIER, BEZIER_ARCS));
     }
-    if (directory == NULL) return set;
-    int count, skipped = 0;
-    char **names = list_directory(directory, ".csv", &count);
-    for (int i = 0; i < count; i++) {
-        char *path = join_text(directory, "/", names[i]);
-        if (read_outline(path, &o))
-            add_outline(&set, &o, path);
-        else
-            skipped++;
-        free(path);
-        free(names[i]);
-    }
-    free(names);
-    if (set.outlines == 0)
-        fail(STATUS_BAD_INPUT, "no outline in %s (a *.csv whose first line is \"x,y\")", directory);
-    if (skipped > 0)
-        fprintf(stderr, "%s: skipped %d CSV file%s in %s: first line is not \"x,y\"\n",
-                example_name, skipped, skipped == 1 ? "" : "s", directory);
+    set.outlines = grains.count;
+    free_outlines(&grains);
     return set;
 }
 

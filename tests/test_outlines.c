@@ -1,0 +1,807 @@
+/* Outlines from pixels and their measures. What they should be comes from flood fills, brute force
+   over all pairs, scan lines and closed forms that share no code with the header. */
+#define DEM2D_IMPLEMENTATION
+#include "dem2d.h"
+
+#include "testing.h"
+
+#define SIDE 24   /* pixels of a random picture */
+#define MOST 4096 /* points of an outline */
+#define LINES 4000
+
+/* --- pictures --------------------------------------------------------------------------------- */
+
+typedef struct picture {
+    uint8_t pixels[SIDE * SIDE];
+    dem2d_image_desc desc;
+} picture;
+
+/* Ground of one grey value; every grain is found. */
+static void picture_init(picture *p, int width, int height, uint8_t grey) {
+    memset(p, 0, sizeof *p);
+    memset(p->pixels, grey, sizeof p->pixels);
+    p->desc.pixels = p->pixels;
+    p->desc.width = width, p->desc.height = height;
+    p->desc.min_pixels = 1, p->desc.scale = 1;
+}
+
+/* Rows of text: '#' is dark. */
+static void picture_draw(picture *p, const char *const *rows, int height) {
+    picture_init(p, (int)strlen(rows[0]), height, 255);
+    for (int r = 0; r < height; r++)
+        for (int c = 0; rows[r][c]; c++)
+            if (rows[r][c] == '#') p->pixels[r * p->desc.width + c] = 0;
+}
+
+static dem2d_outline_set *outlines(const dem2d_image_desc *desc) {
+    dem2d_outline_set *set = NULL;
+    assert_ok(dem2d_image_outlines(NULL, desc, &set));
+    return set;
+}
+
+static dem2d_outline outline_of(const dem2d_outline_set *set, int i) {
+    dem2d_outline outline;
+    assert_ok(dem2d_outline_set_get(set, i, &outline));
+    return outline;
+}
+
+static void check_outline(const dem2d_outline_set *set, int i, int row, int column, int pixels) {
+    const dem2d_outline outline = outline_of(set, i);
+    assert_int_equal(outline.row, row);
+    assert_int_equal(outline.column, column);
+    assert_int_equal(outline.pixels, pixels);
+}
+
+static long double area_of(const dem2d_vec *p, int n) {
+    long double sum = 0;
+    for (int i = 0; i < n; i++) {
+        const dem2d_vec a = p[i], b = p[(i + 1) % n];
+        sum += ((long double)a.x * b.y - (long double)a.y * b.x) / 2;
+    }
+    return sum;
+}
+
+static long double turn_of(dem2d_vec a, dem2d_vec b, dem2d_vec c) {
+    return ((long double)b.x - a.x) * ((long double)c.y - a.y) -
+           ((long double)b.y - a.y) * ((long double)c.x - a.x);
+}
+
+static bool in_box(dem2d_vec p, dem2d_vec a, dem2d_vec b) {
+    return p.x >= fmin(a.x, b.x) && p.x <= fmax(a.x, b.x) && p.y >= fmin(a.y, b.y) &&
+           p.y <= fmax(a.y, b.y);
+}
+
+/* Do two closed segments share a point? */
+static bool segments_meet(dem2d_vec a, dem2d_vec b, dem2d_vec c, dem2d_vec d) {
+    const long double p = turn_of(a, b, c), q = turn_of(a, b, d);
+    const long double r = turn_of(c, d, a), s = turn_of(c, d, b);
+    if (((p < 0 && q > 0) || (p > 0 && q < 0)) && ((r < 0 && s > 0) || (r > 0 && s < 0)))
+        return true;
+    return (p == 0 && in_box(c, a, b)) || (q == 0 && in_box(d, a, b)) ||
+           (r == 0 && in_box(a, c, d)) || (s == 0 && in_box(b, c, d));
+}
+
+/* No two sides meet but neighbours, and those in one point only; counter-clockwise. */
+static void check_simple(const dem2d_vec *p, int n) {
+    assert_true(n >= 4);
+    assert_true(area_of(p, n) > 0);
+    for (int i = 0; i < n; i++) {
+        const dem2d_vec a = p[i], b = p[(i + 1) % n], next = p[(i + 2) % n];
+        assert_true(a.x != b.x || a.y != b.y);
+        if (turn_of(a, b, next) == 0)
+            assert_true((b.x - a.x) * (next.x - b.x) + (b.y - a.y) * (next.y - b.y) > 0);
+        for (int k = i + 2; k < n && !(i == 0 && k == n - 1); k++)
+            assert_false(segments_meet(a, b, p[k], p[(k + 1) % n]));
+    }
+}
+
+/* The definition, for every threshold. */
+static int otsu(const uint8_t *pixels, int count) {
+    long double best = -1;
+    int first = 0, last = 0;
+    for (int t = 1; t < 256; t++) {
+        long long n[2] = {0, 0}, sum[2] = {0, 0};
+        for (int i = 0; i < count; i++) n[pixels[i] >= t]++, sum[pixels[i] >= t] += pixels[i];
+        if (n[0] == 0 || n[1] == 0) continue;
+        const long double gap = (long double)sum[0] / n[0] - (long double)sum[1] / n[1];
+        const long double variance = gap * gap * n[0] * n[1];
+        if (variance > best * (1 + 1e-15L))
+            best = variance, first = last = t;
+        else if (fabsl(variance - best) <= 1e-15L * best && last == t - 1)
+            last = t;
+    }
+    return best < 0 ? 0 : (first + last + 1) / 2;
+}
+
+static void thresholds(void **state) {
+    (void)state;
+    test_random random = {7};
+    picture p;
+    int threshold;
+    for (int run = 0; run < 60; run++) {
+        const int levels = 2 + test_below(&random, 40);
+        picture_init(&p, SIDE, SIDE, 0);
+        for (int i = 0; i < SIDE * SIDE; i++)
+            p.pixels[i] = (uint8_t)(test_below(&random, levels) * 6 + (i % 3 ? 0 : 9));
+        assert_ok(dem2d_image_threshold(&p.desc, &threshold));
+        assert_int_equal(threshold, otsu(p.pixels, SIDE * SIDE));
+    }
+    picture_init(&p, 4, 1, 255);
+    p.pixels[1] = 0;
+    assert_ok(dem2d_image_threshold(&p.desc, &threshold));
+    assert_int_equal(threshold, 128);            /* the middle of all that part 0 from 255 */
+    for (int grey = 0; grey < 256; grey += 51) { /* one grey value: 0, and no grain */
+        picture_init(&p, 6, 5, (uint8_t)grey);
+        assert_ok(dem2d_image_threshold(&p.desc, &threshold));
+        assert_int_equal(threshold, 0);
+        p.desc.keep_border = true;
+        for (int bright = 0; bright < 2; bright++) {
+            p.desc.bright = bright;
+            dem2d_outline_set *set = outlines(&p.desc);
+            assert_int_equal(dem2d_outline_set_count(set), 0);
+            dem2d_outline_set_destroy(set);
+        }
+    }
+}
+
+static void small_pictures(void **state) {
+    (void)state;
+    static const char *const dot[] = {"...", ".#.", "..."};
+    static const char *const diagonal[] = {"....", ".#..", "..#.", "...."};
+    static const char *const nested[] = {".........", ".#######.", ".#.....#.",
+                                         ".#.###.#.", ".#.#.#.#.", ".#.###.#.",
+                                         ".#.....#.", ".#######.", "........."};
+    static const char *const leaky[] = {"......", ".###..", ".#.#..", ".##...", "......"};
+    picture p;
+    picture_draw(&p, dot, 3);
+    dem2d_outline_set *set = outlines(&p.desc);
+    assert_int_equal(dem2d_outline_set_count(set), 1);
+    const dem2d_outline one = outline_of(set, 0);
+    const dem2d_vec diamond[4] = {{1, 1.5}, {1.5, 1}, {2, 1.5}, {1.5, 2}};
+    assert_int_equal(one.count, 4);
+    assert_memory_equal(one.points, diamond, sizeof diamond); /* binary: halfway, exactly */
+    dem2d_outline_set_destroy(set);
+    picture_draw(&p, diagonal, 4);
+    set = outlines(&p.desc);
+    assert_int_equal(dem2d_outline_set_count(set), 2);
+    check_outline(set, 0, 1, 1, 1);
+    check_outline(set, 1, 2, 2, 1);
+    dem2d_outline_set_destroy(set);
+    picture_draw(&p, nested, 9); /* a grain in a hole of a grain is filled with the hole */
+    set = outlines(&p.desc);
+    assert_int_equal(dem2d_outline_set_count(set), 1);
+    check_outline(set, 0, 1, 1, 49);
+    assert_near(area_of(outline_of(set, 0).points, outline_of(set, 0).count), 49 - 0.5, 1e-15L);
+    dem2d_outline_set_destroy(set);
+    picture_draw(&p, leaky, 5); /* the hole touches the outside by a corner: it is none */
+    set = outlines(&p.desc);
+    assert_int_equal(dem2d_outline_set_count(set), 1);
+    check_outline(set, 0, 1, 1, 7);
+    check_simple(outline_of(set, 0).points, outline_of(set, 0).count);
+    dem2d_outline_set_destroy(set);
+    picture_init(&p, 5, 3, 9); /* grain from border to border: its sides are the picture's */
+    p.desc.threshold = 10;
+    set = outlines(&p.desc);
+    assert_int_equal(dem2d_outline_set_count(set), 0);
+    dem2d_outline_set_destroy(set);
+    p.desc.keep_border = true, p.desc.scale = 0.5;
+    set = outlines(&p.desc);
+    assert_int_equal(dem2d_outline_set_count(set), 1);
+    check_outline(set, 0, 0, 0, 15);
+    assert_near(area_of(outline_of(set, 0).points, outline_of(set, 0).count), (15 - 0.5) / 4,
+                1e-15L);
+    dem2d_outline_set_destroy(set);
+}
+
+/* Filled grains by relaxation: outside spreads over ground in 8 directions, then labels over the
+   rest in 4. label[] gets the index of the first pixel, or -1. */
+static void relax(const picture *p, int *label) {
+    const int w = p->desc.width, h = p->desc.height;
+    static bool outside[SIDE + 2][SIDE + 2];
+    memset(outside, 0, sizeof outside);
+    for (int r = 0; r < h + 2; r++)
+        for (int c = 0; c < w + 2; c++)
+            outside[r][c] = r == 0 || c == 0 || r == h + 1 || c == w + 1;
+    for (bool moved = true; moved;) {
+        moved = false;
+        for (int r = 1; r <= h; r++)
+            for (int c = 1; c <= w; c++) {
+                const bool dark = p->pixels[(r - 1) * w + c - 1] < p->desc.threshold;
+                if (outside[r][c] || dark != p->desc.bright) continue;
+                for (int k = 0; k < 9; k++)
+                    if (outside[r - 1 + k / 3][c - 1 + k % 3]) outside[r][c] = moved = true;
+            }
+    }
+    for (int i = 0; i < w * h; i++) label[i] = outside[i / w + 1][i % w + 1] ? -1 : i;
+    for (bool moved = true; moved;) {
+        moved = false;
+        for (int i = 0; i < w * h; i++) {
+            const int next[4] = {i % w > 0 ? i - 1 : i, i % w < w - 1 ? i + 1 : i,
+                                 i >= w ? i - w : i, i + w < w * h ? i + w : i};
+            for (int k = 0; k < 4 && label[i] >= 0; k++)
+                if (label[next[k]] >= 0 && label[next[k]] < label[i])
+                    label[i] = label[next[k]], moved = true;
+        }
+    }
+}
+
+/* The set against labels: who is there, in which order, with how many pixels. */
+static void check_against_labels(const picture *p, const dem2d_outline_set *set) {
+    const int w = p->desc.width, h = p->desc.height;
+    int label[SIDE * SIDE], found = 0;
+    relax(p, label);
+    for (int i = 0; i < w * h; i++) {
+        if (label[i] != i) continue;
+        int pixels = 0;
+        bool border = false;
+        for (int k = 0; k < w * h; k++) {
+            if (label[k] != i) continue;
+            pixels++;
+            border = border || k % w == 0 || k % w == w - 1 || k < w || k >= w * (h - 1);
+        }
+        const int least = p->desc.min_pixels ? p->desc.min_pixels : 16;
+        if (pixels < least || (p->desc.max_pixels && pixels > p->desc.max_pixels)) continue;
+        if (border && !p->desc.keep_border) continue;
+        assert_true(found < dem2d_outline_set_count(set));
+        check_outline(set, found, i / w, i % w, pixels);
+        const dem2d_outline outline = outline_of(set, found++);
+        check_simple(outline.points, outline.count);
+    }
+    assert_int_equal(found, dem2d_outline_set_count(set));
+}
+
+/* Each point is between two pixel centres beside each other, where the grey value interpolated
+   between them is threshold - 1/2; or on the picture's border. */
+static void check_places(const picture *p, const dem2d_outline *outline) {
+    const int w = p->desc.width, h = p->desc.height;
+    for (int i = 0; i < outline->count; i++) {
+        const double x = outline->points[i].x / p->desc.scale - 0.5;
+        const double y = h - outline->points[i].y / p->desc.scale - 0.5;
+        const bool level = fabs(y - round(y)) < 1e-9; /* else x is whole */
+        const double along = level ? x : y, across = round(level ? y : x);
+        const int low = (int)floor(along), size = level ? w : h;
+        assert_true(level || fabs(x - round(x)) < 1e-9);
+        if (low < 0 || low + 1 >= size) {
+            assert_within(along, low < 0 ? -0.5 : size - 0.5, 1e-9);
+            continue;
+        }
+        const int step = level ? 1 : w, at = level ? (int)across * w + low : low * w + (int)across;
+        const double a = p->pixels[at], b = p->pixels[at + step];
+        assert_within(a + (along - low) * (b - a), p->desc.threshold - 0.5, 1e-7);
+    }
+}
+
+static void random_pictures(void **state) {
+    (void)state;
+    test_random random = {11};
+    for (int run = 0; run < 400; run++) {
+        picture p, inverse;
+        const int w = 1 + test_below(&random, SIDE), h = 1 + test_below(&random, SIDE);
+        const int part = 1 + test_below(&random, 9), greys = run % 3 ? 2 : 256;
+        picture_init(&p, w, h, 0);
+        p.desc.threshold = 128, p.desc.bright = run % 2, p.desc.keep_border = run % 4 < 2;
+        p.desc.min_pixels = run % 5, p.desc.max_pixels = run % 3 ? 0 : 1 + run / 20;
+        p.desc.scale = test_uniform(&random, 0.1, 3);
+        for (int i = 0; i < w * h; i++) {
+            const int grey = test_below(&random, greys) * (255 / (greys - 1));
+            p.pixels[i] = (uint8_t)(test_below(&random, 10) < part ? grey : 255);
+        }
+        dem2d_outline_set *set = outlines(&p.desc), *turned;
+        check_against_labels(&p, set);
+        inverse = p; /* the same grains, bright for dark, in rows with a gap */
+        uint8_t wide[SIDE * (SIDE + 5)];
+        memset(wide, 77, sizeof wide);
+        for (int i = 0; i < w * h; i++) wide[i / w * (w + 5) + i % w] = (uint8_t)~p.pixels[i];
+        inverse.desc.pixels = wide, inverse.desc.stride = w + 5;
+        inverse.desc.threshold = 256 - p.desc.threshold, inverse.desc.bright = !p.desc.bright;
+        turned = outlines(&inverse.desc);
+        assert_int_equal(dem2d_outline_set_count(turned), dem2d_outline_set_count(set));
+        for (int i = 0; i < dem2d_outline_set_count(set); i++) {
+            const dem2d_outline a = outline_of(set, i), b = outline_of(turned, i);
+            check_places(&p, &a);
+            assert_int_equal(a.count, b.count);
+            assert_memory_equal(a.points, b.points, (size_t)a.count * sizeof(dem2d_vec));
+        }
+        dem2d_outline_set_destroy(turned);
+        dem2d_outline_set_destroy(set);
+    }
+}
+
+/* A disc whose edge pixels are grey by the part they are covered: far better than a pixel. */
+static void disc_in_grey(void **state) {
+    (void)state;
+    picture p;
+    const double cx = 11.37, cy = 12.81, radius = 8.3;
+    picture_init(&p, SIDE, SIDE, 200);
+    for (int i = 0; i < SIDE * SIDE; i++) {
+        int inside = 0;
+        for (int k = 0; k < 400; k++) {
+            const double x = i % SIDE + (k % 20 + 0.5) / 20, y = i / SIDE + (k / 20 + 0.5) / 20;
+            inside += hypot(x - cx, y - (SIDE - cy)) < radius;
+        }
+        p.pixels[i] = (uint8_t)(200 - 180 * inside / 400);
+    }
+    p.desc.threshold = 111; /* halfway from 20 to 200 is 110 */
+    dem2d_outline_set *set = outlines(&p.desc);
+    assert_int_equal(dem2d_outline_set_count(set), 1);
+    const dem2d_outline outline = outline_of(set, 0);
+    dem2d_outline_info info;
+    assert_ok(dem2d_outline_measure(NULL, outline.points, outline.count, &info));
+    assert_near(info.mass.area, TEST_PI * radius * radius, 0.005L);
+    assert_within(info.mass.centroid.x, cx, 0.01);
+    assert_within(info.mass.centroid.y, cy, 0.01);
+    assert_within(info.inscribed, radius, 0.1);
+    assert_within(info.circumscribed, radius, 0.1);
+    dem2d_outline_set_destroy(set);
+}
+
+static void picture_errors(void **state) {
+    (void)state;
+    static const struct {
+        int width, height, stride, threshold, least, most;
+        double scale;
+        dem2d_result result;
+        const char *word;
+    } bad[] = {{0, 4, 0, 0, 0, 0, 1, DEM2D_OUT_OF_RANGE, "width"},
+               {32769, 4, 0, 0, 0, 0, 1, DEM2D_OUT_OF_RANGE, "width"},
+               {4, -1, 0, 0, 0, 0, 1, DEM2D_OUT_OF_RANGE, "height"},
+               {4, 32769, 0, 0, 0, 0, 1, DEM2D_OUT_OF_RANGE, "height"},
+               {4, 4, 3, 0, 0, 0, 1, DEM2D_OUT_OF_RANGE, "stride"},
+               {4, 4, 0, -1, 0, 0, 1, DEM2D_OUT_OF_RANGE, "threshold"},
+               {4, 4, 0, 256, 0, 0, 1, DEM2D_OUT_OF_RANGE, "threshold"},
+               {4, 4, 0, 0, -1, 0, 1, DEM2D_OUT_OF_RANGE, "min_pixels"},
+               {4, 4, 0, 0, 0, -1, 1, DEM2D_OUT_OF_RANGE, "max_pixels"},
+               {4, 4, 0, 0, 0, 0, 0, DEM2D_OUT_OF_RANGE, "scale"},
+               {4, 4, 0, 0, 0, 0, NAN, DEM2D_NOT_FINITE, "scale"}};
+    picture p;
+    test_env env;
+    dem2d_outline_set *set = NULL;
+    dem2d_outline outline;
+    int threshold = -3;
+    test_env_init(&env);
+    for (int i = 0; i < COUNT_OF(bad); i++) {
+        picture_init(&p, bad[i].width, bad[i].height, 0);
+        p.desc.stride = bad[i].stride, p.desc.threshold = bad[i].threshold;
+        p.desc.min_pixels = bad[i].least, p.desc.max_pixels = bad[i].most;
+        p.desc.scale = bad[i].scale;
+        assert_result(dem2d_image_outlines(&env.env, &p.desc, &set), bad[i].result);
+        assert_logged(&env, bad[i].result, -1, bad[i].word);
+        assert_null(set);
+        if (i < 5) assert_result(dem2d_image_threshold(&p.desc, &threshold), DEM2D_OUT_OF_RANGE);
+    }
+    picture_init(&p, 4, 4, 0);
+    assert_result(dem2d_image_outlines(NULL, NULL, &set), DEM2D_NULL_ARGUMENT);
+    assert_result(dem2d_image_outlines(NULL, &p.desc, NULL), DEM2D_NULL_ARGUMENT);
+    assert_result(dem2d_image_threshold(&p.desc, NULL), DEM2D_NULL_ARGUMENT);
+    assert_result(dem2d_image_threshold(NULL, &threshold), DEM2D_NULL_ARGUMENT);
+    p.desc.pixels = NULL;
+    assert_result(dem2d_image_outlines(NULL, &p.desc, &set), DEM2D_NULL_ARGUMENT);
+    assert_result(dem2d_image_threshold(&p.desc, &threshold), DEM2D_NULL_ARGUMENT);
+    assert_int_equal(threshold, -3);
+    assert_int_equal(dem2d_outline_set_count(NULL), 0);
+    assert_result(dem2d_outline_set_get(NULL, 0, &outline), DEM2D_NULL_ARGUMENT);
+    dem2d_outline_set_destroy(NULL);
+    p.desc.pixels = p.pixels, p.desc.threshold = 1, p.desc.keep_border = true;
+    assert_ok(dem2d_image_outlines(&env.env, &p.desc, &set));
+    assert_result(dem2d_outline_set_get(set, 1, &outline), DEM2D_OUT_OF_RANGE);
+    assert_result(dem2d_outline_set_get(set, -1, &outline), DEM2D_OUT_OF_RANGE);
+    assert_result(dem2d_outline_set_get(set, 0, NULL), DEM2D_NULL_ARGUMENT);
+    dem2d_outline_set_destroy(set);
+    assert_clean(&env);
+}
+
+/* --- measures --------------------------------------------------------------------------------- */
+
+/* A star-shaped outline, concave as a rule. */
+static int star(test_random *random, int n, double depth, dem2d_vec centre, dem2d_vec *p) {
+    for (int i = 0; i < n; i++) {
+        const double r = test_uniform(random, 1 - depth, 1);
+        const dem2d_vec u = direction(6.283185307179586 * (i + test_uniform(random, 0, 0.8)) / n);
+        p[i] = vec(centre.x + 2 * r * u.x, centre.y + r * u.y);
+    }
+    return n;
+}
+
+static void turn_round(dem2d_vec *p, int n) {
+    for (int i = 0; i < n / 2; i++) {
+        const dem2d_vec q = p[i];
+        p[i] = p[n - 1 - i], p[n - 1 - i] = q;
+    }
+}
+
+static double side_distance(dem2d_vec p, dem2d_vec a, dem2d_vec b) {
+    const double ex = b.x - a.x, ey = b.y - a.y, square = ex * ex + ey * ey;
+    double t = square > 0 ? ((p.x - a.x) * ex + (p.y - a.y) * ey) / square : 0;
+    t = fmin(fmax(t, 0), 1);
+    return hypot(p.x - a.x - t * ex, p.y - a.y - t * ey);
+}
+
+/* Distance from the boundary, negative outside. */
+static double depth_at(dem2d_vec c, const dem2d_vec *p, int n) {
+    double least = HUGE_VAL;
+    bool inside = false;
+    for (int i = 0; i < n; i++) {
+        const dem2d_vec a = p[i], b = p[(i + 1) % n];
+        least = fmin(least, side_distance(c, a, b));
+        if ((a.y <= c.y) != (b.y <= c.y) && c.x < a.x + (c.y - a.y) / (b.y - a.y) * (b.x - a.x))
+            inside = !inside;
+    }
+    return inside ? least : -least;
+}
+
+static void measures_of_stars(void **state) {
+    (void)state;
+    test_random random = {13};
+    for (int run = 0; run < 120; run++) {
+        dem2d_vec p[60];
+        dem2d_outline_info info;
+        const int n = star(&random, 3 + run % 50, 0.2 + 0.2 * (run % 4), vec(7, -5), p);
+        if (fabsl(area_of(p, n)) < 1e-3L) continue;
+        double most = 0, length = 0, narrow = HUGE_VAL;
+        for (int i = 0; i < n; i++) {
+            const dem2d_vec a = p[i];
+            length += hypot(p[(i + 1) % n].x - a.x, p[(i + 1) % n].y - a.y);
+            for (int k = 0; k < n; k++) {
+                const dem2d_vec b = p[k];
+                const double span = hypot(b.x - a.x, b.y - a.y);
+                most = fmax(most, span);
+                double low = HUGE_VAL, high = -HUGE_VAL; /* width across the line a b */
+                for (int m = 0; m < n && k != i; m++) {
+                    const double off = (double)turn_of(a, b, p[m]) / span;
+                    low = fmin(low, off), high = fmax(high, off);
+                }
+                if (k != i && (low > -1e-12 || high < 1e-12)) narrow = fmin(narrow, high - low);
+            }
+        }
+        const long double area = fabsl(area_of(p, n));
+        if (run % 2) turn_round(p, n);
+        assert_ok(dem2d_outline_measure(NULL, p, n, &info));
+        assert_near(info.mass.area, area, 1e-12L);
+        assert_near(info.perimeter, length, 1e-13L);
+        assert_near(info.feret_max, most, 1e-13L);
+        assert_near(info.feret_min, narrow, 1e-11L);
+        assert_near(info.aspect * info.sphericity, 1, 1e-15L);
+        assert_near(info.circularity, 4 * TEST_PI * area / (length * length), 1e-12L);
+        assert_between(info.solidity, 0, 1 + 1e-12);
+        assert_between(info.roundness, 0, 1);
+        /* inside: it is, and no point of a fine grid is deeper */
+        assert_within(depth_at(info.inscribed_at, p, n), info.inscribed, 1e-12);
+        for (int i = 0; i < 60 * 60; i++) {
+            const dem2d_vec c = vec(5 + (i % 60 + 0.5) / 15, -6 + (i / 60 + 0.5) / 30);
+            assert_true(depth_at(c, p, n) <= info.inscribed + 1e-6 * info.feret_max);
+        }
+        /* around: all are in it, and those on it do not leave half of it free */
+        double gap = 0, last = HUGE_VAL, first = 0;
+        for (double t = 0; t < 720; t++) { /* directions of points on the circle */
+            const dem2d_vec u = direction(t * 0.00872664625997165);
+            for (int i = 0; i < n; i++) {
+                const double x = p[i].x - info.circumscribed_at.x;
+                const double y = p[i].y - info.circumscribed_at.y;
+                assert_true(hypot(x, y) <= info.circumscribed * (1 + 1e-12));
+                if (hypot(x, y) < info.circumscribed * (1 - 1e-9)) continue;
+                if (x * u.x + y * u.y < info.circumscribed * 0.99996) continue;
+                if (last > 720) first = t;
+                if (last < 720) gap = fmax(gap, t - last);
+                last = t;
+            }
+        }
+        assert_true(fmax(gap, first + 720 - last) <= 364);
+    }
+}
+
+static void measures_of_known_shapes(void **state) {
+    (void)state;
+    dem2d_outline_info info;
+    const dem2d_vec box[] = {{1, 1}, {5, 1}, {5, 3}, {3, 3}, {1, 3}};
+    assert_ok(dem2d_outline_measure(NULL, box, 5, &info));
+    assert_near(info.feret_max, sqrtl(20), 1e-15L);
+    assert_near(info.feret_min, 2, 1e-15L);
+    assert_near(info.circumscribed, sqrtl(5), 1e-15L);
+    assert_near(info.circumscribed_at.x, 3, 1e-15L);
+    assert_near(info.inscribed, 1, 4e-6L);
+    assert_within(info.inscribed_at.y, 2, 4e-6);
+    assert_near(info.solidity, 1, 1e-15L);
+    assert_near(info.perimeter, 12, 1e-15L);
+    assert_between(info.roundness, 0, 0.08);
+    /* an L: the circle touches two sides and the inner corner, a = sqrt(2) (1 - a) */
+    const dem2d_vec ell[] = {{0, 0}, {2, 0}, {2, 1}, {1, 1}, {1, 2}, {0, 2}};
+    assert_ok(dem2d_outline_measure(NULL, ell, 6, &info));
+    assert_near(info.inscribed, 2 - sqrtl(2), 5e-6L);
+    assert_near(info.solidity, 3 / 3.5L, 1e-15L);
+    /* squares with round corners: the corners' radius over half the side; a circle at last */
+    for (double r = 0.2; r < 1.1; r += 0.2) {
+        dem2d_vec p[400];
+        for (int i = 0; i < 400; i++) {
+            const dem2d_vec u = direction(1.5707963267948966 * (i / 100 + (i % 100) / 99.0));
+            const double sx = i < 100 || i >= 300 ? 1 : -1, sy = i < 200 ? 1 : -1;
+            p[i] = vec(sx * (1 - r) + r * u.x, sy * (1 - r) + r * u.y);
+        }
+        assert_ok(dem2d_outline_measure(NULL, p, 400, &info)); /* r = 1: double points */
+        assert_within(info.roundness, r, 0.03);
+        assert_within(info.inscribed, 1, 1e-4);
+    }
+}
+
+/* All lengths times 2^k: the same bits. Sizes are what the manual promises. */
+static void measures_have_no_length(void **state) {
+    (void)state;
+    test_random random = {17};
+    dem2d_vec p[90], q[90], s[90], t[90];
+    const int n = star(&random, 90, 0.3, vec(3, 4), p), m = star(&random, 70, 0.3, vec(3, 4), q);
+    dem2d_outline_info one, other;
+    dem2d_difference d, e;
+    assert_ok(dem2d_outline_measure(NULL, p, n, &one));
+    assert_ok(dem2d_outline_compare(NULL, p, n, q, m, &d));
+    for (int k = -199; k < 200; k += 57) {
+        for (int i = 0; i < 90; i++) {
+            s[i] = vec(ldexp(p[i].x, k), ldexp(p[i].y, k));
+            if (i < m) t[i] = vec(ldexp(q[i].x, k), ldexp(q[i].y, k));
+        }
+        assert_ok(dem2d_outline_measure(NULL, s, n, &other));
+        assert_same_bits(ldexp(other.inscribed, -k), one.inscribed);
+        assert_same_bits(ldexp(other.circumscribed, -k), one.circumscribed);
+        assert_same_bits(ldexp(other.feret_min, -k), one.feret_min);
+        assert_same_bits(other.roundness, one.roundness);
+        assert_same_bits(other.circularity, one.circularity);
+        assert_ok(dem2d_outline_compare(NULL, s, n, t, m, &e));
+        assert_same_bits(e.coverage, d.coverage);
+        assert_same_bits(ldexp(e.area, -2 * k), d.area);
+        assert_same_bits(ldexp(e.hausdorff, -k), d.hausdorff);
+    }
+}
+
+/* --- differences ------------------------------------------------------------------------------ */
+
+typedef struct crossing {
+    double x;
+    int of; /* outline 0 or 1 */
+} crossing;
+
+static int by_x(const void *a, const void *b) {
+    const double p = ((const crossing *)a)->x, q = ((const crossing *)b)->x;
+    return (p > q) - (p < q);
+}
+
+static int cross_line(const dem2d_vec *p, int n, int of, double y, crossing *out) {
+    int count = 0;
+    for (int i = 0; i < n; i++) {
+        const dem2d_vec a = p[i], b = p[(i + 1) % n];
+        if ((a.y <= y) == (b.y <= y)) continue;
+        out[count++] = (crossing){a.x + (y - a.y) / (b.y - a.y) * (b.x - a.x), of};
+    }
+    return count;
+}
+
+/* Area of the symmetric difference by scan lines. */
+static double difference_by_lines(const dem2d_vec *p, int n, const dem2d_vec *q, int m) {
+    static crossing line[2 * MOST];
+    double low = HUGE_VAL, high = -HUGE_VAL, sum = 0;
+    for (int i = 0; i < n + m; i++) {
+        const double y = i < n ? p[i].y : q[i - n].y;
+        low = fmin(low, y), high = fmax(high, y);
+    }
+    for (int i = 0; i < LINES; i++) {
+        const double y = low + (high - low) * (i + 0.5) / LINES;
+        int count = cross_line(p, n, 0, y, line);
+        count += cross_line(q, m, 1, y, line + count);
+        qsort(line, (size_t)count, sizeof line[0], by_x);
+        bool in[2] = {false, false};
+        for (int k = 0; k < count; k++) {
+            if (in[0] != in[1]) sum += line[k].x - line[k - 1].x;
+            in[line[k].of] = !in[line[k].of];
+        }
+    }
+    return sum * (high - low) / LINES;
+}
+
+static double farthest_corner(const dem2d_vec *p, int n, const dem2d_vec *q, int m) {
+    double most = 0;
+    for (int i = 0; i < n; i++) {
+        double least = HUGE_VAL;
+        for (int k = 0; k < m; k++) least = fmin(least, side_distance(p[i], q[k], q[(k + 1) % m]));
+        most = fmax(most, least);
+    }
+    return most;
+}
+
+static void differences_of_stars(void **state) {
+    (void)state;
+    test_random random = {19};
+    for (int run = 0; run < 300; run++) {
+        dem2d_vec p[200], q[200];
+        dem2d_difference d, back;
+        const int n = star(&random, 5 + test_below(&random, run % 3 ? 20 : 190), 0.6, vec(1, 1), p);
+        const dem2d_vec at = vec(test_uniform(&random, 0, run % 5), 1);
+        int m = star(&random, 5 + test_below(&random, 190), 0.1 * (run % 9), at, q);
+        if (run % 4 == 0) { /* many corners on corners, sides on sides */
+            memcpy(q, p, sizeof q), m = n;
+            for (int i = 0; i < m; i += 3) q[i].x += test_uniform(&random, -0.1, 0.1);
+        }
+        if (run % 6 == 0) /* level sides and crossings at corners */
+            for (int i = 0; i < 200; i++) {
+                p[i] = vec(round(8 * p[i].x) / 8, round(8 * p[i].y) / 8);
+                q[i] = vec(round(8 * q[i].x) / 8, round(8 * q[i].y) / 8);
+            }
+        const long double area = area_of(p, n);
+        if (area < 0.01L || area_of(q, m) < 0.01L) continue;
+        if (run % 2) turn_round(q, m);
+        assert_ok(dem2d_outline_compare(NULL, p, n, q, m, &d));
+        assert_within(d.area, difference_by_lines(p, n, q, m), 2e-3);
+        assert_near(1 - d.coverage, d.area / area, 1e-9L);
+        const double far = fmax(farthest_corner(p, n, q, m), farthest_corner(q, m, p, n));
+        assert_within(d.hausdorff, far, 1e-12);
+        assert_ok(dem2d_outline_compare(NULL, q, m, p, n, &back));
+        assert_within(back.area, d.area, 1e-12);
+        assert_within(back.hausdorff, d.hausdorff, 1e-14);
+        assert_ok(dem2d_outline_compare(NULL, q, m, q, m, &d));
+        assert_true(d.area == 0 && d.coverage == 1 && d.hausdorff < 1e-15);
+    }
+}
+
+static void differences_of_boxes(void **state) {
+    (void)state;
+    static const dem2d_vec box[] = {{0, 0}, {2, 0}, {2, 1}, {0, 1}};
+    const struct {
+        dem2d_vec p[8];
+        int n;
+        double area, hausdorff;
+    } other[] = {
+        {{{0, 0}, {1, 0}, {2, 0}, {2, 0.25}, {2, 1}, {0, 1}, {0, 0.5}}, 7, 0, 0}, /* corners on */
+        {{{0, 1}, {2, 1}, {2, 0}, {0, 0}}, 4, 0, 0},                              /* clockwise */
+        {{{1, 0}, {3, 0}, {3, 1}, {1, 1}}, 4, 2, 1},       /* along two sides */
+        {{{2, 0}, {4, 0}, {4, 1}, {2, 1}}, 4, 4, 2},       /* beside */
+        {{{2, 1}, {4, 1}, {4, 2}, {2, 2}}, 4, 4, sqrt(5)}, /* by a corner */
+        {{{5, 0}, {6, 0}, {6, 1}, {5, 1}}, 4, 3, 5},       /* strangers */
+        {{{0.5, 0.25}, {1.5, 0.25}, {1.5, 0.75}, {0.5, 0.75}}, 4, 1.5, sqrt(0.3125)}, /* inside */
+        {{{0, 0}, {2, 0}, {0, 1}}, 3, 1, 2 / sqrt(5)},                 /* cut along the diagonal */
+        {{{0.5, -1}, {1.5, -1}, {1.5, 2}, {0.5, 2}}, 4, 3, 1},         /* a cross */
+        {{{0, 0}, {2, 0}, {2, 1}, {1, 1e-9}, {0, 1}}, 5, 1 - 1e-9, 0}, /* down to a side */
+    };
+    for (int i = 0; i < COUNT_OF(other); i++) {
+        dem2d_difference d;
+        assert_ok(dem2d_outline_compare(NULL, box, 4, other[i].p, other[i].n, &d));
+        assert_within(d.area, other[i].area, 1e-15);
+        assert_within(d.coverage, 1 - other[i].area / 2, 1e-15);
+        if (i < COUNT_OF(other) - 1) assert_within(d.hausdorff, other[i].hausdorff, 1e-15);
+    }
+}
+
+/* --- errors ----------------------------------------------------------------------------------- */
+
+static void outline_errors(void **state) {
+    (void)state;
+    static const dem2d_vec good[] = {{0, 0}, {2, 0}, {2, 1}, {0, 1}};
+    static const struct {
+        dem2d_vec p[4];
+        int count;
+        dem2d_result result;
+    } bad[] = {{{{0, 0}, {1, 0}, {NAN, 1}, {0, 1}}, 4, DEM2D_NOT_FINITE},
+               {{{0, 0}, {1, 0}}, 2, DEM2D_TOO_FEW_POINTS},
+               {{{0, 0}, {1, 2}, {3, 6}, {2, 4}}, 4, DEM2D_ZERO_AREA},
+               {{{1, 2}, {1, 2}, {1, 2}, {1, 2}}, 4, DEM2D_ZERO_AREA}};
+    dem2d_outline_info info, kept;
+    dem2d_difference d, before;
+    memset(&info, 0x5a, sizeof info), memset(&d, 0x5a, sizeof d);
+    kept = info, before = d;
+    for (int i = 0; i < COUNT_OF(bad); i++) {
+        test_env env;
+        test_env_init(&env);
+        const dem2d_vec *p = bad[i].p;
+        const int n = bad[i].count;
+        assert_result(dem2d_outline_measure(&env.env, p, n, &info), bad[i].result);
+        assert_result(env.log.result, bad[i].result);
+        assert_result(dem2d_outline_compare(&env.env, p, n, good, 4, &d), bad[i].result);
+        assert_result(dem2d_outline_compare(&env.env, good, 4, p, n, &d), bad[i].result);
+        assert_int_equal(env.log.count, 3);
+        assert_clean(&env);
+    }
+    assert_result(dem2d_outline_measure(NULL, NULL, 4, &info), DEM2D_NULL_ARGUMENT);
+    assert_result(dem2d_outline_measure(NULL, good, 4, NULL), DEM2D_NULL_ARGUMENT);
+    assert_result(dem2d_outline_compare(NULL, NULL, 4, good, 4, &d), DEM2D_NULL_ARGUMENT);
+    assert_result(dem2d_outline_compare(NULL, good, 4, NULL, 4, &d), DEM2D_NULL_ARGUMENT);
+    assert_result(dem2d_outline_compare(NULL, good, 4, good, 4, NULL), DEM2D_NULL_ARGUMENT);
+    assert_memory_equal(&info, &kept, sizeof info);
+    assert_memory_equal(&d, &before, sizeof d);
+}
+
+static void every_allocation_can_fail(void **state) {
+    (void)state;
+    static const char *const rows[] = {".......", ".##.##.", ".##.##.", ".......", ".#.#.#."};
+    static const dem2d_vec p[] = {{0, 0}, {4, -1}, {6, 2}, {3, 1}, {-1, 3}};
+    picture drawn;
+    picture_draw(&drawn, rows, 5);
+    drawn.desc.keep_border = true;
+    for (int which = 0; which < 3; which++)
+        for (int k = 1;; k++) {
+            test_env env;
+            dem2d_outline_set *set = NULL;
+            dem2d_outline_info info;
+            dem2d_difference d;
+            test_env_init(&env);
+            test_env_fail(&env, k);
+            const dem2d_result result =
+                which == 0   ? dem2d_image_outlines(&env.env, &drawn.desc, &set)
+                : which == 1 ? dem2d_outline_measure(&env.env, p, 5, &info)
+                             : dem2d_outline_compare(&env.env, p, 5, p, 4, &d);
+            if (result == DEM2D_OK) {
+                assert_true(k > 3 && env.calls == k - 1);
+                if (which == 0) assert_int_equal(dem2d_outline_set_count(set), 5);
+                dem2d_outline_set_destroy(set);
+                assert_clean(&env);
+                break;
+            }
+            assert_result(result, DEM2D_OUT_OF_MEMORY);
+            assert_null(set);
+            assert_int_equal(env.log.count, 1);
+            assert_logged(&env, DEM2D_OUT_OF_MEMORY, -1, NULL);
+            assert_clean(&env);
+        }
+}
+
+/* --- real grains ------------------------------------------------------------------------------ */
+
+static int read_outline(const char *folder, const char *name, dem2d_vec *points) {
+    char path[1024], line[256];
+    snprintf(path, sizeof path, "%s/%s", folder, name);
+    FILE *file = fopen(path, "r");
+    int count = 0;
+    if (!file) return 0;
+    if (fgets(line, sizeof line, file))
+        while (count < MOST && fscanf(file, "%lf,%lf", &points[count].x, &points[count].y) == 2)
+            count++;
+    fclose(file);
+    return count;
+}
+
+/* Roundness against the published values of the same grains. */
+static void roundness_of_real_grains(void **state) {
+    (void)state;
+    const char *folder = getenv("DATA");
+    char path[1024], line[1024], name[32];
+    snprintf(path, sizeof path, "%s/test1_results.csv", folder ? folder : ".");
+    FILE *file = folder && *folder ? fopen(path, "r") : NULL;
+    if (!file) {
+        print_message("DATA names no folder with test1_results.csv\n");
+        skip();
+        return;
+    }
+    double sum[5] = {0, 0, 0, 0, 0}, published;
+    int count = 0, number;
+    while (fgets(line, sizeof line, file)) {
+        static dem2d_vec points[MOST];
+        dem2d_outline_info info;
+        if (sscanf(line, "%d,%lf", &number, &published) != 2) continue;
+        snprintf(name, sizeof name, "test1_%02d.csv", number);
+        const int n = read_outline(folder, name, points);
+        if (n == 0) continue;
+        assert_ok(dem2d_outline_measure(NULL, points, n, &info));
+        const double x = info.roundness, y = published;
+        sum[0] += x, sum[1] += y, sum[2] += x * x, sum[3] += y * y, sum[4] += x * y, count++;
+    }
+    fclose(file);
+    assert_true(count > 2);
+    const double xx = count * sum[2] - sum[0] * sum[0], yy = count * sum[3] - sum[1] * sum[1];
+    const double correlation = (count * sum[4] - sum[0] * sum[1]) / sqrt(xx * yy);
+    print_message("roundness of %d grains: correlation %.4f, mean difference %+.4f\n", count,
+                  correlation, (sum[0] - sum[1]) / count);
+    assert_true(correlation > 0.9);
+}
+
+int main(void) {
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(thresholds),
+        cmocka_unit_test(small_pictures),
+        cmocka_unit_test(random_pictures),
+        cmocka_unit_test(disc_in_grey),
+        cmocka_unit_test(picture_errors),
+        cmocka_unit_test(measures_of_stars),
+        cmocka_unit_test(measures_of_known_shapes),
+        cmocka_unit_test(measures_have_no_length),
+        cmocka_unit_test(differences_of_stars),
+        cmocka_unit_test(differences_of_boxes),
+        cmocka_unit_test(outline_errors),
+        cmocka_unit_test(every_allocation_can_fail),
+        cmocka_unit_test(roundness_of_real_grains),
+    };
+    return cmocka_run_group_tests_name("outlines", tests, NULL, NULL);
+}
