@@ -1089,6 +1089,45 @@ static void test_wall_errors(void **state) {
     assert_memory_equal(&c, &before, sizeof c);
 }
 
+/* Sizes and places whose squares are no normal numbers are refused, by creation and by queries. */
+static void test_extreme_sizes(void **state) {
+    (void)state;
+    dem2d_shape *shape = NULL;
+    dem2d_contact c;
+    assert_result(dem2d_shape_create_ellipse(NULL, 1e-170, 5e-171, &shape), DEM2D_OUT_OF_RANGE);
+    assert_result(dem2d_shape_create_ellipse(NULL, 1e200, 5e199, &shape), DEM2D_OUT_OF_RANGE);
+    assert_result(dem2d_shape_create_circle(NULL, 1e-320, &shape), DEM2D_OUT_OF_RANGE);
+    const dem2d_vec far[] = {{0, 0}, {1e150, 0}, {0, 1e150}};
+    assert_result(dem2d_shape_create_polygon(NULL, far, 3, 0, &shape), DEM2D_OUT_OF_RANGE);
+    assert_null(shape);
+    assert_ok(dem2d_shape_create_ellipse(NULL, 2, 1, &shape));
+    const double scales[] = {1, 1e-165, 1e300}, offsets[] = {1e200, 0, 1e300};
+    for (int i = 0; i < 3; i++) {
+        const dem2d_pose a = dem2d_pose_make(0, 0, 0, scales[i]);
+        const dem2d_pose b = dem2d_pose_make(offsets[i], 0, 0, scales[i]);
+        assert_result(dem2d_pair_contact(shape, a, shape, b, NULL, &c), DEM2D_OUT_OF_RANGE);
+        assert_result(dem2d_pair_overlap(shape, a, shape, b, NULL, &c), DEM2D_OUT_OF_RANGE);
+        assert_result(dem2d_pair_distance(shape, a, shape, b, NULL, &c), DEM2D_OUT_OF_RANGE);
+    }
+    dem2d_shape_destroy(shape);
+}
+
+/* A corner of a rounded square over another's, as deep as the rounding: h hardly bends there. */
+static void test_flat_minimum(void **state) {
+    (void)state;
+    const dem2d_vec square[] = {{-1, -1}, {1, -1}, {1, 1}, {-1, 1}};
+    dem2d_shape *shape;
+    assert_ok(dem2d_shape_create_polygon(NULL, square, 4, 0.05, &shape));
+    for (double e = 1e-5; e < 1e-2; e *= 2) {
+        dem2d_contact c;
+        assert_ok(dem2d_pair_contact(shape, dem2d_pose_make(0, 0, 0, 1), shape,
+                                     dem2d_pose_make(2 + e, 2 + e, 0, 1), NULL, &c));
+        assert_int_equal(c.state, DEM2D_PENETRATING);
+        assert_within(c.depth, 0.1L - e * sqrtl(2), c.error + 1e-14);
+    }
+    dem2d_shape_destroy(shape);
+}
+
 int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(test_chosen_depths),
@@ -1116,6 +1155,8 @@ int main(void) {
         cmocka_unit_test(test_walls),
         cmocka_unit_test(test_wall_along_face),
         cmocka_unit_test(test_many_pairs),
+        cmocka_unit_test(test_extreme_sizes),
+        cmocka_unit_test(test_flat_minimum),
         cmocka_unit_test(test_errors),
         cmocka_unit_test(test_wall_errors),
     };

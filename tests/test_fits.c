@@ -231,7 +231,7 @@ static const kind kinds[] = {
     {"ellipse", {.model = DEM2D_ELLIPSE}, true},
     {"polygon 3", {.model = DEM2D_POLYGON, .count = 3}, true},
     {"polygon 6", {.model = DEM2D_POLYGON, .count = 6}, true},
-    {"polygon 16", {.model = DEM2D_POLYGON, .count = 16}, false},
+    {"polygon 8", {.model = DEM2D_POLYGON, .count = 8}, false},
     {"bezier 3", {.model = DEM2D_BEZIER, .count = 3}, true},
     {"bezier 10", {.model = DEM2D_BEZIER, .count = 10, .method = DEM2D_FIT_AREA}, true},
     {"swarm 5", {.model = DEM2D_BEZIER, .count = 5, .method = DEM2D_FIT_SWARM}, true},

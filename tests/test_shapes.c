@@ -1098,6 +1098,65 @@ static void texts_and_version(void **state) {
     assert_non_null(dem2d_result_text((dem2d_result)1000));
 }
 
+/* rho = (1 + cos 2t)^n is 0 to order 2n at two angles: decided, and quickly. */
+static void flat_valleys(void **state) {
+    (void)state;
+    for (int n = 2; n <= 32; n *= 2) {
+        double a[65] = {2}, b[65] = {0}, c = 1;
+        for (int k = 1; k <= n; k++) {
+            c *= (double)(n - k + 1) / (n + k);
+            a[2 * k] = 2 * c / (1 - 4.0 * k * k);
+        }
+        dem2d_convexity convexity;
+        dem2d_shape *shape;
+        assert_ok(dem2d_fourier_convexity(a, b, 2 * n, &convexity));
+        assert_between(convexity.rho_min_lower, -1e-12L, convexity.rho_min_upper);
+        assert_ok(dem2d_shape_create_fourier(NULL, a, b, 2 * n, &shape));
+        dem2d_shape_destroy(shape);
+    }
+}
+
+static void angles_without_digits(void **state) {
+    (void)state;
+    const double angles[] = {NAN, HUGE_VAL, -HUGE_VAL, 1.1e9, -1e300};
+    for (int i = 0; i < 5; i++) {
+        const dem2d_rot q = dem2d_rot_make(angles[i]);
+        assert_true(isnan(q.c) && isnan(q.s));
+    }
+    const dem2d_rot q = dem2d_rot_make(1073741824.0);
+    assert_within(hypotl(q.c, q.s), 1, 4e-16L);
+}
+
+/* Half an allocator is none: what malloc made must go to free. */
+static void allocator_without_release(void **state) {
+    (void)state;
+    test_env env;
+    dem2d_shape *shape;
+    test_env_init(&env);
+    env.env.release = NULL;
+    assert_ok(dem2d_shape_create_circle(&env.env, 1, &shape));
+    assert_int_equal(env.calls, 0);
+    dem2d_shape_destroy(shape);
+}
+
+/* The offending arc is named in the caller's numbering, clockwise or not. */
+static void clockwise_arcs_are_named(void **state) {
+    (void)state;
+    const double k = 0.5522847498;
+    const dem2d_vec circle[12] = {{1, 0},  {1, k},   {k, 1},   {0, 1},  {-k, 1}, {-1, k},
+                                  {-1, 0}, {-1, -k}, {-k, -1}, {0, -1}, {k, -1}, {1, -k}};
+    for (int turn = 0; turn < 2; turn++) {
+        dem2d_vec p[12];
+        test_env env;
+        dem2d_shape *shape = NULL;
+        for (int i = 0; i < 12; i++) p[i] = circle[turn ? (12 - i) % 12 : i];
+        p[10].x *= 0.1, p[10].y *= 0.1; /* bends arc 3 the wrong way */
+        test_env_init(&env);
+        assert_result(dem2d_shape_create_bezier(&env.env, p, 4, &shape), DEM2D_NOT_CONVEX);
+        assert_int_equal(env.log.index, 3);
+    }
+}
+
 int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(circles_and_ellipses_are_checked),
@@ -1122,6 +1181,10 @@ int main(void) {
         cmocka_unit_test(containment),
         cmocka_unit_test(rotations_and_poses),
         cmocka_unit_test(texts_and_version),
+        cmocka_unit_test(flat_valleys),
+        cmocka_unit_test(angles_without_digits),
+        cmocka_unit_test(allocator_without_release),
+        cmocka_unit_test(clockwise_arcs_are_named),
     };
     return cmocka_run_group_tests_name("shapes", tests, NULL, NULL);
 }

@@ -1477,6 +1477,68 @@ static void test_svg_changes_nothing(void **state) {
     end_pile(&p, &env);
 }
 
+/* A disc in contact with a floor; a change of time step, of the law or of the wall is noticed. */
+static void test_changes_are_checked(void **state) {
+    (void)state;
+    const dem2d_world_desc desc = basic_desc();
+    const dem2d_pair_desc hard = {1e13, 1e13, 0.4};
+    for (int change = 0; change < 2; change++) {
+        const scene s = make_scene(&desc, &stone);
+        const dem2d_particle_id id = add_grain(&s, add_disc(s.world, 0.1), 0, 0.1 - 1e-5);
+        add_wall(&s, 0, 0, 0, 1);
+        step(s.world, 1);
+        double safe, limit;
+        assert_ok(dem2d_world_time_step_bounds(s.world, &safe, &limit, NULL));
+        if (change == 0) assert_ok(dem2d_world_set_time_step(s.world, 1.5 * limit));
+        if (change == 1) assert_ok(dem2d_world_set_pair(s.world, s.material, s.material, &hard));
+        int done = -1;
+        const dem2d_particle_info before = particle(s.world, id);
+        assert_result(dem2d_world_step(s.world, 3, &done), DEM2D_TIME_STEP);
+        assert_int_equal(done, 0);
+        const dem2d_particle_info after = particle(s.world, id);
+        assert_memory_equal(&before, &after, sizeof before);
+        assert_int_equal(stats(s.world).wall_contacts, 1); /* of the last good step */
+        dem2d_world_destroy(s.world);
+    }
+}
+
+/* Contacts with a wall live on when it is described anew, and end when it turns. */
+static void test_set_wall_and_contacts(void **state) {
+    (void)state;
+    const dem2d_world_desc desc = basic_desc();
+    for (int turn = 0; turn < 2; turn++) {
+        const scene s = make_scene(&desc, &stone);
+        const dem2d_particle_id id = add_grain(&s, add_disc(s.world, 0.1), 0, 0.1 - 1e-4);
+        const dem2d_wall_id floor = add_wall(&s, 0, 0, 0, 1);
+        assert_ok(dem2d_world_drive_particle(s.world, id, DEM2D_DRIVEN, vec(0.01, 0), 0));
+        step(s.world, 20);
+        const double wound = only_contact(s.world).tangential_force;
+        assert_true(fabs(wound) > 0);
+        dem2d_wall_desc again = wall_desc(&s, 0, 0, 0, 1);
+        if (turn) again = wall_desc(&s, 0, 0.2 - 2e-4, 0, -1);
+        assert_ok(dem2d_world_set_wall(s.world, floor, &again));
+        assert_ok(dem2d_world_drive_particle(s.world, id, DEM2D_DRIVEN, vec(0, 0), 0));
+        step(s.world, 1);
+        assert_within(only_contact(s.world).tangential_force, turn ? 0 : wound, 1e-9 * 1e3);
+        dem2d_world_destroy(s.world);
+    }
+}
+
+static void test_porosity(void **state) {
+    (void)state;
+    const dem2d_world_desc desc = basic_desc();
+    const scene s = make_scene(&desc, &stone);
+    double porosity = -7;
+    add_grain(&s, add_disc(s.world, 0.1), 0, 0);
+    assert_ok(dem2d_world_porosity(s.world, 0.1, &porosity));
+    assert_near(porosity, 1 - 0.1 * acosl(-1), 1e-14);
+    assert_result(dem2d_world_porosity(s.world, 0, &porosity), DEM2D_OUT_OF_RANGE);
+    assert_result(dem2d_world_porosity(s.world, NAN, &porosity), DEM2D_NOT_FINITE);
+    assert_result(dem2d_world_porosity(NULL, 1, &porosity), DEM2D_NULL_ARGUMENT);
+    assert_result(dem2d_world_porosity(s.world, 1, NULL), DEM2D_NULL_ARGUMENT);
+    dem2d_world_destroy(s.world);
+}
+
 int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(test_create_errors),
@@ -1505,6 +1567,9 @@ int main(void) {
         cmocka_unit_test(test_scaled_runs),
         cmocka_unit_test(test_skin),
         cmocka_unit_test(test_time_step_bounds),
+        cmocka_unit_test(test_changes_are_checked),
+        cmocka_unit_test(test_set_wall_and_contacts),
+        cmocka_unit_test(test_porosity),
         cmocka_unit_test(test_time_step_too_long),
         cmocka_unit_test(test_slow_time_step),
         cmocka_unit_test(test_state_error),
