@@ -4027,6 +4027,46 @@ static void dem2di_section_loop(const dem2di_section *section, const dem2di_arc 
     }
 }
 
+/* Where a point lies beside an arc: the arc's parameter level with it along the chord, and how far
+   it is outside, across the chord. Only for arcs that go forward along their chord. */
+typedef struct dem2di_foot {
+    bool level; /* else beyond the ends, or not known */
+    double t, outside;
+} dem2di_foot;
+
+static dem2di_foot dem2di_arc_foot(const dem2di_arc *arc, dem2d_vec chord, dem2d_vec p, double t) {
+    dem2di_foot foot = {false, t, 0};
+    dem2di_cubic f;
+    f.start = dem2di_dot(chord, dem2di_sub(arc->start, p));
+    f.q0 = dem2di_dot(chord, arc->d0);
+    f.q1 = dem2di_dot(chord, arc->d1);
+    f.q2 = dem2di_dot(chord, arc->d2);
+    double end = f.start + f.q0 + f.q1 + f.q2;
+    if (f.q0 < 0 || f.q1 < 0 || f.q2 < 0 || f.start > 0 || end < 0) return foot;
+    for (int i = 0; i < 8 && !foot.level; i++) {
+        double s = 1 - t, value = dem2di_cubic_value(&f, t);
+        double slope = 3 * (s * s * f.q0 + 2 * s * t * f.q1 + t * t * f.q2);
+        double next = dem2di_max(0, dem2di_min(1, t - value / slope));
+        foot.level = fabs(next - t) < 1e-6; /* its square is left: below rounding of a side */
+        t = next;
+    }
+    foot.t = t;
+    foot.outside = dem2di_cross(dem2di_sub(p, dem2di_arc_point(arc, t)), chord);
+    return foot;
+}
+
+/* Can the segment between two points cross the arc? Not when both are inside (it is convex), nor
+   when both are outside by more than the arc bulges between their feet, |B''| dt^2/8. */
+static bool dem2di_may_cross(const dem2di_arc *arc, const dem2di_foot *a, const dem2di_foot *b) {
+    if (!a->level || !b->level || (a->outside < 0) != (b->outside < 0)) return true;
+    if (a->outside < 0) return false;
+    double bend = dem2di_max(dem2di_length(dem2di_sub(arc->d1, arc->d0)),
+                             dem2di_length(dem2di_sub(arc->d2, arc->d1)));
+    double reach = b->t - a->t, bulge = 6 * bend * reach * reach / 8;
+    /* seen across the chord it is longer by 1/cos of at most 60 degrees */
+    return dem2di_min(a->outside, b->outside) <= 2 * bulge;
+}
+
 /* Area between arc and outline: the two cross in points that cut both into loops; the area of
    each loop is the difference of two sweeps. Exact when arc and outline meet the crossings in
    one order. */
@@ -4038,12 +4078,22 @@ static double dem2di_section_area(const dem2di_section *section, const double f[
     double area = 0, loop = 0, last = 0, t[2];
     int place = section->from->place;
     int inner = (section->to->place - place + outline->count) % outline->count + 1;
+    dem2d_vec chord = dem2di_vec(0, 0);
+    dem2di_foot before = {false, 0, 0};
     slope[0] = slope[1] = 0;
+    /* feet need an arc that stays within 60 degrees of its chord; without a chord there are none */
+    (void)dem2di_unit(dem2di_sub(section->to->point, origin), &chord);
+    if (dem2di_dot(chord, section->from->tangent) < 0.5 ||
+        dem2di_dot(chord, section->to->tangent) < 0.5)
+        chord = dem2di_vec(0, 0);
     for (int i = 0; i <= inner; i++) { /* the outline's points, then the second joint */
         dem2d_vec q =
             i < inner ? outline->points[(place + i) % outline->count] : section->to->point;
         q = dem2di_sub(q, origin);
-        int found = dem2di_arc_crossings(&arc, p, dem2di_sub(q, p), t);
+        dem2di_foot here = dem2di_arc_foot(&arc, chord, q, before.t);
+        bool cross = dem2di_may_cross(&arc, &before, &here);
+        int found = cross ? dem2di_arc_crossings(&arc, p, dem2di_sub(q, p), t) : 0;
+        before = here;
         for (int j = 0; j < found; j++) {
             dem2d_vec x = dem2di_arc_point(&arc, t[j]);
             loop += dem2di_cross(p, x) / 2;
@@ -4065,14 +4115,18 @@ static double dem2di_fraction(double f) {
     return dem2di_max(1e-4, dem2di_min(1, f));
 }
 
-/* One step down along -H slope, halved until the area falls; false when it does not within 2^-12.
+/* One step down along -H slope, halved until the area falls; false when it does not within 2^-8.
    A fraction at its bound that would leave stays. */
 static bool dem2di_section_descend(const dem2di_section *section, double inverse[3], double f[2],
                                    double slope[2], double *area) {
     double d[2], g[2], next[2];
     d[0] = -(inverse[0] * slope[0] + inverse[1] * slope[1]);
     d[1] = -(inverse[1] * slope[0] + inverse[2] * slope[1]);
-    for (double factor = 1; factor > 1.0 / 4096; factor /= 2) {
+    for (int j = 0; j < 2; j++)
+        if (dem2di_fraction(f[j] + d[j]) == f[j]) d[j] = 0;
+    /* what the step promises: 1e-5 of the area is about 1e-7 of the grain's */
+    if (-(d[0] * slope[0] + d[1] * slope[1]) <= 1e-5 * *area) return false;
+    for (double factor = 1; factor > 1.0 / 256; factor /= 2) {
         for (int j = 0; j < 2; j++) g[j] = dem2di_fraction(f[j] + factor * d[j]);
         double value = dem2di_section_area(section, g, next);
         if (!(value < *area)) continue;
@@ -4089,7 +4143,7 @@ static bool dem2di_section_descend(const dem2di_section *section, double inverse
         memcpy(f, g, 2 * sizeof *f);
         memcpy(slope, next, 2 * sizeof *slope);
         *area = value;
-        return fabs(s0) + fabs(s1) > 1e-6; /* of the lengths: area to second order, 1e-12 */
+        return true;
     }
     return false;
 }
@@ -4689,18 +4743,18 @@ static double dem2di_fit_difference(dem2di_fit *fit, const dem2d_vec *points, in
 /* x: centre, half axes, angle. A hundred and twenty points lose 5e-4 of an ellipse's area alike
    for all candidates; the ellipse of their polygon's area is taken for the points. */
 static double dem2di_ellipse_objective(void *data, const double *x) {
-    enum { POINTS = 120 };
+    const int count = 120;
     dem2di_fit *fit = (dem2di_fit *)data;
     if (!(x[2] > 0 && x[3] > 0)) return HUGE_VAL;
-    dem2d_rot q = dem2d_rot_make(x[4]), step = dem2d_rot_make(2 * DEM2DI_PI / POINTS);
-    double swell = sqrt(2 * DEM2DI_PI / POINTS / step.s);
+    dem2d_rot q = dem2d_rot_make(x[4]), step = dem2d_rot_make(2 * DEM2DI_PI / count);
+    double swell = sqrt(2 * DEM2DI_PI / count / step.s);
     dem2d_vec z = dem2di_vec(1, 0), centre = dem2di_vec(x[0], x[1]);
-    for (int i = 0; i < POINTS; i++) {
+    for (int i = 0; i < count; i++) {
         dem2d_vec p = dem2di_vec(swell * x[2] * z.x, swell * x[3] * z.y);
         fit->buffer[i] = dem2di_add(centre, dem2di_turn(q, p));
         z = dem2di_turn(step, z);
     }
-    return dem2di_fit_difference(fit, fit->buffer, POINTS);
+    return dem2di_fit_difference(fit, fit->buffer, count);
 }
 
 /* From the hull's moments: half axes of the ellipse with its area and second moments. */
@@ -4917,36 +4971,36 @@ static double dem2di_ray_reach(const dem2d_vec *points, int count, dem2d_vec cen
 
 DEM2D_API dem2d_result dem2d_radial_compare(const dem2d_env *env, const dem2d_vec *points,
                                             int count, int order, dem2d_difference *difference) {
-    enum { POINTS = DEM2DI_FIT_POINTS };
+    const int rays = DEM2DI_FIT_POINTS;
     if (difference == NULL) return dem2di_fail_null(env, "difference");
     dem2d_mass mass;
     dem2d_result result = dem2di_check_points(env, "points", points, count, 3);
     if (result == DEM2D_OK) result = dem2d_polygon_mass(points, count, &mass);
     if (result != DEM2D_OK) return result;
-    if (order < 0 || 2 * order >= POINTS)
+    if (order < 0 || 2 * order >= rays)
         return dem2di_fail(env, DEM2D_OUT_OF_RANGE, order, "order = %d", order);
-    dem2d_vec *fitted = (dem2d_vec *)dem2di_allocate(env, 2 * POINTS, sizeof *fitted);
+    dem2d_vec *fitted = (dem2d_vec *)dem2di_allocate(env, 2 * (size_t)rays, sizeof *fitted);
     if (fitted == NULL) return dem2di_fail(env, DEM2D_OUT_OF_MEMORY, -1, "radial series");
-    double *r = (double *)(void *)(fitted + POINTS), *sum = r + POINTS;
-    for (int i = 0; i < POINTS; i++) {
-        dem2d_rot z = dem2d_rot_make(2 * DEM2DI_PI * i / POINTS);
+    double *r = (double *)(void *)(fitted + rays), *sum = r + rays;
+    for (int i = 0; i < rays; i++) {
+        dem2d_rot z = dem2d_rot_make(2 * DEM2DI_PI * i / rays);
         r[i] = dem2di_ray_reach(points, count, mass.centroid, dem2di_vec(z.c, z.s));
         sum[i] = 0;
     }
     for (int n = 0; n <= order; n++) {
-        dem2d_rot step = dem2d_rot_make(2 * DEM2DI_PI * n / POINTS);
+        dem2d_rot step = dem2d_rot_make(2 * DEM2DI_PI * n / rays);
         dem2d_vec z = dem2di_vec(1, 0), c = dem2di_vec(0, 0);
-        for (int i = 0; i < POINTS; i++, z = dem2di_turn(step, z))
-            c = dem2di_along(c, r[i] * (n == 0 ? 1.0 : 2.0) / POINTS, z);
+        for (int i = 0; i < rays; i++, z = dem2di_turn(step, z))
+            c = dem2di_along(c, r[i] * (n == 0 ? 1.0 : 2.0) / rays, z);
         z = dem2di_vec(1, 0);
-        for (int i = 0; i < POINTS; i++, z = dem2di_turn(step, z)) sum[i] += dem2di_dot(c, z);
+        for (int i = 0; i < rays; i++, z = dem2di_turn(step, z)) sum[i] += dem2di_dot(c, z);
     }
-    for (int i = 0; i < POINTS; i++) {
-        dem2d_rot z = dem2d_rot_make(2 * DEM2DI_PI * i / POINTS);
+    for (int i = 0; i < rays; i++) {
+        dem2d_rot z = dem2d_rot_make(2 * DEM2DI_PI * i / rays);
         fitted[i] = dem2di_along(mass.centroid, dem2di_max(0, sum[i]), dem2di_vec(z.c, z.s));
     }
-    result = dem2d_outline_compare(env, points, count, fitted, POINTS, difference);
-    dem2di_release(env, fitted, 2 * POINTS, sizeof *fitted);
+    result = dem2d_outline_compare(env, points, count, fitted, rays, difference);
+    dem2di_release(env, fitted, 2 * (size_t)rays, sizeof *fitted);
     return result;
 }
 
