@@ -7351,8 +7351,7 @@ static double dem2di_equivalent(const dem2d_world *world, int i) {
     return body->scale * sqrt(body->shape->mass.area / DEM2DI_PI);
 }
 
-/* Contacts of particle i on either side of a sorted list: its first index is scanned on by the
-   caller, its second needs a count of its own; so contacts are counted into scratch. */
+/* Number of contacts of each particle with others, into the scratch of the list. */
 static void dem2di_count_contacts(const dem2d_world *world, dem2di_disc *counts) {
     for (int i = 0; i < world->body_count; i++) counts[i].reach = 0;
     for (int i = 0; i < world->pairs.keys.count; i++) {
