@@ -175,8 +175,8 @@ HOW TO
 OPTIONS (zero means: physical zero for physical fields; "library default" where one is given)
     struct                  field                 unit   default    range
     dem2d_env               user                  -      NULL       handed to the callbacks
-    dem2d_env               allocate              -      malloc     both or neither
-    dem2d_env               release               -      free       both or neither
+    dem2d_env               allocate              -      malloc     with release, else not used
+    dem2d_env               release               -      free       with allocate, else not used
     dem2d_env               log                   -      silent
     dem2d_custom_desc       support               -      none       required
     dem2d_custom_desc       user                  -      NULL
@@ -1594,7 +1594,7 @@ static double dem2di_taylor_bound(const dem2di_series *s, double value, const do
 
 /* Minimum by branch and bound: each interval that may undercut the best value is halved until
    its bound is within the tolerance. 48 halvings of 2 pi reach the spacing of doubles; after
-   DEM2DI_SERIES_PIECES (a second or so) the bounds of larger intervals are taken. */
+   DEM2DI_SERIES_PIECES, which bounds the time, those of larger intervals are taken. */
 #define DEM2DI_SERIES_PIECES 1000000
 
 static dem2di_bounds dem2di_series_minimum(const dem2di_series *s, double tolerance) {
@@ -1745,12 +1745,17 @@ static dem2d_vec dem2di_arc_point(const dem2di_arc *arc, double t) {
                       arc->start.y + w0 * arc->d0.y + w1 * arc->d1.y + w2 * arc->d2.y);
 }
 
+/* B'/3 at t. */
+static dem2d_vec dem2di_arc_speed(const dem2di_arc *arc, double t) {
+    double s = 1 - t;
+    return dem2di_add(dem2di_along(dem2di_scale(arc->d0, s * s), 2 * t * s, arc->d1),
+                      dem2di_scale(arc->d2, t * t));
+}
+
 /* |B'|^3 / B' x B'': 0 where B' vanishes (a point of infinite curvature), infinite on a flat. */
 static double dem2di_arc_rho(const dem2di_arc *arc, double t) {
-    double s = 1 - t, w1 = 2 * t * s;
-    dem2d_vec first = dem2di_add(dem2di_along(dem2di_scale(arc->d0, s * s), w1, arc->d1),
-                                 dem2di_scale(arc->d2, t * t));
-    dem2d_vec second = dem2di_add(dem2di_scale(dem2di_sub(arc->d1, arc->d0), s),
+    dem2d_vec first = dem2di_arc_speed(arc, t);
+    dem2d_vec second = dem2di_add(dem2di_scale(dem2di_sub(arc->d1, arc->d0), 1 - t),
                                   dem2di_scale(dem2di_sub(arc->d2, arc->d1), t));
     double speed = dem2di_length(first), turn = dem2di_cross(first, second);
     if (speed == 0) return 0;
@@ -1962,12 +1967,9 @@ static dem2d_mass dem2di_bezier_mass(const dem2di_arc *arcs, int count) {
     dem2di_moments m = {0, {0, 0}, 0};
     for (int k = 0; k < count; k++)
         for (int i = 0; i < 6; i++) {
-            double t = 0.5 + (i < 3 ? 0.5 : -0.5) * node[i % 3], s = 1 - t;
+            double t = 0.5 + (i < 3 ? 0.5 : -0.5) * node[i % 3];
             dem2d_vec point = dem2di_arc_point(&arcs[k], t);
-            dem2d_vec speed =
-                dem2di_add(dem2di_along(dem2di_scale(arcs[k].d0, s * s), 2 * t * s, arcs[k].d1),
-                           dem2di_scale(arcs[k].d2, t * t));
-            double sweep = 1.5 * weight[i % 3] * dem2di_cross(point, speed);
+            double sweep = 1.5 * weight[i % 3] * dem2di_cross(point, dem2di_arc_speed(&arcs[k], t));
             m.area += sweep / 2;
             m.first = dem2di_along(m.first, sweep / 3, point);
             m.polar += sweep / 4 * dem2di_dot(point, point);
@@ -2608,21 +2610,16 @@ DEM2D_API dem2d_result dem2d_shape_support(const dem2d_shape *shape, dem2d_pose 
     return DEM2D_OK;
 }
 
-/* Support values at a pose along +x, +y, -x, -y, relative to its position. */
-static void dem2di_extents(const dem2d_shape *shape, const dem2d_pose *pose, double extent[4]) {
-    dem2d_vec u = dem2di_vec(1, 0);
-    for (int i = 0; i < 4; i++) {
-        extent[i] = dem2di_dot(dem2di_posed_support(shape, pose, u, NULL), u);
-        u = dem2di_perp(u);
-    }
-}
-
 DEM2D_API dem2d_result dem2d_shape_aabb(const dem2d_shape *shape, dem2d_pose pose, dem2d_box *box) {
     if (shape == NULL || box == NULL) return DEM2D_NULL_ARGUMENT;
     dem2d_result result = dem2di_check_pose(&pose);
     if (result != DEM2D_OK) return result;
-    double extent[4];
-    dem2di_extents(shape, &pose, extent);
+    double extent[4]; /* along +x, +y, -x, -y */
+    dem2d_vec u = dem2di_vec(1, 0);
+    for (int i = 0; i < 4; i++) {
+        extent[i] = dem2di_dot(dem2di_posed_support(shape, &pose, u, NULL), u);
+        u = dem2di_perp(u);
+    }
     box->lower = dem2di_vec(pose.position.x - extent[2], pose.position.y - extent[3]);
     box->upper = dem2di_vec(pose.position.x + extent[0], pose.position.y + extent[1]);
     return DEM2D_OK;
@@ -3933,11 +3930,9 @@ static dem2di_arc dem2di_section_arc(const dem2di_section *section, double f1, d
 static double dem2di_arc_sweep(const dem2di_arc *arc, double t0, double t1) {
     double half = (t1 - t0) / 2, sum = 0;
     for (int i = -1; i <= 1; i++) {
-        double t = (t0 + t1) / 2 + i * half * 0.7745966692414833770, s = 1 - t; /* sqrt(3/5) */
-        dem2d_vec speed = dem2di_add(dem2di_along(dem2di_scale(arc->d0, s * s), 2 * t * s, arc->d1),
-                                     dem2di_scale(arc->d2, t * t));
+        double t = (t0 + t1) / 2 + i * half * 0.7745966692414833770; /* sqrt(3/5) */
         double weight = (i == 0 ? 8.0 : 5.0) / 9;
-        sum += weight * dem2di_cross(dem2di_arc_point(arc, t), speed);
+        sum += weight * dem2di_cross(dem2di_arc_point(arc, t), dem2di_arc_speed(arc, t));
     }
     return 1.5 * half * sum;
 }
@@ -4018,8 +4013,7 @@ static void dem2di_section_loop(const dem2di_section *section, const dem2di_arc 
     for (int i = -1; i <= 1; i++) {
         double t = (t0 + t1) / 2 + i * half * 0.7745966692414833770, s = 1 - t; /* sqrt(3/5) */
         double weight = sign * half * (i == 0 ? 8.0 : 5.0) / 9;
-        dem2d_vec speed = dem2di_add(dem2di_along(dem2di_scale(arc->d0, s * s), 2 * t * s, arc->d1),
-                                     dem2di_scale(arc->d2, t * t));
+        dem2d_vec speed = dem2di_arc_speed(arc, t);
         slope[0] +=
             weight * 9 * t * s * s * section->l1 * dem2di_cross(section->from->tangent, speed);
         slope[1] -=
@@ -4668,21 +4662,20 @@ typedef struct dem2di_fit {
 /* Points of a smooth candidate's outline: its area is short by (2 pi/1440)^2/6 = 3e-6. */
 #define DEM2DI_FIT_POINTS 1440
 
-static bool dem2di_fit_resize(const dem2di_fit *fit, double *a, double *b, int order) {
+static void dem2di_fit_resize(const dem2di_fit *fit, double *a, double *b, int order) {
     double target = fit->desc->scale == DEM2D_SCALE_GRAIN
                         ? fit->mass.area
                         : dem2di_twice_area(fit->outline.hull, fit->outline.hull_count) / 2;
-    if (fit->desc->scale == DEM2D_SCALE_NONE) return true;
+    if (fit->desc->scale == DEM2D_SCALE_NONE) return;
     double area = a[0] * a[0] / 4;
     for (int n = 2; n <= order; n++) area += (1 - (double)n * n) * (a[n] * a[n] + b[n] * b[n]) / 2;
-    if (!(area > 0)) return false;
+    if (!(area > 0)) return; /* creation will refuse it */
     double factor = sqrt(target / (DEM2DI_PI * area));
     for (int n = 0; n <= order; n++) {
         if (n == 1) continue; /* about the Steiner point */
         a[n] *= factor;
         b[n] *= factor;
     }
-    return true;
 }
 
 static dem2d_result dem2di_fit_fourier(dem2di_fit *fit) {
@@ -4708,7 +4701,7 @@ static dem2d_result dem2di_fit_fourier(dem2di_fit *fit) {
         }
         if (desc->method != DEM2D_FIT_FEJER && order >= 2)
             result = dem2di_constrain_series(fit->env, a, b, order, margin, &steps);
-        if (result == DEM2D_OK) (void)dem2di_fit_resize(fit, a, b, order);
+        if (result == DEM2D_OK) dem2di_fit_resize(fit, a, b, order);
     }
     fit->report.iterations += steps;
     if (result == DEM2D_OK) result = dem2d_shape_create_fourier(fit->env, a, b, order, &fit->shape);
@@ -6335,6 +6328,14 @@ static dem2d_pair_desc *dem2di_law(const dem2d_world *world, int a, int b) {
     return &world->laws[a * world->laws_side + b];
 }
 
+/* How the two of a listed contact meet; B is a particle or a wall. */
+static const dem2d_pair_desc *dem2di_law_of(const dem2d_world *world, const dem2di_key *key,
+                                            bool wall) {
+    int material =
+        wall ? (int)world->walls[key->b].desc.material.index : world->bodies[key->b].material;
+    return dem2di_law(world, world->bodies[key->a].material, material);
+}
+
 static dem2d_result dem2di_check_law(const dem2d_env *env, double normal, double tangential,
                                      double friction) {
     dem2d_result result = dem2di_check_positive(env, "normal_stiffness", normal);
@@ -6752,18 +6753,22 @@ static void dem2di_list_merge(const dem2di_list *list, const dem2di_key *keys, i
     }
 }
 
-/* Take the sorted keys in list->spare as the list from now on. */
-static void dem2di_list_renew(dem2di_list *list) {
-    dem2di_list_merge(list, list->spare.key, list->spare.count, list->next);
-    dem2di_keys keys = list->keys;
+static void dem2di_swap_links(dem2di_list *list) {
     dem2di_link *links = list->now;
     int capacity = list->now_capacity;
-    list->keys = list->spare;
-    list->spare = keys;
     list->now = list->next;
     list->now_capacity = list->next_capacity;
     list->next = links;
     list->next_capacity = capacity;
+}
+
+/* Take the sorted keys in list->spare as the list from now on. */
+static void dem2di_list_renew(dem2di_list *list) {
+    dem2di_list_merge(list, list->spare.key, list->spare.count, list->next);
+    dem2di_keys keys = list->keys;
+    list->keys = list->spare;
+    list->spare = keys;
+    dem2di_swap_links(list);
 }
 
 /* Pairs of particles within their skins: into pairs.spare, sorted. */
@@ -6784,8 +6789,8 @@ static bool dem2di_find_pairs(dem2d_world *world) {
         const dem2di_disc *a = &world->discs[key.a], *b = &world->discs[key.b];
         dem2d_vec d = dem2di_centre_line(a->centre, b->centre);
         double reach = a->reach + b->reach;
-        bool listed = dem2di_dot(d, d) < reach * reach && !(a->fixed && b->fixed);
-        if (world->pairs.now[i].depth > 0 && !listed &&
+        bool apart = dem2di_dot(d, d) >= reach * reach && !(a->fixed && b->fixed);
+        if (world->pairs.now[i].depth > 0 && apart &&
             !dem2di_keys_add(&world->env, found, key.a, key.b))
             return false;
     }
@@ -6890,8 +6895,7 @@ static void dem2di_pair_pass(dem2d_world *world, int *calls, int *unresolved) {
         if (!(link->depth > 0)) continue;
         const dem2di_state *sa = &world->now[a], *sb = &world->now[b];
         double slip = dem2di_slip(link, sa->v, sa->w, sb->v, sb->w);
-        const dem2d_pair_desc *law =
-            dem2di_law(world, world->bodies[a].material, world->bodies[b].material);
+        const dem2d_pair_desc *law = dem2di_law_of(world, &list->keys.key[i], false);
         dem2di_law_apply(law, slip, world->time_step, last->shear, link);
     }
 }
@@ -6919,8 +6923,7 @@ static void dem2di_touch_pass(dem2d_world *world, int *calls) {
         }
         link->point = link->branch = dem2di_along(support, -link->depth / 2, u);
         double slip = dem2di_slip(link, state->v, state->w, wall->velocity, 0);
-        int material = (int)world->walls[j].desc.material.index;
-        dem2di_law_apply(dem2di_law(world, body->material, material), slip, world->time_step,
+        dem2di_law_apply(dem2di_law_of(world, &list->keys.key[i], true), slip, world->time_step,
                          list->now[i].shear, link);
     }
 }
@@ -6955,9 +6958,8 @@ static void dem2di_sum_pass(dem2d_world *world) {
         a->force = dem2di_sub(a->force, force);
         a->torque -= dem2di_cross(link->point, force);
         wall->force = dem2di_add(wall->force, force);
-        wall->stiffness += dem2di_law(world, world->bodies[body].material,
-                                      (int)world->walls[j].desc.material.index)
-                               ->normal_stiffness;
+        wall->stiffness +=
+            dem2di_law_of(world, &world->touches.keys.key[i], true)->normal_stiffness;
     }
 }
 
@@ -7035,8 +7037,7 @@ static void dem2di_stiffness_list(const dem2d_world *world, const dem2di_list *l
         const dem2di_link *link = &links[i];
         if (!(link->depth > 0)) continue;
         int a = list->keys.key[i].a, b = list->keys.key[i].b;
-        int material = walls ? (int)world->walls[b].desc.material.index : world->bodies[b].material;
-        const dem2d_pair_desc *law = dem2di_law(world, world->bodies[a].material, material);
+        const dem2d_pair_desc *law = dem2di_law_of(world, &list->keys.key[i], walls);
         bool both = !walls && world->bodies[a].motion == DEM2D_FREE &&
                     world->bodies[b].motion == DEM2D_FREE;
         double f = both ? shared : 1, kn = f * law->normal_stiffness;
@@ -7118,15 +7119,6 @@ DEM2D_API dem2d_result dem2d_world_time_step_bounds(const dem2d_world *world, do
         limit_particle->generation = particle >= 0 ? world->bodies[particle].generation : 0;
     }
     return DEM2D_OK;
-}
-
-static void dem2di_swap_links(dem2di_list *list) {
-    dem2di_link *links = list->now;
-    int capacity = list->now_capacity;
-    list->now = list->next;
-    list->now_capacity = list->next_capacity;
-    list->next = links;
-    list->next_capacity = capacity;
 }
 
 /* Everything new becomes the present; the present becomes the state of the last force pass. */
@@ -7294,9 +7286,7 @@ static void dem2di_spring_energy(const dem2d_world *world, const dem2di_list *li
     for (int i = 0; i < list->keys.count; i++) {
         const dem2di_link *link = &list->now[i];
         if (!(link->depth > 0)) continue;
-        int a = list->keys.key[i].a, b = list->keys.key[i].b;
-        int material = walls ? (int)world->walls[b].desc.material.index : world->bodies[b].material;
-        const dem2d_pair_desc *law = dem2di_law(world, world->bodies[a].material, material);
+        const dem2d_pair_desc *law = dem2di_law_of(world, &list->keys.key[i], walls);
         energy->normal += link->force * link->depth / 2;
         if (law->tangential_stiffness > 0)
             energy->tangential += link->shear * (link->shear / law->tangential_stiffness) / 2;
@@ -7456,15 +7446,13 @@ static dem2di_view dem2di_view_make(const dem2d_world *world, double width) {
     bool first = true;
     for (int i = 0; i < world->body_count; i++) {
         if (world->bodies[i].shape == NULL) continue;
+        dem2d_box box;
         dem2d_pose pose = dem2di_pose_of(world, world->before, i);
-        double extent[4];
-        dem2di_extents(world->bodies[i].shape, &pose, extent);
-        dem2d_vec low = dem2di_vec(pose.position.x - extent[2], pose.position.y - extent[3]);
-        dem2d_vec high = dem2di_vec(pose.position.x + extent[0], pose.position.y + extent[1]);
-        lower.x = first ? low.x : dem2di_min(lower.x, low.x);
-        lower.y = first ? low.y : dem2di_min(lower.y, low.y);
-        upper.x = first ? high.x : dem2di_max(upper.x, high.x);
-        upper.y = first ? high.y : dem2di_max(upper.y, high.y);
+        (void)dem2d_shape_aabb(world->bodies[i].shape, pose, &box);
+        lower.x = first ? box.lower.x : dem2di_min(lower.x, box.lower.x);
+        lower.y = first ? box.lower.y : dem2di_min(lower.y, box.lower.y);
+        upper.x = first ? box.upper.x : dem2di_max(upper.x, box.upper.x);
+        upper.y = first ? box.upper.y : dem2di_max(upper.y, box.upper.y);
         first = false;
     }
     double margin = dem2di_max(upper.x - lower.x, upper.y - lower.y) / 20;
