@@ -1593,8 +1593,8 @@ static double dem2di_taylor_bound(const dem2di_series *s, double value, const do
 }
 
 /* Minimum by branch and bound: each interval that may undercut the best value is halved until
-   its bound is within the tolerance. 48 halvings of 2 pi reach the spacing of doubles; after
-   DEM2DI_SERIES_PIECES, which bounds the time, those of larger intervals are taken. */
+   its bound is within the tolerance. 48 halvings of 2 pi reach the spacing of doubles. After
+   DEM2DI_SERIES_PIECES intervals the bounds of larger ones are taken: looser, never wrong. */
 #define DEM2DI_SERIES_PIECES 1000000
 
 static dem2di_bounds dem2di_series_minimum(const dem2di_series *s, double tolerance) {
@@ -1642,8 +1642,9 @@ static dem2di_bounds dem2di_series_minimum(const dem2di_series *s, double tolera
    uses: config, math, memory, series
    ============================================================================================ */
 
-/* Up to this many corners a plain loop over all is faster than a look-up in the sector table. */
-#define DEM2DI_FEW_CORNERS 8
+/* Up to this many corners a plain loop over all costs no more than a look-up in the sector table:
+   4.9 against 6.3 ns with four, 6.2 each with six, 7.3 against 6.3 with eight. */
+#define DEM2DI_FEW_CORNERS 6
 
 /* One arc: its first point and its three control differences. */
 typedef struct dem2di_arc {
