@@ -33,6 +33,8 @@ CONTENTS (search for the anchor, ">>" and the word)
                     templates from outlines, virtual grains                 >>fitting
                     distance: Gilbert-Johnson-Keerthi                       >>gjk
                     depth: expanding polytope                               >>epa
+                    two polygons, by edges and corners                      >>edges
+                    least support value, certified                          >>minimum
                     contact of two shapes, of a shape and a wall            >>contact
                     candidate pairs from cell grids                         >>broad
                     spring, friction, critical time step                    >>law
@@ -215,6 +217,7 @@ OPTIONS (zero means: physical zero for physical fields; "library default" where 
     dem2d_contact_desc      tolerance             -      1e-10      >= 0, of R_A + R_B + |d|
     dem2d_contact_desc      max_iterations        -      128        >= 0
     dem2d_contact_desc      start                 -      centres    any direction
+    dem2d_contact_desc      solver                -      CERTIFIED
     dem2d_world_desc        time_step             s      none       > 0
     dem2d_world_desc        gravity               m/s2   0          finite
     dem2d_world_desc        local_damping         -      0          [0, 1)
@@ -222,6 +225,8 @@ OPTIONS (zero means: physical zero for physical fields; "library default" where 
     dem2d_world_desc        skin                  -      0.1        >= 0, of the particle radius
     dem2d_world_desc        contact_tolerance     -      1e-8       >= 0, of R_A + R_B + |d|
     dem2d_world_desc        max_iterations        -      128        >= 0
+    dem2d_world_desc        solver                -      CERTIFIED
+    dem2d_world_desc        faces                 -      TWO_POINTS
     dem2d_world_desc        particle_capacity     -      grows      >= 0
     dem2d_world_desc        pair_capacity         -      grows      >= 0
     dem2d_world_desc        skip_time_step_check  -      false
@@ -718,24 +723,52 @@ typedef enum dem2d_contact_state {
     DEM2D_UNRESOLVED   ///< the cap of iterations was reached; depth and error are still bounds
 } dem2d_contact_state;
 
+/// How depth and distance are found.
+typedef enum dem2d_solver {
+    DEM2D_CERTIFIED, ///< minimum of the support value by Newton's steps, proved global
+    DEM2D_GJK_EPA,   ///< the papers' way: GJK, then EPA when the shapes overlap
+    DEM2D_SOLVER_COUNT
+} dem2d_solver;
+
+/// What proves that an answer is the least overlap, or the greatest gap, to its error bound.
+typedef enum dem2d_proof {
+    DEM2D_BY_NOTHING,  ///< the cap was reached: the bounds hold, but are wide
+    DEM2D_BY_FORM,     ///< closed form: circles, walls, edges and corners of two polygons
+    DEM2D_BY_RADIUS,   ///< the depth is below the least radius of curvature; or a gap
+    DEM2D_BY_ARC,      ///< the boundary beside the contact outweighs all other directions
+    DEM2D_BY_POLYTOPE, ///< branch and bound over arcs of directions, or EPA
+    DEM2D_PROOF_COUNT
+} dem2d_proof;
+
 /// How a pair is searched. All zero is fine.
 typedef struct dem2d_contact_desc {
-    double tolerance;   ///< of R_A + R_B + |d|: stop when the error is below; 0 for 1e-10
-    int max_iterations; ///< of GJK and of EPA each; 0 for 128; EPA takes 250 at most
-    dem2d_vec start;    ///< first direction, the last normal for instance; 0 for line of centres
+    double tolerance;    ///< of R_A + R_B + |d|: stop when the error is below; 0 for 1e-10
+    int max_iterations;  ///< of each search; 0 for 128; a polytope takes 250 at most
+    dem2d_vec start;     ///< first direction, the last normal for instance; 0 for line of centres
+    dem2d_solver solver; ///< certified, or GJK and EPA
 } dem2d_contact_desc;
+
+/// One of the points that carry a contact.
+typedef struct dem2d_contact_point {
+    dem2d_vec position; ///< m
+    double depth;       ///< m, overlap there along the contact's normal
+    double weight;      ///< part of the normal stiffness that acts there, in [0, 1]
+} dem2d_contact_point;
 
 /// Answer to a contact query, in the coordinates of the poses.
 typedef struct dem2d_contact {
-    dem2d_contact_state state; ///< see there
-    int support_calls;         ///< evaluations of the support of A minus B
-    int iterations;            ///< of GJK and EPA together
-    dem2d_vec normal;          ///< unit, from A to B
-    double depth;              ///< m, overlap along the normal; negative: minus the gap
-    double error;              ///< m, the true depth is in [depth - error, depth]
-    dem2d_vec point_a;         ///< m, witness point on A
-    dem2d_vec point_b;         ///< m, witness point on B
-    dem2d_vec point;           ///< m, contact point: the middle of the two
+    dem2d_contact_state state;     ///< see there
+    dem2d_proof proof;             ///< why the error bound holds
+    int support_calls;             ///< evaluations of the support of A minus B
+    int iterations;                ///< of all searches together
+    dem2d_vec normal;              ///< unit, from A to B
+    double depth;                  ///< m, overlap along the normal; negative: minus the gap
+    double error;                  ///< m, the true depth is within this of the depth
+    dem2d_vec point_a;             ///< m, witness point on A
+    dem2d_vec point_b;             ///< m, witness point on B
+    dem2d_vec point;               ///< m, the middle of the two; with a wall the one on the wall
+    int count;                     ///< of contact points: 0 when separated, 2 where two faces meet
+    dem2d_contact_point points[2]; ///< by their place along the normal turned by +90 degrees
 } dem2d_contact;
 
 /// Whether a point lies in a shape (boundary included, to rounding).
@@ -747,13 +780,14 @@ DEM2D_API dem2d_result dem2d_shape_contains(const dem2d_shape *shape, dem2d_pose
 DEM2D_API dem2d_result dem2d_pair_overlap(const dem2d_shape *a, dem2d_pose pose_a,
                                           const dem2d_shape *b, dem2d_pose pose_b,
                                           const dem2d_contact_desc *desc, dem2d_contact *contact);
-/// Distance by GJK: gap, normal and witness points of separated shapes. Overlapping shapes get
-/// the answer of dem2d_pair_overlap. desc may be NULL.
+/// Distance by GJK, whatever the solver: gap, normal and witness points of separated shapes.
+/// Overlapping shapes get the answer of dem2d_pair_overlap. desc may be NULL.
 DEM2D_API dem2d_result dem2d_pair_distance(const dem2d_shape *a, dem2d_pose pose_a,
                                            const dem2d_shape *b, dem2d_pose pose_b,
                                            const dem2d_contact_desc *desc, dem2d_contact *contact);
-/// Distance or depth: GJK, then EPA when they overlap. Two circles take the closed form (0
-/// support calls). desc may be NULL.
+/// Distance or depth, with the contact points. Certified: two circles take the closed form (0
+/// support calls), two polygons (or a polygon and a circle) their edges and corners, all others
+/// Newton's steps on the support value, from desc->start or the line of centres. desc may be NULL.
 DEM2D_API dem2d_result dem2d_pair_contact(const dem2d_shape *a, dem2d_pose pose_a,
                                           const dem2d_shape *b, dem2d_pose pose_b,
                                           const dem2d_contact_desc *desc, dem2d_contact *contact);
@@ -791,6 +825,14 @@ typedef struct dem2d_wall_id {
     uint32_t generation; ///< of the slot
 } dem2d_wall_id;
 
+/// Where the force of a contact acts.
+typedef enum dem2d_face_rule {
+    DEM2D_TWO_POINTS,   ///< both ends of the common part where two faces meet, else one point
+    DEM2D_ONE_POINT,    ///< the papers' rule: always the middle of the witness points
+    DEM2D_CONTACT_AREA, ///< energy kn area^2 / (2 length^2): conservative, slow, no closed form
+    DEM2D_FACE_RULE_COUNT
+} dem2d_face_rule;
+
 /// A world. Only time_step has no default.
 typedef struct dem2d_world_desc {
     double time_step;          ///< s, > 0
@@ -799,7 +841,9 @@ typedef struct dem2d_world_desc {
     double global_damping;     ///< 1/s, viscous, >= 0
     double skin;               ///< of the particle radius: reach of the pair list; 0 for 0.1
     double contact_tolerance;  ///< of R_A + R_B + |d|; 0 for 1e-8
-    int max_iterations;        ///< of GJK and EPA; 0 for 128
+    int max_iterations;        ///< of each search; 0 for 128
+    dem2d_solver solver;       ///< of contacts: certified, or GJK and EPA
+    dem2d_face_rule faces;     ///< where forces act
     int particle_capacity;     ///< reserved at creation; 0 grows
     int pair_capacity;         ///< reserved at creation; 0 grows
     bool skip_time_step_check; ///< no stability check
@@ -905,17 +949,20 @@ typedef struct dem2d_contact_info {
 
 /// Counters of a world.
 typedef struct dem2d_stats {
-    int64_t steps;          ///< done since creation
-    int64_t list_rebuilds;  ///< of the pair list
-    int64_t support_calls;  ///< in all steps
-    int64_t not_converged;  ///< contacts whose search reached its cap, in all steps
-    int64_t slow_time_step; ///< checks that found the time step above the safe bound
-    int particles;          ///< alive
-    int walls;              ///< alive
-    int pairs;              ///< in the list, walls included
-    int contacts;           ///< between particles in the last force pass
-    int wall_contacts;      ///< with walls in the last force pass
-    size_t bytes;           ///< in use, all of the world
+    int64_t steps;         ///< done since creation
+    int64_t list_rebuilds; ///< of the pair list
+    int64_t support_calls; ///< in all steps
+    int64_t looks;         ///< at pairs of particles, in all steps; the rest was skipped or far
+    int64_t gaps;          ///< looks that found them apart
+    int64_t proofs[DEM2D_PROOF_COUNT]; ///< of the other looks, by what proves them
+    int64_t not_converged;             ///< contacts whose search reached its cap, in all steps
+    int64_t slow_time_step;            ///< checks that found the time step above the safe bound
+    int particles;                     ///< alive
+    int walls;                         ///< alive
+    int pairs;                         ///< in the list, walls included
+    int contacts;                      ///< between particles in the last force pass
+    int wall_contacts;                 ///< with walls in the last force pass
+    size_t bytes;                      ///< in use, all of the world
 } dem2d_stats;
 
 /// Create a world. Errors: NULL_ARGUMENT, NOT_FINITE, OUT_OF_RANGE, OUT_OF_MEMORY.
@@ -1651,10 +1698,13 @@ typedef struct dem2di_arc {
     dem2d_vec start, d0, d1, d2;
 } dem2di_arc;
 
-/* Four terms n, n+1, n+2, n+3 of a Fourier series, and n times them for the derivative. */
+/* Four terms n, n+1, n+2, n+3 of a Fourier series, n times them for the derivative, and n^2. */
 typedef struct dem2di_block {
-    double a[4], b[4], na[4], nb[4];
+    double a[4], b[4], na[4], nb[4], square[4];
 } dem2di_block;
+
+/* Sectors of directions that have a lower bound of rho: 1/16 of a quadrant each. */
+#define DEM2DI_FLOORS 64
 
 struct dem2d_shape {
     dem2d_shape_type type;
@@ -1670,10 +1720,11 @@ struct dem2d_shape {
     dem2d_env env;
     size_t bytes;
     /* What follows the struct in one block of memory: */
-    dem2d_vec *corners;   /* polygon: count */
-    dem2d_vec *ends;      /* polygon: edge leaving corner k; Bezier: tangent at the end of arc k */
-    dem2di_arc *arcs;     /* Bezier: count */
+    dem2d_vec *corners; /* polygon: count */
+    dem2d_vec *ends;    /* unit tangent; polygon: of the edge leaving k; Bezier: at the end of k */
+    dem2di_arc *arcs;   /* Bezier: count */
     dem2di_block *blocks; /* Fourier: terms 1..order, padded with zeros */
+    double *floors;       /* smooth, not a circle: least rho in the sectors k and k + 1 */
     int *sector;          /* first guess of the corner or arc for a range of directions */
 };
 
@@ -1701,6 +1752,11 @@ static void dem2di_shape_layout(dem2d_shape *shape) {
         shape->blocks = (dem2di_block *)(void *)next;
         next += (size_t)dem2di_block_count(shape->count) * sizeof(dem2di_block);
     }
+    if (shape->type == DEM2D_ELLIPSE || shape->type == DEM2D_BEZIER ||
+        shape->type == DEM2D_FOURIER) {
+        shape->floors = (double *)(void *)next;
+        next += DEM2DI_FLOORS * sizeof(double);
+    }
     shape->sector = (int *)(void *)next;
     next += (size_t)shape->sectors * sizeof(int);
     shape->bytes = (size_t)(next - (char *)shape);
@@ -1711,6 +1767,31 @@ static double dem2di_pseudo_angle(dem2d_vec u) {
     double f = u.y / (fabs(u.x) + fabs(u.y));
     if (u.x < 0) return 2 - f;
     return f < 0 ? 4 + f : f;
+}
+
+/* The sector of floors that holds a direction. */
+static int dem2di_floor_sector(dem2d_vec u) {
+    return (int)(dem2di_pseudo_angle(u) * (DEM2DI_FLOORS / 4)) & (DEM2DI_FLOORS - 1);
+}
+
+/* Lower bound of rho from a direction on, over one sector's width to a side (+1 or -1). */
+static double dem2di_floor(const dem2d_shape *shape, dem2d_vec u, int side) {
+    if (shape->floors == NULL) return shape->rho_min;
+    int k = dem2di_floor_sector(u);
+    return shape->floors[(side > 0 ? k : k - 1) & (DEM2DI_FLOORS - 1)];
+}
+
+/* Lower bound of rho over the directions from one to another, counter-clockwise, at most half a
+   turn. */
+static double dem2di_floor_between(const dem2d_shape *shape, dem2d_vec from, dem2d_vec to) {
+    if (shape->floors == NULL) return shape->rho_min;
+    int k = dem2di_floor_sector(from), last = dem2di_floor_sector(to);
+    double least = shape->floors[k];
+    while (k != last) {
+        least = dem2di_min(least, shape->floors[k]);
+        k = (k + 1) & (DEM2DI_FLOORS - 1);
+    }
+    return least;
 }
 
 /* The corner (polygon) or arc (Bezier) that holds the support point: go on while the next end
@@ -1725,8 +1806,9 @@ static int dem2di_sector_find(const dem2d_shape *shape, dem2d_vec u) {
     return k;
 }
 
-static dem2d_vec dem2di_polygon_support(const dem2d_shape *shape, dem2d_vec u) {
-    if (shape->sectors > 0) return shape->corners[dem2di_sector_find(shape, u)];
+/* The corner of a polygon farthest along a direction. */
+static int dem2di_polygon_corner(const dem2d_shape *shape, dem2d_vec u) {
+    if (shape->sectors > 0) return dem2di_sector_find(shape, u);
     int best = 0;
     double value = dem2di_dot(shape->corners[0], u);
     for (int k = 1; k < shape->count; k++) {
@@ -1736,7 +1818,7 @@ static dem2d_vec dem2di_polygon_support(const dem2d_shape *shape, dem2d_vec u) {
             best = k;
         }
     }
-    return shape->corners[best];
+    return best;
 }
 
 /* Point of an arc at t: start + integral of (1-t)^2 d0 + 2t(1-t) d1 + t^2 d2, times 3. */
@@ -1766,8 +1848,7 @@ static double dem2di_arc_rho(const dem2di_arc *arc, double t) {
 
 /* [P] sec. 3 without its slips: the root of q0 (1-t)^2 + 2 q1 t(1-t) + q2 t^2 with the sum of
    like signs in the denominator, so that nothing cancels and t is in [0, 1]. */
-static double dem2di_arc_parameter(const dem2di_arc *arc, dem2d_vec u) {
-    double q0 = dem2di_dot(arc->d0, u), q1 = dem2di_dot(arc->d1, u), q2 = dem2di_dot(arc->d2, u);
+static double dem2di_arc_parameter(double q0, double q1, double q2) {
     if (q2 > 0) return 1;
     if (q0 < 0) return 0;
     double root = sqrt(q1 * q1 - q0 * q2);
@@ -1776,50 +1857,57 @@ static double dem2di_arc_parameter(const dem2di_arc *arc, dem2d_vec u) {
     return bottom > 0 ? top / bottom : 0;
 }
 
+/* With B'/3 along the tangent and B''/6 against u, rho = |B'|^2 / (-B''.u) = 9/6 of their own. */
 static dem2d_vec dem2di_bezier_support(const dem2d_shape *shape, dem2d_vec u, double *rho) {
     const dem2di_arc *arc = &shape->arcs[dem2di_sector_find(shape, u)];
-    double t = dem2di_arc_parameter(arc, u);
-    if (rho != NULL) *rho = dem2di_arc_rho(arc, t);
+    double q0 = dem2di_dot(arc->d0, u), q1 = dem2di_dot(arc->d1, u), q2 = dem2di_dot(arc->d2, u);
+    double t = dem2di_arc_parameter(q0, q1, q2);
+    if (rho != NULL) {
+        double speed = dem2di_cross(u, dem2di_arc_speed(arc, t));
+        double bend = (q0 - q1) * (1 - t) + (q1 - q2) * t;
+        *rho = speed <= 0 ? 0 : bend > 0 ? 1.5 * speed * (speed / bend) : HUGE_VAL;
+    }
     return dem2di_arc_point(arc, t);
 }
 
-/* s = p u + p' t with z = ux + i uy: powers z..z^4, then four at a time by z^4, so that the
-   chain of dependent products is a quarter of the order. */
+/* s = p u + p' t and rho = p + p'' with z = ux + i uy: powers z .. z^4, then four terms at a time
+   by z^4, so that the chain of dependent products is a quarter of the order. The four are written
+   out: gcc then keeps them in registers, which halves the time. */
 static dem2d_vec dem2di_fourier_support(const dem2d_shape *shape, dem2d_vec u, double *rho) {
-    double x[4], y[4], p[4] = {0, 0, 0, 0}, q[4] = {0, 0, 0, 0}, r[4] = {0, 0, 0, 0};
-    int blocks = dem2di_block_count(shape->count);
-    x[0] = u.x, y[0] = u.y;
-    x[1] = u.x * u.x - u.y * u.y, y[1] = 2 * u.x * u.y;
-    x[2] = x[1] * u.x - y[1] * u.y, y[2] = x[1] * u.y + y[1] * u.x;
-    x[3] = x[1] * x[1] - y[1] * y[1], y[3] = 2 * x[1] * y[1];
-    const double fx = x[3], fy = y[3];
-    for (int k = 0; k < blocks; k++) {
-        const dem2di_block *block = &shape->blocks[k];
-        if (k > 0)
-            for (int j = 0; j < 4; j++) {
-                double turned = x[j] * fx - y[j] * fy;
-                y[j] = x[j] * fy + y[j] * fx;
-                x[j] = turned;
-            }
-        for (int j = 0; j < 4; j++) {
-            p[j] += block->a[j] * x[j] + block->b[j] * y[j];
-            q[j] += block->nb[j] * x[j] - block->na[j] * y[j];
-        }
-        if (rho != NULL)
-            for (int j = 0; j < 4; j++)
-                r[j] += (4 * k + j + 1) * (block->na[j] * x[j] + block->nb[j] * y[j]);
+    double x1 = u.x, y1 = u.y, x2 = x1 * x1 - y1 * y1, y2 = 2 * x1 * y1;
+    double x3 = x2 * x1 - y2 * y1, y3 = x2 * y1 + y2 * x1, x4 = x2 * x2 - y2 * y2, y4 = 2 * x2 * y2;
+    const double fx = x4, fy = y4;
+    double p = 0, q = 0, r = 0, p_odd = 0, q_odd = 0, r_odd = 0;
+    const dem2di_block *block = shape->blocks, *end = block + dem2di_block_count(shape->count);
+    while (block < end) {
+        double e1 = block->a[0] * x1 + block->b[0] * y1, e2 = block->a[1] * x2 + block->b[1] * y2;
+        double e3 = block->a[2] * x3 + block->b[2] * y3, e4 = block->a[3] * x4 + block->b[3] * y4;
+        p += e1 + e2;
+        p_odd += e3 + e4;
+        r += block->square[0] * e1 + block->square[1] * e2;
+        r_odd += block->square[2] * e3 + block->square[3] * e4;
+        q += (block->nb[0] * x1 - block->na[0] * y1) + (block->nb[1] * x2 - block->na[1] * y2);
+        q_odd += (block->nb[2] * x3 - block->na[2] * y3) + (block->nb[3] * x4 - block->na[3] * y4);
+        if (++block == end) break;
+        double turned = x1 * fx - y1 * fy;
+        y1 = x1 * fy + y1 * fx, x1 = turned;
+        turned = x2 * fx - y2 * fy;
+        y2 = x2 * fy + y2 * fx, x2 = turned;
+        turned = x3 * fx - y3 * fy;
+        y3 = x3 * fy + y3 * fx, x3 = turned;
+        turned = x4 * fx - y4 * fy;
+        y4 = x4 * fy + y4 * fx, x4 = turned;
     }
-    double value = shape->a + ((p[0] + p[1]) + (p[2] + p[3]));
-    double slope = (q[0] + q[1]) + (q[2] + q[3]);
-    if (rho != NULL) *rho = dem2di_max(0, value - ((r[0] + r[1]) + (r[2] + r[3])));
+    double value = shape->a + (p + p_odd), slope = q + q_odd;
+    if (rho != NULL) *rho = dem2di_max(0, value - (r + r_odd));
     return dem2di_vec(value * u.x - slope * u.y, value * u.y + slope * u.x);
 }
 
 static dem2d_vec dem2di_ellipse_support(const dem2d_shape *shape, dem2d_vec u, double *rho) {
     dem2d_vec s = dem2di_vec(shape->a * u.x, shape->b * u.y);
-    double h = sqrt(s.x * u.x + s.y * u.y);
-    if (rho != NULL) *rho = shape->a / h * (shape->b / h) / h;
-    return dem2di_vec(s.x / h, s.y / h);
+    double f = 1 / sqrt(s.x * u.x + s.y * u.y);
+    if (rho != NULL) *rho = shape->a * f * (shape->b * f) * f;
+    return dem2di_vec(s.x * f, s.y * f);
 }
 
 /* Support point of a template in a unit direction; rho, if asked for, is the radius of curvature
@@ -1844,7 +1932,7 @@ static dem2d_vec dem2di_support(const dem2d_shape *shape, dem2d_vec u, double *r
         break;
     }
     if (rho != NULL) *rho = shape->rounding;
-    s = dem2di_polygon_support(shape, u);
+    s = shape->corners[dem2di_polygon_corner(shape, u)];
     return shape->rounding > 0 ? dem2di_along(s, shape->rounding, u) : s;
 }
 
@@ -2010,7 +2098,10 @@ static dem2d_vec dem2di_outline_point(const dem2d_shape *shape, int i, int count
         double t = (double)(i - first) / each;
         if (shape->type == DEM2D_BEZIER)
             return dem2di_arc_point(&shape->arcs[k], (double)(place % count) / count);
-        if (shape->rounding == 0) return dem2di_along(shape->corners[k], t, shape->ends[k]);
+        if (shape->rounding == 0) {
+            dem2d_vec edge = dem2di_sub(shape->corners[(k + 1) % n], shape->corners[k]);
+            return dem2di_along(shape->corners[k], t, edge);
+        }
         if (count >= 2 * n) return dem2di_rounded_point(shape, k, i - first, each);
     }
     dem2d_rot z = dem2d_rot_make(2 * DEM2DI_PI * i / count);
@@ -2122,6 +2213,35 @@ DEM2D_API dem2d_result dem2d_shape_create_circle(const dem2d_env *env, double ra
     return DEM2D_OK;
 }
 
+/* The direction where a sector of `sectors` in a turn begins, not normalised: the inverse of the
+   pseudo-angle. */
+static dem2d_vec dem2di_sector_start(int sector, int sectors) {
+    double f = 4.0 * sector / sectors, g = f < 2 ? 1 - f : f - 3; /* |x| - like part of it */
+    return dem2di_vec(g, f < 1 ? f : f < 3 ? 2 - f : f - 4);
+}
+
+/* From the floor of each sector to that of each and the next. */
+static void dem2di_join_floors(dem2d_shape *shape) {
+    double first = shape->floors[0];
+    for (int k = 0; k < DEM2DI_FLOORS; k++)
+        shape->floors[k] =
+            dem2di_min(shape->floors[k], k + 1 < DEM2DI_FLOORS ? shape->floors[k + 1] : first);
+}
+
+/* rho falls or rises all the way along a quadrant, so its least value is at a sector's end. */
+static void dem2di_ellipse_floors(dem2d_shape *shape) {
+    for (int k = 0; k < DEM2DI_FLOORS; k++) {
+        dem2d_vec u = dem2di_vec(1, 0);
+        double rho[2];
+        for (int i = 0; i < 2; i++) {
+            (void)dem2di_unit(dem2di_sector_start((k + i) % DEM2DI_FLOORS, DEM2DI_FLOORS), &u);
+            (void)dem2di_ellipse_support(shape, u, &rho[i]);
+        }
+        shape->floors[k] = (1 - 8 * DBL_EPSILON) * dem2di_min(rho[0], rho[1]);
+    }
+    dem2di_join_floors(shape);
+}
+
 DEM2D_API dem2d_result dem2d_shape_create_ellipse(const dem2d_env *env, double a, double b,
                                                   dem2d_shape **shape) {
     if (shape == NULL) return dem2di_fail_null(env, "shape");
@@ -2143,6 +2263,7 @@ DEM2D_API dem2d_result dem2d_shape_create_ellipse(const dem2d_env *env, double a
     made->rho_min = made->inscribed * (made->inscribed / made->circumscribed);
     made->mass.area = area;
     made->mass.polar_moment = polar;
+    dem2di_ellipse_floors(made);
     *shape = made;
     return DEM2D_OK;
 }
@@ -2151,8 +2272,7 @@ DEM2D_API dem2d_result dem2d_shape_create_ellipse(const dem2d_env *env, double a
 static void dem2di_fill_sectors(dem2d_shape *shape) {
     int sectors = shape->sectors, k = 0;
     for (int s = 0; s < sectors; s++) {
-        double f = 4.0 * s / sectors, g = f < 2 ? 1 - f : f - 3; /* |x| - like part of it */
-        dem2d_vec u = dem2di_vec(g, f < 1 ? f : f < 3 ? 2 - f : f - 4);
+        dem2d_vec u = dem2di_sector_start(s, sectors);
         if (s == 0) { /* the one start that is not beyond: the end before it gains, its own not */
             while (!(dem2di_dot(shape->ends[(k + shape->count - 1) % shape->count], u) > 0 &&
                      dem2di_dot(shape->ends[k], u) <= 0) &&
@@ -2175,9 +2295,8 @@ static int dem2di_sector_count(int count) {
 static void dem2di_polygon_radii(dem2d_shape *shape) {
     double outer = 0, inner = HUGE_VAL, r = shape->rounding;
     for (int k = 0; k < shape->count; k++) {
-        dem2d_vec edge = shape->ends[k];
         outer = dem2di_max(outer, dem2di_length(shape->corners[k]));
-        inner = dem2di_min(inner, dem2di_cross(shape->corners[k], edge) / dem2di_length(edge));
+        inner = dem2di_min(inner, dem2di_cross(shape->corners[k], shape->ends[k]));
     }
     shape->circumscribed = outer + r;
     shape->inscribed = inner + r;
@@ -2208,7 +2327,7 @@ DEM2D_API dem2d_result dem2d_shape_create_polygon(const dem2d_env *env, const de
         made->mass.centroid = dem2di_vec(0, 0);
         for (int k = 0; k < count; k++) {
             made->corners[k] = dem2di_sub(corners[k], made->offset);
-            made->ends[k] = dem2di_sub(corners[(k + 1) % count], corners[k]);
+            (void)dem2di_unit(dem2di_sub(corners[(k + 1) % count], corners[k]), &made->ends[k]);
         }
         dem2di_fill_sectors(made);
         dem2di_polygon_radii(made);
@@ -2248,6 +2367,19 @@ static double dem2di_arc_rho_bound(const dem2di_arc *arc) {
     return turn > 0 ? 1.5 * speed * (speed / turn * speed) : HUGE_VAL;
 }
 
+/* De Casteljau at 1/2, in differences. */
+static void dem2di_arc_halves(const dem2di_arc *arc, dem2di_arc half[2]) {
+    dem2d_vec a = dem2di_scale(dem2di_add(arc->d0, arc->d1), 0.25);
+    dem2d_vec b = dem2di_scale(dem2di_add(arc->d1, arc->d2), 0.25);
+    half[0].start = arc->start;
+    half[0].d0 = dem2di_scale(arc->d0, 0.5);
+    half[0].d1 = a;
+    half[0].d2 = half[1].d0 = dem2di_scale(dem2di_add(a, b), 0.5);
+    half[1].d1 = b;
+    half[1].d2 = dem2di_scale(arc->d2, 0.5);
+    half[1].start = dem2di_add(dem2di_add(arc->start, half[0].d0), dem2di_add(a, half[0].d2));
+}
+
 static void dem2di_bound_arc(dem2di_arc_bounds *bounds, const dem2di_arc *arc, int depth) {
     dem2d_vec q1 = dem2di_add(arc->start, arc->d0), q2 = dem2di_add(q1, arc->d1);
     dem2d_vec q3 = dem2di_add(q2, arc->d2);
@@ -2268,18 +2400,10 @@ static void dem2di_bound_arc(dem2di_arc_bounds *bounds, const dem2di_arc *arc, i
         bounds->rho = dem2di_min(bounds->rho, rho);
         return;
     }
-    dem2di_arc left, right; /* de Casteljau at 1/2, in differences */
-    dem2d_vec a = dem2di_scale(dem2di_add(arc->d0, arc->d1), 0.25);
-    dem2d_vec b = dem2di_scale(dem2di_add(arc->d1, arc->d2), 0.25);
-    left.start = arc->start;
-    left.d0 = dem2di_scale(arc->d0, 0.5);
-    left.d1 = a;
-    left.d2 = right.d0 = dem2di_scale(dem2di_add(a, b), 0.5);
-    right.d1 = b;
-    right.d2 = dem2di_scale(arc->d2, 0.5);
-    right.start = dem2di_add(dem2di_add(left.start, left.d0), dem2di_add(left.d1, left.d2));
-    dem2di_bound_arc(bounds, &left, depth - 1);
-    dem2di_bound_arc(bounds, &right, depth - 1);
+    dem2di_arc half[2];
+    dem2di_arc_halves(arc, half);
+    dem2di_bound_arc(bounds, &half[0], depth - 1);
+    dem2di_bound_arc(bounds, &half[1], depth - 1);
 }
 
 /* Tangents at the ends of an arc: the first difference that is longer than rounding. */
@@ -2290,6 +2414,32 @@ static bool dem2di_arc_tangents(const dem2di_arc *arc, double rounding, dem2d_ve
     while (first < 3 && dem2di_length(*d[first]) <= rounding) first++;
     while (last >= 0 && dem2di_length(*d[last]) <= rounding) last--;
     return first < 3 && dem2di_unit(*d[first], start) && dem2di_unit(*d[last], end);
+}
+
+/* Lower the floors of the sectors that the normals of an arc cross, by its bound of rho; halves
+   while they turn by more than half a sector or the bound is far below what is attained. */
+static void dem2di_arc_floors(dem2d_shape *shape, const dem2di_arc *arc, int depth) {
+    dem2d_vec from, to;
+    if (!dem2di_arc_tangents(arc, 0, &from, &to)) return; /* a point */
+    double rho = dem2di_arc_rho_bound(arc);
+    double met = dem2di_min(dem2di_arc_rho(arc, 0), dem2di_arc_rho(arc, 1));
+    bool wide = dem2di_cross(from, to) > 0.03 || dem2di_dot(from, to) < 0;
+    if (depth > 0 && (wide || (dem2di_finite(met) && rho < 0.9 * met))) {
+        dem2di_arc half[2];
+        dem2di_arc_halves(arc, half);
+        dem2di_arc_floors(shape, &half[0], depth - 1);
+        dem2di_arc_floors(shape, &half[1], depth - 1);
+        return;
+    }
+    /* normals, widened by more than rounding can move them over the border of a sector */
+    from = dem2di_along(from, -1e-12, dem2di_perp(from));
+    to = dem2di_along(to, 1e-12, dem2di_perp(to));
+    int k = dem2di_floor_sector(dem2di_negate(dem2di_perp(from)));
+    int last = dem2di_floor_sector(dem2di_negate(dem2di_perp(to)));
+    for (;; k = (k + 1) & (DEM2DI_FLOORS - 1)) {
+        shape->floors[k] = dem2di_min(shape->floors[k], rho);
+        if (k == last) break;
+    }
 }
 
 /* Rounding of the difference of two control points. */
@@ -2397,6 +2547,11 @@ static void dem2di_finish_bezier(dem2d_shape *shape, double size) {
     shape->circumscribed = bounds.outer;
     shape->inscribed = bounds.inner;
     shape->rho_min = dem2di_finite(bounds.rho) ? bounds.rho : 0;
+    for (int k = 0; k < DEM2DI_FLOORS; k++) shape->floors[k] = HUGE_VAL;
+    for (int k = 0; k < shape->count; k++) dem2di_arc_floors(shape, &shape->arcs[k], 12);
+    for (int k = 0; k < DEM2DI_FLOORS; k++) /* a sector no arc has come to has no bound */
+        if (!dem2di_finite(shape->floors[k])) shape->floors[k] = shape->rho_min;
+    dem2di_join_floors(shape);
     dem2di_fill_sectors(shape);
 }
 
@@ -2459,6 +2614,29 @@ static dem2d_convexity dem2di_convexity(const double *a, const double *b, int or
     return convexity;
 }
 
+/* Bound of rho in each sector: Taylor's in each quarter of it. */
+static void dem2di_fourier_floors(dem2d_shape *shape, const double *a, const double *b) {
+    dem2di_series radius = dem2di_series_make(a, b, shape->count, true, 1);
+    double rounding = DEM2DI_SERIES_ROUNDING * radius.size, d[3];
+    for (int k = 0; k < 4 * DEM2DI_FLOORS; k++) {
+        dem2d_vec u = dem2di_sector_start(2 * k + 1, 8 * DEM2DI_FLOORS);
+        dem2d_vec v = dem2di_sector_start(2 * k, 8 * DEM2DI_FLOORS);
+        dem2d_vec w = dem2di_sector_start((2 * k + 2) % (8 * DEM2DI_FLOORS), 8 * DEM2DI_FLOORS);
+        dem2d_rot q;
+        q.c = u.x;
+        q.s = u.y;
+        /* tangents are above the angles */
+        double half = dem2di_max(dem2di_cross(v, u) / dem2di_dot(v, u),
+                                 dem2di_cross(u, w) / dem2di_dot(u, w));
+        double value = dem2di_series_value(&radius, dem2d_rot_angle(q), d);
+        double least = dem2di_taylor_bound(&radius, value, d, half) - rounding;
+        double *floor = &shape->floors[k / 4];
+        if (k % 4 == 0) *floor = HUGE_VAL;
+        *floor = dem2di_min(*floor, dem2di_max(least, shape->rho_min));
+    }
+    dem2di_join_floors(shape);
+}
+
 /* Everything about an FS shape but its coefficients a, b (already about the centroid). */
 static void dem2di_finish_fourier(dem2d_shape *shape, const double *a, const double *b,
                                   double rho_min) {
@@ -2471,6 +2649,7 @@ static void dem2di_finish_fourier(dem2d_shape *shape, const double *a, const dou
         block->b[j] = b[n];
         block->na[j] = n * a[n];
         block->nb[j] = n * b[n];
+        block->square[j] = (double)n * n;
     }
     /* the greatest support value is the circumscribed radius, the least the inscribed one */
     dem2di_series p = dem2di_series_make(a, b, order, false, 1);
@@ -2478,6 +2657,7 @@ static void dem2di_finish_fourier(dem2d_shape *shape, const double *a, const dou
     shape->circumscribed = -dem2di_series_minimum(&minus, 1e-12 * p.size).lower;
     shape->inscribed = dem2di_max(0, dem2di_series_minimum(&p, 1e-12 * p.size).lower);
     shape->rho_min = dem2di_max(0, rho_min);
+    dem2di_fourier_floors(shape, a, b);
 }
 
 DEM2D_API dem2d_result dem2d_shape_create_fourier(const dem2d_env *env, const double *a,
@@ -3984,7 +4164,8 @@ static int dem2di_arc_crossings(const dem2di_arc *arc, dem2d_vec p, dem2d_vec ed
     /* towards the line: the edge's left normal when the arc bulges there, else its right one */
     dem2d_vec normal = dem2di_perp(edge);
     if (f.q0 < 0 || f.q2 > 0) normal = dem2di_negate(normal);
-    double split = dem2di_arc_parameter(arc, normal);
+    double split = dem2di_arc_parameter(dem2di_dot(arc->d0, normal), dem2di_dot(arc->d1, normal),
+                                        dem2di_dot(arc->d2, normal));
     double ends[3] = {0, split, 1};
     int found = 0;
     for (int i = 0; i < 2; i++) {
@@ -5067,9 +5248,10 @@ typedef struct dem2di_pair {
     const dem2d_shape *a, *b;
     dem2d_rot ra, rb;
     double scale_a, scale_b;
-    dem2d_vec d; /* centre of A to centre of B */
-    double size; /* R_A + R_B + |d|: what rounding is relative to */
-    int calls;   /* of the support function */
+    dem2d_vec d;     /* centre of A to centre of B */
+    double distance; /* |d| */
+    double size;     /* R_A + R_B + |d|: what rounding is relative to */
+    int calls;       /* of the support function */
 } dem2di_pair;
 
 /* A point of A minus B minus d, and the two points it comes from, each from its own centre. */
@@ -5087,6 +5269,8 @@ typedef struct dem2di_search {
     dem2d_vec normal;
     double upper, lower;
     dem2d_vec a, b;
+    dem2d_proof proof;
+    int corner[2]; /* of polygons, where the point belongs to; -1: not known */
 } dem2di_search;
 
 /* d in one place: a periodic cell would change only this. */
@@ -5104,25 +5288,30 @@ static dem2di_pair dem2di_pair_make(const dem2d_shape *a, const dem2d_pose *pose
     pair.scale_a = pose_a->scale;
     pair.scale_b = pose_b->scale;
     pair.d = dem2di_centre_line(pose_a->position, pose_b->position);
-    pair.size =
-        a->circumscribed * pair.scale_a + b->circumscribed * pair.scale_b + dem2di_length(pair.d);
+    pair.distance = dem2di_length(pair.d);
+    pair.size = a->circumscribed * pair.scale_a + b->circumscribed * pair.scale_b + pair.distance;
     pair.calls = 0;
     return pair;
 }
 
-/* Support point of A minus B minus d; rho, if asked for, is the sum of both radii. */
-static dem2di_vertex dem2di_minkowski(dem2di_pair *pair, dem2d_vec u, double *rho) {
-    double rho_a, rho_b, *want_a = rho != NULL ? &rho_a : NULL, *want_b = want_a;
-    if (want_a != NULL) want_b = &rho_b;
+/* The vertex of A minus B minus d that two support points make. */
+static dem2di_vertex dem2di_join(const dem2di_pair *pair, dem2d_vec a, dem2d_vec b) {
     dem2di_vertex v;
-    v.a = dem2di_support(pair->a, dem2di_turn_back(pair->ra, u), want_a);
-    v.a = dem2di_scale(dem2di_turn(pair->ra, v.a), pair->scale_a);
-    v.b = dem2di_support(pair->b, dem2di_turn_back(pair->rb, dem2di_negate(u)), want_b);
-    v.b = dem2di_scale(dem2di_turn(pair->rb, v.b), pair->scale_b);
-    v.w = dem2di_sub(dem2di_sub(v.a, v.b), pair->d);
-    if (rho != NULL) *rho = rho_a * pair->scale_a + rho_b * pair->scale_b;
-    pair->calls++;
+    v.a = a;
+    v.b = b;
+    v.w = dem2di_sub(dem2di_sub(a, b), pair->d);
     return v;
+}
+
+/* Support point of A minus B minus d; rho, if asked for, gets the radii of curvature of A and B. */
+static dem2di_vertex dem2di_minkowski(dem2di_pair *pair, dem2d_vec u, double rho[2]) {
+    double *rho_a = rho, *rho_b = rho != NULL ? rho + 1 : NULL;
+    dem2d_vec a = dem2di_support(pair->a, dem2di_turn_back(pair->ra, u), rho_a);
+    dem2d_vec b = dem2di_support(pair->b, dem2di_turn_back(pair->rb, dem2di_negate(u)), rho_b);
+    if (rho != NULL) rho[0] *= pair->scale_a, rho[1] *= pair->scale_b;
+    pair->calls++;
+    return dem2di_join(pair, dem2di_scale(dem2di_turn(pair->ra, a), pair->scale_a),
+                       dem2di_scale(dem2di_turn(pair->rb, b), pair->scale_b));
 }
 
 /* The first direction: the caller's, else the line of centres, else any. */
@@ -5230,6 +5419,8 @@ static void dem2di_gjk(dem2di_pair *pair, dem2d_vec start, double tolerance, int
     double rounding = DEM2DI_ROUNDING * pair->size, distance;
     dem2d_vec u = dem2di_first_direction(pair, start);
     search->iterations = 0;
+    search->corner[0] = search->corner[1] = -1;
+    search->proof = DEM2D_BY_RADIUS; /* of a gap */
     search->upper = HUGE_VAL;
     search->normal = u;
     search->a = search->b = dem2di_vec(0, 0);
@@ -5247,6 +5438,7 @@ static void dem2di_gjk(dem2di_pair *pair, dem2d_vec start, double tolerance, int
         search->lower = -distance;
         if (search->iterations++ == cap) {
             search->state = DEM2D_UNRESOLVED;
+            search->proof = DEM2D_BY_NOTHING;
             return;
         }
         dem2di_vertex v = dem2di_look(pair, search, u);
@@ -5271,7 +5463,7 @@ static void dem2di_gjk(dem2di_pair *pair, dem2d_vec start, double tolerance, int
 #define DEM2DI_EPA_ITERATIONS 250
 #define DEM2DI_EPA_ROOM (DEM2DI_EPA_ITERATIONS + 8)
 
-/* An edge of the polytope: a bound of the depth for the directions between its ends' own. */
+/* An edge of the polytope: a bound of the depth for the directions between those of its ends. */
 typedef struct dem2di_edge {
     int from, to;
     dem2d_vec normal; /* outward */
@@ -5280,14 +5472,63 @@ typedef struct dem2di_edge {
 
 typedef struct dem2di_polytope {
     int vertices, edges;
-    double floor; /* bound of the depth for directions that no edge covers */
+    bool arcs; /* branch and bound: edges of the shapes eroded by what rho is at least */
     dem2di_vertex vertex[DEM2DI_EPA_ROOM];
+    dem2d_vec direction[DEM2DI_EPA_ROOM]; /* that the vertex is the support of */
     dem2di_edge edge[DEM2DI_EPA_ROOM];
 } dem2di_polytope;
+
+/* Least rho of the pair over the directions between two, at most half a turn apart. */
+static double dem2di_pair_floor(const dem2di_pair *pair, dem2d_vec from, dem2d_vec to) {
+    double a = dem2di_floor_between(pair->a, dem2di_turn_back(pair->ra, from),
+                                    dem2di_turn_back(pair->ra, to));
+    double b = dem2di_floor_between(pair->b, dem2di_turn_back(pair->rb, dem2di_negate(from)),
+                                    dem2di_turn_back(pair->rb, dem2di_negate(to)));
+    return a * pair->scale_a + b * pair->scale_b;
+}
+
+/* Is a direction, of any length, inside the arc between two, at most half a turn apart? */
+static bool dem2di_inside(dem2d_vec u, dem2d_vec from, dem2d_vec to) {
+    return dem2di_cross(from, u) > 0 && dem2di_cross(u, to) > 0;
+}
+
+/* Bound of the depth on an arc of directions. With r the least rho there, h - r is the support
+   value of a convex body and at least max(p.u, q.u) of its points p, q at both ends. That has its
+   minima at the ends, across the chord of p and q, and opposite to p and q if on the arc. */
+static bool dem2di_arc_set(const dem2di_pair *pair, dem2di_polytope *polytope, int slot, int from,
+                           int to) {
+    dem2di_edge *edge = &polytope->edge[slot];
+    dem2d_vec u = polytope->direction[from], v = polytope->direction[to];
+    double r = dem2di_pair_floor(pair, u, v);
+    dem2d_vec p = dem2di_along(polytope->vertex[from].w, -r, u);
+    dem2d_vec q = dem2di_along(polytope->vertex[to].w, -r, v);
+    dem2d_vec chord = dem2di_sub(q, p), low[3];
+    double least = dem2di_min(dem2di_dot(p, u), dem2di_dot(q, v));
+    low[0] = dem2di_vec(chord.y, -chord.x);
+    low[1] = dem2di_negate(p);
+    low[2] = dem2di_negate(q);
+    edge->from = from;
+    edge->to = to;
+    edge->normal = u;
+    for (int i = 0; i < 3; i++) {
+        dem2d_vec n;
+        if (!dem2di_inside(low[i], u, v) || !dem2di_unit(low[i], &n)) continue;
+        double value = i == 2 ? dem2di_dot(q, n) : dem2di_dot(p, n);
+        if (!(value < least)) continue;
+        least = value;
+        /* so near to an end that nothing would be cut off: the middle */
+        double width = 1e-3 * dem2di_cross(u, v);
+        bool end = dem2di_cross(u, n) < width || dem2di_cross(n, v) < width;
+        if (!end || !dem2di_unit(dem2di_add(u, v), &edge->normal)) edge->normal = n;
+    }
+    edge->distance = r + least;
+    return true;
+}
 
 /* Put an edge into a slot; one shorter than rounding has no normal and covers no direction. */
 static bool dem2di_edge_set(const dem2di_pair *pair, dem2di_polytope *polytope, int slot, int from,
                             int to) {
+    if (polytope->arcs) return dem2di_arc_set(pair, polytope, slot, from, to);
     dem2di_edge *edge = &polytope->edge[slot];
     dem2d_vec along = dem2di_sub(polytope->vertex[to].w, polytope->vertex[from].w);
     double length = dem2di_length(along);
@@ -5301,9 +5542,10 @@ static bool dem2di_edge_set(const dem2di_pair *pair, dem2di_polytope *polytope, 
 
 /* Append a vertex counter-clockwise, with the edge from the one before. */
 static void dem2di_polytope_push(const dem2di_pair *pair, dem2di_polytope *polytope,
-                                 dem2di_vertex v) {
+                                 dem2di_vertex v, dem2d_vec u) {
     int last = polytope->vertices;
     polytope->vertex[last] = v;
+    polytope->direction[last] = u;
     polytope->vertices++;
     if (last == 0) return;
     if (dem2di_edge_set(pair, polytope, polytope->edges, last - 1, last))
@@ -5323,20 +5565,20 @@ static void dem2di_polytope_close(const dem2di_pair *pair, dem2di_polytope *poly
 static void dem2di_polytope_start(dem2di_pair *pair, dem2di_search *search,
                                   dem2di_polytope *polytope) {
     const dem2di_vertex *s = search->simplex;
+    dem2d_vec u = search->normal;
     polytope->vertices = polytope->edges = 0;
-    polytope->floor = HUGE_VAL;
+    polytope->arcs = false;
     if (search->count == 3) {
         double turn = dem2di_cross(dem2di_sub(s[1].w, s[0].w), dem2di_sub(s[2].w, s[0].w));
-        dem2di_polytope_push(pair, polytope, s[0]);
-        dem2di_polytope_push(pair, polytope, turn > 0 ? s[1] : s[2]);
-        dem2di_polytope_push(pair, polytope, turn > 0 ? s[2] : s[1]);
+        dem2di_polytope_push(pair, polytope, s[0], u);
+        dem2di_polytope_push(pair, polytope, turn > 0 ? s[1] : s[2], u);
+        dem2di_polytope_push(pair, polytope, turn > 0 ? s[2] : s[1], u);
     } else {
-        dem2d_vec u = search->normal;
         if (search->count == 2) (void)dem2di_unit(dem2di_perp(dem2di_sub(s[1].w, s[0].w)), &u);
         for (int i = 0; i < 4; i++) {
             bool known = search->count == 2 && i % 2 == 1; /* the ends of the segment */
             dem2di_vertex v = known ? s[i / 2] : dem2di_look(pair, search, u);
-            dem2di_polytope_push(pair, polytope, v);
+            dem2di_polytope_push(pair, polytope, v, u);
             u = dem2di_perp(u);
         }
     }
@@ -5352,22 +5594,25 @@ static int dem2di_nearest_edge(const dem2di_polytope *polytope) {
 
 /* Expand the nearest edge until its distance and the least support value agree to the tolerance
    (m). The nearest edge bounds the depth from below (the polytope is inside), each support value
-   from above. Witness points are those of the last edge. */
+   from above. Witness points are those of the last edge, or with arcs of the least value met. */
 static void dem2di_epa(dem2di_pair *pair, dem2di_polytope *polytope, double tolerance, int cap,
                        dem2di_search *search) {
     search->state = DEM2D_UNRESOLVED;
+    search->proof = DEM2D_BY_NOTHING;
     search->lower = -pair->size;
     if (polytope->edges == 0) return; /* supports that are not finite, or all one point */
     if (cap > DEM2DI_EPA_ITERATIONS) cap = DEM2DI_EPA_ITERATIONS;
     for (int iteration = 0;; iteration++) {
         int nearest = dem2di_nearest_edge(polytope);
         dem2di_edge edge = polytope->edge[nearest];
-        search->lower = dem2di_min(search->upper, dem2di_min(edge.distance, polytope->floor));
+        search->lower = dem2di_min(search->upper, edge.distance);
+        if (polytope->arcs && search->upper - edge.distance <= tolerance) break;
         if (iteration == cap) return;
         search->iterations++;
         dem2di_vertex v = dem2di_look(pair, search, edge.normal);
         double h = dem2di_dot(v.w, edge.normal);
-        if (h - edge.distance <= tolerance) { /* normal and witness points of this edge */
+        if (!polytope->arcs &&
+            h - edge.distance <= tolerance) { /* normal and witness points of this edge */
             search->upper = h;
             search->normal = edge.normal;
             dem2di_witness(search, &polytope->vertex[edge.from], &polytope->vertex[edge.to]);
@@ -5375,160 +5620,646 @@ static void dem2di_epa(dem2di_pair *pair, dem2di_polytope *polytope, double tole
         }
         int added = polytope->vertices++, last = polytope->edges;
         polytope->vertex[added] = v;
+        polytope->direction[added] = edge.normal;
         bool first = dem2di_edge_set(pair, polytope, nearest, edge.from, added);
         bool second = dem2di_edge_set(pair, polytope, first ? last : nearest, added, edge.to);
         if (first && second) polytope->edges++;
-        if (!first && !second) /* both ends met within rounding */
-            polytope->edge[nearest] = polytope->edge[--polytope->edges];
+        if (first || second) continue;
+        polytope->edge[nearest] = polytope->edge[--polytope->edges]; /* met within rounding */
+        if (polytope->edges == 0) break;
     }
     search->state = dem2di_judge(pair, search);
+    search->proof = DEM2D_BY_POLYTOPE;
 }
 
 /* ============================================================================================
-   >>contact  Contact of two shapes and of a shape with a wall, cold and warm
-   uses: config, math, memory, support, shapes, gjk, epa
+   >>edges  Two polygons, sharp or rounded, or one and a circle: exact, by edges and corners
+   uses: config, math, support, gjk
    ============================================================================================ */
 
-/* A warm start is as good as its normal: below this angle the Newton step that follows leaves an
-   error of its square, 1e-12, in the normal, and the witness points are off by 1e-6 rho. */
-#define DEM2DI_WARM_ANGLE 1e-6
-
-/* u turned by a small angle, to second order and normalised. */
-static dem2d_vec dem2di_nudge(dem2d_vec u, double angle) {
-    dem2d_vec v = dem2di_along(u, angle, dem2di_perp(u));
-    return dem2di_scale(v, 1 / dem2di_length(v));
+/* The cone of directions about d in which the depth can be below h: discs of the inscribed radii
+   bound it by i_A + i_B - d.u elsewhere. False when that says nothing. */
+static bool dem2di_cone(const dem2di_pair *pair, double h, dem2d_vec end[2]) {
+    double inner = pair->a->inscribed * pair->scale_a + pair->b->inscribed * pair->scale_b;
+    double c = inner - h;
+    if (!(pair->distance > 0) || !(c > -0.5 * pair->distance)) return false;
+    c = dem2di_min(1, c / pair->distance);
+    double sine = sqrt(1 - c * c);
+    dem2d_vec d = dem2di_scale(pair->d, 1 / pair->distance);
+    end[0] = dem2di_along(dem2di_scale(d, c), -sine, dem2di_perp(d));
+    end[1] = dem2di_along(dem2di_scale(d, c), sine, dem2di_perp(d));
+    return dem2di_vec_finite(end[0]) && dem2di_vec_finite(end[1]);
 }
 
-/* Lower bound of h on all directions beyond the support direction of v, seen from `normal` on one
-   side (+1 counter-clockwise, -1 clockwise), up to the back. A minus B - d holds v and a disc of
-   radius r about -d: the line from v that touches the disc is an edge inside it. Past that line's
-   normal the disc's own support r - d.u grows, if d lies on the near side. */
-static double dem2di_tangent_bound(const dem2di_pair *pair, const dem2di_vertex *v, int side,
-                                   dem2d_vec normal) {
-    double r = pair->a->inscribed * pair->scale_a + pair->b->inscribed * pair->scale_b;
-    dem2d_vec q = dem2di_add(v->w, pair->d);
-    double square = dem2di_dot(q, q), root = square - r * r;
-    if (!(root > 0) || dem2di_dot(pair->d, normal) <= 0) return -HUGE_VAL;
-    root = sqrt(root) * side;
-    dem2d_vec m = dem2di_scale(dem2di_along(dem2di_scale(q, r), root, dem2di_perp(q)), 1 / square);
-    if (side * dem2di_cross(pair->d, m) < 0 || side * dem2di_cross(normal, m) < 0) return -HUGE_VAL;
-    return dem2di_dot(v->w, m);
+/* The sharp polygon inside a polygon, or the centre of a circle, in the pair's coordinates. B is
+   reflected through its centre, so that both turn with the direction. */
+typedef struct dem2di_core {
+    const dem2d_vec *corners, *tangents;
+    int count, k; /* k: the corner that is the support now */
+    dem2d_rot q;
+    double scale;    /* negative for B */
+    dem2d_vec point; /* corner k */
+    dem2d_vec ahead; /* unit tangent of the edge that leaves corner k, counter-clockwise */
+    dem2d_vec back;  /* of the edge that comes to it */
+} dem2di_core;
+
+static void dem2di_core_move(dem2di_core *core, int k) {
+    double sign = core->scale < 0 ? -1 : 1;
+    core->k = k;
+    core->point = dem2di_scale(dem2di_turn(core->q, core->corners[k]), core->scale);
+    if (core->count == 1) return;
+    int before = k > 0 ? k - 1 : core->count - 1;
+    core->ahead = dem2di_scale(dem2di_turn(core->q, core->tangents[k]), sign);
+    core->back = dem2di_scale(dem2di_turn(core->q, core->tangents[before]), sign);
 }
 
-/* Directions round the warm normal u, given as angles in ascending order with 0 in the middle
-   for the vertex known there; the polytope of their supports, and the bound for all others. */
-static void dem2di_bracket(dem2di_pair *pair, dem2di_search *search, dem2d_vec u,
-                           const dem2di_vertex *known, const double *angles, int count,
-                           dem2di_polytope *polytope) {
-    double floor[2] = {0, 0};
-    polytope->vertices = polytope->edges = 0;
-    for (int i = 0; i < count; i++) {
-        dem2d_vec direction = dem2di_nudge(u, angles[i]);
-        dem2di_vertex v = i == count / 2 ? *known : dem2di_look(pair, search, direction);
-        dem2di_polytope_push(pair, polytope, v);
-        if (i == 0 || i == count - 1)
-            floor[i > 0] = dem2di_tangent_bound(pair, &v, i > 0 ? 1 : -1, direction);
+static dem2di_core dem2di_core_make(const dem2d_shape *shape, dem2d_rot q, double scale,
+                                    dem2d_vec u) {
+    static const dem2d_vec centre = {0, 0};
+    dem2di_core core;
+    bool circle = shape->type == DEM2D_CIRCLE;
+    core.corners = circle ? &centre : shape->corners;
+    core.tangents = shape->ends;
+    core.count = circle ? 1 : shape->count;
+    core.q = q;
+    core.scale = scale;
+    core.ahead = core.back = dem2di_vec(0, 0);
+    if (scale < 0) u = dem2di_negate(u);
+    dem2di_core_move(&core, circle ? 0 : dem2di_polygon_corner(shape, dem2di_turn_back(q, u)));
+    return core;
+}
+
+/* A corner of A minus B minus d, w, made of one of each, and the edge last passed to reach it. */
+typedef struct dem2di_walk {
+    dem2di_core a, b;
+    dem2d_vec w;
+    dem2d_vec tangent; /* of that edge, counter-clockwise */
+    dem2d_vec from[3]; /* its start: a's corner, b's, w */
+    int corner[2];     /* and their numbers */
+} dem2di_walk;
+
+/* Along the edge beside, to a side (+1 counter-clockwise), to its other end. */
+static void dem2di_walk_on(const dem2di_pair *pair, dem2di_walk *walk, int side) {
+    dem2di_core *a = &walk->a, *b = &walk->b;
+    dem2d_vec ta = side > 0 ? a->ahead : a->back, tb = side > 0 ? b->ahead : b->back;
+    bool first = b->count == 1 || (a->count > 1 && side * dem2di_cross(ta, tb) > 0);
+    dem2di_core *core = first ? a : b;
+    int k = core->k + side;
+    walk->tangent = first ? ta : tb;
+    walk->from[0] = a->point;
+    walk->from[1] = b->point;
+    walk->from[2] = walk->w;
+    walk->corner[0] = a->k;
+    walk->corner[1] = b->k;
+    dem2di_core_move(core, k == core->count ? 0 : k < 0 ? core->count - 1 : k);
+    walk->w = dem2di_sub(dem2di_add(a->point, b->point), pair->d);
+}
+
+static dem2d_vec dem2di_right(dem2d_vec tangent) {
+    return dem2di_vec(tangent.y, -tangent.x);
+}
+
+static double dem2di_rounding_radius(const dem2d_shape *shape) {
+    return shape->type == DEM2D_CIRCLE ? shape->a : shape->rounding;
+}
+
+static double dem2di_rounding_of(const dem2di_pair *pair) {
+    return dem2di_rounding_radius(pair->a) * pair->scale_a +
+           dem2di_rounding_radius(pair->b) * pair->scale_b;
+}
+
+/* What the search knows of cores (their overlap is `core`) as an answer for the shapes. With a
+   foot the origin's nearest point lies on the edge last passed, else at the corner. */
+static void dem2di_walk_report(const dem2di_pair *pair, const dem2di_walk *walk, bool foot,
+                               dem2d_vec normal, double core, dem2di_search *search) {
+    double ra = dem2di_rounding_radius(pair->a) * pair->scale_a;
+    double rb = dem2di_rounding_radius(pair->b) * pair->scale_b;
+    dem2d_vec a = walk->a.point, b = walk->b.point;
+    if (foot) {
+        dem2d_vec edge = dem2di_sub(walk->w, walk->from[2]);
+        double t = dem2di_dot(walk->w, edge) / dem2di_dot(edge, edge);
+        t = dem2di_max(0, dem2di_min(1, t));
+        a = dem2di_along(a, t, dem2di_sub(walk->from[0], a));
+        b = dem2di_along(b, t, dem2di_sub(walk->from[1], b));
     }
-    polytope->floor = dem2di_min(floor[0], floor[1]);
+    search->normal = normal;
+    search->upper = search->lower = core + (ra + rb);
+    search->a = dem2di_along(a, ra, normal);
+    search->b = dem2di_negate(dem2di_along(b, rb, normal));
+    search->corner[0] = foot ? walk->corner[0] : walk->a.k;
+    search->corner[1] = foot ? walk->corner[1] : walk->b.k;
 }
 
-/* The minimum of h near u when no certificate holds (corners, deep overlaps): a polytope of a
-   narrow bracket about u and its Newton step, then a wide one if the bound for the far
-   directions is not high enough. */
-static bool dem2di_warm_bracket(dem2di_pair *pair, dem2d_vec u, const dem2di_vertex *v, double rho,
-                                double step, double tolerance, int cap, dem2di_search *search) {
-    dem2di_polytope polytope;
-    double h = dem2di_dot(v->w, u), angles[5];
-    /* a chord of an arc of angle e lies rho e^2/8 below it; at a corner any small angle will do */
-    double narrow = rho > 0 ? sqrt(8 * tolerance / rho) : 1e-3;
-    narrow = dem2di_min(narrow, 1e-2);
-    /* a support point at 3/4 of the depth to the side lifts the tangent bound above the depth */
-    double wide = rho > 0 ? dem2di_min(0.75 * h / rho, 0.5) : 0.3;
-    wide = dem2di_max(wide, 4 * narrow);
-    angles[0] = dem2di_min(step, 0) - narrow;
-    angles[1] = 0;
-    angles[2] = dem2di_max(step, 0) + narrow;
-    dem2di_bracket(pair, search, u, v, angles, 3, &polytope);
-    if (polytope.floor < search->upper - tolerance) {
-        angles[4] = angles[2] + wide;
-        angles[3] = angles[2];
-        angles[2] = 0;
-        angles[1] = angles[0];
-        angles[0] -= wide;
-        dem2di_bracket(pair, search, u, v, angles, 5, &polytope);
-        if (polytope.floor < search->upper - tolerance) return false;
+/* Cores apart: from a corner that a separating direction u leads to, down to the point of A minus
+   B nearest to the origin. In front of it the distance has one minimum. */
+static void dem2di_walk_apart(const dem2di_pair *pair, dem2di_walk *walk, dem2d_vec u,
+                              dem2di_search *search) {
+    for (int side = 1; side >= -1; side -= 2) {
+        bool moved = false;
+        for (;;) {
+            dem2di_walk next = *walk;
+            dem2di_walk_on(pair, &next, side);
+            /* an edge seen from behind, or one that leads away */
+            if (dem2di_dot(walk->w, dem2di_right(next.tangent)) > DEM2DI_ROUNDING * pair->size)
+                break;
+            if (!(side * dem2di_dot(walk->w, next.tangent) < 0)) break;
+            *walk = next;
+            moved = true;
+            if (side * dem2di_dot(next.w, next.tangent) < 0) continue;
+            u = dem2di_right(next.tangent);
+            dem2di_walk_report(pair, &next, true, u, dem2di_dot(next.w, u), search);
+            return;
+        }
+        if (moved) break;
     }
-    dem2di_epa(pair, &polytope, tolerance, cap, search);
-    return search->state != DEM2D_UNRESOLVED && search->upper - search->lower <= tolerance;
+    /* two corners; so close that rounding hides the direction, the separating one is kept */
+    dem2d_vec away;
+    if (dem2di_length(walk->w) > DEM2DI_ROUNDING * pair->size && dem2di_unit(walk->w, &away))
+        u = dem2di_negate(away);
+    dem2di_walk_report(pair, walk, false, u, dem2di_dot(walk->w, u), search);
 }
 
-/* Start from the last normal. One support call proves separation. For an overlap below the least
-   radius of curvature r, one call at the right normal proves the depth: A minus B eroded by r is
-   convex and its distance bounds the depth, r - |w - r u| <= depth <= w.u. Newton's step on the
-   osculating circle, u <- (rho u - w)/|rho u - w|, leads there. Returns false when nothing was
-   proved; search then holds bounds only. */
-static bool dem2di_contact_warm(dem2di_pair *pair, dem2d_vec u, double tolerance, int cap,
-                                dem2di_search *search) {
-    double r = pair->a->rho_min * pair->scale_a + pair->b->rho_min * pair->scale_b;
-    double rho, step = 0;
-    search->iterations = 0;
-    search->upper = HUGE_VAL;
-    for (int i = 0; i < 4; i++) {
-        dem2di_vertex v = dem2di_minkowski(pair, u, &rho);
-        double h = dem2di_dot(v.w, u), slope = dem2di_cross(u, v.w), bend = rho - h;
+/* Edges passed to each side before branch and bound is cheaper, measured: 24 take as long as the
+   15 support pairs it needs for polygons of 64 corners. */
+#define DEM2DI_MANY_EDGES 24
+
+/* Are all directions from the edge last passed to v, the end of the cone on this side, worse than
+   the least overlap met? The support value there is at least that of the corner reached. */
+static bool dem2di_walk_outweighs(const dem2di_walk *walk, int side, dem2d_vec v, double least) {
+    dem2d_vec n = dem2di_right(walk->tangent);
+    if (side * dem2di_cross(n, v) > 0) return dem2di_dot(walk->w, v) >= least;
+    return dem2di_dot(n, v) > 0; /* past the end */
+}
+
+/* Least overlap or greatest gap. Overlapping cores: the least support value is at an edge's
+   normal. Edges are passed to both sides of the start until their ends outweigh what is left of
+   the cone: w.v >= least at the cone's end v and at the edge means so between them. False when
+   more than `cap` edges would be passed: large and far from round. */
+static bool dem2di_edges_solve(dem2di_pair *pair, dem2d_vec u, int cap, dem2di_search *search) {
+    dem2di_walk walk[2], best;
+    dem2d_vec end[2];
+    double least = HUGE_VAL;
+    bool cone = false;
+    /* from behind both sides would seem to be past the cone */
+    if (!(dem2di_dot(u, pair->d) > 0)) u = dem2di_first_direction(pair, dem2di_vec(0, 0));
+    walk[0].a = dem2di_core_make(pair->a, pair->ra, pair->scale_a, u);
+    walk[0].b = dem2di_core_make(pair->b, pair->rb, -pair->scale_b, u);
+    walk[0].w = dem2di_sub(dem2di_add(walk[0].a.point, walk[0].b.point), pair->d);
+    walk[0].tangent = dem2di_perp(u);
+    walk[1] = best = walk[0];
+    pair->calls++;
+    search->proof = DEM2D_BY_FORM;
+    if (dem2di_dot(walk[0].w, u) < 0) {
+        dem2di_walk_apart(pair, &walk[0], u, search);
+        return true;
+    }
+    int all = walk[0].a.count + walk[0].b.count;
+    for (int i = 0; i <= cap; i++) {
+        bool open = false;
+        for (int side = 0; side < 2; side++) {
+            dem2di_walk *here = &walk[side];
+            int turn = side > 0 ? 1 : -1;
+            if (cone && dem2di_walk_outweighs(here, turn, end[side], least)) continue;
+            open = true;
+            dem2di_walk_on(pair, here, turn);
+            dem2d_vec n = dem2di_right(here->tangent);
+            double h = dem2di_dot(here->w, n);
+            if (!(h < least)) continue;
+            least = h;
+            best = *here;
+            if (!(h < 0)) continue;
+            dem2di_walk_apart(pair, here, n, search);
+            return true;
+        }
+        if (!open || i == all) {
+            dem2di_walk_report(pair, &best, true, dem2di_right(best.tangent), least, search);
+            return true;
+        }
         search->iterations++;
-        search->upper = h;
-        search->normal = u;
-        search->a = v.a;
-        search->b = v.b;
-        if (h < -DEM2DI_ROUNDING * pair->size) {
-            search->lower = -dem2di_length(v.w);
-            search->state = DEM2D_SEPARATED;
-            return true;
-        }
-        bool smooth = bend > 0 && dem2di_finite(bend);
-        step = smooth ? -slope / bend : 0;
-        if (fabs(step) > 0.5) return false;
-        if (!(r > h))
-            return dem2di_warm_bracket(pair, u, &v, dem2di_finite(rho) ? rho : 0, step, tolerance,
-                                       cap, search);
-        double depth = r - h, gap = slope * slope / (sqrt(depth * depth + slope * slope) + depth);
-        if (gap <= tolerance && fabs(step) <= DEM2DI_WARM_ANGLE) {
-            search->normal = dem2di_nudge(u, step);
-            search->lower = dem2di_min(h - gap, dem2di_dot(v.w, search->normal));
-            search->state = dem2di_judge(pair, search);
-            return true;
-        }
-        if (!smooth || step == 0)
-            return dem2di_warm_bracket(pair, u, &v, 0, 0, tolerance, cap, search);
-        u = dem2di_nudge(u, step);
+        if (i == 0) cone = dem2di_cone(pair, least + dem2di_rounding_of(pair), end);
     }
     return false;
 }
 
-/* Depth when shapes overlap, else separation (with `detect`) or distance. */
-static void dem2di_contact_solve(dem2di_pair *pair, const dem2d_vec *warm, dem2d_vec start,
-                                 double tolerance, int cap, bool detect, dem2di_search *search) {
-    double absolute = dem2di_max(tolerance, DEM2DI_ROUNDING) * pair->size;
-    if (warm != NULL && dem2di_contact_warm(pair, *warm, absolute, cap, search)) {
-        if (search->state == DEM2D_SEPARATED && !detect) {
-            start = search->normal;
-        } else if (search->state == DEM2D_SEPARATED || search->lower >= 0 ||
-                   search->state == DEM2D_TOUCHING) {
-            return;
-        } /* else the sign is not sure within the tolerance: GJK decides */
+/* ============================================================================================
+   >>minimum  Least support value of A minus B: Newton's steps, a proof, branch and bound
+   uses: config, math, support, gjk, epa, edges
+   ============================================================================================ */
+
+/* One look at h(u) = s(u).u and dh/du = s(u).perp(u). On the normal of a polygon's edge both ends
+   are kept: v[0] is the support from the clockwise side, v[1] from the other; elsewhere v[0]. */
+typedef struct dem2di_sight {
+    dem2d_vec u;
+    dem2di_vertex v[2];
+    bool edge;
+    double h, slope[2]; /* slopes on both sides */
+    double rho[2];      /* of A and of B, apart from the edge */
+    int corner[2];      /* of the polygon, if the pair has one, for v[0] and v[1] */
+} dem2di_sight;
+
+static void dem2di_see(dem2di_pair *pair, dem2d_vec u, dem2di_sight *sight) {
+    sight->u = u;
+    sight->v[0] = dem2di_minkowski(pair, u, sight->rho);
+    sight->edge = false;
+    sight->h = dem2di_dot(sight->v[0].w, u);
+    sight->slope[0] = sight->slope[1] = dem2di_cross(u, sight->v[0].w);
+}
+
+/* The polygon of a pair that has one. */
+typedef struct dem2di_polygon {
+    const dem2d_shape *shape;
+    dem2d_rot q;
+    double scale;
+    bool first; /* it is A */
+} dem2di_polygon;
+
+static dem2di_polygon dem2di_polygon_of(const dem2di_pair *pair) {
+    dem2di_polygon p;
+    p.first = pair->a->type == DEM2D_POLYGON;
+    p.shape = p.first ? pair->a : pair->b;
+    p.q = p.first ? pair->ra : pair->rb;
+    p.scale = p.first ? pair->scale_a : pair->scale_b;
+    return p;
+}
+
+/* A direction of the pair in the polygon's own coordinates. */
+static dem2d_vec dem2di_polygon_view(const dem2di_polygon *p, dem2d_vec u) {
+    return dem2di_turn_back(p->q, p->first ? u : dem2di_negate(u));
+}
+
+static int dem2di_corner_beside(const dem2di_polygon *p, int k, int step) {
+    k += step;
+    return k == p->shape->count ? 0 : k < 0 ? p->shape->count - 1 : k;
+}
+
+/* The same for a polygon and another shape: at corner `low`, or in u along the normal of the edge
+   from corner `low` to `high`. */
+static void dem2di_see_polygon(dem2di_pair *pair, const dem2di_polygon *p, dem2d_vec u, int low,
+                               int high, dem2di_sight *sight) {
+    const dem2d_shape *other = p->first ? pair->b : pair->a;
+    dem2d_rot q = p->first ? pair->rb : pair->ra;
+    double scale = p->first ? pair->scale_b : pair->scale_a, rho;
+    dem2d_vec v = p->first ? u : dem2di_negate(u);
+    dem2d_vec s = dem2di_support(other, dem2di_turn_back(q, dem2di_negate(v)), &rho);
+    s = dem2di_scale(dem2di_turn(q, s), scale);
+    sight->u = u;
+    sight->edge = low != high;
+    sight->corner[0] = low;
+    sight->corner[1] = high;
+    for (int i = 0; i < 2; i++) {
+        if (i == 0 || sight->edge) {
+            dem2d_vec c = dem2di_turn(p->q, p->shape->corners[sight->corner[i]]);
+            c = dem2di_scale(dem2di_along(c, p->shape->rounding, v), p->scale);
+            sight->v[i] = p->first ? dem2di_join(pair, c, s) : dem2di_join(pair, s, c);
+        }
+        sight->slope[i] = dem2di_cross(u, sight->v[sight->edge ? i : 0].w);
     }
+    sight->h = dem2di_dot(sight->v[0].w, u);
+    sight->rho[p->first ? 0 : 1] = p->shape->rounding * p->scale;
+    sight->rho[p->first ? 1 : 0] = rho * scale;
+    pair->calls++;
+}
+
+static void dem2di_see_edge(dem2di_pair *pair, const dem2di_polygon *p, int edge,
+                            dem2di_sight *sight) {
+    dem2d_vec u = dem2di_turn(p->q, dem2di_right(p->shape->ends[edge]));
+    dem2di_see_polygon(pair, p, p->first ? u : dem2di_negate(u), edge,
+                       dem2di_corner_beside(p, edge, 1), sight);
+}
+
+/* A start this near (sine) to the normal of an edge is taken there: contacts rest on edges, and
+   the edge turns with its polygon. */
+#define DEM2DI_SNAP 0.01
+
+static void dem2di_see_first(dem2di_pair *pair, const dem2di_polygon *p, dem2d_vec u,
+                             dem2di_sight *sight) {
+    dem2d_vec v = dem2di_polygon_view(p, u);
+    int k = dem2di_polygon_corner(p->shape, v), before = dem2di_corner_beside(p, k, -1);
+    double ahead = -dem2di_dot(p->shape->ends[k], v), back = dem2di_dot(p->shape->ends[before], v);
+    if (dem2di_min(ahead, back) < DEM2DI_SNAP)
+        dem2di_see_edge(pair, p, ahead < back ? k : before, sight);
+    else
+        dem2di_see_polygon(pair, p, u, k, k, sight);
+}
+
+/* From the corner seen last towards a direction: there if it is the same corner's, else along the
+   normal of the last edge on the way, which no Newton step would hit. */
+static void dem2di_see_towards(dem2di_pair *pair, const dem2di_polygon *p, dem2d_vec u,
+                               dem2di_sight *sight) {
+    int k = dem2di_polygon_corner(p->shape, dem2di_polygon_view(p, u));
+    if (k == sight->corner[0])
+        dem2di_see_polygon(pair, p, u, k, k, sight);
+    else
+        dem2di_see_edge(pair, p, dem2di_cross(sight->u, u) > 0 ? dem2di_corner_beside(p, k, -1) : k,
+                        sight);
+}
+
+/* A descent: the directions between which the minimum is, and what was seen there. */
+typedef struct dem2di_bracket {
+    dem2d_vec end[2];
+    dem2di_vertex at[2];
+    bool known, seen[2], chord;
+} dem2di_bracket;
+
+/* The bracket with the last look as one of its ends. A look outside of it changes nothing: false.
+ */
+static bool dem2di_bracket_cut(const dem2di_pair *pair, const dem2di_sight *sight,
+                               dem2di_bracket *bracket) {
+    dem2d_vec u = sight->u;
+    if (!bracket->known && !dem2di_cone(pair, sight->h, bracket->end)) {
+        bracket->end[0] = dem2di_negate(dem2di_perp(u));
+        bracket->end[1] = dem2di_perp(u);
+    }
+    bracket->known = true;
+    dem2d_vec middle = dem2di_sub(dem2di_perp(bracket->end[0]), dem2di_perp(bracket->end[1]));
+    bool behind = dem2di_dot(u, middle) < 0 && dem2di_dot(bracket->end[0], bracket->end[1]) > 0;
+    if (behind || dem2di_cross(bracket->end[0], u) < 0 || dem2di_cross(u, bracket->end[1]) < 0)
+        return false;
+    int side = sight->slope[0] < 0 ? 0 : 1;
+    bracket->end[side] = u;
+    bracket->at[side] = sight->v[0];
+    bracket->seen[side] = true;
+    return true;
+}
+
+static bool dem2di_bracket_holds(const dem2di_bracket *bracket, dem2d_vec u) {
+    return dem2di_inside(u, bracket->end[0], bracket->end[1]);
+}
+
+/* The next direction where Newton's has left the bracket: the normal of the chord of both ends,
+   which finds flat faces, or the middle. False when there is nothing between the ends. */
+static bool dem2di_bracket_next(dem2di_bracket *bracket, dem2d_vec *u) {
+    const dem2d_vec *end = bracket->end;
+    bracket->chord = bracket->seen[0] && bracket->seen[1] &&
+                     dem2di_unit(dem2di_right(dem2di_sub(bracket->at[1].w, bracket->at[0].w)), u) &&
+                     dem2di_bracket_holds(bracket, *u);
+    if (bracket->chord) return true;
+    /* wider than a right angle: the quarter turns inwards, which do not cancel there */
+    dem2d_vec middle = dem2di_add(end[0], end[1]);
+    if (dem2di_dot(end[0], end[1]) < 0)
+        middle = dem2di_sub(dem2di_perp(end[0]), dem2di_perp(end[1]));
+    /* one end that was never seen, closed in upon: the minimum is beyond it */
+    bool narrow = dem2di_dot(end[0], end[1]) > 0 && dem2di_cross(end[0], end[1]) < 1e-6;
+    if (narrow && !(bracket->seen[0] && bracket->seen[1])) return false;
+    return dem2di_unit(middle, u) && dem2di_bracket_holds(bracket, *u);
+}
+
+static void dem2di_keep(const dem2di_sight *sight, dem2di_search *search) {
+    if (!(sight->h < search->upper)) return;
+    search->upper = sight->h;
+    search->normal = sight->u;
+    search->a = sight->v[0].a;
+    search->b = sight->v[0].b;
+}
+
+/* Is h stationary at the last look? On an edge when the slope changes sign there; on a chord of
+   the bracket that is a face of the shapes; elsewhere when Newton's step is below `angle`. */
+static bool dem2di_at_rest(const dem2di_pair *pair, const dem2di_bracket *bracket, double angle,
+                           dem2di_sight *sight) {
+    if (sight->edge) {
+        if (sight->slope[0] <= 0 && sight->slope[1] >= 0) return true;
+        int side = sight->slope[1] < 0; /* the minimum is beyond this end */
+        sight->v[0] = sight->v[side];
+        sight->corner[0] = sight->corner[side];
+        sight->slope[0] = sight->slope[1] = sight->slope[side];
+        sight->edge = false;
+    }
+    double bend = sight->rho[0] + sight->rho[1] - sight->h;
+    if (bend > 0 && dem2di_finite(bend) && fabs(sight->slope[0]) <= angle * bend) return true;
+    if (!bracket->chord ||
+        sight->h - dem2di_dot(bracket->at[0].w, sight->u) > DEM2DI_ROUNDING * pair->size)
+        return false;
+    sight->edge = true;
+    for (int i = 0; i < 2; i++) {
+        sight->v[i] = bracket->at[i];
+        sight->slope[i] = dem2di_cross(sight->u, sight->v[i].w);
+    }
+    return sight->slope[0] <= 0 && sight->slope[1] >= 0;
+}
+
+/* Down from a direction to a local minimum of h, by Newton's step on the osculating circle,
+   u <- (rho u - s)/|rho u - s|, kept inside a bracket. With `detect` the first direction that
+   separates is enough. False when the cap comes first. */
+static bool dem2di_descend(dem2di_pair *pair, dem2d_vec u, double angle, int cap, bool detect,
+                           dem2di_sight *sight, dem2di_search *search) {
+    dem2di_bracket bracket;
+    dem2di_polygon polygon = dem2di_polygon_of(pair);
+    bool mixed = polygon.shape->type == DEM2D_POLYGON;
+    bracket.known = bracket.seen[0] = bracket.seen[1] = bracket.chord = false;
+    if (mixed)
+        dem2di_see_first(pair, &polygon, u, sight);
+    else
+        dem2di_see(pair, u, sight);
+    for (int i = 0; i < cap; i++) {
+        search->iterations++;
+        dem2di_keep(sight, search);
+        if (detect && sight->h < -DEM2DI_ROUNDING * pair->size) return true;
+        if (dem2di_at_rest(pair, &bracket, angle, sight)) return true;
+        double rho = sight->rho[0] + sight->rho[1], slope = sight->slope[0], bend = rho - sight->h;
+        bool bends = bend > 0 && dem2di_finite(bend);
+        /* a small step needs no bracket, unless it has not helped before */
+        bool near = bends && fabs(slope) < 0.2 * bend && i < 4;
+        bool outside = (bracket.known || !near) && !dem2di_bracket_cut(pair, sight, &bracket);
+        bool newton = bends && !outside &&
+                      dem2di_unit(dem2di_along(dem2di_negate(sight->v[0].w), rho, sight->u), &u);
+        bracket.chord = false;
+        if (!newton || (bracket.known && !dem2di_bracket_holds(&bracket, u)))
+            if (!dem2di_bracket_next(&bracket, &u)) return false;
+        if (mixed)
+            dem2di_see_towards(pair, &polygon, u, sight);
+        else
+            dem2di_see(pair, u, sight);
+    }
+    return false;
+}
+
+/* The minimum at rest: along an edge the foot of the origin; else Newton's last step, on the
+   osculating circle, which leaves the square of its angle. */
+static void dem2di_settle(const dem2di_sight *sight, dem2di_search *search) {
+    const dem2di_vertex *v = sight->v;
+    if (sight->edge) {
+        double t = sight->slope[0] < 0 ? sight->slope[0] / (sight->slope[0] - sight->slope[1]) : 0;
+        search->normal = sight->u;
+        search->upper = sight->h;
+        search->a = dem2di_along(v[0].a, t, dem2di_sub(v[1].a, v[0].a));
+        search->b = dem2di_along(v[0].b, t, dem2di_sub(v[1].b, v[0].b));
+        return;
+    }
+    double slope = sight->slope[0], bend = sight->rho[0] + sight->rho[1] - sight->h;
+    double length = sqrt(bend * bend + slope * slope), f = 1 / length;
+    dem2d_vec u = sight->u,
+              normal = dem2di_along(dem2di_scale(u, bend * f), -slope * f, dem2di_perp(u));
+    dem2d_vec turned = dem2di_sub(normal, u);
+    search->normal = normal;
+    search->upper = sight->h - slope * (slope / (length + bend));
+    search->a = dem2di_along(v[0].a, sight->rho[0], turned);
+    search->b = dem2di_along(v[0].b, -sight->rho[1], turned);
+}
+
+/* Steps of the march below turn by 2 atan(1/32), which is less than any sector of floors. */
+#define DEM2DI_MARCH_COS (1023.0 / 1025)
+#define DEM2DI_MARCH_SIN (64.0 / 1025)
+
+/* Is h nowhere below its value at rest (less the tolerance), from there to the end v of the cone
+   on one side (0 clockwise, 1 counter-clockwise)? With rho at least r, h is at least the support
+   value of a circle of radius r that fits value and slope, and so on from sector to sector. Where
+   the support point reached keeps above the value up to v, nothing in between is below it. */
+static bool dem2di_outweighs(const dem2di_pair *pair, const dem2di_sight *sight, int side,
+                             dem2d_vec v, double tolerance) {
+    int turn = side > 0 ? 1 : -1;
+    double h = sight->h, slope = turn * sight->slope[side], least = h - tolerance;
+    dem2d_vec u = sight->u;
+    dem2d_rot step;
+    step.c = DEM2DI_MARCH_COS;
+    step.s = turn * DEM2DI_MARCH_SIN;
+    for (int i = 0; i < 10; i++) { /* 10 steps are 36 degrees: a support point farther is rare */
+        double ahead = turn * dem2di_cross(u, v);
+        if (!(ahead > 0)) return dem2di_dot(u, v) > 0;
+        if (h * dem2di_dot(u, v) + slope * ahead >= least && h > 0) return true;
+        double r = dem2di_floor(pair->a, dem2di_turn_back(pair->ra, u), turn) * pair->scale_a +
+                   dem2di_floor(pair->b, dem2di_turn_back(pair->rb, dem2di_negate(u)), turn) *
+                       pair->scale_b;
+        /* at rest but for a last small slope, which lowers h by slope^2/(2 (r - h)) */
+        if (i == 0 && !(sight->edge ? slope >= 0 : slope * slope <= 2 * tolerance * (r - h)))
+            return false;
+        double next = r + (h - r) * step.c + slope * DEM2DI_MARCH_SIN;
+        slope = (r - h) * DEM2DI_MARCH_SIN + slope * step.c;
+        if (!(slope >= 0)) return false;
+        h = next;
+        u = dem2di_turn(step, u);
+    }
+    return false;
+}
+
+/* Is the minimum at rest the least of all? With r <= rho everywhere, r - |s - r u| <= depth (A
+   minus B eroded by r is convex, and its distance from the origin bounds the depth); else the
+   boundary beside it must outweigh the cone. */
+static bool dem2di_certify(const dem2di_pair *pair, const dem2di_sight *sight, double tolerance,
+                           dem2di_search *search) {
+    double r = pair->a->rho_min * pair->scale_a + pair->b->rho_min * pair->scale_b;
+    double h = sight->h, square = sight->edge ? 0 : sight->slope[0] * sight->slope[0];
+    dem2d_vec end[2];
+    if (r > h && square <= 2 * tolerance * (r - h)) {
+        search->lower = search->upper - square / (2 * (r - h));
+        search->proof = DEM2D_BY_RADIUS;
+        return true;
+    }
+    if (!dem2di_cone(pair, h, end) || !dem2di_outweighs(pair, sight, 0, end[0], tolerance) ||
+        !dem2di_outweighs(pair, sight, 1, end[1], tolerance))
+        return false;
+    search->lower = search->upper - (sight->edge ? 0 : tolerance);
+    search->proof = DEM2D_BY_ARC;
+    return true;
+}
+
+/* Branch and bound over arcs of directions, from the least value met so far; then down to rest. */
+static void dem2di_branch(dem2di_pair *pair, double tolerance, double angle, int cap,
+                          dem2di_search *search) {
+    dem2di_polytope polytope;
+    dem2d_vec end[2], u = search->normal;
+    polytope.vertices = polytope.edges = 0;
+    polytope.arcs = true;
+    bool cone = dem2di_cone(pair, search->upper, end) && dem2di_dot(end[0], end[1]) > -0.9;
+    if (cone) {
+        bool inside = dem2di_inside(u, end[0], end[1]);
+        for (int i = 0; i < 3; i++) {
+            dem2d_vec v = i == 0 ? end[0] : i == 1 ? u : end[1];
+            if (i == 1 && !inside) continue;
+            dem2di_polytope_push(pair, &polytope, dem2di_look(pair, search, v), v);
+        }
+    } else {
+        for (int i = 0; i < 4; i++, u = dem2di_perp(u))
+            dem2di_polytope_push(pair, &polytope, dem2di_look(pair, search, u), u);
+        dem2di_polytope_close(pair, &polytope);
+    }
+    dem2di_epa(pair, &polytope, tolerance, cap, search);
+    dem2di_sight sight;
+    dem2di_search last = *search;
+    bool polygons = pair->a->type == DEM2D_POLYGON && pair->b->type == DEM2D_POLYGON;
+    if (search->state == DEM2D_UNRESOLVED || polygons ||
+        !dem2di_descend(pair, search->normal, angle, cap, false, &sight, &last) ||
+        sight.h > search->upper + tolerance)
+        return;
+    dem2di_settle(&sight, &last);
+    last.lower = dem2di_min(last.upper, search->lower);
+    last.state = dem2di_judge(pair, &last);
+    *search = last;
+}
+
+/* Looks that a warm start gets: two for the normal of the last step, and some for a corner passed
+   or an edge that was not where it was. */
+#define DEM2DI_WARM 6
+
+/* Least overlap or greatest gap, certified. With `detect` any direction that separates will do. */
+static void dem2di_certified(dem2di_pair *pair, dem2d_vec start, double tolerance, int cap,
+                             bool detect, dem2di_search *search) {
+    /* Newton's last step leaves about the square of its angle in the normal: a hundredth of the
+       tolerance. 40 of them are more than halving the cone down to rounding needs. */
+    double absolute = dem2di_max(tolerance, DEM2DI_ROUNDING) * pair->size;
+    double angle = 0.1 * sqrt(dem2di_max(tolerance, DEM2DI_ROUNDING));
+    int steps = cap < 64 ? cap : 64;
+    bool round_a = pair->a->type == DEM2D_CIRCLE || pair->a->type == DEM2D_POLYGON;
+    bool round_b = pair->b->type == DEM2D_CIRCLE || pair->b->type == DEM2D_POLYGON;
+    dem2d_vec u = dem2di_first_direction(pair, start);
+    search->iterations = 0;
+    search->upper = HUGE_VAL;
+    search->normal = u;
+    search->corner[0] = search->corner[1] = -1;
+    if (round_a && round_b) {
+        if (!dem2di_edges_solve(pair, u, DEM2DI_MANY_EDGES, search)) {
+            search->upper = HUGE_VAL;
+            (void)dem2di_look(pair, search, u);
+            dem2di_branch(pair, absolute, angle, cap, search);
+            return;
+        }
+        search->state = dem2di_judge(pair, search);
+        return;
+    }
+    /* a start that does not settle at once was none: then from the line of centres */
+    dem2d_vec centres = dem2di_first_direction(pair, dem2di_vec(0, 0));
+    bool warm = u.x != centres.x || u.y != centres.y;
+    for (int i = warm ? 0 : 1; i < 2; i++) {
+        dem2di_sight sight;
+        bool rest = dem2di_descend(pair, i == 0 ? u : centres, angle, i == 0 ? DEM2DI_WARM : steps,
+                                   detect, &sight, search);
+        if (detect && search->upper < -DEM2DI_ROUNDING * pair->size) {
+            search->lower = -HUGE_VAL;
+            search->proof = DEM2D_BY_RADIUS;
+            search->state = DEM2D_SEPARATED;
+            return;
+        }
+        if (!rest) continue;
+        dem2di_settle(&sight, search);
+        search->state = dem2di_judge(pair, search);
+        if (dem2di_certify(pair, &sight, absolute, search)) return;
+    }
+    dem2di_branch(pair, absolute, angle, cap, search);
+}
+
+/* ============================================================================================
+   >>contact  Contact of two shapes, of a shape and a wall
+   uses: config, math, memory, support, shapes, gjk, epa, edges, minimum
+   ============================================================================================ */
+
+/* [P] and [F] sec. 3: GJK, then EPA when the shapes overlap. */
+static void dem2di_gjk_epa(dem2di_pair *pair, dem2d_vec start, double tolerance, int cap,
+                           bool detect, dem2di_search *search) {
+    double absolute = dem2di_max(tolerance, DEM2DI_ROUNDING) * pair->size;
     dem2di_gjk(pair, start, absolute, cap, detect, search);
     if (search->state != DEM2D_PENETRATING) return;
     dem2di_polytope polytope;
     dem2di_polytope_start(pair, search, &polytope);
     dem2di_epa(pair, &polytope, absolute, cap, search);
-    if (search->state == DEM2D_UNRESOLVED) {
-        /* where h hardly bends, chords converge slowly but Newton's step does not */
-        dem2di_search retry = *search;
-        if (dem2di_contact_warm(pair, search->normal, absolute, cap, &retry)) *search = retry;
-    }
     search->lower = dem2di_max(search->lower, dem2di_min(0, search->upper)); /* by GJK */
+}
+
+/* Depth when shapes overlap, else separation (with `detect`) or distance. */
+static void dem2di_contact_solve(dem2di_pair *pair, dem2d_solver solver, dem2d_vec start,
+                                 double tolerance, int cap, bool detect, dem2di_search *search) {
+    if (solver == DEM2D_GJK_EPA)
+        dem2di_gjk_epa(pair, start, tolerance, cap, detect, search);
+    else
+        dem2di_certified(pair, start, tolerance, cap, detect, search);
 }
 
 /* A circle in closed form: centres apart by d. Concentric circles get the normal (1, 0). */
@@ -5542,11 +6273,12 @@ static void dem2di_contact_report(const dem2di_pair *pair, const dem2di_search *
                                   const dem2d_pose *pose_a, const dem2d_pose *pose_b,
                                   dem2d_contact *contact) {
     contact->state = search->state;
+    contact->proof = search->proof;
     contact->support_calls = pair->calls;
     contact->iterations = search->iterations;
     contact->normal = search->normal;
     contact->depth = search->upper;
-    contact->error = dem2di_max(0, search->upper - search->lower);
+    contact->error = dem2di_max(0, search->upper - search->lower) + DEM2DI_ROUNDING * pair->size;
     contact->point_a = dem2di_add(pose_a->position, search->a);
     contact->point_b = dem2di_add(pose_b->position, search->b);
     contact->point = dem2di_scale(dem2di_add(contact->point_a, contact->point_b), 0.5);
@@ -5571,6 +6303,8 @@ static dem2d_result dem2di_query_prepare(const dem2d_shape *a, dem2d_pose *pose_
     if (desc != NULL) *used = *desc;
     if (!dem2di_finite(used->tolerance) || !dem2di_vec_finite(used->start)) return DEM2D_NOT_FINITE;
     if (used->tolerance < 0 || used->max_iterations < 0) return DEM2D_OUT_OF_RANGE;
+    if ((int)used->solver < 0 || (int)used->solver >= (int)DEM2D_SOLVER_COUNT)
+        return DEM2D_OUT_OF_RANGE;
     if (used->tolerance == 0) used->tolerance = 1e-10;
     used->tolerance = dem2di_max(used->tolerance, DEM2DI_ROUNDING);
     if (used->max_iterations == 0) used->max_iterations = 128;
@@ -5633,18 +6367,17 @@ DEM2D_API dem2d_result dem2d_pair_contact(const dem2d_shape *a, dem2d_pose pose_
     dem2di_pair pair = dem2di_pair_make(a, &pose_a, b, &pose_b);
     if (!dem2di_pair_sound(&pair)) return DEM2D_OUT_OF_RANGE;
     dem2di_search search;
-    if (a->type == DEM2D_CIRCLE && b->type == DEM2D_CIRCLE) {
+    if (a->type == DEM2D_CIRCLE && b->type == DEM2D_CIRCLE && used.solver == DEM2D_CERTIFIED) {
         double ra = a->a * pair.scale_a, rb = b->a * pair.scale_b;
         search.iterations = 0;
         search.upper = search.lower = dem2di_circle_contact(pair.d, ra + rb, &search.normal);
         search.a = dem2di_scale(search.normal, ra);
         search.b = dem2di_scale(search.normal, -rb);
+        search.proof = DEM2D_BY_FORM;
         search.state = dem2di_judge(&pair, &search);
     } else {
-        dem2d_vec warm;
-        bool started = dem2di_unit(used.start, &warm);
-        dem2di_contact_solve(&pair, started ? &warm : NULL, used.start, used.tolerance,
-                             used.max_iterations, false, &search);
+        dem2di_contact_solve(&pair, used.solver, used.start, used.tolerance, used.max_iterations,
+                             false, &search);
     }
     dem2di_contact_report(&pair, &search, &pose_a, &pose_b, contact);
     return DEM2D_OK;
@@ -6065,6 +6798,7 @@ struct dem2d_world {
     double time_step, local_damping, global_damping, skin, tolerance;
     dem2d_vec gravity;
     int max_iterations;
+    dem2d_solver solver;
     bool check_time_step;
     bool list_stale;  /* the list must be built before the next force pass */
     double wall_skin; /* how far a wall may move before that */
@@ -6238,6 +6972,7 @@ DEM2D_API dem2d_result dem2d_world_create(const dem2d_world_desc *desc, dem2d_wo
     made->skin = desc->skin == 0 ? 0.1 : desc->skin;
     made->tolerance = desc->contact_tolerance == 0 ? 1e-8 : desc->contact_tolerance;
     made->max_iterations = desc->max_iterations == 0 ? 128 : desc->max_iterations;
+    made->solver = desc->solver;
     made->check_time_step = !desc->skip_time_step_check;
     if (!dem2di_reserve_bodies(made, desc->particle_capacity) ||
         !dem2di_list_reserve(made, &made->pairs, desc->pair_capacity)) {
@@ -6872,10 +7607,11 @@ static void dem2di_pair_geometry(const dem2d_world *world, int a, int b, const d
     pair.scale_a = body_a->scale;
     pair.scale_b = body_b->scale;
     pair.d = d;
-    pair.size = reach + sqrt(square);
+    pair.distance = sqrt(square);
+    pair.size = reach + pair.distance;
     pair.calls = 0;
     bool warm = last->normal.x != 0 || last->normal.y != 0;
-    dem2di_contact_solve(&pair, warm ? &last->normal : NULL, d, world->tolerance,
+    dem2di_contact_solve(&pair, world->solver, warm ? last->normal : d, world->tolerance,
                          world->max_iterations, true, &search);
     *calls += pair.calls;
     *unresolved += search.state == DEM2D_UNRESOLVED;
