@@ -35,6 +35,7 @@ CONTENTS (search for the anchor, ">>" and the word)
                     depth: expanding polytope                               >>epa
                     two polygons, by edges and corners                      >>edges
                     least support value, certified                          >>minimum
+                    faces that meet, two contact points                     >>faces
                     contact of two shapes, of a shape and a wall            >>contact
                     candidate pairs from cell grids                         >>broad
                     spring, friction, critical time step                    >>law
@@ -940,9 +941,10 @@ typedef struct dem2d_contact_info {
     dem2d_particle_id b;     ///< particle B; generation 0 when B is a wall
     dem2d_wall_id wall;      ///< wall B; generation 0 when B is a particle
     dem2d_vec normal;        ///< unit, from A to B
-    dem2d_vec point;         ///< m, contact point
+    dem2d_vec point;         ///< m, contact point; of two the centre of normal force
     dem2d_vec branch;        ///< m, centre of A to centre of B (wall: to the contact point)
-    double depth;            ///< m, overlap
+    int points;              ///< that carry the force: 1, or 2 where two faces meet
+    double depth;            ///< m, overlap; by area: area over width
     double normal_force;     ///< N/m, on B along the normal, >= 0
     double tangential_force; ///< N/m, on B along the normal turned by +90 degrees
 } dem2d_contact_info;
@@ -952,8 +954,8 @@ typedef struct dem2d_stats {
     int64_t steps;         ///< done since creation
     int64_t list_rebuilds; ///< of the pair list
     int64_t support_calls; ///< in all steps
-    int64_t looks;         ///< at pairs of particles, in all steps; the rest was skipped or far
-    int64_t gaps;          ///< looks that found them apart
+    int64_t looks; ///< at pairs with overlapping bounding circles, not skipped, in all steps
+    int64_t gaps;  ///< looks that found them apart
     int64_t proofs[DEM2D_PROOF_COUNT]; ///< of the other looks, by what proves them
     int64_t not_converged;             ///< contacts whose search reached its cap, in all steps
     int64_t slow_time_step;            ///< checks that found the time step above the safe bound
@@ -1710,6 +1712,7 @@ struct dem2d_shape {
     dem2d_shape_type type;
     int count;   /* vertices, arcs, order */
     int sectors; /* length of the sector table, a power of two, or 0 */
+    bool flat;   /* has faces: a polygon, or a Bezier with straight arcs */
     double a, b; /* circle: radius; ellipse: squared half axes; Fourier: a0/2 */
     double rounding;
     double circumscribed, inscribed, rho_min;
@@ -1908,6 +1911,15 @@ static dem2d_vec dem2di_ellipse_support(const dem2d_shape *shape, dem2d_vec u, d
     double f = 1 / sqrt(s.x * u.x + s.y * u.y);
     if (rho != NULL) *rho = shape->a * f * (shape->b * f) * f;
     return dem2di_vec(s.x * f, s.y * f);
+}
+
+/* Straight to the rounding of its control differences, which may cancel to 8 eps of the size. */
+static bool dem2di_arc_straight(const dem2d_shape *shape, const dem2di_arc *arc) {
+    double rounding = 8 * DBL_EPSILON * shape->circumscribed;
+    double lengths = dem2di_length(arc->d0) + dem2di_length(arc->d1) + dem2di_length(arc->d2);
+    double turn = fabs(dem2di_cross(arc->d0, arc->d1)) + fabs(dem2di_cross(arc->d1, arc->d2)) +
+                  fabs(dem2di_cross(arc->d0, arc->d2));
+    return turn <= rounding * lengths;
 }
 
 /* Support point of a template in a unit direction; rho, if asked for, is the radius of curvature
@@ -2322,6 +2334,7 @@ DEM2D_API dem2d_result dem2d_shape_create_polygon(const dem2d_env *env, const de
     }
     if (made != NULL) {
         made->rounding = rounding;
+        made->flat = true;
         made->mass = dem2di_rounded_polygon_mass(corners, count, rounding);
         made->offset = made->mass.centroid;
         made->mass.centroid = dem2di_vec(0, 0);
@@ -2552,6 +2565,8 @@ static void dem2di_finish_bezier(dem2d_shape *shape, double size) {
     for (int k = 0; k < DEM2DI_FLOORS; k++) /* a sector no arc has come to has no bound */
         if (!dem2di_finite(shape->floors[k])) shape->floors[k] = shape->rho_min;
     dem2di_join_floors(shape);
+    for (int k = 0; k < shape->count; k++)
+        shape->flat = shape->flat || dem2di_arc_straight(shape, &shape->arcs[k]);
     dem2di_fill_sectors(shape);
 }
 
@@ -6237,8 +6252,161 @@ static void dem2di_certified(dem2di_pair *pair, dem2d_vec start, double toleranc
 }
 
 /* ============================================================================================
+   >>faces  Where two faces meet: the two points that carry the contact
+   uses: config, math, support, gjk, edges
+   ============================================================================================ */
+
+/* The face of a shape that a contact is at or near: from the support point to the face's other
+   end, both from the shape's centre. Its weight is 1 for a face along the contact and falls to 0
+   where the face on the other side of the support point is as close. */
+typedef struct dem2di_face {
+    dem2d_vec near, far;
+    double weight;
+} dem2di_face;
+
+/* With angles (sines) of both faces to the contact: 1 up to a third of the other, 0 when equal. */
+static double dem2di_face_weight(double angle, double other) {
+    return other > 0 ? dem2di_max(0, dem2di_min(1, 2 * (other - angle) / (other + angle))) : 0;
+}
+
+/* A straight arc whose end is round counts up to this angle (sine): a tenth of a radian is tilt, a
+   third is another contact. */
+#define DEM2DI_FLAT_ANGLE 0.3
+
+static bool dem2di_polygon_face(const dem2d_shape *shape, dem2d_vec v, int corner,
+                                dem2di_face *face) {
+    int n = shape->count, k = corner >= 0 ? corner : dem2di_polygon_corner(shape, v);
+    int before = k > 0 ? k - 1 : n - 1, after = k + 1 < n ? k + 1 : 0;
+    dem2d_vec out = shape->ends[k], in = shape->ends[before];
+    double ahead = dem2di_max(0, -dem2di_dot(out, v)), back = dem2di_max(0, dem2di_dot(in, v));
+    if (dem2di_cross(v, out) < 0) ahead = 2 - ahead; /* beyond a right angle sines fall again */
+    if (dem2di_cross(v, in) < 0) back = 2 - back;
+    face->near = shape->corners[k];
+    face->far = shape->corners[ahead < back ? after : before];
+    face->weight = dem2di_face_weight(dem2di_min(ahead, back), dem2di_max(ahead, back));
+    return face->weight > 0;
+}
+
+static bool dem2di_arc_face(const dem2d_shape *shape, dem2d_vec v, dem2di_face *face) {
+    int n = shape->count, k = dem2di_sector_find(shape, v);
+    double least = DEM2DI_FLAT_ANGLE;
+    for (int i = -1; i <= 1; i++) {
+        const dem2di_arc *arc = &shape->arcs[(k + n + i) % n];
+        if (!dem2di_arc_straight(shape, arc)) continue;
+        dem2d_vec chord = dem2di_add(dem2di_add(arc->d0, arc->d1), arc->d2), along;
+        if (!dem2di_unit(chord, &along) || dem2di_cross(v, along) <= 0) continue;
+        double sine = dem2di_dot(along, v);
+        if (!(fabs(sine) < least)) continue;
+        least = fabs(sine);
+        face->far = sine > 0 ? arc->start : dem2di_add(arc->start, chord);
+    }
+    face->near = dem2di_bezier_support(shape, v, NULL);
+    face->weight = dem2di_face_weight(least, DEM2DI_FLAT_ANGLE);
+    return face->weight > 0;
+}
+
+/* The face of a posed shape towards u; false when there is none. */
+static bool dem2di_face_of(const dem2d_shape *shape, dem2d_rot q, double scale, dem2d_vec u,
+                           int corner, dem2di_face *face) {
+    if (!shape->flat) return false;
+    dem2d_vec v = dem2di_turn_back(q, u);
+    bool found = shape->type == DEM2D_POLYGON ? dem2di_polygon_face(shape, v, corner, face)
+                                              : dem2di_arc_face(shape, v, face);
+    face->near = dem2di_scale(dem2di_turn(q, face->near), scale);
+    face->far = dem2di_scale(dem2di_turn(q, face->far), scale);
+    return found;
+}
+
+/* Height of a face along u at the place x along t = perp(u). */
+typedef struct dem2di_slope {
+    double x0, x1; /* extent, x0 < x1 */
+    double y0, rise;
+} dem2di_slope;
+
+static dem2di_slope dem2di_face_slope(const dem2di_face *face, dem2d_vec u, dem2d_vec shift) {
+    dem2d_vec t = dem2di_perp(u), p = dem2di_add(face->near, shift);
+    dem2d_vec q = dem2di_add(face->far, shift);
+    double xp = dem2di_dot(p, t), xq = dem2di_dot(q, t);
+    double yp = dem2di_dot(p, u), yq = dem2di_dot(q, u);
+    dem2di_slope line;
+    line.x0 = dem2di_min(xp, xq);
+    line.x1 = dem2di_max(xp, xq);
+    line.y0 = xp < xq ? yp : yq;
+    line.rise = xp != xq ? (yq - yp) / (xq - xp) : 0;
+    return line;
+}
+
+static double dem2di_height(const dem2di_slope *line, double x) {
+    return line->y0 + line->rise * (x - line->x0);
+}
+
+/* The two points of a contact along u, in the coordinates of the slopes: ends of the common part
+   of both faces, each with its own depth. Weights: that of the deeper point is 1, and the other
+   comes in with the faces' weight; as the common part shrinks below the depth both go to a half, so
+   that one point is left with nothing lost. Force and moment change steadily all the way. False
+   when there is no common part. */
+static bool dem2di_face_points(const dem2di_slope *a, const dem2di_slope *b, double weight,
+                               double depth, dem2d_vec u, dem2d_contact_point points[2]) {
+    double x[2];
+    x[0] = dem2di_max(a->x0, b->x0);
+    x[1] = dem2di_min(a->x1, b->x1);
+    if (!(x[1] > x[0]) || !(weight > 0) || !(depth > 0)) return false;
+    for (int i = 0; i < 2; i++) {
+        double ya = dem2di_height(a, x[i]), yb = dem2di_height(b, x[i]);
+        points[i].depth = ya - yb;
+        points[i].position = dem2di_along(dem2di_scale(u, (ya + yb) / 2), x[i], dem2di_perp(u));
+    }
+    double common = dem2di_min(1, (x[1] - x[0]) / depth);
+    int deeper = points[1].depth > points[0].depth;
+    points[deeper].weight = 1 - weight * (1 - common) / 2;
+    points[1 - deeper].weight = weight * (1 + common) / 2;
+    return true;
+}
+
+/* Contact points of an overlapping pair, from A's centre: how many. */
+static int dem2di_pair_points(const dem2di_pair *pair, const dem2di_search *search,
+                              dem2d_contact_point points[2]) {
+    dem2di_face fa, fb;
+    dem2d_vec u = search->normal, down = dem2di_negate(u);
+    if (dem2di_face_of(pair->a, pair->ra, pair->scale_a, u, search->corner[0], &fa) &&
+        dem2di_face_of(pair->b, pair->rb, pair->scale_b, down, search->corner[1], &fb)) {
+        double ra = pair->a->rounding * pair->scale_a, rb = pair->b->rounding * pair->scale_b;
+        dem2di_slope a = dem2di_face_slope(&fa, u, dem2di_scale(u, ra));
+        dem2di_slope b = dem2di_face_slope(&fb, u, dem2di_along(pair->d, -rb, u));
+        if (dem2di_face_points(&a, &b, fa.weight * fb.weight, search->upper, u, points)) return 2;
+    }
+    points[0].depth = search->upper;
+    points[0].weight = 1;
+    points[0].position = dem2di_scale(dem2di_add(search->a, dem2di_add(search->b, pair->d)), 0.5);
+    return 1;
+}
+
+/* The same with a wall along u whose surface is at a height along u from A's centre. The points
+   are on the surface. */
+static int dem2di_wall_points(const dem2d_shape *shape, dem2d_rot q, double scale, dem2d_vec u,
+                              double surface, dem2d_vec support, double depth,
+                              dem2d_contact_point points[2]) {
+    dem2di_face face;
+    if (dem2di_face_of(shape, q, scale, u, -1, &face)) {
+        dem2di_slope a = dem2di_face_slope(&face, u, dem2di_scale(u, shape->rounding * scale));
+        dem2di_slope wall = a;
+        wall.y0 = surface;
+        wall.rise = 0;
+        if (dem2di_face_points(&a, &wall, face.weight, depth, u, points)) {
+            for (int i = 0; i < 2; i++)
+                points[i].position = dem2di_along(points[i].position, -points[i].depth / 2, u);
+            return 2;
+        }
+    }
+    points[0].depth = depth;
+    points[0].weight = 1;
+    points[0].position = dem2di_along(support, -depth, u);
+    return 1;
+}
+
+/* ============================================================================================
    >>contact  Contact of two shapes, of a shape and a wall
-   uses: config, math, memory, support, shapes, gjk, epa, edges, minimum
+   uses: config, math, memory, support, shapes, gjk, epa, edges, minimum, faces
    ============================================================================================ */
 
 /* [P] and [F] sec. 3: GJK, then EPA when the shapes overlap. */
@@ -6282,6 +6450,12 @@ static void dem2di_contact_report(const dem2di_pair *pair, const dem2di_search *
     contact->point_a = dem2di_add(pose_a->position, search->a);
     contact->point_b = dem2di_add(pose_b->position, search->b);
     contact->point = dem2di_scale(dem2di_add(contact->point_a, contact->point_b), 0.5);
+    contact->count = 0;
+    memset(contact->points, 0, sizeof contact->points);
+    if (search->state == DEM2D_SEPARATED) return;
+    contact->count = dem2di_pair_points(pair, search, contact->points);
+    for (int i = 0; i < contact->count; i++)
+        contact->points[i].position = dem2di_add(contact->points[i].position, pose_a->position);
 }
 
 /* Squares of sizes, and of their rounding, are normal numbers. */
@@ -6411,10 +6585,18 @@ DEM2D_API dem2d_result dem2d_wall_contact(const dem2d_shape *shape, dem2d_pose p
     contact->iterations = 0;
     contact->normal = u;
     contact->depth = depth;
-    contact->error = 0;
+    contact->error = rounding;
     contact->point_a = dem2di_add(pose.position, support);
-    contact->point_b = dem2di_along(contact->point_a, -depth, u);
-    contact->point = dem2di_along(contact->point_a, -depth / 2, u);
+    contact->point = contact->point_b = dem2di_along(contact->point_a, -depth, u);
+    contact->proof = DEM2D_BY_FORM;
+    contact->count = 0;
+    memset(contact->points, 0, sizeof contact->points);
+    if (contact->state == DEM2D_SEPARATED) return DEM2D_OK;
+    contact->count = dem2di_wall_points(shape, pose.rotation, pose.scale, u,
+                                        dem2di_dot(dem2di_sub(point, pose.position), u), support,
+                                        depth, contact->points);
+    for (int i = 0; i < contact->count; i++)
+        contact->points[i].position = dem2di_add(contact->points[i].position, pose.position);
     return DEM2D_OK;
 }
 
@@ -6614,7 +6796,16 @@ typedef struct dem2di_link {
     double depth;     /* m; closed: at most 0 */
     double force;     /* normal, N/m */
     double shear;     /* on B along perp(normal), N/m: the tangential spring */
+    double budget;    /* the pair is apart until both have travelled this far together */
 } dem2di_link;
+
+/* What a contact of two points has beside its link, which holds the sums, and as its point the
+   centre of the normal force. All zero for a contact of one point. */
+typedef struct dem2di_ends {
+    double weight[2], depth[2];
+    double offset[2]; /* along perp(normal) from the link's point */
+    double shear[2];
+} dem2di_ends;
 
 /* Velocity of B against A at the contact point, along the tangent. */
 static double dem2di_slip(const dem2di_link *link, dem2d_vec va, double wa, dem2d_vec vb,
@@ -6634,6 +6825,44 @@ static void dem2di_law_apply(const dem2d_pair_desc *law, double slip, double tim
     limit = law->friction * link->force;
     link->shear = last_shear - law->tangential_stiffness * slip * time_step;
     link->shear = dem2di_max(-limit, dem2di_min(limit, link->shear));
+}
+
+/* The same for two points, both with the link's slip: it depends on the height along the normal
+   alone. Their springs go on; when the contact had one point before, its spring is shared out by
+   the normal forces, and one point gets the sum of two. */
+static void dem2di_law_apply_ends(const dem2d_pair_desc *law, double slip, double time_step,
+                                  double last_shear, const dem2di_ends *last, dem2di_ends *ends,
+                                  dem2di_link *link) {
+    double force[2];
+    for (int i = 0; i < 2; i++)
+        force[i] = law->normal_stiffness * ends->weight[i] * dem2di_max(0, ends->depth[i]);
+    link->force = force[0] + force[1];
+    link->shear = 0;
+    bool two = last->weight[0] > 0 || last->weight[1] > 0;
+    for (int i = 0; i < 2; i++) {
+        double limit = law->friction * force[i];
+        double shear = two ? last->shear[i] : last_shear * (force[i] / link->force);
+        shear -= law->tangential_stiffness * ends->weight[i] * slip * time_step;
+        ends->shear[i] = dem2di_max(-limit, dem2di_min(limit, shear));
+        link->shear += ends->shear[i];
+    }
+}
+
+/* Point and depths of a contact of two points into its link: the centre of the normal force. */
+static void dem2di_ends_set(const dem2d_contact_point points[2], dem2di_ends *ends,
+                            dem2di_link *link) {
+    double part[2], sum;
+    dem2d_vec t = dem2di_perp(link->normal);
+    for (int i = 0; i < 2; i++) {
+        ends->weight[i] = points[i].weight;
+        ends->depth[i] = points[i].depth;
+        part[i] = points[i].weight * dem2di_max(0, points[i].depth);
+    }
+    sum = part[0] + part[1];
+    link->point = dem2di_along(points[0].position, part[1] / sum,
+                               dem2di_sub(points[1].position, points[0].position));
+    for (int i = 0; i < 2; i++)
+        ends->offset[i] = dem2di_dot(dem2di_sub(points[i].position, link->point), t);
 }
 
 /* Force on B. */
@@ -6741,6 +6970,17 @@ static dem2di_state dem2di_move(const dem2di_state *now, double time_step) {
     return next;
 }
 
+/* Bound of how far a point of the support moves with a particle in a step: its path, by the
+   octagon around the circle, and the turn times the greatest lever; rounded up. tan of half the
+   angle, as dem2di_rotate takes it, is above half the angle. */
+static double dem2di_travel(const dem2di_state *state, double lever, double time_step,
+                            double before) {
+    double x = fabs(state->v.x), y = fabs(state->v.y), turn = fabs(state->w) * time_step / 2;
+    double path = dem2di_max(x, y) + 0.41421356237309515 * dem2di_min(x, y);
+    double step = path * time_step + lever * (2 * turn * (1 + turn * turn / 3));
+    return before + (step + before * (2 * DBL_EPSILON));
+}
+
 static bool dem2di_state_finite(const dem2di_state *state) {
     return dem2di_vec_finite(state->x) && dem2di_vec_finite(state->v) && dem2di_finite(state->w) &&
            dem2di_finite(state->q.c) && dem2di_finite(state->q.s);
@@ -6764,6 +7004,7 @@ typedef struct dem2di_body {
     int shape_index, material;
     dem2d_motion motion;
     double scale, radius, skin;
+    double lever; /* a support value changes by at most this times the angle of a turn */
     double mass, inertia;
     dem2d_vec listed; /* position when the list was built */
 } dem2di_body;
@@ -6789,8 +7030,14 @@ typedef struct dem2di_wall_state {
 typedef struct dem2di_list {
     dem2di_keys keys, spare;
     dem2di_link *now, *next;
-    int now_capacity, next_capacity;
+    dem2di_ends *ends, *next_ends; /* of contacts with two points; NULL in worlds without faces */
+    int now_capacity, next_capacity, ends_capacity, next_ends_capacity;
 } dem2di_list;
+
+/* What the contact passes count. */
+typedef struct dem2di_count {
+    int64_t calls, looks, gaps, proofs[DEM2D_PROOF_COUNT];
+} dem2di_count;
 
 struct dem2d_world {
     dem2d_env user_env, env; /* the caller's, and the one that counts bytes */
@@ -6799,16 +7046,20 @@ struct dem2d_world {
     dem2d_vec gravity;
     int max_iterations;
     dem2d_solver solver;
+    dem2d_face_rule faces;
+    bool two_points; /* contacts may have two: by the rule, and some template has faces */
     bool check_time_step;
     bool list_stale;  /* the list must be built before the next force pass */
     double wall_skin; /* how far a wall may move before that */
-    int64_t steps, rebuilds, calls, not_converged, slow_time_step;
+    int64_t steps, rebuilds, slow_time_step;
+    dem2di_count count;
 
     dem2di_template *templates;
     dem2d_material_desc *materials;
     dem2d_pair_desc *laws; /* material_capacity squared */
     dem2di_body *bodies;
     dem2di_state *before, *now, *next; /* at the last force pass, present, being made */
+    double *travel, *next_travel;      /* since the list was built, see dem2di_travel */
     dem2di_load *load, *next_load;
     dem2di_stiffness *stiffness; /* scratch of the time step check and of its query */
     dem2di_disc *discs;          /* scratch of the list and of the packing query */
@@ -6818,6 +7069,7 @@ struct dem2d_world {
     int holes; /* free slots among the bodies */
     int body_count, body_capacity, before_capacity, now_capacity, next_capacity;
     int load_capacity, next_load_capacity, stiffness_capacity, discs_capacity;
+    int travel_capacity, next_travel_capacity;
     int wall_count, wall_capacity, wall_before_capacity, wall_now_capacity, wall_next_capacity;
     dem2di_list pairs, touches; /* particle with particle, particle with wall */
     dem2di_keys found;          /* scratch: pairs before sorting */
@@ -6856,7 +7108,12 @@ static bool dem2di_list_reserve(dem2d_world *world, dem2di_list *list, int count
            dem2di_reserve(env, (void **)&list->now, &list->now_capacity, count,
                           sizeof *list->now) &&
            dem2di_reserve(env, (void **)&list->next, &list->next_capacity, count,
-                          sizeof *list->next);
+                          sizeof *list->next) &&
+           (!world->two_points ||
+            (dem2di_reserve(env, (void **)&list->ends, &list->ends_capacity, count,
+                            sizeof *list->ends) &&
+             dem2di_reserve(env, (void **)&list->next_ends, &list->next_ends_capacity, count,
+                            sizeof *list->next_ends)));
 }
 
 static void dem2di_list_release(dem2d_world *world, dem2di_list *list) {
@@ -6865,6 +7122,8 @@ static void dem2di_list_release(dem2d_world *world, dem2di_list *list) {
     dem2di_release(env, list->spare.key, (size_t)list->spare.capacity, sizeof *list->spare.key);
     dem2di_release(env, list->now, (size_t)list->now_capacity, sizeof *list->now);
     dem2di_release(env, list->next, (size_t)list->next_capacity, sizeof *list->next);
+    dem2di_release(env, list->ends, (size_t)list->ends_capacity, sizeof *list->ends);
+    dem2di_release(env, list->next_ends, (size_t)list->next_ends_capacity, sizeof *list->ends);
 }
 
 static bool dem2di_reserve_bodies(dem2d_world *w, int count) {
@@ -6872,6 +7131,9 @@ static bool dem2di_reserve_bodies(dem2d_world *w, int count) {
            dem2di_grow(w, (void **)&w->before, &w->before_capacity, count, sizeof *w->before) &&
            dem2di_grow(w, (void **)&w->now, &w->now_capacity, count, sizeof *w->now) &&
            dem2di_grow(w, (void **)&w->next, &w->next_capacity, count, sizeof *w->next) &&
+           dem2di_grow(w, (void **)&w->travel, &w->travel_capacity, count, sizeof *w->travel) &&
+           dem2di_grow(w, (void **)&w->next_travel, &w->next_travel_capacity, count,
+                       sizeof *w->next_travel) &&
            dem2di_grow(w, (void **)&w->load, &w->load_capacity, count, sizeof *w->load) &&
            dem2di_grow(w, (void **)&w->next_load, &w->next_load_capacity, count,
                        sizeof *w->next_load) &&
@@ -6907,6 +7169,8 @@ DEM2D_API void dem2d_world_destroy(dem2d_world *world) {
     dem2di_release(env, w->before, (size_t)w->before_capacity, sizeof *w->before);
     dem2di_release(env, w->now, (size_t)w->now_capacity, sizeof *w->now);
     dem2di_release(env, w->next, (size_t)w->next_capacity, sizeof *w->next);
+    dem2di_release(env, w->travel, (size_t)w->travel_capacity, sizeof *w->travel);
+    dem2di_release(env, w->next_travel, (size_t)w->next_travel_capacity, sizeof *w->travel);
     dem2di_release(env, w->load, (size_t)w->load_capacity, sizeof *w->load);
     dem2di_release(env, w->next_load, (size_t)w->next_load_capacity, sizeof *w->next_load);
     dem2di_release(env, w->stiffness, (size_t)w->stiffness_capacity, sizeof *w->stiffness);
@@ -6948,7 +7212,12 @@ static dem2d_result dem2di_check_world(const dem2d_env *env, const dem2d_world_d
     if (result == DEM2D_OK)
         result = dem2di_check_count(env, "particle_capacity", desc->particle_capacity);
     if (result == DEM2D_OK) result = dem2di_check_count(env, "pair_capacity", desc->pair_capacity);
-    return result;
+    if (result != DEM2D_OK) return result;
+    if ((int)desc->solver < 0 || (int)desc->solver >= (int)DEM2D_SOLVER_COUNT)
+        return dem2di_fail(env, DEM2D_OUT_OF_RANGE, -1, "solver = %d", (int)desc->solver);
+    if ((int)desc->faces < 0 || (int)desc->faces >= (int)DEM2D_FACE_RULE_COUNT)
+        return dem2di_fail(env, DEM2D_OUT_OF_RANGE, -1, "faces = %d", (int)desc->faces);
+    return DEM2D_OK;
 }
 
 DEM2D_API dem2d_result dem2d_world_create(const dem2d_world_desc *desc, dem2d_world **world) {
@@ -6973,6 +7242,7 @@ DEM2D_API dem2d_result dem2d_world_create(const dem2d_world_desc *desc, dem2d_wo
     made->tolerance = desc->contact_tolerance == 0 ? 1e-8 : desc->contact_tolerance;
     made->max_iterations = desc->max_iterations == 0 ? 128 : desc->max_iterations;
     made->solver = desc->solver;
+    made->faces = desc->faces;
     made->check_time_step = !desc->skip_time_step_check;
     if (!dem2di_reserve_bodies(made, desc->particle_capacity) ||
         !dem2di_list_reserve(made, &made->pairs, desc->pair_capacity)) {
@@ -7023,6 +7293,10 @@ DEM2D_API dem2d_result dem2d_world_add_shape(dem2d_world *world, const dem2d_sha
     place->generation++;
     place->users = 0;
     if (slot == world->template_count) world->template_count++;
+    if (copy->flat && world->faces == DEM2D_TWO_POINTS && !world->two_points) {
+        world->two_points = true;
+        world->list_stale = true; /* so that there is room for second points */
+    }
     id->index = (uint32_t)slot;
     id->generation = place->generation;
     return DEM2D_OK;
@@ -7183,6 +7457,10 @@ static void dem2di_body_set(const dem2d_world *world, const dem2d_particle_desc 
     body->scale = desc->scale;
     body->radius = shape->circumscribed * desc->scale;
     body->skin = body->radius * world->skin;
+    /* |p'| <= sqrt(R^2 - p^2) and p is at least the inscribed radius; of a circle p' is 0 */
+    double inner = shape->inscribed * desc->scale;
+    body->lever =
+        shape->type == DEM2D_CIRCLE ? 0 : sqrt(body->radius * body->radius - inner * inner);
     body->mass = world->materials[body->material].density * shape->mass.area * square;
     body->inertia =
         world->materials[body->material].density * shape->mass.polar_moment * square * square;
@@ -7219,6 +7497,7 @@ DEM2D_API dem2d_result dem2d_world_add_particle(dem2d_world *world, const dem2d_
     state.w = desc->angular_velocity;
     world->now[slot] = world->before[slot] = state;
     memset(&world->load[slot], 0, sizeof *world->load);
+    world->travel[slot] = 0;
     if (slot == world->body_count)
         world->body_count++;
     else
@@ -7473,7 +7752,7 @@ DEM2D_API dem2d_result dem2d_world_set_time_step(dem2d_world *world, double time
 
 /* The contact each key of the new list had in the old one: both are in the order of keys. */
 static void dem2di_list_merge(const dem2di_list *list, const dem2di_key *keys, int count,
-                              dem2di_link *links) {
+                              dem2di_link *links, dem2di_ends *ends) {
     int old = 0;
     for (int i = 0; i < count; i++) {
         dem2di_key key = keys[i];
@@ -7481,11 +7760,13 @@ static void dem2di_list_merge(const dem2di_list *list, const dem2di_key *keys, i
                (list->keys.key[old].a < key.a ||
                 (list->keys.key[old].a == key.a && list->keys.key[old].b < key.b)))
             old++;
-        if (old < list->keys.count && list->keys.key[old].a == key.a &&
-            list->keys.key[old].b == key.b)
-            links[i] = list->now[old];
-        else
-            memset(&links[i], 0, sizeof links[i]);
+        bool known = old < list->keys.count && list->keys.key[old].a == key.a &&
+                     list->keys.key[old].b == key.b;
+        memset(&links[i], 0, sizeof links[i]);
+        if (known) links[i] = list->now[old];
+        if (ends == NULL) continue;
+        memset(&ends[i], 0, sizeof ends[i]);
+        if (known) ends[i] = list->ends[old];
     }
 }
 
@@ -7496,11 +7777,17 @@ static void dem2di_swap_links(dem2di_list *list) {
     list->now_capacity = list->next_capacity;
     list->next = links;
     list->next_capacity = capacity;
+    dem2di_ends *ends = list->ends;
+    capacity = list->ends_capacity;
+    list->ends = list->next_ends;
+    list->ends_capacity = list->next_ends_capacity;
+    list->next_ends = ends;
+    list->next_ends_capacity = capacity;
 }
 
 /* Take the sorted keys in list->spare as the list from now on. */
 static void dem2di_list_renew(dem2di_list *list) {
-    dem2di_list_merge(list, list->spare.key, list->spare.count, list->next);
+    dem2di_list_merge(list, list->spare.key, list->spare.count, list->next, list->next_ends);
     dem2di_keys keys = list->keys;
     list->keys = list->spare;
     list->spare = keys;
@@ -7577,26 +7864,47 @@ static dem2d_result dem2di_build_lists(dem2d_world *world) {
         return dem2di_out_of_memory(world, "the list of pairs");
     dem2di_list_renew(&world->pairs);
     dem2di_list_renew(&world->touches);
-    for (int i = 0; i < world->body_count; i++) world->bodies[i].listed = world->now[i].x;
+    for (int i = 0; i < world->pairs.keys.count; i++) { /* budgets count from here */
+        const dem2di_key *key = &world->pairs.keys.key[i];
+        world->pairs.now[i].budget -= world->travel[key->a] + world->travel[key->b];
+    }
+    for (int i = 0; i < world->body_count; i++) {
+        world->bodies[i].listed = world->now[i].x;
+        world->travel[i] = 0;
+    }
     for (int i = 0; i < world->wall_count; i++) world->walls[i].listed = world->wall_now[i].point;
     world->list_stale = false;
     return DEM2D_OK;
 }
 
-/* Geometry of one pair at the present positions; depth <= 0 when apart. */
-static void dem2di_pair_geometry(const dem2d_world *world, int a, int b, const dem2di_link *last,
-                                 dem2di_link *link, int *calls, int *unresolved) {
+/* A pair found apart by a gap (m) stays so until its particles have travelled as far together. */
+static void dem2di_link_apart(const dem2d_world *world, int a, int b, double gap, double size,
+                              dem2di_link *link) {
+    link->depth = -1;
+    link->budget = world->travel[a] + world->travel[b] + (gap - DEM2DI_ROUNDING * size);
+}
+
+/* Geometry of one pair at the present positions; depth <= 0 when apart. Returns the number of
+   points that carry the contact. */
+static int dem2di_pair_geometry(const dem2d_world *world, int a, int b, const dem2di_link *last,
+                                dem2di_link *link, dem2d_contact_point points[2],
+                                dem2di_count *count) {
     const dem2di_body *body_a = &world->bodies[a], *body_b = &world->bodies[b];
     dem2d_vec d = dem2di_centre_line(world->now[a].x, world->now[b].x);
-    double reach = body_a->radius + body_b->radius, square = dem2di_dot(d, d);
+    double reach = body_a->radius + body_b->radius, distance = dem2di_length(d);
     link->branch = d;
     link->normal = last->normal;
-    link->depth = -1;
-    if (square >= reach * reach) return;
+    link->budget = 0;
+    if (distance >= reach) {
+        dem2di_link_apart(world, a, b, distance - reach, distance + reach, link);
+        return 0;
+    }
+    count->looks++;
     if (body_a->shape->type == DEM2D_CIRCLE && body_b->shape->type == DEM2D_CIRCLE) {
         link->depth = dem2di_circle_contact(d, reach, &link->normal);
-        link->point = dem2di_scale(link->normal, body_a->radius - link->depth / 2);
-        return;
+        points[0].position = dem2di_scale(link->normal, body_a->radius - link->depth / 2);
+        count->proofs[DEM2D_BY_FORM]++;
+        return 1;
     }
     dem2di_pair pair;
     dem2di_search search;
@@ -7607,39 +7915,75 @@ static void dem2di_pair_geometry(const dem2d_world *world, int a, int b, const d
     pair.scale_a = body_a->scale;
     pair.scale_b = body_b->scale;
     pair.d = d;
-    pair.distance = sqrt(square);
-    pair.size = reach + pair.distance;
+    pair.distance = distance;
+    pair.size = reach + distance;
     pair.calls = 0;
     bool warm = last->normal.x != 0 || last->normal.y != 0;
     dem2di_contact_solve(&pair, world->solver, warm ? last->normal : d, world->tolerance,
                          world->max_iterations, true, &search);
-    *calls += pair.calls;
-    *unresolved += search.state == DEM2D_UNRESOLVED;
+    count->calls += pair.calls;
     link->normal = search.normal;
+    if (!(search.upper > 0)) {
+        count->gaps++;
+        dem2di_link_apart(world, a, b, -search.upper, pair.size, link);
+        return 0;
+    }
+    count->proofs[search.proof]++;
     link->depth = search.upper;
-    link->point = dem2di_scale(dem2di_add(search.a, dem2di_add(search.b, d)), 0.5);
+    if (world->two_points) return dem2di_pair_points(&pair, &search, points);
+    points[0].position = dem2di_scale(dem2di_add(search.a, dem2di_add(search.b, d)), 0.5);
+    return 1;
+}
+
+/* Force of a contact whose geometry is known, from its springs before. */
+static void dem2di_link_load(const dem2d_world *world, const dem2di_list *list, int i,
+                             const dem2d_pair_desc *law, double slip, bool two) {
+    if (two)
+        dem2di_law_apply_ends(law, slip, world->time_step, list->now[i].shear, &list->ends[i],
+                              &list->next_ends[i], &list->next[i]);
+    else
+        dem2di_law_apply(law, slip, world->time_step, list->now[i].shear, &list->next[i]);
+}
+
+/* Points of a contact into its link, and beside it when there are two. */
+static void dem2di_link_place(const dem2di_list *list, int i, int count,
+                              const dem2d_contact_point points[2]) {
+    if (count == 2)
+        dem2di_ends_set(points, &list->next_ends[i], &list->next[i]);
+    else
+        list->next[i].point = points[0].position;
 }
 
 /* Geometry and force of every pair in the list, into list->next. */
-static void dem2di_pair_pass(dem2d_world *world, int *calls, int *unresolved) {
+static void dem2di_pair_pass(dem2d_world *world, dem2di_count *count) {
     const dem2di_list *list = &world->pairs;
+    dem2d_contact_point points[2];
     for (int i = 0; i < list->keys.count; i++) {
         int a = list->keys.key[i].a, b = list->keys.key[i].b;
         const dem2di_link *last = &list->now[i];
         dem2di_link *link = &list->next[i];
-        dem2di_pair_geometry(world, a, b, last, link, calls, unresolved);
         link->force = link->shear = 0;
+        if (world->two_points) memset(&list->next_ends[i], 0, sizeof *list->next_ends);
+        if (world->travel[a] + world->travel[b] < last->budget) { /* surely still apart */
+            link->normal = last->normal;
+            link->budget = last->budget;
+            link->depth = -1;
+            continue;
+        }
+        int found = dem2di_pair_geometry(world, a, b, last, link, points, count);
         if (!(link->depth > 0)) continue;
+        dem2di_link_place(list, i, found, points);
         const dem2di_state *sa = &world->now[a], *sb = &world->now[b];
         double slip = dem2di_slip(link, sa->v, sa->w, sb->v, sb->w);
-        const dem2d_pair_desc *law = dem2di_law_of(world, &list->keys.key[i], false);
-        dem2di_law_apply(law, slip, world->time_step, last->shear, link);
+        dem2di_link_load(world, list, i, dem2di_law_of(world, &list->keys.key[i], false), slip,
+                         found == 2);
     }
 }
 
 /* The same for particles and walls: one support call each, none for circles. */
-static void dem2di_touch_pass(dem2d_world *world, int *calls) {
+static void dem2di_touch_pass(dem2d_world *world, dem2di_count *count) {
     const dem2di_list *list = &world->touches;
+    dem2d_contact_point points[2];
     for (int i = 0; i < list->keys.count; i++) {
         int a = list->keys.key[i].a, j = list->keys.key[i].b;
         const dem2di_body *body = &world->bodies[a];
@@ -7650,19 +7994,32 @@ static void dem2di_touch_pass(dem2d_world *world, int *calls) {
         dem2d_vec u = dem2di_negate(world->walls[j].desc.normal);
         dem2d_vec support = dem2di_scale(u, body->radius);
         link->normal = u;
-        link->depth = dem2di_dot(dem2di_sub(state->x, wall->point), u) + body->radius;
+        if (world->two_points) memset(&list->next_ends[i], 0, sizeof *list->next_ends);
+        double surface = dem2di_dot(dem2di_sub(wall->point, state->x), u);
+        link->depth = body->radius - surface;
         if (!(link->depth > 0)) continue;
         if (body->shape->type != DEM2D_CIRCLE) {
             dem2d_pose pose = dem2di_pose_of(world, world->now, a);
             link->depth = dem2di_wall_depth(body->shape, &pose, wall->point, u, &support);
-            ++*calls;
+            count->calls++;
             if (!(link->depth > 0)) continue;
         }
-        link->point = link->branch = dem2di_along(support, -link->depth / 2, u);
+        int found = 1;
+        points[0].position = dem2di_along(support, -link->depth, u);
+        if (world->two_points)
+            found = dem2di_wall_points(body->shape, state->q, body->scale, u, surface, support,
+                                       link->depth, points);
+        dem2di_link_place(list, i, found, points);
+        link->branch = link->point;
         double slip = dem2di_slip(link, state->v, state->w, wall->velocity, 0);
-        dem2di_law_apply(dem2di_law_of(world, &list->keys.key[i], true), slip, world->time_step,
-                         list->now[i].shear, link);
+        dem2di_link_load(world, list, i, dem2di_law_of(world, &list->keys.key[i], true), slip,
+                         found == 2);
     }
+}
+
+/* Part of the normal stiffness that the two points carry together. */
+static double dem2di_ends_weight(const dem2di_ends *ends) {
+    return (ends->depth[0] > 0 ? ends->weight[0] : 0) + (ends->depth[1] > 0 ? ends->weight[1] : 0);
 }
 
 /* Sums over the contacts of a list's next links: per particle, in the order of the partner. */
@@ -7695,8 +8052,11 @@ static void dem2di_sum_pass(dem2d_world *world) {
         a->force = dem2di_sub(a->force, force);
         a->torque -= dem2di_cross(link->point, force);
         wall->force = dem2di_add(wall->force, force);
-        wall->stiffness +=
+        double stiffness =
             dem2di_law_of(world, &world->touches.keys.key[i], true)->normal_stiffness;
+        if (world->two_points && world->touches.next_ends[i].weight[0] > 0)
+            stiffness *= dem2di_ends_weight(&world->touches.next_ends[i]);
+        wall->stiffness += stiffness;
     }
 }
 
@@ -7750,6 +8110,7 @@ static int dem2di_motion_pass(dem2d_world *world, bool *stale) {
         const dem2di_body *body = &world->bodies[i];
         dem2di_state *next = &world->next[i];
         *next = world->now[i];
+        world->next_travel[i] = world->travel[i];
         if (body->shape == NULL || body->motion == DEM2D_FIXED) continue;
         if (body->motion == DEM2D_FREE) {
             const dem2di_load *load = &world->next_load[i];
@@ -7758,6 +8119,8 @@ static int dem2di_motion_pass(dem2d_world *world, bool *stale) {
             next->v.y = dem2di_accelerate(&damping, next->v.y, a.y);
             next->w = dem2di_accelerate(&damping, next->w, load->torque / body->inertia);
         }
+        world->next_travel[i] =
+            dem2di_travel(next, body->lever, world->time_step, world->travel[i]);
         *next = dem2di_move(next, world->time_step);
         if (!dem2di_state_finite(next)) return i;
         dem2d_vec moved = dem2di_sub(next->x, body->listed);
@@ -7766,39 +8129,54 @@ static int dem2di_motion_pass(dem2d_world *world, bool *stale) {
     return -1;
 }
 
-/* Stiffness on both sides of the contacts of one list; `shared` counts contacts between two free
-   particles that often. */
-static void dem2di_stiffness_list(const dem2d_world *world, const dem2di_list *list,
-                                  const dem2di_link *links, bool walls, double shared) {
+/* Stiffness of one contact point on both sides. */
+static void dem2di_stiffness_point(const dem2d_world *world, const dem2di_key *key, bool wall,
+                                   double kn, double kt, const dem2di_link *link, dem2d_vec point) {
+    dem2d_vec t = dem2di_perp(link->normal), arm = dem2di_sub(point, link->branch);
+    dem2di_stiffness_add(&world->stiffness[key->a], kn, link->normal, point);
+    dem2di_stiffness_add(&world->stiffness[key->a], kt, t, point);
+    if (wall) return;
+    dem2di_stiffness_add(&world->stiffness[key->b], kn, link->normal, arm);
+    dem2di_stiffness_add(&world->stiffness[key->b], kt, t, arm);
+}
+
+/* Stiffness of the contacts of one list; `shared` counts those between two free particles that
+   often. `next`: of the step that is being made. */
+static void dem2di_stiffness_list(const dem2d_world *world, bool walls, bool next, double shared) {
+    const dem2di_list *list = walls ? &world->touches : &world->pairs;
+    const dem2di_link *links = next ? list->next : list->now;
+    const dem2di_ends *ends = next ? list->next_ends : list->ends;
     for (int i = 0; i < list->keys.count; i++) {
         const dem2di_link *link = &links[i];
+        const dem2di_key *key = &list->keys.key[i];
         if (!(link->depth > 0)) continue;
-        int a = list->keys.key[i].a, b = list->keys.key[i].b;
-        const dem2d_pair_desc *law = dem2di_law_of(world, &list->keys.key[i], walls);
-        bool both = !walls && world->bodies[a].motion == DEM2D_FREE &&
-                    world->bodies[b].motion == DEM2D_FREE;
+        const dem2d_pair_desc *law = dem2di_law_of(world, key, walls);
+        bool both = !walls && world->bodies[key->a].motion == DEM2D_FREE &&
+                    world->bodies[key->b].motion == DEM2D_FREE;
         double f = both ? shared : 1, kn = f * law->normal_stiffness;
         /* one that slides does not resist: it counts for the safe bound only */
         bool sticks = fabs(link->shear) < law->friction * link->force;
         double kt = sticks || (law->friction > 0 && shared > 1) ? f * law->tangential_stiffness : 0;
-        dem2d_vec t = dem2di_perp(link->normal), arm = dem2di_sub(link->point, link->branch);
-        dem2di_stiffness_add(&world->stiffness[a], kn, link->normal, link->point);
-        dem2di_stiffness_add(&world->stiffness[a], kt, t, link->point);
-        if (walls) continue;
-        dem2di_stiffness_add(&world->stiffness[b], kn, link->normal, arm);
-        dem2di_stiffness_add(&world->stiffness[b], kt, t, arm);
+        if (!world->two_points || dem2di_ends_weight(&ends[i]) == 0) {
+            dem2di_stiffness_point(world, key, walls, kn, kt, link, link->point);
+            continue;
+        }
+        for (int k = 0; k < 2; k++) {
+            double w = ends[i].depth[k] > 0 ? ends[i].weight[k] : 0;
+            dem2d_vec p = dem2di_along(link->point, ends[i].offset[k], dem2di_perp(link->normal));
+            dem2di_stiffness_point(world, key, walls, w * kn, w * kt, link, p);
+        }
     }
 }
 
 /* Greatest eigenvalue of M_i^-1 sum_c f_c K_c over the free particles, and where; 0 without
    contacts. f is `shared` between free particles and 1 against walls and others. */
-static double dem2di_stiffest(const dem2d_world *world, const dem2di_link *pairs,
-                              const dem2di_link *touches, double shared, int *particle) {
+static double dem2di_stiffest(const dem2d_world *world, bool next, double shared, int *particle) {
     double greatest = 0;
     size_t count = (size_t)world->body_count;
     if (count > 0) memset(world->stiffness, 0, count * sizeof *world->stiffness);
-    dem2di_stiffness_list(world, &world->pairs, pairs, false, shared);
-    dem2di_stiffness_list(world, &world->touches, touches, true, shared);
+    dem2di_stiffness_list(world, false, next, shared);
+    dem2di_stiffness_list(world, true, next, shared);
     for (int i = 0; i < world->body_count; i++) {
         const dem2di_body *body = &world->bodies[i];
         const dem2di_stiffness *k = &world->stiffness[i];
@@ -7815,14 +8193,13 @@ static double dem2di_stiffest(const dem2d_world *world, const dem2di_link *pairs
    between the two it is noted. */
 static dem2d_result dem2di_check_step(dem2d_world *world, bool *slow) {
     int particle = -1;
-    const dem2di_link *pairs = world->pairs.next, *touches = world->touches.next;
     double dt = world->time_step;
-    double limit = dem2di_stiffest(world, pairs, touches, 1, &particle);
+    double limit = dem2di_stiffest(world, true, 1, &particle);
     if (dt * dt * limit > 4)
         return dem2di_fail(&world->env, DEM2D_TIME_STEP, particle,
                            "time_step = %g is above the limit %g of particle %d", dt,
                            2 / sqrt(limit), particle);
-    double safe = dem2di_stiffest(world, pairs, touches, 2, &particle);
+    double safe = dem2di_stiffest(world, true, 2, &particle);
     *slow = dt * dt * safe > 4;
     if (*slow && world->slow_time_step == 0)
         (void)dem2di_fail(&world->env, DEM2D_OK, particle,
@@ -7835,10 +8212,9 @@ DEM2D_API dem2d_result dem2d_world_time_step_bounds(const dem2d_world *world, do
                                                     double *limit,
                                                     dem2d_particle_id *limit_particle) {
     if (world == NULL || safe == NULL || limit == NULL) return DEM2D_NULL_ARGUMENT;
-    const dem2di_link *pairs = world->pairs.now, *touches = world->touches.now;
     int particle = -1, unused = -1;
-    double slowest = dem2di_stiffest(world, pairs, touches, 1, &particle);
-    double stiffest = dem2di_stiffest(world, pairs, touches, 2, &unused);
+    double slowest = dem2di_stiffest(world, false, 1, &particle);
+    double stiffest = dem2di_stiffest(world, false, 2, &unused);
     for (int i = 0; i < world->body_count; i++) { /* the loose: one contact with their own kind */
         const dem2di_body *body = &world->bodies[i];
         const dem2di_stiffness *k = &world->stiffness[i];
@@ -7868,6 +8244,9 @@ static void dem2di_commit(dem2d_world *world) {
     world->next = state;
     world->load = world->next_load;
     world->next_load = load;
+    double *travel = world->travel;
+    world->travel = world->next_travel;
+    world->next_travel = travel;
     world->wall_before = world->wall_now;
     world->wall_now = world->wall_next;
     world->wall_next = wall;
@@ -7879,14 +8258,14 @@ static void dem2di_commit(dem2d_world *world) {
 /* The straight road: candidate pairs, contacts, sums, walls, motion; then commit. All results go
    to arrays beside the present ones, so that a failure only has to return. */
 static dem2d_result dem2di_step(dem2d_world *world) {
-    int calls = 0, unresolved = 0;
+    dem2di_count count = world->count;
     bool slow = false, listed = world->list_stale;
     if (listed) {
         dem2d_result result = dem2di_build_lists(world);
         if (result != DEM2D_OK) return result;
     }
-    dem2di_pair_pass(world, &calls, &unresolved);
-    dem2di_touch_pass(world, &calls);
+    dem2di_pair_pass(world, &count);
+    dem2di_touch_pass(world, &count);
     if (listed && world->check_time_step) {
         dem2d_result result = dem2di_check_step(world, &slow);
         if (result != DEM2D_OK) {
@@ -7906,8 +8285,7 @@ static dem2d_result dem2di_step(dem2d_world *world) {
                                "wall %d would get a place that is not finite", j);
     world->list_stale = stale;
     world->rebuilds += listed;
-    world->calls += calls;
-    world->not_converged += unresolved;
+    world->count = count;
     world->slow_time_step += slow;
     dem2di_commit(world);
     return DEM2D_OK;
@@ -7940,8 +8318,11 @@ DEM2D_API dem2d_result dem2d_world_stats(const dem2d_world *world, dem2d_stats *
     if (world == NULL || stats == NULL) return DEM2D_NULL_ARGUMENT;
     stats->steps = world->steps;
     stats->list_rebuilds = world->rebuilds;
-    stats->support_calls = world->calls;
-    stats->not_converged = world->not_converged;
+    stats->support_calls = world->count.calls;
+    stats->looks = world->count.looks;
+    stats->gaps = world->count.gaps;
+    memcpy(stats->proofs, world->count.proofs, sizeof stats->proofs);
+    stats->not_converged = world->count.proofs[DEM2D_BY_NOTHING];
     stats->slow_time_step = world->slow_time_step;
     stats->particles = world->body_count - world->holes;
     stats->walls = 0;
@@ -7976,8 +8357,10 @@ DEM2D_API dem2d_result dem2d_world_particles(const dem2d_world *world, dem2d_par
     return DEM2D_OK;
 }
 
-static dem2d_contact_info dem2di_contact_of(const dem2d_world *world, const dem2di_key *key,
-                                            const dem2di_link *link, bool wall) {
+static dem2d_contact_info dem2di_contact_of(const dem2d_world *world, const dem2di_list *list,
+                                            int i, bool wall) {
+    const dem2di_key *key = &list->keys.key[i];
+    const dem2di_link *link = &list->now[i];
     dem2d_contact_info info;
     memset(&info, 0, sizeof info);
     info.a = dem2di_particle_id(world, key->a);
@@ -7990,6 +8373,9 @@ static dem2d_contact_info dem2di_contact_of(const dem2d_world *world, const dem2
     info.normal = link->normal;
     info.point = dem2di_add(world->before[key->a].x, link->point);
     info.branch = link->branch;
+    info.points = 1;
+    if (world->two_points && list->ends[i].weight[0] > 0 && list->ends[i].weight[1] > 0)
+        info.points = 1 + (list->ends[i].depth[0] > 0 && list->ends[i].depth[1] > 0);
     info.depth = link->depth;
     info.normal_force = link->force;
     info.tangential_force = link->shear;
@@ -8007,9 +8393,7 @@ DEM2D_API dem2d_result dem2d_world_contacts(const dem2d_world *world, dem2d_cont
         const dem2di_list *list = wall ? &world->touches : &world->pairs;
         for (int i = 0; i < list->keys.count; i++) {
             if (!(list->now[i].depth > 0)) continue;
-            if (open < capacity)
-                contacts[open] =
-                    dem2di_contact_of(world, &list->keys.key[i], &list->now[i], wall == 1);
+            if (open < capacity) contacts[open] = dem2di_contact_of(world, list, i, wall == 1);
             open++;
         }
     }
@@ -8024,9 +8408,20 @@ static void dem2di_spring_energy(const dem2d_world *world, const dem2di_list *li
         const dem2di_link *link = &list->now[i];
         if (!(link->depth > 0)) continue;
         const dem2d_pair_desc *law = dem2di_law_of(world, &list->keys.key[i], walls);
-        energy->normal += link->force * link->depth / 2;
-        if (law->tangential_stiffness > 0)
-            energy->tangential += link->shear * (link->shear / law->tangential_stiffness) / 2;
+        double kn = law->normal_stiffness, kt = law->tangential_stiffness;
+        if (!world->two_points || dem2di_ends_weight(&list->ends[i]) == 0) {
+            energy->normal += link->force * link->depth / 2;
+            if (kt > 0) energy->tangential += link->shear * (link->shear / kt) / 2;
+            continue;
+        }
+        const dem2di_ends *ends = &list->ends[i];
+        for (int k = 0; k < 2; k++) {
+            if (!(ends->depth[k] > 0 && ends->weight[k] > 0)) continue;
+            energy->normal += ends->weight[k] * kn * ends->depth[k] * ends->depth[k] / 2;
+            if (kt > 0)
+                energy->tangential +=
+                    ends->shear[k] * (ends->shear[k] / (ends->weight[k] * kt)) / 2;
+        }
     }
 }
 

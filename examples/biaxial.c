@@ -28,6 +28,8 @@ static const char usage[] =
     "  --shapes SET      mixed (all five), noncircular (ellipse, polygon, bezier), or a\n"
     "                    comma-separated list of circle, ellipse, polygon, bezier, fs (mixed)\n"
     "  --damping KIND    local (Cundall, 0.7) or global (viscous, 0.7 1/s) (local)\n"
+    "  --solver NAME     of contacts: certified or gjk (GJK and EPA) (certified)\n"
+    "  --faces RULE      forces where faces meet: two (points), one, or area (two)\n"
     "  --grains PATH     bezier and fs grains from an image (PBM, PGM), an outline (CSV, first\n"
     "                    line \"x,y\"), or a directory of outlines, without any of images\n"
     "                    (without PATH: a few outlines made here)\n"
@@ -47,6 +49,7 @@ typedef struct options {
     bool kinds[KINDS];
     bool global_damping;
     bool quick;
+    int solver, faces;  // dem2d_solver, dem2d_face_rule
     const char *grains; // or NULL
     const char *out;
 } options;
@@ -57,11 +60,14 @@ static options parse_options(int count, char **arguments) {
     o.out = "out";
     parse_shapes("mixed", o.kinds);
     static const char *const names[] = {
-        "--quick", "--particles=", "--seed=", "--shapes=", "--damping=", "--grains=", "--out="};
+        "--quick",   "--particles=", "--seed=",   "--shapes=", "--damping=",
+        "--grains=", "--out=",       "--solver=", "--faces="};
     static const char *const dampings[] = {"local", "global"};
+    static const char *const solvers[] = {"certified", "gjk"};
+    static const char *const rules[] = {"two", "one", "area"};
     for (int i = 1; i < count; i++) {
         const char *name = arguments[i], *value;
-        const int which = parse_option(count, arguments, &i, usage, names, 7, &value);
+        const int which = parse_option(count, arguments, &i, usage, names, 9, &value);
         if (which == 0) o.quick = true;
         if (which == 1) o.particles = (int)parse_integer(name, value, 10, 1000000);
         if (which == 2) o.seed = parse_integer(name, value, 0, UINT64_MAX);
@@ -69,6 +75,8 @@ static options parse_options(int count, char **arguments) {
         if (which == 4) o.global_damping = parse_name(name, value, dampings, 2) == 1;
         if (which == 5) o.grains = value;
         if (which == 6) o.out = value;
+        if (which == 7) o.solver = parse_name(name, value, solvers, 2);
+        if (which == 8) o.faces = parse_name(name, value, rules, 3);
     }
     if (o.particles == 0) o.particles = o.quick ? 100 : 500;
     return o;
@@ -161,7 +169,8 @@ typedef struct job {
     double packed_ratio;            // stress ratio then
     dem2d_packing packed;           // and packing
     double porosity;
-    double max_overlap;   // over consolidation and compression
+    double max_overlap; // over consolidation and compression
+    double near_pairs, near_samples;
     double lateral_sum;   // Pa, over the steps after 0.1 % of strain
     double lateral_worst; // Pa, greatest error at any of them
     int lateral_steps;
@@ -252,6 +261,32 @@ static void show_progress(job *j) {
     fprintf(stderr, "biaxial: %s, step %d of %d, %.0f s left\n", j->stage, j->steps, total, left);
 }
 
+/* Pairs whose bounding circles overlap and that do not touch: those a step might have to look at
+   in vain. Every WATCH steps and in small scenes, as it takes the square of their number. */
+enum { WATCH = 500, WATCHED = 2000 };
+
+static void watch_near_pairs(job *j) {
+    dem2d_stats stats;
+    int count;
+    must(dem2d_world_stats(j->world, &stats), "stats");
+    dem2d_particle_id *ids = get_memory(NULL, (size_t)stats.particles, sizeof *ids);
+    dem2d_particle_info *grains = get_memory(NULL, (size_t)stats.particles, sizeof *grains);
+    must(dem2d_world_particles(j->world, ids, stats.particles, &count), "particles");
+    for (int i = 0; i < count; i++) {
+        must(dem2d_world_get_particle(j->world, ids[i], &grains[i]), "particle");
+        for (int k = 0; k < i; k++) {
+            const double dx = grains[i].pose.position.x - grains[k].pose.position.x;
+            const double dy = grains[i].pose.position.y - grains[k].pose.position.y;
+            const double reach = grains[i].radius + grains[k].radius;
+            j->near_pairs += dx * dx + dy * dy < reach * reach;
+        }
+    }
+    j->near_pairs -= stats.contacts;
+    j->near_samples++;
+    free(ids);
+    free(grains);
+}
+
 static void take_steps(job *j, int count) {
     int done = 0;
     const dem2d_result result = dem2d_world_step(j->world, count, &done);
@@ -259,6 +294,7 @@ static void take_steps(job *j, int count) {
     snprintf(what, sizeof what, "%s, step %d", j->stage, j->steps + done + 1);
     must(result, what);
     j->steps += count;
+    if (j->steps % WATCH == 0 && j->plan.particles <= WATCHED) watch_near_pairs(j);
     show_progress(j);
 }
 
@@ -275,13 +311,15 @@ static void watch_overlap(job *j) {
 
 /* ---- 1. settling ---- */
 
-static void build_world(job *j) {
+static void build_world(job *j, const options *o) {
     dem2d_world_desc scene = {0};
     scene.time_step = TIME_STEP;
     scene.gravity.y = -j->plan.gravity;
     scene.local_damping = j->plan.local_damping;
     scene.global_damping = j->plan.global_damping;
     scene.particle_capacity = j->plan.particles;
+    scene.solver = (dem2d_solver)o->solver;
+    scene.faces = (dem2d_face_rule)o->faces;
     scene.env = example_env();
     must(dem2d_world_create(&scene, &j->world), "world");
     dem2d_material_desc stone = {0};
@@ -436,6 +474,12 @@ typedef struct figure {
 #define FINITE \
     { -DBL_MAX, DBL_MAX }
 
+/* Of the pairs found in contact, those proved in a way. */
+static double share(const dem2d_stats *stats, dem2d_proof proof) {
+    const double found = (double)(stats->looks - stats->gaps);
+    return found > 0 ? 100 * (double)stats->proofs[proof] / found : 0;
+}
+
 /* Prints the figures and returns whether each lies in its band. The plateau: the mean stress ratio
    of the last fifth of the compression over the peak; a ratio that falls back or never stops
    jumping is below the band. It rises because it is about 0 at the end of consolidation. */
@@ -451,6 +495,7 @@ static bool report(const job *j, const options *o, double strain) {
     plateau /= j->block_count - tail;
     dem2d_stats stats;
     must(dem2d_world_stats(j->world, &stats), "stats");
+    const double looks = stats.looks > 0 ? (double)stats.looks : 1;
     const figure figures[] = {
         {"particles", particles, "-", FINITE, FINITE},
         {"steps", steps, "-", FINITE, FINITE},
@@ -471,6 +516,17 @@ static bool report(const job *j, const options *o, double strain) {
         {"peak_stress_ratio", peak, "-", {0.1, 0.7}, {0.1, 0.7}},
         {"plateau_over_peak", plateau / peak, "-", {0.7, 1.01}, {0.6, 1.01}},
         {"axial_strain_final", strain, "-", {0.001, 2}, {0.001, 2}},
+        {"looks_per_step", (double)stats.looks / steps, "-", FINITE, FINITE},
+        {"support_calls_per_look", (double)stats.support_calls / looks, "-", FINITE, FINITE},
+        {"near_pairs_skipped_percent",
+         j->near_pairs > 0
+             ? 100 - 100 * (double)stats.gaps / steps * j->near_samples / j->near_pairs
+             : 0,
+         "%", FINITE, FINITE},
+        {"proved_by_form_percent", share(&stats, DEM2D_BY_FORM), "%", FINITE, FINITE},
+        {"proved_by_radius_percent", share(&stats, DEM2D_BY_RADIUS), "%", FINITE, FINITE},
+        {"proved_by_arc_percent", share(&stats, DEM2D_BY_ARC), "%", FINITE, FINITE},
+        {"proved_by_polytope_percent", share(&stats, DEM2D_BY_POLYTOPE), "%", FINITE, FINITE},
         {"contacts_not_converged", (double)stats.not_converged, "-", {0, 0}, {0, 0}},
         {"rows_not_finite", j->bad_rows, "-", {0, 0}, {0, 0}},
     };
@@ -507,7 +563,7 @@ int main(int count, char **arguments) {
     j.history = open_memstream(&history, &history_size);
     if (j.history == NULL) fail(STATUS_FAILED, "out of memory");
     fputs(header, j.history);
-    build_world(&j);
+    build_world(&j, &o);
     grain *grains = draw_grains(j.world, &o, &set, &random);
     fill_box(&j, grains, &random);
     free(grains); // the world has its own copies of all

@@ -960,7 +960,8 @@ static void test_walls(void **state) {
         assert_within((c.point_b.x - on.x) * u.x + (c.point_b.y - on.y) * u.y, 0, ROUNDING * size);
         assert_within(c.point_a.x - c.point_b.x, c.depth * c.normal.x, ROUNDING * size);
         assert_within(c.point_a.y - c.point_b.y, c.depth * c.normal.y, ROUNDING * size);
-        assert_within(c.point.x, (c.point_a.x + c.point_b.x) / 2, ROUNDING * size);
+        assert_within(c.point.x, c.point_b.x, 0); /* the foot, on the wall */
+        assert_within(c.point.y, c.point_b.y, 0);
         check_witness(kind, &pose, c.point_a, -u.x, -u.y, ROUNDING * size);
     }
 }
