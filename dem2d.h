@@ -752,7 +752,7 @@ typedef struct dem2d_contact_desc {
 /// One of the points that carry a contact.
 typedef struct dem2d_contact_point {
     dem2d_vec position; ///< m
-    double depth;       ///< m, overlap there along the contact's normal
+    double depth;       ///< m, overlap there along the contact's normal (of corners' roundings)
     double weight;      ///< part of the normal stiffness that acts there, in [0, 1]
 } dem2d_contact_point;
 
@@ -1227,12 +1227,23 @@ static bool dem2di_vec_finite(dem2d_vec a) {
 
 /* v / |v| for any finite v but 0, without overflow or underflow on the way. */
 static bool dem2di_unit(dem2d_vec v, dem2d_vec *unit) {
+    double square = dem2di_dot(v, v);
+    if (square > 1e-280 && square < 1e280) {
+        double length = sqrt(square);
+        *unit = dem2di_vec(v.x / length, v.y / length);
+        return true;
+    }
     double largest = dem2di_max(fabs(v.x), fabs(v.y));
     if (!dem2di_vec_finite(v) || !(largest > 0)) return false;
     v = dem2di_vec(v.x / largest, v.y / largest);
     double length = dem2di_length(v);
     *unit = dem2di_vec(v.x / length, v.y / length);
     return true;
+}
+
+/* The same for vectors whose square is a normal number, as of sizes that were checked: faster. */
+static dem2d_vec dem2di_normalised(dem2d_vec v) {
+    return dem2di_scale(v, 1 / dem2di_length(v));
 }
 
 static dem2d_vec dem2di_turn(dem2d_rot q, dem2d_vec v) {
@@ -2768,18 +2779,22 @@ DEM2D_API dem2d_result dem2d_shape_get(const dem2d_shape *shape, dem2d_shape_inf
     return DEM2D_OK;
 }
 
+/* Unit to rounding: kept to the bit, so that exact rotations stay exact. */
+static bool dem2di_is_unit(double x, double y) {
+    return fabs(x * x + y * y - 1) <= 4 * DBL_EPSILON;
+}
+
 /* A pose that a caller gave: finite, rotation not zero (made unit), scale above 0. */
 static dem2d_result dem2di_check_pose(dem2d_pose *pose) {
-    dem2d_vec unit, rotation = dem2di_vec(pose->rotation.c, pose->rotation.s);
+    dem2d_vec rotation = dem2di_vec(pose->rotation.c, pose->rotation.s);
     if (!dem2di_vec_finite(pose->position) || !dem2di_vec_finite(rotation) ||
         !dem2di_finite(pose->scale))
         return DEM2D_NOT_FINITE;
-    if (!(pose->scale > 0) || !dem2di_unit(rotation, &unit)) return DEM2D_OUT_OF_RANGE;
-    /* unit to rounding already: keep the bits, so that exact rotations stay exact */
-    if (fabs(dem2di_dot(rotation, rotation) - 1) > 4 * DBL_EPSILON) {
-        pose->rotation.c = unit.x;
-        pose->rotation.s = unit.y;
-    }
+    if (!(pose->scale > 0)) return DEM2D_OUT_OF_RANGE;
+    if (dem2di_is_unit(rotation.x, rotation.y)) return DEM2D_OK;
+    if (!dem2di_unit(rotation, &rotation)) return DEM2D_OUT_OF_RANGE;
+    pose->rotation.c = rotation.x;
+    pose->rotation.s = rotation.y;
     return DEM2D_OK;
 }
 
@@ -5309,30 +5324,30 @@ static dem2di_pair dem2di_pair_make(const dem2d_shape *a, const dem2d_pose *pose
     return pair;
 }
 
-/* The vertex of A minus B minus d that two support points make. */
-static dem2di_vertex dem2di_join(const dem2di_pair *pair, dem2d_vec a, dem2d_vec b) {
-    dem2di_vertex v;
-    v.a = a;
-    v.b = b;
-    v.w = dem2di_sub(dem2di_sub(a, b), pair->d);
-    return v;
+/* The vertex of A minus B minus d that two support points make. Through a pointer: a returned
+   struct would be copied in pieces wider than those it was written in, which stalls. */
+static void dem2di_join(const dem2di_pair *pair, dem2d_vec a, dem2d_vec b, dem2di_vertex *v) {
+    v->a = a;
+    v->b = b;
+    v->w.x = (a.x - b.x) - pair->d.x;
+    v->w.y = (a.y - b.y) - pair->d.y;
 }
 
 /* Support point of A minus B minus d; rho, if asked for, gets the radii of curvature of A and B. */
-static dem2di_vertex dem2di_minkowski(dem2di_pair *pair, dem2d_vec u, double rho[2]) {
+static void dem2di_minkowski(dem2di_pair *pair, dem2d_vec u, double rho[2], dem2di_vertex *v) {
     double *rho_a = rho, *rho_b = rho != NULL ? rho + 1 : NULL;
     dem2d_vec a = dem2di_support(pair->a, dem2di_turn_back(pair->ra, u), rho_a);
     dem2d_vec b = dem2di_support(pair->b, dem2di_turn_back(pair->rb, dem2di_negate(u)), rho_b);
     if (rho != NULL) rho[0] *= pair->scale_a, rho[1] *= pair->scale_b;
     pair->calls++;
-    return dem2di_join(pair, dem2di_scale(dem2di_turn(pair->ra, a), pair->scale_a),
-                       dem2di_scale(dem2di_turn(pair->rb, b), pair->scale_b));
+    dem2di_join(pair, dem2di_scale(dem2di_turn(pair->ra, a), pair->scale_a),
+                dem2di_scale(dem2di_turn(pair->rb, b), pair->scale_b), v);
 }
 
-/* The first direction: the caller's, else the line of centres, else any. */
-static dem2d_vec dem2di_first_direction(const dem2di_pair *pair, dem2d_vec start) {
+/* The line of centres; of concentric shapes any direction. */
+static dem2d_vec dem2di_centres(const dem2di_pair *pair) {
     dem2d_vec u = dem2di_vec(1, 0);
-    if (!dem2di_unit(start, &u)) (void)dem2di_unit(pair->d, &u);
+    (void)dem2di_unit(pair->d, &u);
     return u;
 }
 
@@ -5396,7 +5411,8 @@ static bool dem2di_simplex_add(dem2di_search *search, dem2di_vertex v, double *d
 
 /* Support value at u: keeps the least one met. */
 static dem2di_vertex dem2di_look(dem2di_pair *pair, dem2di_search *search, dem2d_vec u) {
-    dem2di_vertex v = dem2di_minkowski(pair, u, NULL);
+    dem2di_vertex v;
+    dem2di_minkowski(pair, u, NULL, &v);
     double h = dem2di_dot(v.w, u);
     if (h < search->upper) {
         search->upper = h;
@@ -5432,7 +5448,7 @@ static dem2d_contact_state dem2di_judge(const dem2di_pair *pair, const dem2di_se
 static void dem2di_gjk(dem2di_pair *pair, dem2d_vec start, double tolerance, int cap, bool detect,
                        dem2di_search *search) {
     double rounding = DEM2DI_ROUNDING * pair->size, distance;
-    dem2d_vec u = dem2di_first_direction(pair, start);
+    dem2d_vec u = start;
     search->iterations = 0;
     search->corner[0] = search->corner[1] = -1;
     search->proof = DEM2D_BY_RADIUS; /* of a gap */
@@ -5617,11 +5633,14 @@ static void dem2di_epa(dem2di_pair *pair, dem2di_polytope *polytope, double tole
     search->lower = -pair->size;
     if (polytope->edges == 0) return; /* supports that are not finite, or all one point */
     if (cap > DEM2DI_EPA_ITERATIONS) cap = DEM2DI_EPA_ITERATIONS;
+    double rounding = DEM2DI_ROUNDING * pair->size;
     for (int iteration = 0;; iteration++) {
         int nearest = dem2di_nearest_edge(polytope);
         dem2di_edge edge = polytope->edge[nearest];
         search->lower = dem2di_min(search->upper, edge.distance);
-        if (polytope->arcs && search->upper - edge.distance <= tolerance) break;
+        if (polytope->arcs && search->upper - edge.distance <= tolerance &&
+            (search->upper < -rounding || edge.distance >= -rounding))
+            break; /* and the sign is sure */
         if (iteration == cap) return;
         search->iterations++;
         dem2di_vertex v = dem2di_look(pair, search, edge.normal);
@@ -5666,192 +5685,250 @@ static bool dem2di_cone(const dem2di_pair *pair, double h, dem2d_vec end[2]) {
     return dem2di_vec_finite(end[0]) && dem2di_vec_finite(end[1]);
 }
 
-/* The sharp polygon inside a polygon, or the centre of a circle, in the pair's coordinates. B is
-   reflected through its centre, so that both turn with the direction. */
+/* Polygons and circles are a sharp polygon or a point, grown by a radius. */
+static bool dem2di_has_core(const dem2d_shape *shape) {
+    return shape->type == DEM2D_CIRCLE || shape->type == DEM2D_POLYGON;
+}
+
+/* The sharp polygon inside a polygon, or the centre of a circle. B is reflected through its
+   centre, so that both turn with the direction: A minus B is the sum of the two. */
 typedef struct dem2di_core {
     const dem2d_vec *corners, *tangents;
-    int count, k; /* k: the corner that is the support now */
+    int count;
     dem2d_rot q;
-    double scale;    /* negative for B */
-    dem2d_vec point; /* corner k */
-    dem2d_vec ahead; /* unit tangent of the edge that leaves corner k, counter-clockwise */
-    dem2d_vec back;  /* of the edge that comes to it */
+    double scale, sign; /* both negative for B */
+    double radius;      /* that it is grown by */
 } dem2di_core;
 
-static void dem2di_core_move(dem2di_core *core, int k) {
-    double sign = core->scale < 0 ? -1 : 1;
-    core->k = k;
-    core->point = dem2di_scale(dem2di_turn(core->q, core->corners[k]), core->scale);
-    if (core->count == 1) return;
-    int before = k > 0 ? k - 1 : core->count - 1;
-    core->ahead = dem2di_scale(dem2di_turn(core->q, core->tangents[k]), sign);
-    core->back = dem2di_scale(dem2di_turn(core->q, core->tangents[before]), sign);
-}
-
-static dem2di_core dem2di_core_make(const dem2d_shape *shape, dem2d_rot q, double scale,
-                                    dem2d_vec u) {
+static void dem2di_core_set(const dem2d_shape *shape, dem2d_rot q, double scale, double sign,
+                            dem2di_core *core) {
     static const dem2d_vec centre = {0, 0};
-    dem2di_core core;
     bool circle = shape->type == DEM2D_CIRCLE;
-    core.corners = circle ? &centre : shape->corners;
-    core.tangents = shape->ends;
-    core.count = circle ? 1 : shape->count;
-    core.q = q;
-    core.scale = scale;
-    core.ahead = core.back = dem2di_vec(0, 0);
-    if (scale < 0) u = dem2di_negate(u);
-    dem2di_core_move(&core, circle ? 0 : dem2di_polygon_corner(shape, dem2di_turn_back(q, u)));
-    return core;
+    core->corners = circle ? &centre : shape->corners;
+    core->tangents = shape->ends;
+    core->count = circle ? 1 : shape->count;
+    core->q.c = q.c;
+    core->q.s = q.s;
+    core->scale = sign * scale;
+    core->sign = sign;
+    core->radius = (circle ? shape->a : shape->rounding) * scale;
 }
 
-/* A corner of A minus B minus d, w, made of one of each, and the edge last passed to reach it. */
+/* A corner of A minus B minus d: one corner of each core, and to one side the tangents of the
+   edges that come next, always counter-clockwise; 0 where a core has no edges. */
 typedef struct dem2di_walk {
-    dem2di_core a, b;
-    dem2d_vec w;
-    dem2d_vec tangent; /* of that edge, counter-clockwise */
-    dem2d_vec from[3]; /* its start: a's corner, b's, w */
-    int corner[2];     /* and their numbers */
+    int k[2];
+    dem2d_vec p[2], t[2], w;
 } dem2di_walk;
 
-/* Along the edge beside, to a side (+1 counter-clockwise), to its other end. */
-static void dem2di_walk_on(const dem2di_pair *pair, dem2di_walk *walk, int side) {
-    dem2di_core *a = &walk->a, *b = &walk->b;
-    dem2d_vec ta = side > 0 ? a->ahead : a->back, tb = side > 0 ? b->ahead : b->back;
-    bool first = b->count == 1 || (a->count > 1 && side * dem2di_cross(ta, tb) > 0);
-    dem2di_core *core = first ? a : b;
-    int k = core->k + side;
-    walk->tangent = first ? ta : tb;
-    walk->from[0] = a->point;
-    walk->from[1] = b->point;
-    walk->from[2] = walk->w;
-    walk->corner[0] = a->k;
-    walk->corner[1] = b->k;
-    dem2di_core_move(core, k == core->count ? 0 : k < 0 ? core->count - 1 : k);
-    walk->w = dem2di_sub(dem2di_add(a->point, b->point), pair->d);
+/* An edge of A minus B: the one of core `own` that leaves (side +1) or comes to (-1) corners k. */
+typedef struct dem2di_beside {
+    int k[2], own, side;
+    dem2d_vec tangent;
+    double h; /* support value at its normal */
+} dem2di_beside;
+
+static int dem2di_core_beside(const dem2di_core *core, int k, int side) {
+    k += side;
+    return k == core->count ? 0 : k < 0 ? core->count - 1 : k;
+}
+
+static void dem2di_core_corner(const dem2di_core *core, int k, dem2d_vec *p) {
+    dem2d_vec v = dem2di_turn(core->q, core->corners[k]);
+    p->x = v.x * core->scale;
+    p->y = v.y * core->scale;
+}
+
+/* The tangent of the edge beside corner k. */
+static void dem2di_core_tangent(const dem2di_core *core, int k, int side, dem2d_vec *t) {
+    if (core->count == 1) {
+        t->x = t->y = 0;
+        return;
+    }
+    dem2d_vec v = core->tangents[side > 0 ? k : dem2di_core_beside(core, k, -1)];
+    t->x = core->sign * (core->q.c * v.x - core->q.s * v.y);
+    t->y = core->sign * (core->q.s * v.x + core->q.c * v.y);
+}
+
+static void dem2di_walk_set(const dem2di_pair *pair, const dem2di_core core[2], int ka, int kb,
+                            int side, dem2di_walk *walk) {
+    walk->k[0] = ka;
+    walk->k[1] = kb;
+    for (int i = 0; i < 2; i++) {
+        dem2di_core_corner(&core[i], walk->k[i], &walk->p[i]);
+        dem2di_core_tangent(&core[i], walk->k[i], side, &walk->t[i]);
+    }
+    walk->w.x = (walk->p[0].x + walk->p[1].x) - pair->d.x;
+    walk->w.y = (walk->p[0].y + walk->p[1].y) - pair->d.y;
+}
+
+/* The edge that comes next to a side. */
+static void dem2di_walk_edge(const dem2di_core core[2], const dem2di_walk *walk, int side,
+                             dem2di_beside *edge) {
+    bool first = core[1].count == 1 ||
+                 (core[0].count > 1 && side * dem2di_cross(walk->t[0], walk->t[1]) > 0);
+    edge->own = !first;
+    edge->side = side;
+    edge->k[0] = walk->k[0];
+    edge->k[1] = walk->k[1];
+    edge->tangent.x = walk->t[edge->own].x;
+    edge->tangent.y = walk->t[edge->own].y;
+    edge->h = walk->w.x * edge->tangent.y - walk->w.y * edge->tangent.x;
+}
+
+/* Along that edge to its other end. */
+static void dem2di_walk_pass(const dem2di_pair *pair, const dem2di_core core[2],
+                             const dem2di_beside *edge, dem2di_walk *walk) {
+    int i = edge->own;
+    walk->k[i] = dem2di_core_beside(&core[i], walk->k[i], edge->side);
+    dem2di_core_corner(&core[i], walk->k[i], &walk->p[i]);
+    dem2di_core_tangent(&core[i], walk->k[i], edge->side, &walk->t[i]);
+    walk->w.x = (walk->p[0].x + walk->p[1].x) - pair->d.x;
+    walk->w.y = (walk->p[0].y + walk->p[1].y) - pair->d.y;
 }
 
 static dem2d_vec dem2di_right(dem2d_vec tangent) {
     return dem2di_vec(tangent.y, -tangent.x);
 }
 
-static double dem2di_rounding_radius(const dem2d_shape *shape) {
-    return shape->type == DEM2D_CIRCLE ? shape->a : shape->rounding;
-}
-
-static double dem2di_rounding_of(const dem2di_pair *pair) {
-    return dem2di_rounding_radius(pair->a) * pair->scale_a +
-           dem2di_rounding_radius(pair->b) * pair->scale_b;
-}
-
-/* What the search knows of cores (their overlap is `core`) as an answer for the shapes. With a
-   foot the origin's nearest point lies on the edge last passed, else at the corner. */
-static void dem2di_walk_report(const dem2di_pair *pair, const dem2di_walk *walk, bool foot,
-                               dem2d_vec normal, double core, dem2di_search *search) {
-    double ra = dem2di_rounding_radius(pair->a) * pair->scale_a;
-    double rb = dem2di_rounding_radius(pair->b) * pair->scale_b;
-    dem2d_vec a = walk->a.point, b = walk->b.point;
-    if (foot) {
-        dem2d_vec edge = dem2di_sub(walk->w, walk->from[2]);
-        double t = dem2di_dot(walk->w, edge) / dem2di_dot(edge, edge);
-        t = dem2di_max(0, dem2di_min(1, t));
-        a = dem2di_along(a, t, dem2di_sub(walk->from[0], a));
-        b = dem2di_along(b, t, dem2di_sub(walk->from[1], b));
-    }
+/* The answer for the shapes: an overlap of the cores along a normal, at points of theirs. */
+static void dem2di_core_report(const dem2di_core core[2], dem2d_vec p, dem2d_vec q,
+                               dem2d_vec normal, double overlap, dem2di_search *search) {
     search->normal = normal;
-    search->upper = search->lower = core + (ra + rb);
-    search->a = dem2di_along(a, ra, normal);
-    search->b = dem2di_negate(dem2di_along(b, rb, normal));
-    search->corner[0] = foot ? walk->corner[0] : walk->a.k;
-    search->corner[1] = foot ? walk->corner[1] : walk->b.k;
+    search->upper = search->lower = overlap + (core[0].radius + core[1].radius);
+    search->a = dem2di_along(p, core[0].radius, normal);
+    search->b = dem2di_negate(dem2di_along(q, core[1].radius, normal));
+}
+
+/* The foot of the origin on an edge, as a part of it from its first end; both ends of the edge. */
+static double dem2di_edge_foot(const dem2di_pair *pair, const dem2di_core core[2],
+                               const dem2di_beside *edge, dem2di_walk *from, dem2di_walk *to) {
+    dem2di_walk_set(pair, core, edge->k[0], edge->k[1], edge->side, from);
+    *to = *from;
+    dem2di_walk_pass(pair, core, edge, to);
+    dem2d_vec along = dem2di_sub(to->w, from->w);
+    return -dem2di_dot(from->w, along) / dem2di_dot(along, along);
+}
+
+/* The same at the foot of the origin on an edge. Where an edge of A and one of B are parallel they
+   follow each other, and the foot may be on the other. */
+static void dem2di_edge_report(const dem2di_pair *pair, const dem2di_core core[2],
+                               const dem2di_beside *edge, dem2di_search *search) {
+    dem2di_walk from, to;
+    dem2di_beside next;
+    double t = dem2di_edge_foot(pair, core, edge, &from, &to);
+    if (t < 0 || t > 1) {
+        int side = t > 1 ? edge->side : -edge->side;
+        const dem2di_walk *end = t > 1 ? &to : &from;
+        dem2di_walk beyond;
+        dem2di_walk_set(pair, core, end->k[0], end->k[1], side, &beyond);
+        dem2di_walk_edge(core, &beyond, side, &next);
+        if (fabs(next.h - edge->h) <= DEM2DI_ROUNDING * pair->size &&
+            dem2di_dot(next.tangent, edge->tangent) > 0) {
+            edge = &next;
+            t = dem2di_edge_foot(pair, core, edge, &from, &to);
+        }
+    }
+    t = dem2di_max(0, dem2di_min(1, t));
+    for (int i = 0; i < 2; i++)
+        from.p[i] = dem2di_along(from.p[i], t, dem2di_sub(to.p[i], from.p[i]));
+    search->corner[0] = edge->k[0];
+    search->corner[1] = edge->k[1];
+    dem2di_core_report(core, from.p[0], from.p[1], dem2di_right(edge->tangent), edge->h, search);
 }
 
 /* Cores apart: from a corner that a separating direction u leads to, down to the point of A minus
    B nearest to the origin. In front of it the distance has one minimum. */
-static void dem2di_walk_apart(const dem2di_pair *pair, dem2di_walk *walk, dem2d_vec u,
-                              dem2di_search *search) {
-    for (int side = 1; side >= -1; side -= 2) {
-        bool moved = false;
+static void dem2di_cores_apart(const dem2di_pair *pair, const dem2di_core core[2], int ka, int kb,
+                               dem2d_vec u, dem2di_search *search) {
+    double rounding = DEM2DI_ROUNDING * pair->size;
+    dem2di_walk walk;
+    bool moved = false;
+    for (int side = 1; side >= -1 && !moved; side -= 2) {
+        dem2di_walk_set(pair, core, ka, kb, side, &walk);
         for (;;) {
-            dem2di_walk next = *walk;
-            dem2di_walk_on(pair, &next, side);
+            dem2di_beside edge;
+            dem2di_walk_edge(core, &walk, side, &edge);
             /* an edge seen from behind, or one that leads away */
-            if (dem2di_dot(walk->w, dem2di_right(next.tangent)) > DEM2DI_ROUNDING * pair->size)
-                break;
-            if (!(side * dem2di_dot(walk->w, next.tangent) < 0)) break;
-            *walk = next;
+            if (edge.h > rounding || !(side * dem2di_dot(walk.w, edge.tangent) < 0)) break;
+            dem2di_walk_pass(pair, core, &edge, &walk);
             moved = true;
-            if (side * dem2di_dot(next.w, next.tangent) < 0) continue;
-            u = dem2di_right(next.tangent);
-            dem2di_walk_report(pair, &next, true, u, dem2di_dot(next.w, u), search);
+            if (side * dem2di_dot(walk.w, edge.tangent) < 0) continue;
+            dem2di_edge_report(pair, core, &edge, search);
             return;
         }
-        if (moved) break;
     }
     /* two corners; so close that rounding hides the direction, the separating one is kept */
     dem2d_vec away;
-    if (dem2di_length(walk->w) > DEM2DI_ROUNDING * pair->size && dem2di_unit(walk->w, &away))
-        u = dem2di_negate(away);
-    dem2di_walk_report(pair, walk, false, u, dem2di_dot(walk->w, u), search);
+    if (dem2di_length(walk.w) > rounding && dem2di_unit(walk.w, &away)) u = dem2di_negate(away);
+    search->corner[0] = walk.k[0];
+    search->corner[1] = walk.k[1];
+    dem2di_core_report(core, walk.p[0], walk.p[1], u, dem2di_dot(walk.w, u), search);
+}
+
+/* Are all directions from the normal n of the edge last passed to v, the end of the cone on this
+   side, worse than the least overlap met? There h is at least the support value of the corner w
+   that was reached, and that is at least `least` at both ends. */
+static bool dem2di_walk_outweighs(dem2d_vec w, dem2d_vec n, int side, dem2d_vec v, double least) {
+    if (side * dem2di_cross(n, v) > 0) return dem2di_dot(w, v) >= least;
+    return dem2di_dot(n, v) > 0; /* past the end */
 }
 
 /* Edges passed to each side before branch and bound is cheaper, measured: 24 take as long as the
    15 support pairs it needs for polygons of 64 corners. */
 #define DEM2DI_MANY_EDGES 24
 
-/* Are all directions from the edge last passed to v, the end of the cone on this side, worse than
-   the least overlap met? The support value there is at least that of the corner reached. */
-static bool dem2di_walk_outweighs(const dem2di_walk *walk, int side, dem2d_vec v, double least) {
-    dem2d_vec n = dem2di_right(walk->tangent);
-    if (side * dem2di_cross(n, v) > 0) return dem2di_dot(walk->w, v) >= least;
-    return dem2di_dot(n, v) > 0; /* past the end */
-}
-
 /* Least overlap or greatest gap. Overlapping cores: the least support value is at an edge's
    normal. Edges are passed to both sides of the start until their ends outweigh what is left of
-   the cone: w.v >= least at the cone's end v and at the edge means so between them. False when
-   more than `cap` edges would be passed: large and far from round. */
-static bool dem2di_edges_solve(dem2di_pair *pair, dem2d_vec u, int cap, dem2di_search *search) {
-    dem2di_walk walk[2], best;
-    dem2d_vec end[2];
-    double least = HUGE_VAL;
+   the cone; with `beside` the better of the next two is known to be the one. False when there are
+   too many: large polygons far from round. */
+static bool dem2di_edges_solve(dem2di_pair *pair, dem2d_vec u, bool beside, dem2di_search *search) {
+    dem2di_core core[2];
+    dem2di_walk walk[2];
+    dem2di_beside edge, best;
+    dem2d_vec end[2], n[2];
     bool cone = false;
     /* from behind both sides would seem to be past the cone */
-    if (!(dem2di_dot(u, pair->d) > 0)) u = dem2di_first_direction(pair, dem2di_vec(0, 0));
-    walk[0].a = dem2di_core_make(pair->a, pair->ra, pair->scale_a, u);
-    walk[0].b = dem2di_core_make(pair->b, pair->rb, -pair->scale_b, u);
-    walk[0].w = dem2di_sub(dem2di_add(walk[0].a.point, walk[0].b.point), pair->d);
-    walk[0].tangent = dem2di_perp(u);
-    walk[1] = best = walk[0];
+    if (!(dem2di_dot(u, pair->d) > 0)) u = dem2di_centres(pair);
+    dem2di_core_set(pair->a, pair->ra, pair->scale_a, 1, &core[0]);
+    dem2di_core_set(pair->b, pair->rb, pair->scale_b, -1, &core[1]);
+    int k[2] = {0, 0};
+    for (int i = 0; i < 2; i++) {
+        const dem2d_shape *shape = i == 0 ? pair->a : pair->b;
+        dem2d_vec v = dem2di_turn_back(core[i].q, dem2di_scale(u, core[i].sign));
+        if (core[i].count > 1) k[i] = dem2di_polygon_corner(shape, v);
+    }
     pair->calls++;
     search->proof = DEM2D_BY_FORM;
+    for (int i = 0; i < 2; i++) dem2di_walk_set(pair, core, k[0], k[1], i > 0 ? 1 : -1, &walk[i]);
     if (dem2di_dot(walk[0].w, u) < 0) {
-        dem2di_walk_apart(pair, &walk[0], u, search);
+        dem2di_cores_apart(pair, core, k[0], k[1], u, search);
         return true;
     }
-    int all = walk[0].a.count + walk[0].b.count;
-    for (int i = 0; i <= cap; i++) {
+    best.h = HUGE_VAL;
+    int all = core[0].count + core[1].count;
+    for (int i = 0; i <= DEM2DI_MANY_EDGES; i++) {
         bool open = false;
         for (int side = 0; side < 2; side++) {
             dem2di_walk *here = &walk[side];
             int turn = side > 0 ? 1 : -1;
-            if (cone && dem2di_walk_outweighs(here, turn, end[side], least)) continue;
+            if (cone && dem2di_walk_outweighs(here->w, n[side], turn, end[side], best.h)) continue;
             open = true;
-            dem2di_walk_on(pair, here, turn);
-            dem2d_vec n = dem2di_right(here->tangent);
-            double h = dem2di_dot(here->w, n);
-            if (!(h < least)) continue;
-            least = h;
-            best = *here;
-            if (!(h < 0)) continue;
-            dem2di_walk_apart(pair, here, n, search);
+            dem2di_walk_edge(core, here, turn, &edge);
+            n[side] = dem2di_right(edge.tangent);
+            dem2di_walk_pass(pair, core, &edge, here);
+            if (!(edge.h < best.h)) continue;
+            best = edge;
+            if (!(edge.h < 0)) continue;
+            dem2di_cores_apart(pair, core, here->k[0], here->k[1], n[side], search);
             return true;
         }
-        if (!open || i == all) {
-            dem2di_walk_report(pair, &best, true, dem2di_right(best.tangent), least, search);
+        if (!open || i == all || beside) {
+            dem2di_edge_report(pair, core, &best, search);
             return true;
         }
         search->iterations++;
-        if (i == 0) cone = dem2di_cone(pair, least + dem2di_rounding_of(pair), end);
+        if (i == 0) cone = dem2di_cone(pair, best.h + (core[0].radius + core[1].radius), end);
     }
     return false;
 }
@@ -5873,11 +5950,13 @@ typedef struct dem2di_sight {
 } dem2di_sight;
 
 static void dem2di_see(dem2di_pair *pair, dem2d_vec u, dem2di_sight *sight) {
-    sight->u = u;
-    sight->v[0] = dem2di_minkowski(pair, u, sight->rho);
+    dem2di_vertex *v = &sight->v[0];
+    dem2di_minkowski(pair, u, sight->rho, v);
+    sight->u.x = u.x;
+    sight->u.y = u.y;
     sight->edge = false;
-    sight->h = dem2di_dot(sight->v[0].w, u);
-    sight->slope[0] = sight->slope[1] = dem2di_cross(u, sight->v[0].w);
+    sight->h = v->w.x * u.x + v->w.y * u.y;
+    sight->slope[0] = sight->slope[1] = u.x * v->w.y - u.y * v->w.x;
 }
 
 /* The polygon of a pair that has one. */
@@ -5925,7 +6004,7 @@ static void dem2di_see_polygon(dem2di_pair *pair, const dem2di_polygon *p, dem2d
         if (i == 0 || sight->edge) {
             dem2d_vec c = dem2di_turn(p->q, p->shape->corners[sight->corner[i]]);
             c = dem2di_scale(dem2di_along(c, p->shape->rounding, v), p->scale);
-            sight->v[i] = p->first ? dem2di_join(pair, c, s) : dem2di_join(pair, s, c);
+            dem2di_join(pair, p->first ? c : s, p->first ? s : c, &sight->v[i]);
         }
         sight->slope[i] = dem2di_cross(u, sight->v[sight->edge ? i : 0].w);
     }
@@ -6019,16 +6098,15 @@ static bool dem2di_bracket_next(dem2di_bracket *bracket, dem2d_vec *u) {
     return dem2di_unit(middle, u) && dem2di_bracket_holds(bracket, *u);
 }
 
-static void dem2di_keep(const dem2di_sight *sight, dem2di_search *search) {
-    if (!(sight->h < search->upper)) return;
-    search->upper = sight->h;
-    search->normal = sight->u;
-    search->a = sight->v[0].a;
-    search->b = sight->v[0].b;
+/* A minimum that Newton's step can find: h curves upward there. A radius so large that its circle
+   is straight to rounding across the whole pair is a face. */
+static bool dem2di_bends(const dem2di_pair *pair, double bend) {
+    return bend > 0 && bend * DEM2DI_ROUNDING < pair->size;
 }
 
 /* Is h stationary at the last look? On an edge when the slope changes sign there; on a chord of
-   the bracket that is a face of the shapes; elsewhere when Newton's step is below `angle`. */
+   the bracket that is a face of the shapes; elsewhere when Newton's step is below `angle`, and
+   lowers h by less than half the tolerance. */
 static bool dem2di_at_rest(const dem2di_pair *pair, const dem2di_bracket *bracket, double angle,
                            dem2di_sight *sight) {
     if (sight->edge) {
@@ -6039,10 +6117,13 @@ static bool dem2di_at_rest(const dem2di_pair *pair, const dem2di_bracket *bracke
         sight->slope[0] = sight->slope[1] = sight->slope[side];
         sight->edge = false;
     }
-    double bend = sight->rho[0] + sight->rho[1] - sight->h;
-    if (bend > 0 && dem2di_finite(bend) && fabs(sight->slope[0]) <= angle * bend) return true;
-    if (!bracket->chord ||
-        sight->h - dem2di_dot(bracket->at[0].w, sight->u) > DEM2DI_ROUNDING * pair->size)
+    double bend = sight->rho[0] + sight->rho[1] - sight->h, slope = sight->slope[0];
+    if (dem2di_bends(pair, bend) && fabs(slope) <= angle * bend &&
+        slope * slope <= angle * angle * bend * pair->size)
+        return true;
+    double rounding = DEM2DI_ROUNDING * pair->size;
+    if (!bracket->chord || sight->h - dem2di_dot(bracket->at[0].w, sight->u) > rounding ||
+        sight->h - dem2di_dot(bracket->at[1].w, sight->u) > rounding)
         return false;
     sight->edge = true;
     for (int i = 0; i < 2; i++) {
@@ -6067,48 +6148,69 @@ static bool dem2di_descend(dem2di_pair *pair, dem2d_vec u, double angle, int cap
         dem2di_see(pair, u, sight);
     for (int i = 0; i < cap; i++) {
         search->iterations++;
-        dem2di_keep(sight, search);
+        if (sight->h < search->upper) {
+            search->upper = sight->h;
+            search->normal.x = sight->u.x;
+            search->normal.y = sight->u.y;
+        }
         if (detect && sight->h < -DEM2DI_ROUNDING * pair->size) return true;
-        if (dem2di_at_rest(pair, &bracket, angle, sight)) return true;
-        double rho = sight->rho[0] + sight->rho[1], slope = sight->slope[0], bend = rho - sight->h;
-        bool bends = bend > 0 && dem2di_finite(bend);
+        double rho = sight->rho[0] + sight->rho[1], bend = rho - sight->h;
+        if (dem2di_at_rest(pair, &bracket, angle, sight)) {
+            if (!mixed || sight->edge) return true;
+            /* the last step of Newton must not turn past an edge unseen */
+            u = dem2di_normalised(dem2di_along(dem2di_negate(sight->v[0].w), rho, sight->u));
+            int k = dem2di_polygon_corner(polygon.shape, dem2di_polygon_view(&polygon, u));
+            if (k == sight->corner[0]) return true;
+        }
+        double slope = sight->slope[0];
+        bool bends = dem2di_bends(pair, bend);
         /* a small step needs no bracket, unless it has not helped before */
         bool near = bends && fabs(slope) < 0.2 * bend && i < 4;
         bool outside = (bracket.known || !near) && !dem2di_bracket_cut(pair, sight, &bracket);
-        bool newton = bends && !outside &&
-                      dem2di_unit(dem2di_along(dem2di_negate(sight->v[0].w), rho, sight->u), &u);
+        bool newton = bends && !outside;
         bracket.chord = false;
+        if (newton) /* rho u - s is longer than bend > 0 */
+            u = dem2di_normalised(dem2di_along(dem2di_negate(sight->v[0].w), rho, sight->u));
         if (!newton || (bracket.known && !dem2di_bracket_holds(&bracket, u)))
             if (!dem2di_bracket_next(&bracket, &u)) return false;
         if (mixed)
             dem2di_see_towards(pair, &polygon, u, sight);
         else
             dem2di_see(pair, u, sight);
+        /* an edge on the way to the chord's normal is not the chord */
+        if (sight->u.x != u.x || sight->u.y != u.y) bracket.chord = false;
     }
     return false;
 }
 
 /* The minimum at rest: along an edge the foot of the origin; else Newton's last step, on the
-   osculating circle, which leaves the square of its angle. */
-static void dem2di_settle(const dem2di_sight *sight, dem2di_search *search) {
+   osculating circle, which leaves the square of its angle. What is beside the last look on a
+   custom shape is not known: no step there. */
+static void dem2di_settle(const dem2di_pair *pair, const dem2di_sight *sight,
+                          dem2di_search *search) {
     const dem2di_vertex *v = sight->v;
+    double ux = sight->u.x, uy = sight->u.y, slope = sight->slope[0];
+    search->normal.x = ux;
+    search->normal.y = uy;
+    search->upper = sight->h;
     if (sight->edge) {
-        double t = sight->slope[0] < 0 ? sight->slope[0] / (sight->slope[0] - sight->slope[1]) : 0;
-        search->normal = sight->u;
-        search->upper = sight->h;
+        double t = slope < 0 ? slope / (slope - sight->slope[1]) : 0;
         search->a = dem2di_along(v[0].a, t, dem2di_sub(v[1].a, v[0].a));
         search->b = dem2di_along(v[0].b, t, dem2di_sub(v[1].b, v[0].b));
         return;
     }
-    double slope = sight->slope[0], bend = sight->rho[0] + sight->rho[1] - sight->h;
+    double bend = sight->rho[0] + sight->rho[1] - sight->h;
     double length = sqrt(bend * bend + slope * slope), f = 1 / length;
-    dem2d_vec u = sight->u,
-              normal = dem2di_along(dem2di_scale(u, bend * f), -slope * f, dem2di_perp(u));
-    dem2d_vec turned = dem2di_sub(normal, u);
-    search->normal = normal;
-    search->upper = sight->h - slope * (slope / (length + bend));
-    search->a = dem2di_along(v[0].a, sight->rho[0], turned);
-    search->b = dem2di_along(v[0].b, -sight->rho[1], turned);
+    double c = bend * f, s = slope * f, fall = s * s / (1 + c); /* 1 - c */
+    double dx = s * uy - fall * ux, dy = -s * ux - fall * uy;
+    if (pair->a->type == DEM2D_CUSTOM || pair->b->type == DEM2D_CUSTOM) dx = dy = fall = 0;
+    search->normal.x = ux + dx;
+    search->normal.y = uy + dy;
+    search->upper = sight->h - fall * length;
+    search->a.x = v->a.x + sight->rho[0] * dx;
+    search->a.y = v->a.y + sight->rho[0] * dy;
+    search->b.x = v->b.x - sight->rho[1] * dx;
+    search->b.y = v->b.y - sight->rho[1] * dy;
 }
 
 /* Steps of the march below turn by 2 atan(1/32), which is less than any sector of floors. */
@@ -6159,12 +6261,29 @@ static bool dem2di_certify(const dem2di_pair *pair, const dem2di_sight *sight, d
         search->proof = DEM2D_BY_RADIUS;
         return true;
     }
+    if (sight->edge) tolerance = 0;
     if (!dem2di_cone(pair, h, end) || !dem2di_outweighs(pair, sight, 0, end[0], tolerance) ||
         !dem2di_outweighs(pair, sight, 1, end[1], tolerance))
         return false;
-    search->lower = search->upper - (sight->edge ? 0 : tolerance);
+    search->lower = search->upper - tolerance;
     search->proof = DEM2D_BY_ARC;
     return true;
+}
+
+/* Points on both shapes for the least value met: of the vertices that are as far along its normal,
+   to the tolerance, the two that enclose the origin. */
+static void dem2di_polytope_foot(const dem2di_polytope *polytope, double tolerance,
+                                 dem2di_search *search) {
+    const dem2di_vertex *low = NULL, *high = NULL;
+    dem2d_vec u = search->normal;
+    for (int i = 0; i < polytope->vertices; i++) {
+        const dem2di_vertex *v = &polytope->vertex[i];
+        double x = dem2di_cross(u, v->w);
+        if (dem2di_dot(v->w, u) < search->upper - tolerance) continue;
+        if (x <= 0 && (low == NULL || x > dem2di_cross(u, low->w))) low = v;
+        if (x >= 0 && (high == NULL || x < dem2di_cross(u, high->w))) high = v;
+    }
+    if (low != NULL && high != NULL) dem2di_witness(search, low, high);
 }
 
 /* Branch and bound over arcs of directions, from the least value met so far; then down to rest. */
@@ -6174,6 +6293,8 @@ static void dem2di_branch(dem2di_pair *pair, double tolerance, double angle, int
     dem2d_vec end[2], u = search->normal;
     polytope.vertices = polytope.edges = 0;
     polytope.arcs = true;
+    search->upper = HUGE_VAL; /* the least value again, with its points */
+    (void)dem2di_look(pair, search, u);
     bool cone = dem2di_cone(pair, search->upper, end) && dem2di_dot(end[0], end[1]) > -0.9;
     if (cone) {
         bool inside = dem2di_inside(u, end[0], end[1]);
@@ -6188,15 +6309,23 @@ static void dem2di_branch(dem2di_pair *pair, double tolerance, double angle, int
         dem2di_polytope_close(pair, &polytope);
     }
     dem2di_epa(pair, &polytope, tolerance, cap, search);
-    dem2di_sight sight;
+    dem2di_polytope_foot(&polytope, tolerance, search);
+    if (search->state == DEM2D_UNRESOLVED) return;
     dem2di_search last = *search;
-    bool polygons = pair->a->type == DEM2D_POLYGON && pair->b->type == DEM2D_POLYGON;
-    if (search->state == DEM2D_UNRESOLVED || polygons ||
-        !dem2di_descend(pair, search->normal, angle, cap, false, &sight, &last) ||
-        sight.h > search->upper + tolerance)
-        return;
-    dem2di_settle(&sight, &last);
-    last.lower = dem2di_min(last.upper, search->lower);
+    if (dem2di_has_core(pair->a) && dem2di_has_core(pair->b)) {
+        (void)dem2di_edges_solve(pair, search->normal, true, &last);
+        if (last.upper > search->upper + tolerance) return;
+    } else {
+        dem2di_sight sight;
+        if (!dem2di_descend(pair, search->normal, angle, cap, false, &sight, &last) ||
+            sight.h > search->upper + tolerance)
+            return;
+        dem2di_settle(pair, &sight, &last);
+        /* what Newton's last step takes away was not attained: as unsure as what is below */
+        last.upper = dem2di_max(last.upper, search->lower);
+        last.lower = dem2di_min(search->lower, 2 * last.upper - sight.h);
+    }
+    last.proof = DEM2D_BY_POLYTOPE;
     last.state = dem2di_judge(pair, &last);
     *search = last;
 }
@@ -6209,33 +6338,28 @@ static void dem2di_branch(dem2di_pair *pair, double tolerance, double angle, int
 static void dem2di_certified(dem2di_pair *pair, dem2d_vec start, double tolerance, int cap,
                              bool detect, dem2di_search *search) {
     /* Newton's last step leaves about the square of its angle in the normal: a hundredth of the
-       tolerance. 40 of them are more than halving the cone down to rounding needs. */
-    double absolute = dem2di_max(tolerance, DEM2DI_ROUNDING) * pair->size;
-    double angle = 0.1 * sqrt(dem2di_max(tolerance, DEM2DI_ROUNDING));
-    int steps = cap < 64 ? cap : 64;
-    bool round_a = pair->a->type == DEM2D_CIRCLE || pair->a->type == DEM2D_POLYGON;
-    bool round_b = pair->b->type == DEM2D_CIRCLE || pair->b->type == DEM2D_POLYGON;
-    dem2d_vec u = dem2di_first_direction(pair, start);
+       tolerance. 64 looks are more than halving the cone down to rounding needs. */
+    double relative = dem2di_max(tolerance, DEM2DI_ROUNDING);
+    double absolute = relative * pair->size, angle = 0.1 * sqrt(relative);
+    if (pair->a->type == DEM2D_CUSTOM || pair->b->type == DEM2D_CUSTOM) angle *= 0.01;
     search->iterations = 0;
     search->upper = HUGE_VAL;
-    search->normal = u;
+    search->normal = start;
     search->corner[0] = search->corner[1] = -1;
-    if (round_a && round_b) {
-        if (!dem2di_edges_solve(pair, u, DEM2DI_MANY_EDGES, search)) {
-            search->upper = HUGE_VAL;
-            (void)dem2di_look(pair, search, u);
-            dem2di_branch(pair, absolute, angle, cap, search);
+    if (dem2di_has_core(pair->a) && dem2di_has_core(pair->b)) {
+        if (dem2di_edges_solve(pair, start, false, search)) {
+            search->state = dem2di_judge(pair, search);
             return;
         }
-        search->state = dem2di_judge(pair, search);
+        search->normal = start;
+        dem2di_branch(pair, absolute, angle, cap, search);
         return;
     }
     /* a start that does not settle at once was none: then from the line of centres */
-    dem2d_vec centres = dem2di_first_direction(pair, dem2di_vec(0, 0));
-    bool warm = u.x != centres.x || u.y != centres.y;
-    for (int i = warm ? 0 : 1; i < 2; i++) {
+    for (int i = 0; i < 2; i++) {
         dem2di_sight sight;
-        bool rest = dem2di_descend(pair, i == 0 ? u : centres, angle, i == 0 ? DEM2DI_WARM : steps,
+        int looks = i == 0 ? DEM2DI_WARM : cap < 64 ? cap : 64;
+        bool rest = dem2di_descend(pair, i == 0 ? start : dem2di_centres(pair), angle, looks,
                                    detect, &sight, search);
         if (detect && search->upper < -DEM2DI_ROUNDING * pair->size) {
             search->lower = -HUGE_VAL;
@@ -6244,7 +6368,7 @@ static void dem2di_certified(dem2di_pair *pair, dem2d_vec start, double toleranc
             return;
         }
         if (!rest) continue;
-        dem2di_settle(&sight, search);
+        dem2di_settle(pair, &sight, search);
         search->state = dem2di_judge(pair, search);
         if (dem2di_certify(pair, &sight, absolute, search)) return;
     }
@@ -6358,6 +6482,10 @@ static bool dem2di_face_points(const dem2di_slope *a, const dem2di_slope *b, dou
     }
     double common = dem2di_min(1, (x[1] - x[0]) / depth);
     int deeper = points[1].depth > points[0].depth;
+    /* the deeper one is as deep as the contact, but for the normal's error times the face */
+    double lift = depth - points[deeper].depth;
+    points[0].depth += lift;
+    points[1].depth += lift;
     points[deeper].weight = 1 - weight * (1 - common) / 2;
     points[1 - deeper].weight = weight * (1 + common) / 2;
     return true;
@@ -6430,11 +6558,12 @@ static void dem2di_contact_solve(dem2di_pair *pair, dem2d_solver solver, dem2d_v
         dem2di_certified(pair, start, tolerance, cap, detect, search);
 }
 
-/* A circle in closed form: centres apart by d. Concentric circles get the normal (1, 0). */
-static double dem2di_circle_contact(dem2d_vec d, double radii, dem2d_vec *normal) {
-    *normal = dem2di_vec(1, 0);
-    (void)dem2di_unit(d, normal);
-    return radii - dem2di_length(d);
+/* Two circles in closed form: centres apart by d. Concentric circles get the normal (1, 0). */
+static double dem2di_circle_contact(dem2d_vec d, double distance, double radii, dem2d_vec *normal) {
+    bool apart = distance > 0;
+    normal->x = apart ? d.x / distance : 1;
+    normal->y = apart ? d.y / distance : 0;
+    return radii - distance;
 }
 
 static void dem2di_contact_report(const dem2di_pair *pair, const dem2di_search *search,
@@ -6498,9 +6627,16 @@ DEM2D_API dem2d_result dem2d_shape_contains(const dem2d_shape *shape, dem2d_pose
     dem2di_pair pair = dem2di_pair_make(shape, &pose, &dot, &there);
     if (!dem2di_pair_sound(&pair)) return DEM2D_OUT_OF_RANGE;
     dem2di_search search;
-    dem2di_gjk(&pair, dem2di_vec(0, 0), 0, 128, true, &search);
+    dem2di_gjk(&pair, dem2di_centres(&pair), 0, 128, true, &search);
     *inside = search.state != DEM2D_SEPARATED;
     return DEM2D_OK;
+}
+
+/* The first direction of a query: the caller's, else the line of centres. */
+static dem2d_vec dem2di_start(const dem2di_pair *pair, dem2d_vec start) {
+    dem2d_vec u;
+    if (dem2di_is_unit(start.x, start.y)) return start;
+    return dem2di_unit(start, &u) ? u : dem2di_centres(pair);
 }
 
 /* GJK alone: up to the sign (`detect`) or to the distance. */
@@ -6513,7 +6649,8 @@ static dem2d_result dem2di_query_gjk(const dem2d_shape *a, dem2d_pose pose_a, co
     dem2di_pair pair = dem2di_pair_make(a, &pose_a, b, &pose_b);
     if (!dem2di_pair_sound(&pair)) return DEM2D_OUT_OF_RANGE;
     dem2di_search search;
-    dem2di_gjk(&pair, used.start, used.tolerance * pair.size, used.max_iterations, detect, &search);
+    dem2di_gjk(&pair, dem2di_start(&pair, used.start), used.tolerance * pair.size,
+               used.max_iterations, detect, &search);
     if (search.state == DEM2D_PENETRATING && search.upper <= DEM2DI_ROUNDING * pair.size)
         search.state = DEM2D_TOUCHING;
     dem2di_contact_report(&pair, &search, &pose_a, &pose_b, contact);
@@ -6544,14 +6681,15 @@ DEM2D_API dem2d_result dem2d_pair_contact(const dem2d_shape *a, dem2d_pose pose_
     if (a->type == DEM2D_CIRCLE && b->type == DEM2D_CIRCLE && used.solver == DEM2D_CERTIFIED) {
         double ra = a->a * pair.scale_a, rb = b->a * pair.scale_b;
         search.iterations = 0;
-        search.upper = search.lower = dem2di_circle_contact(pair.d, ra + rb, &search.normal);
+        search.upper = search.lower =
+            dem2di_circle_contact(pair.d, pair.distance, ra + rb, &search.normal);
         search.a = dem2di_scale(search.normal, ra);
         search.b = dem2di_scale(search.normal, -rb);
         search.proof = DEM2D_BY_FORM;
         search.state = dem2di_judge(&pair, &search);
     } else {
-        dem2di_contact_solve(&pair, used.solver, used.start, used.tolerance, used.max_iterations,
-                             false, &search);
+        dem2di_contact_solve(&pair, used.solver, dem2di_start(&pair, used.start), used.tolerance,
+                             used.max_iterations, false, &search);
     }
     dem2di_contact_report(&pair, &search, &pose_a, &pose_b, contact);
     return DEM2D_OK;
@@ -7901,7 +8039,7 @@ static int dem2di_pair_geometry(const dem2d_world *world, int a, int b, const de
     }
     count->looks++;
     if (body_a->shape->type == DEM2D_CIRCLE && body_b->shape->type == DEM2D_CIRCLE) {
-        link->depth = dem2di_circle_contact(d, reach, &link->normal);
+        link->depth = dem2di_circle_contact(d, distance, reach, &link->normal);
         points[0].position = dem2di_scale(link->normal, body_a->radius - link->depth / 2);
         count->proofs[DEM2D_BY_FORM]++;
         return 1;
@@ -7919,8 +8057,8 @@ static int dem2di_pair_geometry(const dem2d_world *world, int a, int b, const de
     pair.size = reach + distance;
     pair.calls = 0;
     bool warm = last->normal.x != 0 || last->normal.y != 0;
-    dem2di_contact_solve(&pair, world->solver, warm ? last->normal : d, world->tolerance,
-                         world->max_iterations, true, &search);
+    dem2di_contact_solve(&pair, world->solver, warm ? last->normal : dem2di_centres(&pair),
+                         world->tolerance, world->max_iterations, true, &search);
     count->calls += pair.calls;
     link->normal = search.normal;
     if (!(search.upper > 0)) {
