@@ -219,6 +219,7 @@ OPTIONS (zero means: physical zero for physical fields; "library default" where 
     dem2d_contact_desc      max_iterations        -      128        >= 0
     dem2d_contact_desc      start                 -      centres    any direction
     dem2d_contact_desc      solver                -      CERTIFIED
+    dem2d_contact_desc      skip_points           -      false
     dem2d_world_desc        time_step             s      none       > 0
     dem2d_world_desc        gravity               m/s2   0          finite
     dem2d_world_desc        local_damping         -      0          [0, 1)
@@ -747,6 +748,7 @@ typedef struct dem2d_contact_desc {
     int max_iterations;  ///< of each search; 0 for 128; a polytope takes 250 at most
     dem2d_vec start;     ///< first direction, the last normal for instance; 0 for line of centres
     dem2d_solver solver; ///< certified, or GJK and EPA
+    bool skip_points;    ///< leave out the contact points: count 0, faster
 } dem2d_contact_desc;
 
 /// One of the points that carry a contact.
@@ -1239,11 +1241,6 @@ static bool dem2di_unit(dem2d_vec v, dem2d_vec *unit) {
     double length = dem2di_length(v);
     *unit = dem2di_vec(v.x / length, v.y / length);
     return true;
-}
-
-/* The same for vectors whose square is a normal number, as of sizes that were checked: faster. */
-static dem2d_vec dem2di_normalised(dem2d_vec v) {
-    return dem2di_scale(v, 1 / dem2di_length(v));
 }
 
 static dem2d_vec dem2di_turn(dem2d_rot q, dem2d_vec v) {
@@ -1776,11 +1773,13 @@ static void dem2di_shape_layout(dem2d_shape *shape) {
     shape->bytes = (size_t)(next - (char *)shape);
 }
 
-/* The octant-wise angle y/(|x| + |y|), unwrapped to [0, 4): monotone, without trigonometry. */
-static double dem2di_pseudo_angle(dem2d_vec u) {
-    double f = u.y / (fabs(u.x) + fabs(u.y));
-    if (u.x < 0) return 2 - f;
-    return f < 0 ? 4 + f : f;
+/* The angle y/(|x| + |y|) of a quadrant, unwrapped to [0, 4): monotone, without trigonometry, and
+   without branches, as the quadrant can't be predicted. */
+static inline double dem2di_pseudo_angle(dem2d_vec u) {
+    double f = u.y / (fabs(u.x) + fabs(u.y)), value[2];
+    value[0] = f + 4 * (f < 0);
+    value[1] = 2 - f;
+    return value[u.x < 0];
 }
 
 /* The sector of floors that holds a direction. */
@@ -1810,7 +1809,7 @@ static double dem2di_floor_between(const dem2d_shape *shape, dem2d_vec from, dem
 
 /* The corner (polygon) or arc (Bezier) that holds the support point: go on while the next end
    still gains in the direction. */
-static int dem2di_sector_find(const dem2d_shape *shape, dem2d_vec u) {
+static inline int dem2di_sector_find(const dem2d_shape *shape, dem2d_vec u) {
     int k = 0;
     if (shape->sectors > 0) {
         int place = (int)(dem2di_pseudo_angle(u) * (shape->sectors / 4));
@@ -1821,7 +1820,7 @@ static int dem2di_sector_find(const dem2d_shape *shape, dem2d_vec u) {
 }
 
 /* The corner of a polygon farthest along a direction. */
-static int dem2di_polygon_corner(const dem2d_shape *shape, dem2d_vec u) {
+static inline int dem2di_polygon_corner(const dem2d_shape *shape, dem2d_vec u) {
     if (shape->sectors > 0) return dem2di_sector_find(shape, u);
     int best = 0;
     double value = dem2di_dot(shape->corners[0], u);
@@ -1871,15 +1870,19 @@ static double dem2di_arc_parameter(double q0, double q1, double q2) {
     return bottom > 0 ? top / bottom : 0;
 }
 
-/* With B'/3 along the tangent and B''/6 against u, rho = |B'|^2 / (-B''.u) = 9/6 of their own. */
+/* With B'/3 along the tangent and B''/6 against u, rho = |B'|^2 / (-B''.u) = 9/6 of their own; at
+   the root the latter is the square root of [P]'s formula. */
 static dem2d_vec dem2di_bezier_support(const dem2d_shape *shape, dem2d_vec u, double *rho) {
     const dem2di_arc *arc = &shape->arcs[dem2di_sector_find(shape, u)];
     double q0 = dem2di_dot(arc->d0, u), q1 = dem2di_dot(arc->d1, u), q2 = dem2di_dot(arc->d2, u);
     double t = dem2di_arc_parameter(q0, q1, q2);
     if (rho != NULL) {
-        double speed = dem2di_cross(u, dem2di_arc_speed(arc, t));
-        double bend = (q0 - q1) * (1 - t) + (q1 - q2) * t;
-        *rho = speed <= 0 ? 0 : bend > 0 ? 1.5 * speed * (speed / bend) : HUGE_VAL;
+        bool inside = q0 >= 0 && q2 <= 0;
+        double bend = inside ? sqrt(q1 * q1 - q0 * q2) : (q0 - q1) * (1 - t) + (q1 - q2) * t;
+        double f = 1.5 / bend, s = 1 - t; /* beside the division for t, not after it */
+        double speed = dem2di_cross(u, arc->d0) * (s * s) + dem2di_cross(u, arc->d1) * (2 * t * s) +
+                       dem2di_cross(u, arc->d2) * (t * t);
+        *rho = speed <= 0 ? 0 : bend > 0 ? speed * speed * f : HUGE_VAL;
     }
     return dem2di_arc_point(arc, t);
 }
@@ -1917,7 +1920,7 @@ static dem2d_vec dem2di_fourier_support(const dem2d_shape *shape, dem2d_vec u, d
     return dem2di_vec(value * u.x - slope * u.y, value * u.y + slope * u.x);
 }
 
-static dem2d_vec dem2di_ellipse_support(const dem2d_shape *shape, dem2d_vec u, double *rho) {
+static inline dem2d_vec dem2di_ellipse_support(const dem2d_shape *shape, dem2d_vec u, double *rho) {
     dem2d_vec s = dem2di_vec(shape->a * u.x, shape->b * u.y);
     double f = 1 / sqrt(s.x * u.x + s.y * u.y);
     if (rho != NULL) *rho = shape->a * f * (shape->b * f) * f;
@@ -1935,7 +1938,7 @@ static bool dem2di_arc_straight(const dem2d_shape *shape, const dem2di_arc *arc)
 
 /* Support point of a template in a unit direction; rho, if asked for, is the radius of curvature
    there. */
-static dem2d_vec dem2di_support(const dem2d_shape *shape, dem2d_vec u, double *rho) {
+static inline dem2d_vec dem2di_support(const dem2d_shape *shape, dem2d_vec u, double *rho) {
     dem2d_vec s;
     switch (shape->type) {
     case DEM2D_CIRCLE:
@@ -2244,7 +2247,7 @@ static dem2d_vec dem2di_sector_start(int sector, int sectors) {
 }
 
 /* From the floor of each sector to that of each and the next. */
-static void dem2di_join_floors(dem2d_shape *shape) {
+static inline void dem2di_join_floors(dem2d_shape *shape) {
     double first = shape->floors[0];
     for (int k = 0; k < DEM2DI_FLOORS; k++)
         shape->floors[k] =
@@ -2307,10 +2310,11 @@ static void dem2di_fill_sectors(dem2d_shape *shape) {
     }
 }
 
-/* The table has one to two entries for each corner, at least four: a power of two. */
+/* The table has four to eight entries for each corner or arc, so that most look-ups need no step
+   and are predicted well: a power of two. */
 static int dem2di_sector_count(int count) {
-    int sectors = 4;
-    while (sectors < count && sectors < (1 << 28)) sectors *= 2;
+    int sectors = 16;
+    while (sectors / 4 < count && sectors < (1 << 28)) sectors *= 2;
     return sectors;
 }
 
@@ -2594,8 +2598,7 @@ DEM2D_API dem2d_result dem2d_shape_create_bezier(const dem2d_env *env, const dem
     area = dem2di_twice_area(control, 3 * arcs);
     if (fabs(area) <= 8 * DBL_EPSILON * size * extent)
         return dem2di_fail(env, DEM2D_ZERO_AREA, -1, "control polygon's area %g", area / 2);
-    dem2d_shape *made =
-        dem2di_shape_allocate(env, DEM2D_BEZIER, arcs, dem2di_sector_count(2 * arcs));
+    dem2d_shape *made = dem2di_shape_allocate(env, DEM2D_BEZIER, arcs, dem2di_sector_count(arcs));
     if (made == NULL) return DEM2D_OUT_OF_MEMORY;
     dem2di_arcs_from_control(control, arcs, area < 0, made->arcs);
     result = dem2di_check_arcs(env, made->arcs, arcs, area < 0, size);
@@ -4027,7 +4030,8 @@ static int dem2di_place_of(const dem2di_outline *outline, dem2d_vec point) {
 }
 
 /* Support joints in uniform directions; where the direction is an edge's normal, the middle. */
-static void dem2di_joints_make(const dem2di_outline *outline, int arcs, dem2di_joint *joints) {
+static inline void dem2di_joints_make(const dem2di_outline *outline, int arcs,
+                                      dem2di_joint *joints) {
     int n = outline->hull_count, k = dem2di_hull_start(outline);
     for (int i = 0; i < arcs; i++) {
         dem2di_joint *joint = &joints[i];
@@ -5326,7 +5330,8 @@ static dem2di_pair dem2di_pair_make(const dem2d_shape *a, const dem2d_pose *pose
 
 /* The vertex of A minus B minus d that two support points make. Through a pointer: a returned
    struct would be copied in pieces wider than those it was written in, which stalls. */
-static void dem2di_join(const dem2di_pair *pair, dem2d_vec a, dem2d_vec b, dem2di_vertex *v) {
+static inline void dem2di_join(const dem2di_pair *pair, dem2d_vec a, dem2d_vec b,
+                               dem2di_vertex *v) {
     v->a = a;
     v->b = b;
     v->w.x = (a.x - b.x) - pair->d.x;
@@ -5334,7 +5339,8 @@ static void dem2di_join(const dem2di_pair *pair, dem2d_vec a, dem2d_vec b, dem2d
 }
 
 /* Support point of A minus B minus d; rho, if asked for, gets the radii of curvature of A and B. */
-static void dem2di_minkowski(dem2di_pair *pair, dem2d_vec u, double rho[2], dem2di_vertex *v) {
+static inline void dem2di_minkowski(dem2di_pair *pair, dem2d_vec u, double rho[2],
+                                    dem2di_vertex *v) {
     double *rho_a = rho, *rho_b = rho != NULL ? rho + 1 : NULL;
     dem2d_vec a = dem2di_support(pair->a, dem2di_turn_back(pair->ra, u), rho_a);
     dem2d_vec b = dem2di_support(pair->b, dem2di_turn_back(pair->rb, dem2di_negate(u)), rho_b);
@@ -5685,6 +5691,10 @@ static bool dem2di_cone(const dem2di_pair *pair, double h, dem2d_vec end[2]) {
     return dem2di_vec_finite(end[0]) && dem2di_vec_finite(end[1]);
 }
 
+/* A start this near (sine) to the normal of an edge is taken there: contacts rest on edges, and
+   the edge turns with its polygon. */
+#define DEM2DI_SNAP 0.01
+
 /* Polygons and circles are a sharp polygon or a point, grown by a radius. */
 static bool dem2di_has_core(const dem2d_shape *shape) {
     return shape->type == DEM2D_CIRCLE || shape->type == DEM2D_POLYGON;
@@ -5721,9 +5731,11 @@ typedef struct dem2di_walk {
     dem2d_vec p[2], t[2], w;
 } dem2di_walk;
 
-/* An edge of A minus B: the one of core `own` that leaves (side +1) or comes to (-1) corners k. */
+/* An edge of A minus B passed on a walk: the one of core `own` that leaves (side +1) or comes to
+   (-1) corners k, which are at p; its other end is at `to`. */
 typedef struct dem2di_beside {
     int k[2], own, side;
+    dem2d_vec p[2], to;
     dem2d_vec tangent;
     double h; /* support value at its normal */
 } dem2di_beside;
@@ -5733,14 +5745,14 @@ static int dem2di_core_beside(const dem2di_core *core, int k, int side) {
     return k == core->count ? 0 : k < 0 ? core->count - 1 : k;
 }
 
-static void dem2di_core_corner(const dem2di_core *core, int k, dem2d_vec *p) {
+static inline void dem2di_core_corner(const dem2di_core *core, int k, dem2d_vec *p) {
     dem2d_vec v = dem2di_turn(core->q, core->corners[k]);
     p->x = v.x * core->scale;
     p->y = v.y * core->scale;
 }
 
 /* The tangent of the edge beside corner k. */
-static void dem2di_core_tangent(const dem2di_core *core, int k, int side, dem2d_vec *t) {
+static inline void dem2di_core_tangent(const dem2di_core *core, int k, int side, dem2d_vec *t) {
     if (core->count == 1) {
         t->x = t->y = 0;
         return;
@@ -5762,27 +5774,27 @@ static void dem2di_walk_set(const dem2di_pair *pair, const dem2di_core core[2], 
     walk->w.y = (walk->p[0].y + walk->p[1].y) - pair->d.y;
 }
 
-/* The edge that comes next to a side. */
-static void dem2di_walk_edge(const dem2di_core core[2], const dem2di_walk *walk, int side,
-                             dem2di_beside *edge) {
-    bool first = core[1].count == 1 ||
-                 (core[0].count > 1 && side * dem2di_cross(walk->t[0], walk->t[1]) > 0);
-    edge->own = !first;
+/* The edge that comes next to a side, and along it to its other end. */
+static inline void dem2di_walk_on(const dem2di_pair *pair, const dem2di_core core[2], int side,
+                                  dem2di_walk *walk, dem2di_beside *edge) {
+    /* no short circuits: which comes first can't be predicted */
+    int first = side * dem2di_cross(walk->t[0], walk->t[1]) > 0;
+    int i = 1 - ((first & (core[0].count > 1)) | (core[1].count == 1));
+    edge->own = i;
     edge->side = side;
-    edge->k[0] = walk->k[0];
-    edge->k[1] = walk->k[1];
-    edge->tangent.x = walk->t[edge->own].x;
-    edge->tangent.y = walk->t[edge->own].y;
+    edge->tangent.x = walk->t[i].x;
+    edge->tangent.y = walk->t[i].y;
     edge->h = walk->w.x * edge->tangent.y - walk->w.y * edge->tangent.x;
-}
-
-/* Along that edge to its other end. */
-static void dem2di_walk_pass(const dem2di_pair *pair, const dem2di_core core[2],
-                             const dem2di_beside *edge, dem2di_walk *walk) {
-    int i = edge->own;
-    walk->k[i] = dem2di_core_beside(&core[i], walk->k[i], edge->side);
+    for (int j = 0; j < 2; j++) {
+        edge->k[j] = walk->k[j];
+        edge->p[j].x = walk->p[j].x;
+        edge->p[j].y = walk->p[j].y;
+    }
+    walk->k[i] = dem2di_core_beside(&core[i], walk->k[i], side);
     dem2di_core_corner(&core[i], walk->k[i], &walk->p[i]);
-    dem2di_core_tangent(&core[i], walk->k[i], edge->side, &walk->t[i]);
+    dem2di_core_tangent(&core[i], walk->k[i], side, &walk->t[i]);
+    edge->to.x = walk->p[i].x;
+    edge->to.y = walk->p[i].y;
     walk->w.x = (walk->p[0].x + walk->p[1].x) - pair->d.x;
     walk->w.y = (walk->p[0].y + walk->p[1].y) - pair->d.y;
 }
@@ -5800,41 +5812,38 @@ static void dem2di_core_report(const dem2di_core core[2], dem2d_vec p, dem2d_vec
     search->b = dem2di_negate(dem2di_along(q, core[1].radius, normal));
 }
 
-/* The foot of the origin on an edge, as a part of it from its first end; both ends of the edge. */
-static double dem2di_edge_foot(const dem2di_pair *pair, const dem2di_core core[2],
-                               const dem2di_beside *edge, dem2di_walk *from, dem2di_walk *to) {
-    dem2di_walk_set(pair, core, edge->k[0], edge->k[1], edge->side, from);
-    *to = *from;
-    dem2di_walk_pass(pair, core, edge, to);
-    dem2d_vec along = dem2di_sub(to->w, from->w);
-    return -dem2di_dot(from->w, along) / dem2di_dot(along, along);
+/* The foot of the origin on an edge, as a part of it from its first end. */
+static double dem2di_edge_foot(const dem2di_pair *pair, const dem2di_beside *edge) {
+    dem2d_vec w = dem2di_sub(dem2di_add(edge->p[0], edge->p[1]), pair->d);
+    dem2d_vec along = dem2di_sub(edge->to, edge->p[edge->own]);
+    return -dem2di_dot(w, along) / dem2di_dot(along, along);
 }
 
 /* The same at the foot of the origin on an edge. Where an edge of A and one of B are parallel they
    follow each other, and the foot may be on the other. */
 static void dem2di_edge_report(const dem2di_pair *pair, const dem2di_core core[2],
                                const dem2di_beside *edge, dem2di_search *search) {
-    dem2di_walk from, to;
     dem2di_beside next;
-    double t = dem2di_edge_foot(pair, core, edge, &from, &to);
+    double t = dem2di_edge_foot(pair, edge);
     if (t < 0 || t > 1) {
-        int side = t > 1 ? edge->side : -edge->side;
-        const dem2di_walk *end = t > 1 ? &to : &from;
+        int side = edge->side, k[2] = {edge->k[0], edge->k[1]};
+        if (t > 1) k[edge->own] = dem2di_core_beside(&core[edge->own], k[edge->own], side);
+        if (t < 0) side = -side;
         dem2di_walk beyond;
-        dem2di_walk_set(pair, core, end->k[0], end->k[1], side, &beyond);
-        dem2di_walk_edge(core, &beyond, side, &next);
+        dem2di_walk_set(pair, core, k[0], k[1], side, &beyond);
+        dem2di_walk_on(pair, core, side, &beyond, &next);
         if (fabs(next.h - edge->h) <= DEM2DI_ROUNDING * pair->size &&
             dem2di_dot(next.tangent, edge->tangent) > 0) {
             edge = &next;
-            t = dem2di_edge_foot(pair, core, edge, &from, &to);
+            t = dem2di_edge_foot(pair, edge);
         }
     }
     t = dem2di_max(0, dem2di_min(1, t));
-    for (int i = 0; i < 2; i++)
-        from.p[i] = dem2di_along(from.p[i], t, dem2di_sub(to.p[i], from.p[i]));
+    dem2d_vec p[2] = {{edge->p[0].x, edge->p[0].y}, {edge->p[1].x, edge->p[1].y}};
+    p[edge->own] = dem2di_along(p[edge->own], t, dem2di_sub(edge->to, p[edge->own]));
     search->corner[0] = edge->k[0];
     search->corner[1] = edge->k[1];
-    dem2di_core_report(core, from.p[0], from.p[1], dem2di_right(edge->tangent), edge->h, search);
+    dem2di_core_report(core, p[0], p[1], dem2di_right(edge->tangent), edge->h, search);
 }
 
 /* Cores apart: from a corner that a separating direction u leads to, down to the point of A minus
@@ -5848,10 +5857,11 @@ static void dem2di_cores_apart(const dem2di_pair *pair, const dem2di_core core[2
         dem2di_walk_set(pair, core, ka, kb, side, &walk);
         for (;;) {
             dem2di_beside edge;
-            dem2di_walk_edge(core, &walk, side, &edge);
+            dem2di_walk next = walk;
+            dem2di_walk_on(pair, core, side, &next, &edge);
             /* an edge seen from behind, or one that leads away */
             if (edge.h > rounding || !(side * dem2di_dot(walk.w, edge.tangent) < 0)) break;
-            dem2di_walk_pass(pair, core, &edge, &walk);
+            walk = next;
             moved = true;
             if (side * dem2di_dot(walk.w, edge.tangent) < 0) continue;
             dem2di_edge_report(pair, core, &edge, search);
@@ -5866,12 +5876,70 @@ static void dem2di_cores_apart(const dem2di_pair *pair, const dem2di_core core[2
     dem2di_core_report(core, walk.p[0], walk.p[1], u, dem2di_dot(walk.w, u), search);
 }
 
-/* Are all directions from the normal n of the edge last passed to v, the end of the cone on this
-   side, worse than the least overlap met? There h is at least the support value of the corner w
-   that was reached, and that is at least `least` at both ends. */
-static bool dem2di_walk_outweighs(dem2d_vec w, dem2d_vec n, int side, dem2d_vec v, double least) {
-    if (side * dem2di_cross(n, v) > 0) return dem2di_dot(w, v) >= least;
+/* Are all directions from the normal n of the edge last passed to v (of a length), the end of the
+   cone on this side, worse than the least overlap met? There h is at least the support value of
+   the corner w that was reached, and that is at least `least` at both ends. */
+static bool dem2di_walk_outweighs(dem2d_vec w, dem2d_vec n, int side, dem2d_vec v, double length,
+                                  double least) {
+    if (side * dem2di_cross(n, v) > 0) return dem2di_dot(w, v) >= least * length;
     return dem2di_dot(n, v) > 0; /* past the end */
+}
+
+/* The same on both sides, with the corners beside a minimum, for a cone of a right angle to each
+   side of d, which holds the true one where the depth is below the inscribed radii: most faces
+   need no more. */
+static bool dem2di_ends_outweigh(const dem2di_pair *pair, const dem2d_vec w[2],
+                                 const dem2d_vec n[2], double least, double depth) {
+    double inner = pair->a->inscribed * pair->scale_a + pair->b->inscribed * pair->scale_b;
+    dem2d_vec across = dem2di_perp(pair->d);
+    return depth <= inner && dem2di_walk_outweighs(w[1], n[1], 1, across, pair->distance, least) &&
+           dem2di_walk_outweighs(w[0], n[0], -1, dem2di_negate(across), pair->distance, least);
+}
+
+/* The edge whose normal is nearest to u, of the four beside the corners k; its sine to u. */
+static double dem2di_edge_near(const dem2di_core core[2], const int k[2], dem2d_vec u,
+                               dem2di_beside *edge) {
+    double least = HUGE_VAL;
+    for (int i = 0; i < 2; i++) {
+        if (core[i].count == 1) continue;
+        dem2d_vec v = dem2di_turn_back(core[i].q, dem2di_scale(u, core[i].sign));
+        int before = dem2di_core_beside(&core[i], k[i], -1);
+        double ahead = fabs(dem2di_dot(core[i].tangents[k[i]], v));
+        double back = fabs(dem2di_dot(core[i].tangents[before], v));
+        double sine = dem2di_min(ahead, back);
+        bool nearer = sine < least;
+        least = nearer ? sine : least;
+        edge->own = nearer ? i : edge->own;
+        edge->side = nearer ? (ahead < back ? 1 : -1) : edge->side;
+    }
+    return least;
+}
+
+/* A start near an edge's normal, as contacts of faces have it: that edge is the answer when the
+   origin's foot is on it and its ends outweigh the rest. */
+static bool dem2di_edge_warm(const dem2di_pair *pair, const dem2di_core core[2], const int k[2],
+                             dem2d_vec u, dem2di_search *search) {
+    dem2di_beside edge;
+    dem2d_vec w[2], n[2];
+    edge.own = edge.side = 0;
+    if (dem2di_edge_near(core, k, u, &edge) > DEM2DI_SNAP) return false;
+    int i = edge.own, low = edge.side > 0 ? 0 : 1;
+    for (int j = 0; j < 2; j++) {
+        edge.k[j] = k[j];
+        dem2di_core_corner(&core[j], k[j], &edge.p[j]);
+    }
+    dem2di_core_corner(&core[i], dem2di_core_beside(&core[i], k[i], edge.side), &edge.to);
+    dem2di_core_tangent(&core[i], k[i], edge.side, &edge.tangent);
+    w[low] = dem2di_sub(dem2di_add(edge.p[0], edge.p[1]), pair->d);
+    w[1 - low] = dem2di_add(w[low], dem2di_sub(edge.to, edge.p[i]));
+    n[0] = n[1] = dem2di_right(edge.tangent);
+    edge.h = dem2di_dot(w[low], n[0]);
+    if (!(edge.h >= 0 && dem2di_dot(w[0], edge.tangent) <= 0 &&
+          dem2di_dot(w[1], edge.tangent) >= 0 &&
+          dem2di_ends_outweigh(pair, w, n, edge.h, edge.h + (core[0].radius + core[1].radius))))
+        return false;
+    dem2di_edge_report(pair, core, &edge, search);
+    return true;
 }
 
 /* Edges passed to each side before branch and bound is cheaper, measured: 24 take as long as the
@@ -5885,7 +5953,8 @@ static bool dem2di_walk_outweighs(dem2d_vec w, dem2d_vec n, int side, dem2d_vec 
 static bool dem2di_edges_solve(dem2di_pair *pair, dem2d_vec u, bool beside, dem2di_search *search) {
     dem2di_core core[2];
     dem2di_walk walk[2];
-    dem2di_beside edge, best;
+    dem2di_beside edge[2]; /* the best, and the last */
+    int best = 0;
     dem2d_vec end[2], n[2];
     bool cone = false;
     /* from behind both sides would seem to be past the cone */
@@ -5900,35 +5969,40 @@ static bool dem2di_edges_solve(dem2di_pair *pair, dem2d_vec u, bool beside, dem2
     }
     pair->calls++;
     search->proof = DEM2D_BY_FORM;
+    if (!beside && dem2di_edge_warm(pair, core, k, u, search)) return true;
     for (int i = 0; i < 2; i++) dem2di_walk_set(pair, core, k[0], k[1], i > 0 ? 1 : -1, &walk[i]);
     if (dem2di_dot(walk[0].w, u) < 0) {
         dem2di_cores_apart(pair, core, k[0], k[1], u, search);
         return true;
     }
-    best.h = HUGE_VAL;
+    edge[0].h = HUGE_VAL;
     int all = core[0].count + core[1].count;
     for (int i = 0; i <= DEM2DI_MANY_EDGES; i++) {
         bool open = false;
         for (int side = 0; side < 2; side++) {
             dem2di_walk *here = &walk[side];
             int turn = side > 0 ? 1 : -1;
-            if (cone && dem2di_walk_outweighs(here->w, n[side], turn, end[side], best.h)) continue;
+            if (cone && dem2di_walk_outweighs(here->w, n[side], turn, end[side], 1, edge[best].h))
+                continue;
             open = true;
-            dem2di_walk_edge(core, here, turn, &edge);
-            n[side] = dem2di_right(edge.tangent);
-            dem2di_walk_pass(pair, core, &edge, here);
-            if (!(edge.h < best.h)) continue;
-            best = edge;
-            if (!(edge.h < 0)) continue;
+            dem2di_beside *last = &edge[1 - best];
+            dem2di_walk_on(pair, core, turn, here, last);
+            n[side].x = last->tangent.y;
+            n[side].y = -last->tangent.x;
+            best = last->h < edge[best].h ? 1 - best : best;
+            if (!(last->h < 0)) continue;
             dem2di_cores_apart(pair, core, here->k[0], here->k[1], n[side], search);
             return true;
         }
-        if (!open || i == all || beside) {
-            dem2di_edge_report(pair, core, &best, search);
+        double depth = edge[best].h + (core[0].radius + core[1].radius);
+        dem2d_vec w[2] = {{walk[0].w.x, walk[0].w.y}, {walk[1].w.x, walk[1].w.y}};
+        if (!open || i == all || beside ||
+            (i == 0 && dem2di_ends_outweigh(pair, w, n, edge[best].h, depth))) {
+            dem2di_edge_report(pair, core, &edge[best], search);
             return true;
         }
         search->iterations++;
-        if (i == 0) cone = dem2di_cone(pair, best.h + (core[0].radius + core[1].radius), end);
+        if (i == 0) cone = dem2di_cone(pair, depth, end);
     }
     return false;
 }
@@ -5949,7 +6023,7 @@ typedef struct dem2di_sight {
     int corner[2];      /* of the polygon, if the pair has one, for v[0] and v[1] */
 } dem2di_sight;
 
-static void dem2di_see(dem2di_pair *pair, dem2d_vec u, dem2di_sight *sight) {
+static inline void dem2di_see(dem2di_pair *pair, dem2d_vec u, dem2di_sight *sight) {
     dem2di_vertex *v = &sight->v[0];
     dem2di_minkowski(pair, u, sight->rho, v);
     sight->u.x = u.x;
@@ -6020,10 +6094,6 @@ static void dem2di_see_edge(dem2di_pair *pair, const dem2di_polygon *p, int edge
     dem2di_see_polygon(pair, p, p->first ? u : dem2di_negate(u), edge,
                        dem2di_corner_beside(p, edge, 1), sight);
 }
-
-/* A start this near (sine) to the normal of an edge is taken there: contacts rest on edges, and
-   the edge turns with its polygon. */
-#define DEM2DI_SNAP 0.01
 
 static void dem2di_see_first(dem2di_pair *pair, const dem2di_polygon *p, dem2d_vec u,
                              dem2di_sight *sight) {
@@ -6107,8 +6177,8 @@ static bool dem2di_bends(const dem2di_pair *pair, double bend) {
 /* Is h stationary at the last look? On an edge when the slope changes sign there; on a chord of
    the bracket that is a face of the shapes; elsewhere when Newton's step is below `angle`, and
    lowers h by less than half the tolerance. */
-static bool dem2di_at_rest(const dem2di_pair *pair, const dem2di_bracket *bracket, double angle,
-                           dem2di_sight *sight) {
+static inline bool dem2di_at_rest(const dem2di_pair *pair, const dem2di_bracket *bracket,
+                                  double angle, dem2di_sight *sight) {
     if (sight->edge) {
         if (sight->slope[0] <= 0 && sight->slope[1] >= 0) return true;
         int side = sight->slope[1] < 0; /* the minimum is beyond this end */
@@ -6133,19 +6203,31 @@ static bool dem2di_at_rest(const dem2di_pair *pair, const dem2di_bracket *bracke
     return sight->slope[0] <= 0 && sight->slope[1] >= 0;
 }
 
+/* Newton's step without angles, to the direction in which the centre of the osculating circle is
+   seen: (rho u - s)/|rho u - s|, that is u + e t with e = -slope/bend, made unit. For small e the
+   root is its series, whose next term is below 5/16 e^6 = 3e-19. */
+static inline dem2d_vec dem2di_newton(const dem2di_sight *sight, double bend) {
+    double e = -sight->slope[0] / bend, square = e * e, f;
+    f = square < 1e-6 ? 1 - square * (0.5 - 0.375 * square) : 1 / sqrt(1 + square);
+    double ux = sight->u.x, uy = sight->u.y;
+    return dem2di_vec((ux - e * uy) * f, (uy + e * ux) * f);
+}
+
 /* Down from a direction to a local minimum of h, by Newton's step on the osculating circle,
    u <- (rho u - s)/|rho u - s|, kept inside a bracket. With `detect` the first direction that
    separates is enough. False when the cap comes first. */
 static bool dem2di_descend(dem2di_pair *pair, dem2d_vec u, double angle, int cap, bool detect,
                            dem2di_sight *sight, dem2di_search *search) {
     dem2di_bracket bracket;
-    dem2di_polygon polygon = dem2di_polygon_of(pair);
-    bool mixed = polygon.shape->type == DEM2D_POLYGON;
+    bool mixed = pair->a->type == DEM2D_POLYGON || pair->b->type == DEM2D_POLYGON;
+    dem2di_polygon polygon;
     bracket.known = bracket.seen[0] = bracket.seen[1] = bracket.chord = false;
-    if (mixed)
+    if (mixed) {
+        polygon = dem2di_polygon_of(pair);
         dem2di_see_first(pair, &polygon, u, sight);
-    else
+    } else {
         dem2di_see(pair, u, sight);
+    }
     for (int i = 0; i < cap; i++) {
         search->iterations++;
         if (sight->h < search->upper) {
@@ -6158,7 +6240,7 @@ static bool dem2di_descend(dem2di_pair *pair, dem2d_vec u, double angle, int cap
         if (dem2di_at_rest(pair, &bracket, angle, sight)) {
             if (!mixed || sight->edge) return true;
             /* the last step of Newton must not turn past an edge unseen */
-            u = dem2di_normalised(dem2di_along(dem2di_negate(sight->v[0].w), rho, sight->u));
+            u = dem2di_newton(sight, bend);
             int k = dem2di_polygon_corner(polygon.shape, dem2di_polygon_view(&polygon, u));
             if (k == sight->corner[0]) return true;
         }
@@ -6169,8 +6251,7 @@ static bool dem2di_descend(dem2di_pair *pair, dem2d_vec u, double angle, int cap
         bool outside = (bracket.known || !near) && !dem2di_bracket_cut(pair, sight, &bracket);
         bool newton = bends && !outside;
         bracket.chord = false;
-        if (newton) /* rho u - s is longer than bend > 0 */
-            u = dem2di_normalised(dem2di_along(dem2di_negate(sight->v[0].w), rho, sight->u));
+        if (newton) u = dem2di_newton(sight, bend);
         if (!newton || (bracket.known && !dem2di_bracket_holds(&bracket, u)))
             if (!dem2di_bracket_next(&bracket, &u)) return false;
         if (mixed)
@@ -6199,14 +6280,13 @@ static void dem2di_settle(const dem2di_pair *pair, const dem2di_sight *sight,
         search->b = dem2di_along(v[0].b, t, dem2di_sub(v[1].b, v[0].b));
         return;
     }
-    double bend = sight->rho[0] + sight->rho[1] - sight->h;
-    double length = sqrt(bend * bend + slope * slope), f = 1 / length;
-    double c = bend * f, s = slope * f, fall = s * s / (1 + c); /* 1 - c */
-    double dx = s * uy - fall * ux, dy = -s * ux - fall * uy;
-    if (pair->a->type == DEM2D_CUSTOM || pair->b->type == DEM2D_CUSTOM) dx = dy = fall = 0;
+    /* e below 1e-6: sine e, 1 - cosine e^2/2, and h falls by bend e^2/2, all to e^4 */
+    double e = -slope / (sight->rho[0] + sight->rho[1] - sight->h), fall = e * e / 2;
+    if (pair->a->type == DEM2D_CUSTOM || pair->b->type == DEM2D_CUSTOM) e = fall = 0;
+    double dx = -e * uy - fall * ux, dy = e * ux - fall * uy;
     search->normal.x = ux + dx;
     search->normal.y = uy + dy;
-    search->upper = sight->h - fall * length;
+    search->upper = sight->h + slope * e / 2;
     search->a.x = v->a.x + sight->rho[0] * dx;
     search->a.y = v->a.y + sight->rho[0] * dy;
     search->b.x = v->b.x - sight->rho[1] * dx;
@@ -6315,6 +6395,7 @@ static void dem2di_branch(dem2di_pair *pair, double tolerance, double angle, int
     if (dem2di_has_core(pair->a) && dem2di_has_core(pair->b)) {
         (void)dem2di_edges_solve(pair, search->normal, true, &last);
         if (last.upper > search->upper + tolerance) return;
+        last.lower = dem2di_min(last.upper, search->lower);
     } else {
         dem2di_sight sight;
         if (!dem2di_descend(pair, search->normal, angle, cap, false, &sight, &last) ||
@@ -6390,7 +6471,8 @@ typedef struct dem2di_face {
 
 /* With angles (sines) of both faces to the contact: 1 up to a third of the other, 0 when equal. */
 static double dem2di_face_weight(double angle, double other) {
-    return other > 0 ? dem2di_max(0, dem2di_min(1, 2 * (other - angle) / (other + angle))) : 0;
+    if (other >= 3 * angle) return other > 0 ? 1 : 0;
+    return 2 * (other - angle) / (other + angle);
 }
 
 /* A straight arc whose end is round counts up to this angle (sine): a tenth of a radian is tilt, a
@@ -6465,10 +6547,10 @@ static double dem2di_height(const dem2di_slope *line, double x) {
 }
 
 /* The two points of a contact along u, in the coordinates of the slopes: ends of the common part
-   of both faces, each with its own depth. Weights: that of the deeper point is 1, and the other
-   comes in with the faces' weight; as the common part shrinks below the depth both go to a half, so
-   that one point is left with nothing lost. Force and moment change steadily all the way. False
-   when there is no common part. */
+   of both faces, each with its own depth. The deeper one has weight 1, and the other comes in with
+   the faces' weight. As the common part shrinks below the depth, and the depths become equal, both
+   go to a half: one point is left and nothing lost. Force and moment change steadily all the way.
+   False when only one point touches. */
 static bool dem2di_face_points(const dem2di_slope *a, const dem2di_slope *b, double weight,
                                double depth, dem2d_vec u, dem2d_contact_point points[2]) {
     double x[2];
@@ -6480,13 +6562,15 @@ static bool dem2di_face_points(const dem2di_slope *a, const dem2di_slope *b, dou
         points[i].depth = ya - yb;
         points[i].position = dem2di_along(dem2di_scale(u, (ya + yb) / 2), x[i], dem2di_perp(u));
     }
-    double common = dem2di_min(1, (x[1] - x[0]) / depth);
+    double common = x[1] - x[0] < depth ? (x[1] - x[0]) / depth : 1;
     int deeper = points[1].depth > points[0].depth;
     /* the deeper one is as deep as the contact, but for the normal's error times the face */
     double lift = depth - points[deeper].depth;
     points[0].depth += lift;
     points[1].depth += lift;
-    points[deeper].weight = 1 - weight * (1 - common) / 2;
+    double other = points[1 - deeper].depth;
+    if (!(other > 0)) return false;
+    points[deeper].weight = 1 - weight * (1 - common) / 2 * (other / depth);
     points[1 - deeper].weight = weight * (1 + common) / 2;
     return true;
 }
@@ -6532,6 +6616,71 @@ static int dem2di_wall_points(const dem2d_shape *shape, dem2d_rot q, double scal
     return 1;
 }
 
+/* The overlap of two convex polygons, for the contact-area rule. Its boundary comes from both. */
+typedef struct dem2di_overlap {
+    dem2d_vec point; /* a corner of the overlap */
+    bool own;        /* the edge that leaves it is part of A's boundary */
+} dem2di_overlap;
+
+/* Keep what is left of the line through p along `along` (Sutherland and Hodgman); the new edge is
+   not A's. Returns the number of corners in `kept`, at most one more than before. */
+static int dem2di_overlap_cut(const dem2di_overlap *corners, int count, dem2d_vec p,
+                              dem2d_vec along, dem2di_overlap *kept) {
+    int left = 0;
+    for (int i = 0; i < count; i++) {
+        const dem2di_overlap *a = &corners[i], *b = &corners[i + 1 < count ? i + 1 : 0];
+        double ha = dem2di_cross(along, dem2di_sub(a->point, p));
+        double hb = dem2di_cross(along, dem2di_sub(b->point, p));
+        if (ha >= 0) kept[left++] = *a;
+        if ((ha >= 0) == (hb >= 0)) continue;
+        kept[left] = *a;
+        kept[left].point = dem2di_along(a->point, ha / (ha - hb), dem2di_sub(b->point, a->point));
+        if (ha >= 0) kept[left].own = false;
+        left++;
+    }
+    return left;
+}
+
+/* Area of the overlap; sum over A's part of its boundary of the edges, and of edge . middle; its
+   centroid. With F per area, the force on B is F times the sum turned by -90 degrees, and its
+   moment about the origin -F times the second sum. */
+static double dem2di_overlap_sums(const dem2di_overlap *corners, int count, dem2d_vec *edges,
+                                  double *moment, dem2d_vec *centroid) {
+    double twice = 0;
+    dem2d_vec first = dem2di_vec(0, 0), origin = corners[0].point;
+    *edges = first;
+    *moment = 0;
+    for (int i = 0; i < count; i++) {
+        dem2d_vec p = corners[i].point, q = corners[i + 1 < count ? i + 1 : 0].point;
+        dem2d_vec edge = dem2di_sub(q, p);
+        double part = dem2di_cross(dem2di_sub(p, origin), dem2di_sub(q, origin));
+        twice += part;
+        first =
+            dem2di_along(first, part / 3, dem2di_sub(dem2di_add(p, q), dem2di_scale(origin, 2)));
+        if (!corners[i].own) continue;
+        *edges = dem2di_add(*edges, edge);
+        *moment += dem2di_dot(edge, dem2di_add(p, q)) / 2;
+    }
+    *centroid = twice > 0 ? dem2di_along(origin, 1 / twice, first) : origin;
+    return twice / 2;
+}
+
+/* What the contact-area rule needs of an overlap: area over width as its depth, the normal across
+   the chord between the crossings, and a point on the force's line. False when there is none. */
+static bool dem2di_overlap_contact(const dem2di_overlap *corners, int count, double *area,
+                                   double *width, dem2d_vec *normal, dem2d_vec *point) {
+    dem2d_vec edges, centroid;
+    double moment;
+    if (count < 3) return false;
+    *area = dem2di_overlap_sums(corners, count, &edges, &moment, &centroid);
+    *width = dem2di_length(edges);
+    if (!(*area > 0) || !(*width > 0)) return false;
+    *normal = dem2di_vec(edges.y / *width, -edges.x / *width);
+    *point = dem2di_along(dem2di_scale(*normal, dem2di_dot(centroid, *normal)), moment / *width,
+                          dem2di_perp(*normal));
+    return true;
+}
+
 /* ============================================================================================
    >>contact  Contact of two shapes, of a shape and a wall
    uses: config, math, memory, support, shapes, gjk, epa, edges, minimum, faces
@@ -6568,20 +6717,24 @@ static double dem2di_circle_contact(dem2d_vec d, double distance, double radii, 
 
 static void dem2di_contact_report(const dem2di_pair *pair, const dem2di_search *search,
                                   const dem2d_pose *pose_a, const dem2d_pose *pose_b,
-                                  dem2d_contact *contact) {
+                                  bool skip_points, dem2d_contact *contact) {
     contact->state = search->state;
     contact->proof = search->proof;
     contact->support_calls = pair->calls;
     contact->iterations = search->iterations;
-    contact->normal = search->normal;
+    contact->normal.x = search->normal.x;
+    contact->normal.y = search->normal.y;
     contact->depth = search->upper;
     contact->error = dem2di_max(0, search->upper - search->lower) + DEM2DI_ROUNDING * pair->size;
-    contact->point_a = dem2di_add(pose_a->position, search->a);
-    contact->point_b = dem2di_add(pose_b->position, search->b);
-    contact->point = dem2di_scale(dem2di_add(contact->point_a, contact->point_b), 0.5);
+    contact->point_a.x = pose_a->position.x + search->a.x;
+    contact->point_a.y = pose_a->position.y + search->a.y;
+    contact->point_b.x = pose_b->position.x + search->b.x;
+    contact->point_b.y = pose_b->position.y + search->b.y;
+    contact->point.x = (contact->point_a.x + contact->point_b.x) * 0.5;
+    contact->point.y = (contact->point_a.y + contact->point_b.y) * 0.5;
     contact->count = 0;
     memset(contact->points, 0, sizeof contact->points);
-    if (search->state == DEM2D_SEPARATED) return;
+    if (search->state == DEM2D_SEPARATED || skip_points) return;
     contact->count = dem2di_pair_points(pair, search, contact->points);
     for (int i = 0; i < contact->count; i++)
         contact->points[i].position = dem2di_add(contact->points[i].position, pose_a->position);
@@ -6653,7 +6806,7 @@ static dem2d_result dem2di_query_gjk(const dem2d_shape *a, dem2d_pose pose_a, co
                used.max_iterations, detect, &search);
     if (search.state == DEM2D_PENETRATING && search.upper <= DEM2DI_ROUNDING * pair.size)
         search.state = DEM2D_TOUCHING;
-    dem2di_contact_report(&pair, &search, &pose_a, &pose_b, contact);
+    dem2di_contact_report(&pair, &search, &pose_a, &pose_b, used.skip_points, contact);
     return DEM2D_OK;
 }
 
@@ -6691,7 +6844,7 @@ DEM2D_API dem2d_result dem2d_pair_contact(const dem2d_shape *a, dem2d_pose pose_
         dem2di_contact_solve(&pair, used.solver, dem2di_start(&pair, used.start), used.tolerance,
                              used.max_iterations, false, &search);
     }
-    dem2di_contact_report(&pair, &search, &pose_a, &pose_b, contact);
+    dem2di_contact_report(&pair, &search, &pose_a, &pose_b, used.skip_points, contact);
     return DEM2D_OK;
 }
 
@@ -6954,33 +7107,59 @@ static double dem2di_slip(const dem2di_link *link, dem2d_vec va, double wa, dem2
     return dem2di_cross(link->normal, dem2di_sub(b, a));
 }
 
-/* [F] eq. 8-10, with the tangential force held within both limits. The spring is a scalar along
-   perp(normal), so that it turns with the contact. */
+/* [F] eq. 8-10 for a given normal force, with the tangential one held within both limits. The
+   spring is a scalar along perp(normal), so that it turns with the contact. */
 static void dem2di_law_apply(const dem2d_pair_desc *law, double slip, double time_step,
                              double last_shear, dem2di_link *link) {
-    double limit;
-    link->force = law->normal_stiffness * link->depth;
-    limit = law->friction * link->force;
+    double limit = law->friction * link->force;
     link->shear = last_shear - law->tangential_stiffness * slip * time_step;
     link->shear = dem2di_max(-limit, dem2di_min(limit, link->shear));
 }
 
+/* Place of a point of two along the tangent, from A's centre. */
+static double dem2di_ends_place(const dem2di_link *link, const dem2di_ends *ends, int i) {
+    return dem2di_cross(link->normal, link->point) + ends->offset[i];
+}
+
+/* The springs of the last step's points, handed on to those of this step: each to the point that
+   is where it was. A spring of one point is shared out by the normal forces; of a point that has
+   gone it is left to the other. */
+static void dem2di_ends_hand_on(const dem2di_link *last, const dem2di_ends *last_ends,
+                                const dem2di_link *link, const dem2di_ends *ends,
+                                const double force[2], double shear[2]) {
+    if (!(last_ends->weight[0] > 0)) {
+        shear[1] = last->shear * (force[1] / (force[0] + force[1]));
+        shear[0] = last->shear - shear[1];
+        return;
+    }
+    double now[2], before[2];
+    for (int i = 0; i < 2; i++) {
+        now[i] = dem2di_ends_place(link, ends, i);
+        before[i] = dem2di_ends_place(last, last_ends, i);
+    }
+    shear[0] = last_ends->shear[0];
+    shear[1] = last_ends->shear[1];
+    bool left = fabs(now[1] - before[0]) < fabs(now[1] - before[1]);  /* a new one clockwise */
+    bool right = fabs(now[0] - before[1]) < fabs(now[0] - before[0]); /* or on the other side */
+    if (left == right) return;
+    shear[left ? 1 : 0] = last->shear;
+    shear[left ? 0 : 1] = 0;
+}
+
 /* The same for two points, both with the link's slip: it depends on the height along the normal
-   alone. Their springs go on; when the contact had one point before, its spring is shared out by
-   the normal forces, and one point gets the sum of two. */
+   alone. */
 static void dem2di_law_apply_ends(const dem2d_pair_desc *law, double slip, double time_step,
-                                  double last_shear, const dem2di_ends *last, dem2di_ends *ends,
-                                  dem2di_link *link) {
+                                  const dem2di_link *last, const dem2di_ends *last_ends,
+                                  dem2di_ends *ends, dem2di_link *link) {
     double force[2];
-    for (int i = 0; i < 2; i++)
-        force[i] = law->normal_stiffness * ends->weight[i] * dem2di_max(0, ends->depth[i]);
+    for (int i = 0; i < 2; i++) force[i] = law->normal_stiffness * ends->weight[i] * ends->depth[i];
     link->force = force[0] + force[1];
     link->shear = 0;
-    bool two = last->weight[0] > 0 || last->weight[1] > 0;
+    dem2di_ends_hand_on(last, last_ends, link, ends, force, ends->shear);
     for (int i = 0; i < 2; i++) {
         double limit = law->friction * force[i];
-        double shear = two ? last->shear[i] : last_shear * (force[i] / link->force);
-        shear -= law->tangential_stiffness * ends->weight[i] * slip * time_step;
+        double shear =
+            ends->shear[i] - law->tangential_stiffness * ends->weight[i] * slip * time_step;
         ends->shear[i] = dem2di_max(-limit, dem2di_min(limit, shear));
         link->shear += ends->shear[i];
     }
@@ -6994,7 +7173,7 @@ static void dem2di_ends_set(const dem2d_contact_point points[2], dem2di_ends *en
     for (int i = 0; i < 2; i++) {
         ends->weight[i] = points[i].weight;
         ends->depth[i] = points[i].depth;
-        part[i] = points[i].weight * dem2di_max(0, points[i].depth);
+        part[i] = points[i].weight * points[i].depth;
     }
     sum = part[0] + part[1];
     link->point = dem2di_along(points[0].position, part[1] / sum,
@@ -7133,6 +7312,8 @@ typedef struct dem2di_template {
     dem2d_shape *shape; /* NULL: free slot */
     uint32_t generation;
     int users;
+    int corners;        /* contact-area rule: of the polygon that stands for the shape */
+    dem2d_vec *outline; /* that many */
 } dem2di_template;
 
 /* What does not change while a particle lives. */
@@ -7185,6 +7366,8 @@ struct dem2d_world {
     int max_iterations;
     dem2d_solver solver;
     dem2d_face_rule faces;
+    dem2di_overlap *overlap; /* scratch of the contact-area rule, twice what one overlap may have */
+    int overlap_capacity;
     bool two_points; /* contacts may have two: by the rule, and some template has faces */
     bool check_time_step;
     bool list_stale;  /* the list must be built before the next force pass */
@@ -7294,11 +7477,21 @@ static dem2d_result dem2di_out_of_memory(const dem2d_world *world, const char *w
     return dem2di_fail(&world->env, DEM2D_OUT_OF_MEMORY, -1, "no memory for %s", what);
 }
 
+static void dem2di_template_clear(const dem2d_env *env, dem2di_template *place) {
+    if (place->shape == NULL) return;
+    dem2di_release(env, place->outline, (size_t)place->corners, sizeof *place->outline);
+    dem2d_shape_destroy(place->shape);
+    place->shape = NULL;
+    place->outline = NULL;
+    place->corners = 0;
+}
+
 DEM2D_API void dem2d_world_destroy(dem2d_world *world) {
     if (world == NULL) return;
     dem2d_world *w = world;
-    for (int i = 0; i < w->template_count; i++) dem2d_shape_destroy(w->templates[i].shape);
     const dem2d_env *env = &w->env;
+    for (int i = 0; i < w->template_count; i++) dem2di_template_clear(env, &w->templates[i]);
+    dem2di_release(env, w->overlap, (size_t)w->overlap_capacity, sizeof *w->overlap);
     size_t side = (size_t)w->laws_side;
     dem2di_release(env, w->templates, (size_t)w->template_capacity, sizeof *w->templates);
     dem2di_release(env, w->materials, (size_t)w->material_capacity, sizeof *w->materials);
@@ -7416,6 +7609,36 @@ static dem2d_result dem2di_stale(const dem2d_world *w, const char *kind, uint32_
     return dem2di_fail(&w->env, DEM2D_STALE_ID, (int)(index & INT_MAX), "no such %s", kind);
 }
 
+/* Corners of the polygon that stands for a curved shape in the contact-area rule, whose energy is
+   what is conserved: its edges bulge by R pi^2/(2 n^2) = 5e-6 R, little against any overlap. */
+#define DEM2DI_AREA_CORNERS 1024
+
+/* The polygon of a template, and scratch for the overlap of any two. */
+static bool dem2di_template_outline(dem2d_world *world, const dem2d_shape *shape,
+                                    dem2di_template *place) {
+    bool sharp = shape->type == DEM2D_POLYGON && shape->rounding == 0;
+    int count = sharp ? shape->count : DEM2DI_AREA_CORNERS, most = count;
+    if (!sharp && shape->count > count / 2 && shape->type != DEM2D_FOURIER)
+        most = count = 2 * shape->count;
+    for (int i = 0; i < world->template_count; i++)
+        if (world->templates[i].corners > most) most = world->templates[i].corners;
+    dem2d_vec *outline = (dem2d_vec *)dem2di_allocate(&world->env, (size_t)count, sizeof *outline);
+    if (outline == NULL) return false;
+    if (!dem2di_grow(world, (void **)&world->overlap, &world->overlap_capacity, 4 * most + 8,
+                     sizeof *world->overlap)) {
+        dem2di_release(&world->env, outline, (size_t)count, sizeof *outline);
+        return false;
+    }
+    for (int i = 0; i < count; i++) outline[i] = dem2di_outline_point(shape, i, count);
+    /* of the shape's own area: on the mean its boundary, not within it by 1e-4 of its size, which
+       counts against an overlap */
+    double twice = dem2di_twice_area(outline, count), grow = sqrt(2 * shape->mass.area / twice);
+    for (int i = 0; i < count; i++) outline[i] = dem2di_scale(outline[i], grow);
+    place->outline = outline;
+    place->corners = count;
+    return true;
+}
+
 DEM2D_API dem2d_result dem2d_world_add_shape(dem2d_world *world, const dem2d_shape *shape,
                                              dem2d_shape_id *id) {
     if (world == NULL || shape == NULL || id == NULL) return DEM2D_NULL_ARGUMENT;
@@ -7427,6 +7650,10 @@ DEM2D_API dem2d_result dem2d_world_add_shape(dem2d_world *world, const dem2d_sha
     dem2d_shape *copy = dem2di_shape_copy(&world->env, shape);
     if (copy == NULL) return DEM2D_OUT_OF_MEMORY;
     dem2di_template *place = &world->templates[slot];
+    if (world->faces == DEM2D_CONTACT_AREA && !dem2di_template_outline(world, copy, place)) {
+        dem2d_shape_destroy(copy);
+        return dem2di_out_of_memory(world, "an outline");
+    }
     place->shape = copy;
     place->generation++;
     place->users = 0;
@@ -7447,8 +7674,7 @@ DEM2D_API dem2d_result dem2d_world_remove_shape(dem2d_world *world, dem2d_shape_
     if (place->users > 0)
         return dem2di_fail(&world->env, DEM2D_IN_USE, (int)id.index, "shape of %d particles",
                            place->users);
-    dem2d_shape_destroy(place->shape);
-    place->shape = NULL;
+    dem2di_template_clear(&world->env, place);
     return DEM2D_OK;
 }
 
@@ -8076,11 +8302,98 @@ static int dem2di_pair_geometry(const dem2d_world *world, int a, int b, const de
 /* Force of a contact whose geometry is known, from its springs before. */
 static void dem2di_link_load(const dem2d_world *world, const dem2di_list *list, int i,
                              const dem2d_pair_desc *law, double slip, bool two) {
-    if (two)
-        dem2di_law_apply_ends(law, slip, world->time_step, list->now[i].shear, &list->ends[i],
-                              &list->next_ends[i], &list->next[i]);
-    else
-        dem2di_law_apply(law, slip, world->time_step, list->now[i].shear, &list->next[i]);
+    dem2di_link *link = &list->next[i];
+    if (two) {
+        dem2di_law_apply_ends(law, slip, world->time_step, &list->now[i], &list->ends[i],
+                              &list->next_ends[i], link);
+        return;
+    }
+    if (world->faces != DEM2D_CONTACT_AREA) link->force = law->normal_stiffness * link->depth;
+    dem2di_law_apply(law, slip, world->time_step, list->now[i].shear, &list->next[i]);
+}
+
+static dem2d_vec dem2di_outline_corner(const dem2d_world *world, int body, int i) {
+    const dem2di_body *b = &world->bodies[body];
+    dem2d_vec p = world->templates[b->shape_index].outline[i];
+    return dem2di_scale(dem2di_turn(world->now[body].q, p), b->scale);
+}
+
+/* Corners of a body's polygon that are within `depth` of its farthest along u, and one more to each
+   side: the first, counted cyclically, and how many. */
+static int dem2di_outline_range(const dem2d_world *world, int body, dem2d_vec u, double depth,
+                                int *first) {
+    const dem2di_body *b = &world->bodies[body];
+    const dem2di_template *place = &world->templates[b->shape_index];
+    dem2d_vec v = dem2di_turn_back(world->now[body].q, u);
+    int n = place->corners, best = 0, low = 0, high = 0;
+    double most = -HUGE_VAL;
+    for (int i = 0; i < n; i++) {
+        double height = dem2di_dot(place->outline[i], v);
+        if (!(height > most)) continue;
+        most = height;
+        best = i;
+    }
+    double level = most - depth / b->scale;
+    while (high < n - 1 && dem2di_dot(place->outline[(best + high) % n], v) >= level) high++;
+    while (low < n - 1 - high && dem2di_dot(place->outline[(best + n - low) % n], v) >= level)
+        low++;
+    *first = (best + n - low) % n;
+    return low + high + 1;
+}
+
+/* The overlap of two bodies, or of one and a wall (b negative), from A's centre: A's corners near
+   the contact, cut by B's edges there. The contact's normal and depth tell where that is: all of
+   the overlap is within the depth of the farthest corners of both. */
+static int dem2di_overlap_of(const dem2d_world *world, int a, int b, const dem2di_link *link,
+                             dem2d_vec d, dem2di_overlap **corners) {
+    int first, cuts = 1, start = 0;
+    double depth = 1.001 * link->depth; /* B's polygon is not quite B */
+    dem2d_vec u = link->normal;
+    dem2di_overlap *from = world->overlap, *to = from + world->overlap_capacity / 2;
+    int count = dem2di_outline_range(world, a, u, depth, &first);
+    int n = world->templates[world->bodies[a].shape_index].corners;
+    for (int i = 0; i < count; i++) {
+        from[i].point = dem2di_outline_corner(world, a, (first + i) % n);
+        from[i].own = true;
+    }
+    if (b >= 0) {
+        cuts = dem2di_outline_range(world, b, dem2di_negate(u), depth, &start);
+        n = world->templates[world->bodies[b].shape_index].corners;
+        if (cuts < n) cuts--; /* edges between the corners, or all around */
+    }
+    for (int i = 0; i < cuts && count >= 3; i++) {
+        dem2d_vec p = d, along = dem2di_negate(dem2di_perp(u));
+        if (b >= 0) {
+            p = dem2di_outline_corner(world, b, (start + i) % n);
+            along = dem2di_sub(dem2di_outline_corner(world, b, (start + i + 1) % n), p);
+            p = dem2di_add(p, d);
+        }
+        count = dem2di_overlap_cut(from, count, p, along, to);
+        dem2di_overlap *swap = from;
+        from = to;
+        to = swap;
+    }
+    *corners = from;
+    return count;
+}
+
+static double dem2di_equivalent(const dem2d_world *world, int i) {
+    const dem2di_body *body = &world->bodies[i];
+    return body->scale * sqrt(body->shape->mass.area / DEM2DI_PI);
+}
+
+/* The contact-area rule (Feng, Owen 2004): energy kn area^2/(2 L^2), with L the mean equivalent
+   radius, so that kn keeps its unit; its gradient is the force kn area width/L^2 across the chord
+   between the crossings of both boundaries. Depth is area/width: the energy is half force times
+   depth. */
+static void dem2di_area_load(const dem2d_world *world, const dem2d_pair_desc *law, int a, int b,
+                             const dem2di_overlap *corners, int count, dem2di_link *link) {
+    double area, width, length = dem2di_equivalent(world, a);
+    if (b >= 0) length = (length + dem2di_equivalent(world, b)) / 2;
+    link->depth = -1;
+    if (!dem2di_overlap_contact(corners, count, &area, &width, &link->normal, &link->point)) return;
+    link->depth = area / width;
+    link->force = law->normal_stiffness * (area / length) * (width / length);
 }
 
 /* Points of a contact into its link, and beside it when there are two. */
@@ -8110,11 +8423,17 @@ static void dem2di_pair_pass(dem2d_world *world, dem2di_count *count) {
         }
         int found = dem2di_pair_geometry(world, a, b, last, link, points, count);
         if (!(link->depth > 0)) continue;
+        const dem2d_pair_desc *law = dem2di_law_of(world, &list->keys.key[i], false);
         dem2di_link_place(list, i, found, points);
+        if (world->faces == DEM2D_CONTACT_AREA) {
+            dem2di_overlap *overlap;
+            int corners = dem2di_overlap_of(world, a, b, link, link->branch, &overlap);
+            dem2di_area_load(world, law, a, b, overlap, corners, link);
+            if (!(link->depth > 0)) continue;
+        }
         const dem2di_state *sa = &world->now[a], *sb = &world->now[b];
         double slip = dem2di_slip(link, sa->v, sa->w, sb->v, sb->w);
-        dem2di_link_load(world, list, i, dem2di_law_of(world, &list->keys.key[i], false), slip,
-                         found == 2);
+        dem2di_link_load(world, list, i, law, slip, found == 2);
     }
 }
 
@@ -8147,17 +8466,32 @@ static void dem2di_touch_pass(dem2d_world *world, dem2di_count *count) {
         if (world->two_points)
             found = dem2di_wall_points(body->shape, state->q, body->scale, u, surface, support,
                                        link->depth, points);
+        const dem2d_pair_desc *law = dem2di_law_of(world, &list->keys.key[i], true);
         dem2di_link_place(list, i, found, points);
+        if (world->faces == DEM2D_CONTACT_AREA) {
+            dem2di_overlap *overlap;
+            dem2d_vec foot = dem2di_sub(wall->point, state->x);
+            int corners = dem2di_overlap_of(world, a, -1, link, foot, &overlap);
+            dem2di_area_load(world, law, a, -1, overlap, corners, link);
+            if (!(link->depth > 0)) continue;
+        }
         link->branch = link->point;
         double slip = dem2di_slip(link, state->v, state->w, wall->velocity, 0);
-        dem2di_link_load(world, list, i, dem2di_law_of(world, &list->keys.key[i], true), slip,
-                         found == 2);
+        dem2di_link_load(world, list, i, law, slip, found == 2);
     }
+}
+
+/* Of a contact of one point. By area the force kn A w/L^2 rises as kn w^2/L^2 and with the width w
+   itself, which for crossing corners (w as the depth, A as its square) adds half of that. */
+static double dem2di_stiffness_of(const dem2d_world *world, const dem2d_pair_desc *law,
+                                  const dem2di_link *link) {
+    if (world->faces != DEM2D_CONTACT_AREA) return law->normal_stiffness;
+    return link->depth > 0 ? 1.5 * link->force / link->depth : 0;
 }
 
 /* Part of the normal stiffness that the two points carry together. */
 static double dem2di_ends_weight(const dem2di_ends *ends) {
-    return (ends->depth[0] > 0 ? ends->weight[0] : 0) + (ends->depth[1] > 0 ? ends->weight[1] : 0);
+    return ends->weight[0] + ends->weight[1];
 }
 
 /* Sums over the contacts of a list's next links: per particle, in the order of the partner. */
@@ -8190,8 +8524,8 @@ static void dem2di_sum_pass(dem2d_world *world) {
         a->force = dem2di_sub(a->force, force);
         a->torque -= dem2di_cross(link->point, force);
         wall->force = dem2di_add(wall->force, force);
-        double stiffness =
-            dem2di_law_of(world, &world->touches.keys.key[i], true)->normal_stiffness;
+        const dem2d_pair_desc *law = dem2di_law_of(world, &world->touches.keys.key[i], true);
+        double stiffness = dem2di_stiffness_of(world, law, link);
         if (world->two_points && world->touches.next_ends[i].weight[0] > 0)
             stiffness *= dem2di_ends_weight(&world->touches.next_ends[i]);
         wall->stiffness += stiffness;
@@ -8291,7 +8625,7 @@ static void dem2di_stiffness_list(const dem2d_world *world, bool walls, bool nex
         const dem2d_pair_desc *law = dem2di_law_of(world, key, walls);
         bool both = !walls && world->bodies[key->a].motion == DEM2D_FREE &&
                     world->bodies[key->b].motion == DEM2D_FREE;
-        double f = both ? shared : 1, kn = f * law->normal_stiffness;
+        double f = both ? shared : 1, kn = f * dem2di_stiffness_of(world, law, link);
         /* one that slides does not resist: it counts for the safe bound only */
         bool sticks = fabs(link->shear) < law->friction * link->force;
         double kt = sticks || (law->friction > 0 && shared > 1) ? f * law->tangential_stiffness : 0;
@@ -8300,7 +8634,7 @@ static void dem2di_stiffness_list(const dem2d_world *world, bool walls, bool nex
             continue;
         }
         for (int k = 0; k < 2; k++) {
-            double w = ends[i].depth[k] > 0 ? ends[i].weight[k] : 0;
+            double w = ends[i].weight[k];
             dem2d_vec p = dem2di_along(link->point, ends[i].offset[k], dem2di_perp(link->normal));
             dem2di_stiffness_point(world, key, walls, w * kn, w * kt, link, p);
         }
@@ -8511,9 +8845,7 @@ static dem2d_contact_info dem2di_contact_of(const dem2d_world *world, const dem2
     info.normal = link->normal;
     info.point = dem2di_add(world->before[key->a].x, link->point);
     info.branch = link->branch;
-    info.points = 1;
-    if (world->two_points && list->ends[i].weight[0] > 0 && list->ends[i].weight[1] > 0)
-        info.points = 1 + (list->ends[i].depth[0] > 0 && list->ends[i].depth[1] > 0);
+    info.points = world->two_points && dem2di_ends_weight(&list->ends[i]) > 0 ? 2 : 1;
     info.depth = link->depth;
     info.normal_force = link->force;
     info.tangential_force = link->shear;
@@ -8554,7 +8886,7 @@ static void dem2di_spring_energy(const dem2d_world *world, const dem2di_list *li
         }
         const dem2di_ends *ends = &list->ends[i];
         for (int k = 0; k < 2; k++) {
-            if (!(ends->depth[k] > 0 && ends->weight[k] > 0)) continue;
+            if (!(ends->weight[k] > 0)) continue;
             energy->normal += ends->weight[k] * kn * ends->depth[k] * ends->depth[k] / 2;
             if (kt > 0)
                 energy->tangential +=
@@ -8604,11 +8936,6 @@ DEM2D_API dem2d_result dem2d_world_stress(const dem2d_world *world, double area,
     stress->yx = sum.yx / area;
     stress->yy = sum.yy / area;
     return DEM2D_OK;
-}
-
-static double dem2di_equivalent(const dem2d_world *world, int i) {
-    const dem2di_body *body = &world->bodies[i];
-    return body->scale * sqrt(body->shape->mass.area / DEM2DI_PI);
 }
 
 /* Number of contacts of each particle with others, into the scratch of the list. */

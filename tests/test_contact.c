@@ -920,6 +920,7 @@ static void test_iteration_cap(void **state) {
     dem2d_contact_desc desc = {0};
     int unresolved = 0;
     desc.max_iterations = 1;
+    desc.solver = DEM2D_GJK_EPA; /* the certified one needs no more rounds than it has looks */
     for (int i = 0; i < KINDS * KINDS * 10; i++) {
         pair p = random_pair(&random, i % KINDS, i / KINDS % KINDS);
         const double delta = certified(&p) > 0 ? 0.5 * certified(&p) : -0.1;

@@ -1032,11 +1032,11 @@ static void test_weight(void **state) {
     (void)state;
     test_env env;
     pile p;
-    const pile_desc desc = {30, 0, SMOOTH, false, 0, 0.7, 0.4};
+    const pile_desc desc = {29, 0, SMOOTH, false, 0, 0.7, 0.4};
     test_env_init(&env);
     make_pile(&p, &env, &desc);
     const double weight = weight_of(p.scene.world);
-    for (int i = 0; i < 20; i++) {
+    for (int i = 0; i < 40; i++) {
         step(p.scene.world, 5000);
         if (fabs(carried(&p) - weight) < 1e-7 * weight && kinetic(p.scene.world) < 1e-9) break;
     }
