@@ -1,4 +1,4 @@
-/* dem2d.h - two-dimensional discrete element method for smooth and irregular grains, version 0.1.0
+/* dem2d.h - two-dimensional discrete element method for smooth and irregular grains, version 0.2.0
 
    One C99 header, no dependency but the C standard library. MIT licence (end of file).
 
@@ -64,11 +64,11 @@ WHAT IT DOES NOT DO
 LIMITS
     * Doubles only. At most 2^30 particles. Sizes and coordinates are best within 1e-60 to 1e60.
     * A custom support function that is not convex can't be detected; contacts are then wrong.
-    * One contact point for a pair. Where two long faces meet it moves with the last bits of the
-      angle, so faces do not conserve energy exactly.
-    * Where the support value hardly changes with the direction (discs one inside the other and
-      concentric, an overlap as deep as the radius of curvature), EPA may reach its cap: the
-      answer is then UNRESOLVED, with bounds a few 1e-4 of the size apart.
+    * Two points carry a contact of faces. A box on a wall then conserves its energy; between two
+      free polygons, where the reference edge changes, no rule of points does exactly.
+    * Where the support value hardly changes with the direction (bodies of constant width, one
+      concentric with the other), a search may reach its cap: the answer is then UNRESOLVED, with
+      bounds a few 1e-4 of the size apart.
     * 32-bit x86 needs SSE2 (-msse2 -mfpmath=sse): the x87 rounds differently each time.
     * -ffast-math is refused: it removes NaN checks and reorders sums.
 
@@ -144,11 +144,25 @@ CONCEPTS
                 pose is position of the centroid, rotation, and a size scale.
     Contact     The normal points from A to B. depth = min over u of h_A(u) + h_B(-u) - d.u with
                 d the vector from A's centre to B's; positive is overlap, negative a gap. The
-                true depth lies between depth - error and depth.
+                true depth is within `error` of depth: that is proved, see below.
+    Proof       Certified contacts descend to a minimum of h by Newton's steps on the osculating
+                circle and then show that no other is lower. By radius: where the depth is below
+                the least radius of curvature r, h - r is the support value of a convex body, so
+                one stationary value below r is the least of all; a direction with h < 0 proves a
+                gap. By arc: the boundary beside the contact, from tables of least radii, is
+                long enough to outweigh the cone of directions that the inscribed discs leave.
+                By form: circles, and edges and corners of two polygons. By polytope: branch and
+                bound over arcs of directions, for what is left.
+    Face        Where two edges meet (polygons, straight arcs, walls) two points carry the
+                contact, the ends of the common part, each with its own depth and the whole kn.
+                They come and go without a jump of force or moment.
     Wall        A half-plane: its normal points into the grains. It stands still, moves at a
                 velocity, or is servo-controlled to a stress.
-    Force       On B along the normal: kn depth (never attractive). Along the tangent an
-                incremental spring kt, at most friction times the normal force ([F] eq. 8-10).
+    Force       On B along the normal at each contact point: kn depth (never attractive). Along
+                the tangent an incremental spring kt, at most friction times the normal force
+                ([F] eq. 8-10).
+    Skipping    A pair found apart by a gap is not looked at again before its particles have
+                moved and turned that far together.
     Step        Positions are at step n, velocities half a step earlier (leapfrog). Contacts,
                 forces, energies and stresses are those of the last force pass: at the positions
                 before the last move. Kinetic energy is the mean of the two half steps around it.
@@ -167,7 +181,9 @@ HOW TO
     measure a grain      dem2d_outline_measure; two of them: dem2d_outline_compare.
     test two shapes      dem2d_pair_overlap (yes or no), dem2d_pair_distance (gap, witness
                          points), dem2d_pair_contact (gap or depth, normal, contact point).
-                         Pass the last normal as desc.start when the pair has moved little.
+                         Pass the last normal as desc.start when the pair has moved little, and
+                         skip_points if the contact points are not needed.
+    repeat the papers    dem2d_world_desc.solver = DEM2D_GJK_EPA, faces = DEM2D_ONE_POINT.
     choose a time step   dem2d_world_time_step_bounds on a settled scene. The world checks it
                          whenever it renews its list of pairs.
     stop friction        dem2d_world_set_pair for the two materials.
@@ -302,10 +318,10 @@ DETERMINISM
    ============================================================================================ */
 
 #define DEM2D_VERSION_MAJOR 0
-#define DEM2D_VERSION_MINOR 1
+#define DEM2D_VERSION_MINOR 2
 #define DEM2D_VERSION_PATCH 0
-#define DEM2D_VERSION 100 /* major * 10000 + minor * 100 + patch */
-#define DEM2D_VERSION_STRING "0.1.0"
+#define DEM2D_VERSION 200 /* major * 10000 + minor * 100 + patch */
+#define DEM2D_VERSION_STRING "0.2.0"
 
 #if defined(DEM2D_STATIC)
 #if defined(__GNUC__)
@@ -9191,6 +9207,9 @@ DEM2D_API dem2d_result dem2d_world_write_svg(const dem2d_world *world, const dem
    >>licence  Changes and licence
 
    CHANGES
+     0.2.0  Certified contacts by Newton's steps on the support value; GJK and EPA selectable. Two
+            contact points where faces meet, or the contact-area rule. Separated pairs are left
+            alone while their gap lasts. The contact point of a wall is on the wall.
      0.1.0  First version: five shape models and custom ones, outlines from pictures, fits, GJK
             and EPA, world, measures, SVG.
 
