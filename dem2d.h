@@ -6562,11 +6562,15 @@ static double dem2di_height(const dem2di_slope *line, double x) {
     return line->y0 + line->rise * (x - line->x0);
 }
 
+/* A common part of up to so many depths is one of two corners, not of faces: it could slide apart
+   almost as soon as be pressed apart, and one point alone conserves energy there. */
+#define DEM2DI_SHORT_FACE 16.0
+
 /* The two points of a contact along u, in the coordinates of the slopes: ends of the common part
    of both faces, each with its own depth. The deeper one has weight 1, and the other comes in with
-   the faces' weight. As the common part shrinks below the depth, and the depths become equal, both
-   go to a half: one point is left and nothing lost. Force and moment change steadily all the way.
-   False when only one point touches. */
+   the faces' weight. As the common part becomes short, and the depths equal, both go to a half: one
+   point is left and nothing lost. Force and moment change steadily all the way. False when only
+   one point touches. */
 static bool dem2di_face_points(const dem2di_slope *a, const dem2di_slope *b, double weight,
                                double depth, dem2d_vec u, dem2d_contact_point points[2]) {
     double x[2];
@@ -6578,7 +6582,8 @@ static bool dem2di_face_points(const dem2di_slope *a, const dem2di_slope *b, dou
         points[i].depth = ya - yb;
         points[i].position = dem2di_along(dem2di_scale(u, (ya + yb) / 2), x[i], dem2di_perp(u));
     }
-    double common = x[1] - x[0] < depth ? (x[1] - x[0]) / depth : 1;
+    double common = ((x[1] - x[0]) / depth - DEM2DI_SHORT_FACE) / (3 * DEM2DI_SHORT_FACE);
+    common = dem2di_max(0, dem2di_min(1, common));
     int deeper = points[1].depth > points[0].depth;
     /* the deeper one is as deep as the contact, but for the normal's error times the face */
     double lift = depth - points[deeper].depth;
@@ -8363,7 +8368,9 @@ static int dem2di_outline_range(const dem2d_world *world, int body, dem2d_vec u,
 static int dem2di_overlap_of(const dem2d_world *world, int a, int b, const dem2di_link *link,
                              dem2d_vec d, dem2di_overlap **corners) {
     int first, cuts = 1, start = 0;
-    double depth = 1.001 * link->depth; /* B's polygon is not quite B */
+    /* the polygons, grown to the shapes' areas, may stick out of them a little */
+    double depth = link->depth + 2e-3 * world->bodies[a].radius;
+    if (b >= 0) depth += 2e-3 * world->bodies[b].radius;
     dem2d_vec u = link->normal;
     dem2di_overlap *from = world->overlap, *to = from + world->overlap_capacity / 2;
     int count = dem2di_outline_range(world, a, u, depth, &first);
