@@ -6296,13 +6296,20 @@ static void dem2di_settle(const dem2di_pair *pair, const dem2di_sight *sight,
         search->b = dem2di_along(v[0].b, t, dem2di_sub(v[1].b, v[0].b));
         return;
     }
-    /* e below 1e-6: sine e, 1 - cosine e^2/2, and h falls by bend e^2/2, all to e^4 */
-    double e = -slope / (sight->rho[0] + sight->rho[1] - sight->h), fall = e * e / 2;
+    /* tan of the angle; for small e sine e, 1 - cosine and the fall of h, bend e^2/2, to e^4 */
+    double e = -slope / (sight->rho[0] + sight->rho[1] - sight->h), fall = e * e / 2, half = 0.5;
     if (pair->a->type == DEM2D_CUSTOM || pair->b->type == DEM2D_CUSTOM) e = fall = 0;
+    double tangent = e;
+    if (fall > 1e-8) { /* a tolerance above 1e-6 was asked for */
+        double root = sqrt(1 + e * e);
+        half = 1 / (1 + root);
+        fall = e * e * half / root;
+        e /= root;
+    }
     double dx = -e * uy - fall * ux, dy = e * ux - fall * uy;
     search->normal.x = ux + dx;
     search->normal.y = uy + dy;
-    search->upper = sight->h + slope * e / 2;
+    search->upper = sight->h + slope * tangent * half;
     search->a.x = v->a.x + sight->rho[0] * dx;
     search->a.y = v->a.y + sight->rho[0] * dy;
     search->b.x = v->b.x - sight->rho[1] * dx;
