@@ -5857,6 +5857,10 @@ static void dem2di_edge_report(const dem2di_pair *pair, const dem2di_core core[2
     t = dem2di_max(0, dem2di_min(1, t));
     dem2d_vec p[2] = {{edge->p[0].x, edge->p[0].y}, {edge->p[1].x, edge->p[1].y}};
     p[edge->own] = dem2di_along(p[edge->own], t, dem2di_sub(edge->to, p[edge->own]));
+    /* a foot beyond the end all the same is on a third edge in line: of the other core */
+    double off = dem2di_dot(dem2di_sub(dem2di_add(p[0], p[1]), pair->d), edge->tangent);
+    if (fabs(off) > DEM2DI_ROUNDING * pair->size)
+        p[1 - edge->own] = dem2di_along(p[1 - edge->own], -off, edge->tangent);
     search->corner[0] = edge->k[0];
     search->corner[1] = edge->k[1];
     dem2di_core_report(core, p[0], p[1], dem2di_right(edge->tangent), edge->h, search);
@@ -6280,9 +6284,14 @@ static bool dem2di_descend(dem2di_pair *pair, dem2d_vec u, double angle, int cap
     return false;
 }
 
+/* May a face begin beside a direction without a sign of it? Of custom shapes nothing is known. */
+static bool dem2di_unseen(const dem2d_shape *shape) {
+    return shape->type == DEM2D_CUSTOM || (shape->type == DEM2D_BEZIER && shape->flat);
+}
+
 /* The minimum at rest: along an edge the foot of the origin; else Newton's last step, on the
-   osculating circle, which leaves the square of its angle. What is beside the last look on a
-   custom shape is not known: no step there. */
+   osculating circle, which leaves the square of its angle. Where a face may begin beside the last
+   look there is no step. */
 static void dem2di_settle(const dem2di_pair *pair, const dem2di_sight *sight,
                           dem2di_search *search) {
     const dem2di_vertex *v = sight->v;
@@ -6298,7 +6307,7 @@ static void dem2di_settle(const dem2di_pair *pair, const dem2di_sight *sight,
     }
     /* tan of the angle; for small e sine e, 1 - cosine and the fall of h, bend e^2/2, to e^4 */
     double e = -slope / (sight->rho[0] + sight->rho[1] - sight->h), fall = e * e / 2, half = 0.5;
-    if (pair->a->type == DEM2D_CUSTOM || pair->b->type == DEM2D_CUSTOM) e = fall = 0;
+    if (dem2di_unseen(pair->a) || dem2di_unseen(pair->b)) e = fall = 0;
     double tangent = e;
     if (fall > 1e-8) { /* a tolerance above 1e-6 was asked for */
         double root = sqrt(1 + e * e);
@@ -6307,8 +6316,10 @@ static void dem2di_settle(const dem2di_pair *pair, const dem2di_sight *sight,
         e /= root;
     }
     double dx = -e * uy - fall * ux, dy = e * ux - fall * uy;
-    search->normal.x = ux + dx;
-    search->normal.y = uy + dy;
+    double nx = ux + dx, ny = uy + dy;
+    double f = 1.5 - (nx * nx + ny * ny) / 2; /* steps and warm starts let the length drift */
+    search->normal.x = nx * f;
+    search->normal.y = ny * f;
     search->upper = sight->h + slope * tangent * half;
     search->a.x = v->a.x + sight->rho[0] * dx;
     search->a.y = v->a.y + sight->rho[0] * dy;
@@ -6373,20 +6384,24 @@ static bool dem2di_certify(const dem2di_pair *pair, const dem2di_sight *sight, d
     return true;
 }
 
-/* Points on both shapes for the least value met: of the vertices that are as far along its normal,
-   to the tolerance, the two that enclose the origin. */
-static void dem2di_polytope_foot(const dem2di_polytope *polytope, double tolerance,
-                                 dem2di_search *search) {
-    const dem2di_vertex *low = NULL, *high = NULL;
+/* Points on both shapes for the least value met. Bounds to a tolerance fix its direction to about
+   the root of it: the supports of two directions so far to both sides enclose the foot, at the
+   ends of a face if there is one. They are moved along the normal to the depth. */
+static void dem2di_branch_foot(dem2di_pair *pair, double tolerance, dem2di_search *search) {
+    dem2di_vertex v[2];
     dem2d_vec u = search->normal;
-    for (int i = 0; i < polytope->vertices; i++) {
-        const dem2di_vertex *v = &polytope->vertex[i];
-        double x = dem2di_cross(u, v->w);
-        if (dem2di_dot(v->w, u) < search->upper - tolerance) continue;
-        if (x <= 0 && (low == NULL || x > dem2di_cross(u, low->w))) low = v;
-        if (x >= 0 && (high == NULL || x < dem2di_cross(u, high->w))) high = v;
+    double angle = sqrt(tolerance / pair->size);
+    for (int i = 0; i < 2; i++) {
+        dem2d_vec side = dem2di_along(u, i == 0 ? -angle : angle, dem2di_perp(u));
+        (void)dem2di_unit(side, &side);
+        dem2di_minkowski(pair, side, NULL, &v[i]);
     }
-    if (low != NULL && high != NULL) dem2di_witness(search, low, high);
+    if (dem2di_cross(u, v[0].w) > 0 || dem2di_cross(u, v[1].w) < 0) return;
+    dem2di_witness(search, &v[0], &v[1]);
+    dem2d_vec w = dem2di_sub(dem2di_sub(search->a, search->b), pair->d);
+    double lift = (search->upper - dem2di_dot(w, u)) / 2;
+    search->a = dem2di_along(search->a, lift, u);
+    search->b = dem2di_along(search->b, -lift, u);
 }
 
 /* Branch and bound over arcs of directions, from the least value met so far; then down to rest. */
@@ -6412,7 +6427,7 @@ static void dem2di_branch(dem2di_pair *pair, double tolerance, double angle, int
         dem2di_polytope_close(pair, &polytope);
     }
     dem2di_epa(pair, &polytope, tolerance, cap, search);
-    dem2di_polytope_foot(&polytope, tolerance, search);
+    dem2di_branch_foot(pair, tolerance, search);
     if (search->state == DEM2D_UNRESOLVED) return;
     dem2di_search last = *search;
     if (dem2di_has_core(pair->a) && dem2di_has_core(pair->b)) {
@@ -6445,7 +6460,7 @@ static void dem2di_certified(dem2di_pair *pair, dem2d_vec start, double toleranc
        tolerance. 64 looks are more than halving the cone down to rounding needs. */
     double relative = dem2di_max(tolerance, DEM2DI_ROUNDING);
     double absolute = relative * pair->size, angle = 0.1 * sqrt(relative);
-    if (pair->a->type == DEM2D_CUSTOM || pair->b->type == DEM2D_CUSTOM) angle *= 0.01;
+    if (dem2di_unseen(pair->a) || dem2di_unseen(pair->b)) angle *= 0.01;
     search->iterations = 0;
     search->upper = HUGE_VAL;
     search->normal = start;
@@ -6737,9 +6752,12 @@ static void dem2di_contact_solve(dem2di_pair *pair, dem2d_solver solver, dem2d_v
 
 /* Two circles in closed form: centres apart by d. Concentric circles get the normal (1, 0). */
 static double dem2di_circle_contact(dem2d_vec d, double distance, double radii, dem2d_vec *normal) {
-    bool apart = distance > 0;
-    normal->x = apart ? d.x / distance : 1;
-    normal->y = apart ? d.y / distance : 0;
+    if (distance > 1e-140) { /* its square is a normal number */
+        normal->x = d.x / distance;
+        normal->y = d.y / distance;
+    } else if (!dem2di_unit(d, normal)) {
+        *normal = dem2di_vec(1, 0);
+    }
     return radii - distance;
 }
 
