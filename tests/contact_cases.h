@@ -967,7 +967,9 @@ static real shear_bound(const pair *p, const dem2d_contact *c, double tolerance,
     /* faces that the bounds can't tell from parallel ones touch anywhere along them */
     const bool faces = custom || p->a->kind == POLYGON || p->a->kind == ROUNDED ||
                        p->b->kind == POLYGON || p->b->kind == ROUNDED;
-    if (c->proof == DEM2D_BY_POLYTOPE && faces) return pair_size(p);
+    const bool unknown = p->a->kind >= CUSTOM || p->b->kind >= CUSTOM;
+    if ((c->proof == DEM2D_BY_POLYTOPE && faces) || (c->proof == DEM2D_BY_ARC && unknown))
+        return pair_size(p);
     const real unsure = fmax(c->error + point_slack(p), tolerance * pair_size(p));
     return sqrtl(8 * unsure * pair_size(p));
 }
@@ -1002,7 +1004,7 @@ CASE_HELPER const char *answer_flaw(const pair *p, const dem2d_contact *c, doubl
         return "a vector not finite";
     if (!isfinite(c->depth) || !isfinite(c->error)) return "a number not finite";
     if (c->error < 0) return "a negative error";
-    if (!(fabsl(hypotl(n.x, n.y) - 1) <= 8 * DBL_EPSILON)) return "a normal that is not unit";
+    if (!(fabsl(hypotl(n.x, n.y) - 1) <= 16 * DBL_EPSILON)) return "a normal that is not unit";
     if (c->state > DEM2D_UNRESOLVED || c->proof >= DEM2D_PROOF_COUNT) return "not a state or proof";
     if ((c->state == DEM2D_UNRESOLVED) != (c->proof == DEM2D_BY_NOTHING))
         return "proof by nothing and unresolved are not the same";
