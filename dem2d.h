@@ -6474,22 +6474,32 @@ static void dem2di_certified(dem2di_pair *pair, dem2d_vec start, double toleranc
         dem2di_branch(pair, absolute, angle, cap, search);
         return;
     }
-    /* a start that does not settle at once was none: then from the line of centres */
-    for (int i = 0; i < 2; i++) {
+    /* A start that does not settle at once was none: then from the line of centres. Where bounds
+       that are good to the tolerance leave the sign open, a third time, from there to rounding. */
+    double rounding = DEM2DI_ROUNDING * pair->size;
+    for (int i = 0; i < 3; i++) {
         dem2di_sight sight;
         int looks = i == 0 ? DEM2DI_WARM : cap < 64 ? cap : 64;
-        bool rest = dem2di_descend(pair, i == 0 ? start : dem2di_centres(pair), angle, looks,
+        bool rest = dem2di_descend(pair, i == 1 ? dem2di_centres(pair) : start, angle, looks,
                                    detect, &sight, search);
-        if (detect && search->upper < -DEM2DI_ROUNDING * pair->size) {
+        if (detect && search->upper < -rounding) {
             search->lower = -HUGE_VAL;
             search->proof = DEM2D_BY_RADIUS;
             search->state = DEM2D_SEPARATED;
             return;
         }
-        if (!rest) continue;
-        dem2di_settle(pair, &sight, search);
-        search->state = dem2di_judge(pair, search);
-        if (dem2di_certify(pair, &sight, absolute, search)) return;
+        if (rest) {
+            dem2di_settle(pair, &sight, search);
+            search->state = dem2di_judge(pair, search);
+        }
+        bool proved = rest && dem2di_certify(pair, &sight, absolute, search);
+        bool open = proved && sight.h >= -rounding && search->lower < -rounding;
+        if (proved && (!open || i == 2)) return;
+        if (!open && i >= 1) break;
+        if (!open) continue;
+        start = search->normal;
+        angle *= 1e-3;
+        i = 1;
     }
     dem2di_branch(pair, absolute, angle, cap, search);
 }
