@@ -40,7 +40,9 @@ CONTENTS (search for the anchor, ">>" and the word)
                     candidate pairs from cell grids                         >>broad
                     spring, friction, critical time step                    >>law
                     leapfrog motion                                         >>motion
-                    the world: objects, list, step                          >>world
+                    the world: objects with ids                             >>world
+                    the list of contacts, particles sorted in space         >>list
+                    contacts, sums, motion; the stable time step            >>step
                     energy, stress, coordination                            >>measures
                     pictures                                                >>writers
     Changes, licence                                                        >>licence
@@ -240,7 +242,7 @@ OPTIONS (zero means: physical zero for physical fields; "library default" where 
     dem2d_world_desc        gravity               m/s2   0          finite
     dem2d_world_desc        local_damping         -      0          [0, 1)
     dem2d_world_desc        global_damping        1/s    0          >= 0
-    dem2d_world_desc        skin                  -      0.1        >= 0, of the particle radius
+    dem2d_world_desc        skin                  -      by itself  >= 0, of the particle radius
     dem2d_world_desc        contact_tolerance     -      1e-8       >= 0, of R_A + R_B + |d|
     dem2d_world_desc        max_iterations        -      128        >= 0
     dem2d_world_desc        solver                -      CERTIFIED
@@ -248,6 +250,8 @@ OPTIONS (zero means: physical zero for physical fields; "library default" where 
     dem2d_world_desc        particle_capacity     -      grows      >= 0
     dem2d_world_desc        pair_capacity         -      grows      >= 0
     dem2d_world_desc        skip_time_step_check  -      false
+    dem2d_world_desc        parallel_for          -      NULL       the caller's thread does all
+    dem2d_world_desc        parallel_user         -      NULL
     dem2d_world_desc        env                   -      NULL       copied
     dem2d_material_desc     density               kg/m2  none       > 0 (walls ignore it)
     dem2d_material_desc     normal_stiffness      N/m    none       > 0
@@ -852,13 +856,30 @@ typedef enum dem2d_face_rule {
     DEM2D_FACE_RULE_COUNT
 } dem2d_face_rule;
 
+/// Part of a step that parallel work belongs to, for profiles.
+typedef enum dem2d_phase {
+    DEM2D_PHASE_LIST,     ///< candidate pairs, when they are renewed; the time step check
+    DEM2D_PHASE_CONTACTS, ///< geometry and forces of the listed contacts
+    DEM2D_PHASE_MOTION,   ///< sums of forces per particle, new velocities and positions
+    DEM2D_PHASE_COUNT
+} dem2d_phase;
+
+/// A piece of work: items begin to end - 1. Different ranges may be done at once.
+typedef void dem2d_task_fn(void *context, int begin, int end);
+
+/// Calls task(context, begin, end) on ranges that cover 0 to count - 1 once, on any threads, in
+/// any order and number, and returns when all are done. An item is a block of some hundred
+/// contacts or particles. user is the desc's parallel_user.
+typedef void dem2d_parallel_fn(void *user, dem2d_phase phase, int count, dem2d_task_fn *task,
+                               void *context);
+
 /// A world. Only time_step has no default.
 typedef struct dem2d_world_desc {
     double time_step;          ///< s, > 0
     dem2d_vec gravity;         ///< m/s2
     double local_damping;      ///< Cundall's factor, [0, 1)
     double global_damping;     ///< 1/s, viscous, >= 0
-    double skin;               ///< of the particle radius: reach of the pair list; 0 for 0.1
+    double skin;               ///< of the particle radius: reach of the pair list; 0: by itself
     double contact_tolerance;  ///< of R_A + R_B + |d|; 0 for 1e-8
     int max_iterations;        ///< of each search; 0 for 128
     dem2d_solver solver;       ///< of contacts: certified, or GJK and EPA
@@ -866,7 +887,9 @@ typedef struct dem2d_world_desc {
     int particle_capacity;     ///< reserved at creation; 0 grows
     int pair_capacity;         ///< reserved at creation; 0 grows
     bool skip_time_step_check; ///< no stability check
-    const dem2d_env *env;      ///< memory and log, copied; NULL for malloc, free, silence
+    dem2d_parallel_fn *parallel_for; ///< shares a step's work out; NULL: all is done in the call
+    void *parallel_user;             ///< handed to parallel_for
+    const dem2d_env *env;            ///< memory and log, copied; NULL for malloc, free, silence
 } dem2d_world_desc;
 
 /// A material. Two materials meet with the harmonic mean of their stiffnesses (springs in
@@ -982,6 +1005,7 @@ typedef struct dem2d_stats {
     int pairs;                         ///< in the list, walls included
     int contacts;                      ///< between particles in the last force pass
     int wall_contacts;                 ///< with walls in the last force pass
+    double skin;                       ///< of the list of pairs, of the particle radius
     size_t bytes;                      ///< in use, all of the world
 } dem2d_stats;
 
@@ -1165,6 +1189,13 @@ DEM2D_API dem2d_result dem2d_world_write_svg(const dem2d_world *world, const dem
 #define DEM2DI_PRINTF(text, first) __attribute__((format(printf, text, first)))
 #else
 #define DEM2DI_PRINTF(text, first)
+#endif
+
+/* For loops that are written once and compiled for what a scene has. */
+#if defined(__GNUC__)
+#define DEM2DI_INLINE inline __attribute__((always_inline))
+#else
+#define DEM2DI_INLINE inline
 #endif
 
 #define DEM2DI_PI 3.14159265358979323846
@@ -1384,12 +1415,9 @@ static void dem2di_release(const dem2d_env *env, void *memory, size_t count, siz
         free(memory);
 }
 
-/* A growing array keeps its capacity in elements beside it. Content is kept. */
-static bool dem2di_reserve(const dem2d_env *env, void **array, int *capacity, int needed,
+/* More room in an array, whose capacity in elements stands beside it. Content is kept. */
+static bool dem2di_enlarge(const dem2d_env *env, void **array, int *capacity, int grown,
                            size_t size) {
-    if (needed <= *capacity) return true;
-    int grown = *capacity < INT_MAX / 2 ? *capacity + *capacity / 2 : INT_MAX;
-    if (grown < needed) grown = needed;
     void *memory = dem2di_allocate(env, (size_t)grown, size);
     if (memory == NULL) return false;
     if (*capacity > 0) memcpy(memory, *array, (size_t)*capacity * size);
@@ -1398,6 +1426,14 @@ static bool dem2di_reserve(const dem2d_env *env, void **array, int *capacity, in
     *array = memory;
     *capacity = grown;
     return true;
+}
+
+/* An array that grows element by element. */
+static bool dem2di_reserve(const dem2d_env *env, void **array, int *capacity, int needed,
+                           size_t size) {
+    if (needed <= *capacity) return true;
+    int grown = *capacity < INT_MAX / 2 ? *capacity + *capacity / 2 : INT_MAX;
+    return dem2di_enlarge(env, array, capacity, grown < needed ? needed : grown, size);
 }
 
 /* Errors of numbers: each names the field and the value. */
@@ -6948,44 +6984,41 @@ DEM2D_API dem2d_result dem2d_wall_contact(const dem2d_shape *shape, dem2d_pose p
 }
 
 /* ============================================================================================
-   >>broad  Candidate pairs from cell grids, one per power of two of the size
-   uses: config, math, memory
+   >>broad  Candidate pairs from cell grids, one per power of two of the size; sorting in space
+   uses: config, math
    ============================================================================================ */
 
-/* Two indices, the lower one first; for walls: particle, wall. */
+/* Two partners: slots of particles, the one with the lower id first; or a particle and a wall. */
 typedef struct dem2di_key {
     int a, b;
 } dem2di_key;
 
-/* A disc in the grid: its level has cells of twice the level's greatest radius. */
-typedef struct dem2di_cell {
-    int64_t x, y;
-    int level, disc;
-} dem2di_cell;
-
 typedef struct dem2di_disc {
     dem2d_vec centre;
-    double reach; /* bounding radius and skin; below 0: not there */
+    double reach; /* bounding radius and skin */
+    int level;    /* its cells are 2^-level of the largest, at least twice its reach */
     bool fixed;   /* two fixed ones are no pair */
+    bool round;   /* two circles are a pair of the first kind, others of the second */
 } dem2di_disc;
 
-/* Scratch memory of the search, kept between rebuilds. */
+/* The discs sorted by the cells of their centres. The arrays are the caller's. */
 typedef struct dem2di_grid {
-    dem2di_cell *cells, *sorted; /* capacity */
-    int *heads;                  /* table + 1, and capacity + 1 for sorting pairs */
-    int cells_capacity, sorted_capacity, heads_capacity;
-    int table;       /* power of two, at least twice the number of discs */
+    dem2di_disc *discs;
+    int *slot;   /* of the table, for each disc */
+    int *sorted; /* discs by slot */
+    int *heads;  /* table + 1: where each slot begins in sorted */
+    int count, table;
     double largest;  /* reach */
     uint32_t levels; /* bit mask of those in use */
 } dem2di_grid;
 
 #define DEM2DI_LEVELS 31
 
-static uint32_t dem2di_hash(int64_t x, int64_t y, int level) {
-    uint64_t h = (uint64_t)x * 0x9E3779B97F4A7C15u; /* 2^64 / golden ratio, and a shift between */
-    h = (h ^ (h >> 32) ^ (uint64_t)y) * 0x9E3779B97F4A7C15u;
-    h = (h ^ (h >> 29) ^ (uint64_t)level) * 0x9E3779B97F4A7C15u;
-    return (uint32_t)(h >> 32);
+/* Slots for so many discs: a power of two, so that about one disc is in each. */
+static int dem2di_grid_table(int count) {
+    int table = 64;
+    while (table < count) table *= 2;
+    return table;
 }
 
 static double dem2di_cell_size(const dem2di_grid *grid, int level) {
@@ -6999,135 +7032,133 @@ static int64_t dem2di_cell_of(double coordinate, double size) {
     return cell > -limit ? (int64_t)cell : -((int64_t)1 << 62);
 }
 
-static bool dem2di_grid_fill(const dem2d_env *env, dem2di_grid *grid, const dem2di_disc *discs,
-                             int count, int *used) {
-    grid->table = 16;
-    while (grid->table < 2 * count) grid->table *= 2;
-    if (!dem2di_reserve(env, (void **)&grid->cells, &grid->cells_capacity, count,
-                        sizeof *grid->cells) ||
-        !dem2di_reserve(env, (void **)&grid->sorted, &grid->sorted_capacity, count,
-                        sizeof *grid->sorted) ||
-        !dem2di_reserve(env, (void **)&grid->heads, &grid->heads_capacity,
-                        (grid->table > count ? grid->table : count) + 1, sizeof *grid->heads))
-        return false;
-    int n = 0;
-    grid->largest = 0;
-    grid->levels = 0;
-    for (int i = 0; i < count; i++) grid->largest = dem2di_max(grid->largest, discs[i].reach);
-    memset(grid->heads, 0, ((size_t)grid->table + 1) * sizeof *grid->heads);
-    for (int i = 0; i < count; i++) {
-        if (discs[i].reach < 0) continue;
-        dem2di_cell *cell = &grid->cells[n++];
+/* Slot of a cell: squares of 8 x 8 cells are scattered by a hash, the cells of a square lie side
+   by side, so that neighbours in space are neighbours in memory. Of 8 cells in a row no two share
+   a slot, whatever the hash does. */
+static int dem2di_cell_slot(const dem2di_grid *grid, int64_t x, int64_t y, int level) {
+    uint64_t cx = (uint64_t)x, cy = (uint64_t)y;
+    uint64_t h = (cx >> 3) * 0x9E3779B97F4A7C15u; /* 2^64 / golden ratio, and a shift between */
+    h = (h ^ (h >> 32) ^ (cy >> 3)) * 0x9E3779B97F4A7C15u;
+    h = (h ^ (h >> 29) ^ (uint64_t)level) * 0x9E3779B97F4A7C15u;
+    uint64_t slot = (h >> 32) << 6 | (cy & 7) << 3 | (cx & 7);
+    return (int)(slot & (uint64_t)(grid->table - 1));
+}
+
+/* Level and slot of the discs from begin to end; largest is known. */
+static void dem2di_grid_place(const dem2di_grid *grid, int begin, int end) {
+    for (int i = begin; i < end; i++) {
+        dem2di_disc *disc = &grid->discs[i];
         double size = grid->largest / 2;
-        cell->disc = i;
-        cell->level = 0;
-        while (discs[i].reach <= size && cell->level < DEM2DI_LEVELS - 1) {
+        disc->level = 0;
+        while (disc->reach <= size && disc->level < DEM2DI_LEVELS - 1) {
             size /= 2;
-            cell->level++;
+            disc->level++;
         }
-        size = dem2di_cell_size(grid, cell->level);
-        cell->x = dem2di_cell_of(discs[i].centre.x, size);
-        cell->y = dem2di_cell_of(discs[i].centre.y, size);
-        grid->levels |= (uint32_t)1 << cell->level;
-        uint32_t slot = dem2di_hash(cell->x, cell->y, cell->level) & (uint32_t)(grid->table - 1);
-        grid->heads[slot]++;
-    }
-    /* counting sort by hash: heads[s] ends as the first of slot s */
-    for (int s = 0, sum = 0; s <= grid->table; s++) {
-        int held = grid->heads[s];
-        grid->heads[s] = sum += held;
-    }
-    for (int i = n - 1; i >= 0; i--) {
-        const dem2di_cell *cell = &grid->cells[i];
-        uint32_t slot = dem2di_hash(cell->x, cell->y, cell->level) & (uint32_t)(grid->table - 1);
-        grid->sorted[--grid->heads[slot]] = *cell;
-    }
-    *used = n;
-    return true;
-}
-
-/* A list of pairs that grows. */
-typedef struct dem2di_keys {
-    dem2di_key *key;
-    int count, capacity;
-} dem2di_keys;
-
-static bool dem2di_keys_add(const dem2d_env *env, dem2di_keys *keys, int a, int b) {
-    if (!dem2di_reserve(env, (void **)&keys->key, &keys->capacity, keys->count + 1,
-                        sizeof *keys->key))
-        return false;
-    keys->key[keys->count].a = a < b ? a : b;
-    keys->key[keys->count].b = a < b ? b : a;
-    keys->count++;
-    return true;
-}
-
-/* Pairs of one disc with those of one cell. On its own level each pair is met twice and taken
-   when the disc is the lower one. */
-static bool dem2di_grid_visit(const dem2d_env *env, const dem2di_grid *grid,
-                              const dem2di_disc *discs, const dem2di_cell *own, int64_t x,
-                              int64_t y, int level, dem2di_keys *keys) {
-    const dem2di_disc *disc = &discs[own->disc];
-    uint32_t slot = dem2di_hash(x, y, level) & (uint32_t)(grid->table - 1);
-    for (int i = grid->heads[slot]; i < grid->heads[slot + 1]; i++) {
-        const dem2di_cell *cell = &grid->sorted[i];
-        if (cell->level != level || cell->x != x || cell->y != y) continue;
-        if (level == own->level && cell->disc <= own->disc) continue;
-        const dem2di_disc *other = &discs[cell->disc];
-        if (disc->fixed && other->fixed) continue;
-        dem2d_vec d = dem2di_centre_line(disc->centre, other->centre);
-        double reach = disc->reach + other->reach;
-        if (dem2di_dot(d, d) < reach * reach && !dem2di_keys_add(env, keys, own->disc, cell->disc))
-            return false;
-    }
-    return true;
-}
-
-/* Sort by first index (counting), then second (insertion: a disc has few partners). */
-static void dem2di_keys_sort(dem2di_grid *grid, int discs, const dem2di_keys *from,
-                             dem2di_key *to) {
-    int *heads = grid->heads;
-    memset(heads, 0, ((size_t)discs + 1) * sizeof *heads);
-    for (int i = 0; i < from->count; i++) heads[from->key[i].a]++;
-    for (int i = 0, sum = 0; i <= discs; i++) heads[i] = sum += heads[i];
-    for (int i = from->count - 1; i >= 0; i--) to[--heads[from->key[i].a]] = from->key[i];
-    for (int i = 1; i < from->count; i++) {
-        dem2di_key key = to[i];
-        int j = i;
-        for (; j > 0 && to[j - 1].a == key.a && to[j - 1].b > key.b; j--) to[j] = to[j - 1];
-        to[j] = key;
+        size = dem2di_cell_size(grid, disc->level);
+        int64_t x = dem2di_cell_of(disc->centre.x, size), y = dem2di_cell_of(disc->centre.y, size);
+        grid->slot[i] = dem2di_cell_slot(grid, x, y, disc->level);
     }
 }
 
-/* All pairs of discs that overlap, unsorted. Each disc looks on its own level and on coarser
-   ones, where at most three cells a side are within reach: linear for any mixture of sizes. */
-static bool dem2di_grid_pairs(const dem2d_env *env, dem2di_grid *grid, const dem2di_disc *discs,
-                              int count, dem2di_keys *keys) {
-    int used;
-    keys->count = 0;
-    if (!dem2di_grid_fill(env, grid, discs, count, &used)) return false;
-    for (int i = 0; i < used; i++) {
-        const dem2di_cell *own = &grid->cells[i];
-        const dem2di_disc *disc = &discs[own->disc];
-        for (int level = 0; level <= own->level; level++) {
-            if (!(grid->levels >> level & 1)) continue;
-            double size = dem2di_cell_size(grid, level), reach = disc->reach + size / 2;
-            int64_t x0 = dem2di_cell_of(disc->centre.x - reach, size);
-            int64_t x1 = dem2di_cell_of(disc->centre.x + reach, size);
-            int64_t y0 = dem2di_cell_of(disc->centre.y - reach, size);
-            int64_t y1 = dem2di_cell_of(disc->centre.y + reach, size);
-            for (int64_t x = x0; x <= x1; x++)
-                for (int64_t y = y0; y <= y1; y++)
-                    if (!dem2di_grid_visit(env, grid, discs, own, x, y, level, keys)) return false;
+/* Counts to starts: each number becomes the sum of those before it. Returns the sum of all. */
+static int dem2di_starts(int *numbers, int count) {
+    int sum = 0;
+    for (int i = 0; i < count; i++) {
+        int number = numbers[i];
+        numbers[i] = sum;
+        sum += number;
+    }
+    return sum;
+}
+
+/* Counting sort by slot; in a slot the order of the discs stays. */
+static void dem2di_grid_sort(dem2di_grid *grid) {
+    grid->levels = 0;
+    memset(grid->heads, 0, ((size_t)grid->table + 1) * sizeof *grid->heads);
+    for (int i = 0; i < grid->count; i++) {
+        grid->levels |= (uint32_t)1 << grid->discs[i].level;
+        grid->heads[grid->slot[i] + 1]++;
+    }
+    for (int s = 0; s < grid->table; s++) grid->heads[s + 1] += grid->heads[s];
+    for (int i = grid->count - 1; i >= 0; i--) grid->sorted[--grid->heads[grid->slot[i] + 1]] = i;
+    /* the start of slot s now stands at s + 1 */
+    memmove(grid->heads, grid->heads + 1, (size_t)grid->table * sizeof *grid->heads);
+    grid->heads[grid->table] = grid->count;
+}
+
+/* The partners of disc i on one level: counted by kind, and written as (i, j) where there is room.
+   On its own level each pair is met from both sides and taken from the lower disc's. */
+static void dem2di_grid_level(const dem2di_grid *grid, int i, int level, dem2di_key *to[2],
+                              int count[2]) {
+    const dem2di_disc *own = &grid->discs[i];
+    double size = dem2di_cell_size(grid, level), reach = own->reach + size / 2;
+    int64_t x0 = dem2di_cell_of(own->centre.x - reach, size);
+    int64_t x1 = dem2di_cell_of(own->centre.x + reach, size);
+    int64_t y0 = dem2di_cell_of(own->centre.y - reach, size);
+    int64_t y1 = dem2di_cell_of(own->centre.y + reach, size);
+    int least = level == own->level ? i : -1;
+    for (int64_t y = y0; y <= y1; y++)
+        for (int64_t x = x0; x <= x1; x++) {
+            int slot = dem2di_cell_slot(grid, x, y, level);
+            for (int k = grid->heads[slot]; k < grid->heads[slot + 1]; k++) {
+                int j = grid->sorted[k];
+                const dem2di_disc *other = &grid->discs[j];
+                if (j <= least || other->level != level) continue;
+                dem2d_vec d = dem2di_sub(other->centre, own->centre);
+                double both = own->reach + other->reach;
+                if (!(dem2di_dot(d, d) < both * both) || (own->fixed && other->fixed)) continue;
+                int kind = !(own->round && other->round);
+                if (to != NULL) {
+                    to[kind][count[kind]].a = i;
+                    to[kind][count[kind]].b = j;
+                }
+                count[kind]++;
+            }
         }
-    }
-    return true;
 }
 
-static void dem2di_grid_release(const dem2d_env *env, dem2di_grid *grid) {
-    dem2di_release(env, grid->cells, (size_t)grid->cells_capacity, sizeof *grid->cells);
-    dem2di_release(env, grid->sorted, (size_t)grid->sorted_capacity, sizeof *grid->sorted);
-    dem2di_release(env, grid->heads, (size_t)grid->heads_capacity, sizeof *grid->heads);
+/* All partners of a disc that it finds: of its level and of coarser ones, where at most three
+   cells a side are within reach: linear for any mixture of sizes. */
+static void dem2di_grid_partners(const dem2di_grid *grid, int i, dem2di_key *to[2], int count[2]) {
+    for (int level = 0; level <= grid->discs[i].level; level++)
+        if (grid->levels >> level & 1) dem2di_grid_level(grid, i, level, to, count);
+}
+
+/* A number to sort by and what it stands for. */
+typedef struct dem2di_order {
+    uint64_t key;
+    int value;
+} dem2di_order;
+
+/* Radix sort, a byte at a time from the lowest; equal keys keep their order. */
+static void dem2di_sort(dem2di_order *items, dem2di_order *spare, int count) {
+    uint64_t differ = 0;
+    for (int i = 1; i < count; i++) differ |= items[i].key ^ items[0].key;
+    for (int shift = 0; shift < 64; shift += 8) {
+        int heads[256] = {0};
+        if ((differ >> shift & 255) == 0) continue;
+        for (int i = 0; i < count; i++) heads[items[i].key >> shift & 255]++;
+        (void)dem2di_starts(heads, 256);
+        for (int i = 0; i < count; i++) spare[heads[items[i].key >> shift & 255]++] = items[i];
+        memcpy(items, spare, (size_t)count * sizeof *items);
+    }
+}
+
+/* The low 16 bits of x at the even places. */
+static uint64_t dem2di_spread_bits(uint64_t x) {
+    x = (x | x << 16) & 0x0000FFFF0000FFFFu;
+    x = (x | x << 8) & 0x00FF00FF00FF00FFu;
+    x = (x | x << 4) & 0x0F0F0F0F0F0F0F0Fu;
+    x = (x | x << 2) & 0x3333333333333333u;
+    return (x | x << 1) & 0x5555555555555555u;
+}
+
+/* Place along the Z-shaped curve through a square with a corner and a size: of 2^20 x 2^20 cells.
+ */
+static uint64_t dem2di_curve_place(dem2d_vec corner, double size, dem2d_vec point) {
+    double f = size > 0 ? 1048575 / size : 0;
+    uint64_t x = (uint64_t)((point.x - corner.x) * f), y = (uint64_t)((point.y - corner.y) * f);
+    return dem2di_spread_bits(x) | dem2di_spread_bits(y) << 1;
 }
 
 /* ============================================================================================
@@ -7135,11 +7166,10 @@ static void dem2di_grid_release(const dem2d_env *env, dem2di_grid *grid) {
    uses: config, math
    ============================================================================================ */
 
-/* One contact of a list. Closed (depth <= 0) ones keep the normal for the next warm start. */
+/* A contact. Closed (depth <= 0) ones keep the normal for the next warm start. */
 typedef struct dem2di_link {
     dem2d_vec normal; /* from A to B; 0 before the first look */
     dem2d_vec point;  /* contact point from A's centre */
-    dem2d_vec branch; /* from A's centre to B's; to a wall: the contact point again */
     double depth;     /* m; closed: at most 0 */
     double force;     /* normal, N/m */
     double shear;     /* on B along perp(normal), N/m: the tangential spring */
@@ -7154,10 +7184,10 @@ typedef struct dem2di_ends {
     double shear[2];
 } dem2di_ends;
 
-/* Velocity of B against A at the contact point, along the tangent. */
-static double dem2di_slip(const dem2di_link *link, dem2d_vec va, double wa, dem2d_vec vb,
-                          double wb) {
-    dem2d_vec arm_b = dem2di_sub(link->point, link->branch);
+/* Velocity of B against A at the contact point, along the tangent; arm_b is the point seen from
+   B's centre. */
+static double dem2di_slip(const dem2di_link *link, dem2d_vec arm_b, dem2d_vec va, double wa,
+                          dem2d_vec vb, double wb) {
     dem2d_vec a = dem2di_along(va, wa, dem2di_perp(link->point));
     dem2d_vec b = dem2di_along(vb, wb, dem2di_perp(arm_b));
     return dem2di_cross(link->normal, dem2di_sub(b, a));
@@ -7244,6 +7274,18 @@ static dem2d_vec dem2di_link_force(const dem2di_link *link) {
                         dem2di_perp(link->normal));
 }
 
+/* What a contact does to its two partners: the force on B, its opposite on A, and torques. */
+typedef struct dem2di_pull {
+    dem2d_vec force;
+    double torque[2]; /* on A, on B */
+} dem2di_pull;
+
+static void dem2di_link_pull(const dem2di_link *link, dem2d_vec arm_b, dem2di_pull *pull) {
+    pull->force = dem2di_link_force(link);
+    pull->torque[0] = -dem2di_cross(link->point, pull->force);
+    pull->torque[1] = dem2di_cross(arm_b, pull->force);
+}
+
 /* Stiffness of one particle: the upper triangle of a symmetric matrix in x, y, angle. */
 typedef struct dem2di_stiffness {
     double xx, xy, yy, xr, yr, rr;
@@ -7287,12 +7329,14 @@ static double dem2di_largest_eigenvalue(const dem2di_stiffness *k, double mass, 
    uses: config, math
    ============================================================================================ */
 
-/* What moves of a particle. */
+/* What moves of a particle, with the radius of its bounding circle: all that a look at a pair of
+   circles needs is in one line of a cache. */
 typedef struct dem2di_state {
     dem2d_vec x;
     dem2d_rot q;
     dem2d_vec v;
     double w;
+    double radius;
 } dem2di_state;
 
 /* Sum of contact forces on a particle. */
@@ -7316,7 +7360,8 @@ static dem2di_damping dem2di_damping_make(double local, double global, double ti
 }
 
 /* New velocity component under an acceleration. */
-static double dem2di_accelerate(const dem2di_damping *damping, double v, double acceleration) {
+static inline double dem2di_accelerate(const dem2di_damping *damping, double v,
+                                       double acceleration) {
     double drag = damping->local * fabs(acceleration);
     acceleration += v > 0 ? -drag : v < 0 ? drag : 0;
     return damping->keep * v + damping->receive * acceleration;
@@ -7324,8 +7369,8 @@ static double dem2di_accelerate(const dem2di_damping *damping, double v, double 
 
 /* q turned by an angle: tan(angle/2) = x (1 + x^2/3) with x = angle/2 to fourth order, and the
    rational rotation of it; one Newton step of 1/|q| keeps the length at 1 to rounding. */
-static dem2d_rot dem2di_rotate(dem2d_rot q, double angle) {
-    double x = angle / 2, t = x * (1 + x * x / 3), f = 1 / (1 + t * t);
+static inline dem2d_rot dem2di_rotate(dem2d_rot q, double angle) {
+    double x = angle / 2, t = x * (1 + x * x * (1.0 / 3)), f = 1 / (1 + t * t);
     double c = (1 - t * t) * f, s = 2 * t * f;
     dem2d_rot r;
     r.c = q.c * c - q.s * s;
@@ -7336,21 +7381,14 @@ static dem2d_rot dem2di_rotate(dem2d_rot q, double angle) {
     return r;
 }
 
-static dem2di_state dem2di_move(const dem2di_state *now, double time_step) {
-    dem2di_state next = *now;
-    next.x = dem2di_along(now->x, time_step, now->v);
-    next.q = dem2di_rotate(now->q, now->w * time_step);
-    return next;
-}
-
 /* Bound of how far a point of the support moves with a particle in a step: its path, by the
    octagon around the circle, and the turn times the greatest lever; rounded up. tan of half the
    angle, as dem2di_rotate takes it, is above half the angle. */
-static double dem2di_travel(const dem2di_state *state, double lever, double time_step,
-                            double before) {
+static inline double dem2di_travel(const dem2di_state *state, double lever, double time_step,
+                                   double before) {
     double x = fabs(state->v.x), y = fabs(state->v.y), turn = fabs(state->w) * time_step / 2;
     double path = dem2di_max(x, y) + 0.41421356237309515 * dem2di_min(x, y);
-    double step = path * time_step + lever * (2 * turn * (1 + turn * turn / 3));
+    double step = path * time_step + lever * (2 * turn * (1 + turn * turn * (1.0 / 3)));
     return before + (step + before * (2 * DBL_EPSILON));
 }
 
@@ -7360,8 +7398,8 @@ static bool dem2di_state_finite(const dem2di_state *state) {
 }
 
 /* ============================================================================================
-   >>world  Objects with ids, the list of pairs, and the step
-   uses: config, math, memory, support, shapes, gjk, epa, contact, broad, law, motion
+   >>world  Objects with ids
+   uses: config, math, memory, support, shapes, faces, contact, broad, law, motion
    ============================================================================================ */
 
 typedef struct dem2di_template {
@@ -7372,23 +7410,38 @@ typedef struct dem2di_template {
     dem2d_vec *outline; /* that many */
 } dem2di_template;
 
-/* What does not change while a particle lives. */
+/* What does not change while a particle lives, but for its motion. */
 typedef struct dem2di_body {
-    const dem2d_shape *shape; /* NULL: free slot */
-    uint32_t generation;
-    int shape_index, material;
-    dem2d_motion motion;
-    double scale, radius, skin;
-    double lever; /* a support value changes by at most this times the angle of a turn */
-    double mass, inertia;
-    dem2d_vec listed; /* position when the list was built */
+    const dem2d_shape *shape; /* NULL: removed, until the slots are put in order */
+    double scale;
+    int shape_index, index; /* of the template, of the particle's id */
+    uint16_t material;
+    uint8_t motion; /* dem2d_motion */
 } dem2di_body;
+
+/* What turns force and torque into accelerations: 0 of all that is not free. */
+typedef struct dem2di_inverse {
+    double mass, inertia;
+} dem2di_inverse;
+
+/* The list holds while no particle is farther than its skin from where it was listed. */
+typedef struct dem2di_watch {
+    dem2d_vec listed;
+    double skin;
+} dem2di_watch;
+
+/* A particle's id: its slot, or where the next free id is: -2 - index, -1 at the end. */
+typedef struct dem2di_name {
+    int slot;
+    uint32_t generation;
+} dem2di_name;
 
 /* A wall as described, and where it is. */
 typedef struct dem2di_wall {
     dem2d_wall_desc desc; /* normal of unit length */
     int span[2];          /* indices, or -1 */
     dem2d_vec listed;     /* point when the list was built */
+    double skin;          /* how far it may move before the next time */
     uint32_t generation;
     int users; /* walls that span to it */
     bool alive;
@@ -7401,12 +7454,20 @@ typedef struct dem2di_wall_state {
     double drift;     /* servo: mean speed along the normal that holds the force */
 } dem2di_wall_state;
 
-/* Pairs in the order of their keys, and the contact of each now and after the step. */
+/* The listed contacts: of two circles, of two other particles, of particles and walls (in the order
+   of the wall, then of the particle's id). Each at the last force pass and in the one being made.
+   What the scene has no use for is not there. */
 typedef struct dem2di_list {
-    dem2di_keys keys, spare;
-    dem2di_link *now, *next;
-    dem2di_ends *ends, *next_ends; /* of contacts with two points; NULL in worlds without faces */
-    int now_capacity, next_capacity, ends_capacity, next_ends_capacity;
+    dem2di_key *keys;                /* count; a < 0 when the contact was forgotten */
+    int discs, pairs, count;         /* where the kinds end */
+    double *shear, *next_shear;      /* circles with friction: the tangential springs */
+    dem2di_link *links, *next_links; /* all but circles: of contact i at i - discs */
+    dem2di_ends *ends, *next_ends;   /* likewise, where contacts may have two points */
+    int *incident; /* 2 i for the A of contact i, 2 i + 1 for its B: those of each particle in the
+                      order of the partner's id, walls last */
+    int *first;    /* of a slot's in incident; bodies + 1 */
+    int keys_capacity, shear_capacity, next_shear_capacity, links_capacity, next_links_capacity;
+    int ends_capacity, next_ends_capacity, incident_capacity, first_capacity;
 } dem2di_list;
 
 /* What the contact passes count. */
@@ -7414,43 +7475,90 @@ typedef struct dem2di_count {
     int64_t calls, looks, gaps, proofs[DEM2D_PROOF_COUNT];
 } dem2di_count;
 
+/* The greatest eigenvalues of M_i^-1 sum_c f_c K_c, for the limit of the time step and for the safe
+   bound, and the slots of their particles, or -1. */
+typedef struct dem2di_stiffest {
+    double value[2];
+    int at[2];
+} dem2di_stiffest;
+
+/* What one block of parallel work found. */
+typedef struct dem2di_tally {
+    dem2di_count count;
+    dem2di_stiffest stiffest;
+    double reach;   /* greatest of the discs */
+    int64_t spread; /* sum of the distances in memory of the partners found */
+    bool stale;     /* a particle has left its skin */
+    bool sound;     /* all states are finite */
+} dem2di_tally;
+
+/* What the scene makes use of: decided when the list is renewed, not per contact. */
+typedef struct dem2di_plan {
+    bool friction; /* some law between the materials in use has it */
+    bool spin;     /* something turns, or may be turned */
+    bool travels;  /* some particle is no circle: pairs are skipped by what they have travelled */
+    bool one_law;  /* all particles are of one material */
+    bool heavy, damped; /* gravity, damping: as they are set at the step */
+} dem2di_plan;
+
+/* Of the pair list before anything is known of the motion: skin in radii, steps between two
+   lists. */
+#define DEM2DI_SKIN_FIRST 0.1
+#define DEM2DI_INTERVAL_FIRST 100
+
+#define DEM2DI_LINE \
+    64 /* bytes: of a cache line, so that parts of scratch memory do not share one */
+
 struct dem2d_world {
     dem2d_env user_env, env; /* the caller's, and the one that counts bytes */
     size_t bytes;
-    double time_step, local_damping, global_damping, skin, tolerance;
+    dem2d_parallel_fn *parallel_for;
+    void *parallel_user;
+    double time_step, local_damping, global_damping, tolerance;
     dem2d_vec gravity;
     int max_iterations;
     dem2d_solver solver;
     dem2d_face_rule faces;
-    dem2di_overlap *overlap; /* scratch of the contact-area rule, twice what one overlap may have */
-    int overlap_capacity;
     bool two_points; /* contacts may have two: by the rule, and some template has faces */
     bool check_time_step;
-    bool list_stale;  /* the list must be built before the next force pass */
-    double wall_skin; /* how far a wall may move before that */
-    int64_t steps, rebuilds, slow_time_step;
+    bool list_stale; /* the list must be built before the next force pass */
+    bool list_worn;  /* because something has left its skin */
+    bool skin_fixed; /* as the caller wants it */
+    bool scattered;  /* particles that meet are far from each other in memory */
+    double skin;     /* of the radius */
+    double interval; /* steps that a list is expected to last */
+    double spread;   /* mean distance in memory of two partners when last sorted */
+    int64_t steps, rebuilds, slow_time_step, listed_at, sorts;
     dem2di_count count;
+    dem2di_plan plan;
 
     dem2di_template *templates;
     dem2d_material_desc *materials;
-    dem2d_pair_desc *laws; /* material_capacity squared */
-    dem2di_body *bodies;
+    dem2d_pair_desc *laws, *used_laws; /* laws_side squared: now, and at the last force pass */
+    int template_count, template_capacity, material_count, material_capacity, laws_side;
+
+    int body_count; /* slots in use, holes too */
+    int holes, name_count, free_name;
+    dem2di_name *names;                /* by the index of an id */
     dem2di_state *before, *now, *next; /* at the last force pass, present, being made */
-    double *travel, *next_travel;      /* since the list was built, see dem2di_travel */
-    dem2di_load *load, *next_load;
-    dem2di_stiffness *stiffness; /* scratch of the time step check and of its query */
-    dem2di_disc *discs;          /* scratch of the list and of the packing query */
+    dem2di_body *bodies;
+    dem2di_inverse *inverse;
+    dem2di_watch *watch;
+    double *travel, *next_travel; /* since the list was built, see dem2di_travel */
+    double *lever; /* a support value changes by at most this times the angle of a turn */
+    int name_capacity, before_capacity, now_capacity, next_capacity, body_capacity;
+    int inverse_capacity, watch_capacity, travel_capacity, next_travel_capacity, lever_capacity;
+
     dem2di_wall *walls;
     dem2di_wall_state *wall_before, *wall_now, *wall_next;
-    int template_count, template_capacity, material_count, material_capacity, laws_side;
-    int holes; /* free slots among the bodies */
-    int body_count, body_capacity, before_capacity, now_capacity, next_capacity;
-    int load_capacity, next_load_capacity, stiffness_capacity, discs_capacity;
-    int travel_capacity, next_travel_capacity;
     int wall_count, wall_capacity, wall_before_capacity, wall_now_capacity, wall_next_capacity;
-    dem2di_list pairs, touches; /* particle with particle, particle with wall */
-    dem2di_keys found;          /* scratch: pairs before sorting */
-    dem2di_grid grid;
+
+    dem2di_list list;
+    dem2di_pull *pulls; /* of each listed contact, in scratch */
+    char *scratch;      /* what only a step or only the building of the list needs */
+    dem2di_tally *tallies;
+    dem2di_overlap *overlap; /* contact-area rule: for each block twice what one overlap may have */
+    int scratch_capacity, tally_capacity, overlap_capacity, overlap_size;
 };
 
 /* The world's own environment counts what is in use and hands on to the caller's. */
@@ -7476,47 +7584,62 @@ static bool dem2di_grow(dem2d_world *world, void **array, int *capacity, int nee
     return dem2di_reserve(&world->env, array, capacity, needed, size);
 }
 
-static bool dem2di_list_reserve(dem2d_world *world, dem2di_list *list, int count) {
-    const dem2d_env *env = &world->env;
-    return dem2di_reserve(env, (void **)&list->keys.key, &list->keys.capacity, count,
-                          sizeof *list->keys.key) &&
-           dem2di_reserve(env, (void **)&list->spare.key, &list->spare.capacity, count,
-                          sizeof *list->spare.key) &&
-           dem2di_reserve(env, (void **)&list->now, &list->now_capacity, count,
-                          sizeof *list->now) &&
-           dem2di_reserve(env, (void **)&list->next, &list->next_capacity, count,
-                          sizeof *list->next) &&
-           (!world->two_points ||
-            (dem2di_reserve(env, (void **)&list->ends, &list->ends_capacity, count,
-                            sizeof *list->ends) &&
-             dem2di_reserve(env, (void **)&list->next_ends, &list->next_ends_capacity, count,
-                            sizeof *list->next_ends)));
+/* As above without room to spare: what is renewed as a whole, and in large scenes most of it. */
+static bool dem2di_room(dem2d_world *world, void **array, int *capacity, int needed, size_t size) {
+    if (needed <= *capacity) return true;
+    needed = needed < INT_MAX - needed / 16 ? needed + needed / 16 : needed;
+    return dem2di_enlarge(&world->env, array, capacity, needed, size);
 }
 
-static void dem2di_list_release(dem2d_world *world, dem2di_list *list) {
-    const dem2d_env *env = &world->env;
-    dem2di_release(env, list->keys.key, (size_t)list->keys.capacity, sizeof *list->keys.key);
-    dem2di_release(env, list->spare.key, (size_t)list->spare.capacity, sizeof *list->spare.key);
-    dem2di_release(env, list->now, (size_t)list->now_capacity, sizeof *list->now);
-    dem2di_release(env, list->next, (size_t)list->next_capacity, sizeof *list->next);
-    dem2di_release(env, list->ends, (size_t)list->ends_capacity, sizeof *list->ends);
-    dem2di_release(env, list->next_ends, (size_t)list->next_ends_capacity, sizeof *list->ends);
+static bool dem2di_list_reserve(dem2d_world *w, bool friction, int discs, int pairs, int count) {
+    dem2di_list *l = &w->list;
+    int others = count - discs, springs = friction ? discs : 0;
+    if (l->count - l->discs > others) others = l->count - l->discs; /* which are read once more */
+    int ends = w->two_points ? others : 0;
+    return dem2di_room(w, (void **)&l->keys, &l->keys_capacity, count, sizeof *l->keys) &&
+           dem2di_room(w, (void **)&l->shear, &l->shear_capacity, springs, sizeof *l->shear) &&
+           dem2di_room(w, (void **)&l->next_shear, &l->next_shear_capacity, springs,
+                       sizeof *l->next_shear) &&
+           dem2di_room(w, (void **)&l->links, &l->links_capacity, others, sizeof *l->links) &&
+           dem2di_room(w, (void **)&l->next_links, &l->next_links_capacity, others,
+                       sizeof *l->next_links) &&
+           dem2di_room(w, (void **)&l->ends, &l->ends_capacity, ends, sizeof *l->ends) &&
+           dem2di_room(w, (void **)&l->next_ends, &l->next_ends_capacity, ends,
+                       sizeof *l->next_ends) &&
+           dem2di_room(w, (void **)&l->incident, &l->incident_capacity, count + pairs,
+                       sizeof *l->incident);
+}
+
+static void dem2di_list_release(const dem2d_env *env, dem2di_list *l) {
+    dem2di_release(env, l->keys, (size_t)l->keys_capacity, sizeof *l->keys);
+    dem2di_release(env, l->shear, (size_t)l->shear_capacity, sizeof *l->shear);
+    dem2di_release(env, l->next_shear, (size_t)l->next_shear_capacity, sizeof *l->next_shear);
+    dem2di_release(env, l->links, (size_t)l->links_capacity, sizeof *l->links);
+    dem2di_release(env, l->next_links, (size_t)l->next_links_capacity, sizeof *l->next_links);
+    dem2di_release(env, l->ends, (size_t)l->ends_capacity, sizeof *l->ends);
+    dem2di_release(env, l->next_ends, (size_t)l->next_ends_capacity, sizeof *l->next_ends);
+    dem2di_release(env, l->incident, (size_t)l->incident_capacity, sizeof *l->incident);
+    dem2di_release(env, l->first, (size_t)l->first_capacity, sizeof *l->first);
 }
 
 static bool dem2di_reserve_bodies(dem2d_world *w, int count) {
-    return dem2di_grow(w, (void **)&w->bodies, &w->body_capacity, count, sizeof *w->bodies) &&
+    dem2di_list *l = &w->list;
+    return dem2di_grow(w, (void **)&w->names, &w->name_capacity, count, sizeof *w->names) &&
            dem2di_grow(w, (void **)&w->before, &w->before_capacity, count, sizeof *w->before) &&
            dem2di_grow(w, (void **)&w->now, &w->now_capacity, count, sizeof *w->now) &&
            dem2di_grow(w, (void **)&w->next, &w->next_capacity, count, sizeof *w->next) &&
-           dem2di_grow(w, (void **)&w->travel, &w->travel_capacity, count, sizeof *w->travel) &&
+           dem2di_grow(w, (void **)&w->bodies, &w->body_capacity, count, sizeof *w->bodies) &&
+           dem2di_grow(w, (void **)&w->inverse, &w->inverse_capacity, count, sizeof *w->inverse) &&
+           dem2di_grow(w, (void **)&w->watch, &w->watch_capacity, count, sizeof *w->watch) &&
+           dem2di_grow(w, (void **)&l->first, &l->first_capacity, count + 1, sizeof *l->first);
+}
+
+/* What pairs that may be skipped need beside. */
+static bool dem2di_reserve_travel(dem2d_world *w, int count) {
+    return dem2di_grow(w, (void **)&w->travel, &w->travel_capacity, count, sizeof *w->travel) &&
            dem2di_grow(w, (void **)&w->next_travel, &w->next_travel_capacity, count,
                        sizeof *w->next_travel) &&
-           dem2di_grow(w, (void **)&w->load, &w->load_capacity, count, sizeof *w->load) &&
-           dem2di_grow(w, (void **)&w->next_load, &w->next_load_capacity, count,
-                       sizeof *w->next_load) &&
-           dem2di_grow(w, (void **)&w->stiffness, &w->stiffness_capacity, count,
-                       sizeof *w->stiffness) &&
-           dem2di_grow(w, (void **)&w->discs, &w->discs_capacity, count, sizeof *w->discs);
+           dem2di_grow(w, (void **)&w->lever, &w->lever_capacity, count, sizeof *w->lever);
 }
 
 static bool dem2di_reserve_walls(dem2d_world *w, int count) {
@@ -7547,29 +7670,29 @@ DEM2D_API void dem2d_world_destroy(dem2d_world *world) {
     dem2d_world *w = world;
     const dem2d_env *env = &w->env;
     for (int i = 0; i < w->template_count; i++) dem2di_template_clear(env, &w->templates[i]);
-    dem2di_release(env, w->overlap, (size_t)w->overlap_capacity, sizeof *w->overlap);
     size_t side = (size_t)w->laws_side;
     dem2di_release(env, w->templates, (size_t)w->template_capacity, sizeof *w->templates);
     dem2di_release(env, w->materials, (size_t)w->material_capacity, sizeof *w->materials);
     dem2di_release(env, w->laws, side * side, sizeof *w->laws);
-    dem2di_release(env, w->bodies, (size_t)w->body_capacity, sizeof *w->bodies);
+    dem2di_release(env, w->used_laws, side * side, sizeof *w->laws);
+    dem2di_release(env, w->names, (size_t)w->name_capacity, sizeof *w->names);
     dem2di_release(env, w->before, (size_t)w->before_capacity, sizeof *w->before);
     dem2di_release(env, w->now, (size_t)w->now_capacity, sizeof *w->now);
     dem2di_release(env, w->next, (size_t)w->next_capacity, sizeof *w->next);
+    dem2di_release(env, w->bodies, (size_t)w->body_capacity, sizeof *w->bodies);
+    dem2di_release(env, w->inverse, (size_t)w->inverse_capacity, sizeof *w->inverse);
+    dem2di_release(env, w->watch, (size_t)w->watch_capacity, sizeof *w->watch);
     dem2di_release(env, w->travel, (size_t)w->travel_capacity, sizeof *w->travel);
-    dem2di_release(env, w->next_travel, (size_t)w->next_travel_capacity, sizeof *w->travel);
-    dem2di_release(env, w->load, (size_t)w->load_capacity, sizeof *w->load);
-    dem2di_release(env, w->next_load, (size_t)w->next_load_capacity, sizeof *w->next_load);
-    dem2di_release(env, w->stiffness, (size_t)w->stiffness_capacity, sizeof *w->stiffness);
-    dem2di_release(env, w->discs, (size_t)w->discs_capacity, sizeof *w->discs);
+    dem2di_release(env, w->next_travel, (size_t)w->next_travel_capacity, sizeof *w->next_travel);
+    dem2di_release(env, w->lever, (size_t)w->lever_capacity, sizeof *w->lever);
     dem2di_release(env, w->walls, (size_t)w->wall_capacity, sizeof *w->walls);
     dem2di_release(env, w->wall_before, (size_t)w->wall_before_capacity, sizeof *w->wall_before);
     dem2di_release(env, w->wall_now, (size_t)w->wall_now_capacity, sizeof *w->wall_now);
     dem2di_release(env, w->wall_next, (size_t)w->wall_next_capacity, sizeof *w->wall_next);
-    dem2di_list_release(w, &w->pairs);
-    dem2di_list_release(w, &w->touches);
-    dem2di_release(env, w->found.key, (size_t)w->found.capacity, sizeof *w->found.key);
-    dem2di_grid_release(env, &w->grid);
+    dem2di_list_release(env, &w->list);
+    dem2di_release(env, w->scratch, (size_t)w->scratch_capacity, DEM2DI_LINE);
+    dem2di_release(env, w->tallies, (size_t)w->tally_capacity, sizeof *w->tallies);
+    dem2di_release(env, w->overlap, (size_t)w->overlap_capacity, sizeof *w->overlap);
     dem2d_env user = w->user_env;
     dem2di_release(&user, w, 1, sizeof *w);
 }
@@ -7625,14 +7748,21 @@ DEM2D_API dem2d_result dem2d_world_create(const dem2d_world_desc *desc, dem2d_wo
     made->gravity = desc->gravity;
     made->local_damping = desc->local_damping;
     made->global_damping = desc->global_damping;
-    made->skin = desc->skin == 0 ? 0.1 : desc->skin;
+    made->parallel_for = desc->parallel_for;
+    made->parallel_user = desc->parallel_user;
+    made->skin_fixed = desc->skin > 0;
+    made->skin = made->skin_fixed ? desc->skin : DEM2DI_SKIN_FIRST;
+    made->interval = DEM2DI_INTERVAL_FIRST;
+    made->scattered = true;
+    made->free_name = -1;
     made->tolerance = desc->contact_tolerance == 0 ? 1e-8 : desc->contact_tolerance;
     made->max_iterations = desc->max_iterations == 0 ? 128 : desc->max_iterations;
     made->solver = desc->solver;
     made->faces = desc->faces;
     made->check_time_step = !desc->skip_time_step_check;
     if (!dem2di_reserve_bodies(made, desc->particle_capacity) ||
-        !dem2di_list_reserve(made, &made->pairs, desc->pair_capacity)) {
+        !dem2di_room(made, (void **)&made->list.keys, &made->list.keys_capacity,
+                     desc->pair_capacity, sizeof *made->list.keys)) {
         result = dem2di_out_of_memory(made, "the capacities asked for");
         dem2d_world_destroy(made);
         return result;
@@ -7651,14 +7781,23 @@ static bool dem2di_material_lives(const dem2d_world *w, dem2d_material_id id) {
     return (int64_t)id.index < w->material_count && id.generation == 1; /* never removed */
 }
 
-static bool dem2di_particle_lives(const dem2d_world *w, dem2d_particle_id id) {
-    return (int64_t)id.index < w->body_count && w->bodies[id.index].shape != NULL &&
-           w->bodies[id.index].generation == id.generation;
+/* Slot of a particle, or -1 for a stale id. */
+static int dem2di_slot(const dem2d_world *w, dem2d_particle_id id) {
+    if ((int64_t)id.index >= w->name_count) return -1;
+    const dem2di_name *name = &w->names[id.index];
+    return name->slot >= 0 && name->generation == id.generation ? name->slot : -1;
 }
 
 static bool dem2di_wall_lives(const dem2d_world *w, dem2d_wall_id id) {
     return (int64_t)id.index < w->wall_count && w->walls[id.index].alive &&
            w->walls[id.index].generation == id.generation;
+}
+
+static dem2d_particle_id dem2di_particle_id(const dem2d_world *world, int slot) {
+    dem2d_particle_id id;
+    id.index = (uint32_t)world->bodies[slot].index;
+    id.generation = world->names[id.index].generation;
+    return id;
 }
 
 static dem2d_result dem2di_stale(const dem2d_world *w, const char *kind, uint32_t index) {
@@ -7669,7 +7808,7 @@ static dem2d_result dem2di_stale(const dem2d_world *w, const char *kind, uint32_
    what is conserved: its edges bulge by R pi^2/(2 n^2) = 5e-6 R, little against any overlap. */
 #define DEM2DI_AREA_CORNERS 1024
 
-/* The polygon of a template, and scratch for the overlap of any two. */
+/* The polygon of a template, and how much scratch the overlap of any two takes. */
 static bool dem2di_template_outline(dem2d_world *world, const dem2d_shape *shape,
                                     dem2di_template *place) {
     bool sharp = shape->type == DEM2D_POLYGON && shape->rounding == 0;
@@ -7680,11 +7819,7 @@ static bool dem2di_template_outline(dem2d_world *world, const dem2d_shape *shape
         if (world->templates[i].corners > most) most = world->templates[i].corners;
     dem2d_vec *outline = (dem2d_vec *)dem2di_allocate(&world->env, (size_t)count, sizeof *outline);
     if (outline == NULL) return false;
-    if (!dem2di_grow(world, (void **)&world->overlap, &world->overlap_capacity, 4 * most + 8,
-                     sizeof *world->overlap)) {
-        dem2di_release(&world->env, outline, (size_t)count, sizeof *outline);
-        return false;
-    }
+    if (4 * most + 8 > world->overlap_size) world->overlap_size = 4 * most + 8;
     for (int i = 0; i < count; i++) outline[i] = dem2di_outline_point(shape, i, count);
     /* of the shape's own area: on the mean its boundary, not within it by 1e-4 of its size, which
        counts against an overlap */
@@ -7759,10 +7894,10 @@ static dem2d_pair_desc *dem2di_law(const dem2d_world *world, int a, int b) {
 }
 
 /* How the two of a listed contact meet; B is a particle or a wall. */
-static const dem2d_pair_desc *dem2di_law_of(const dem2d_world *world, const dem2di_key *key,
-                                            bool wall) {
-    int material =
-        wall ? (int)world->walls[key->b].desc.material.index : world->bodies[key->b].material;
+static const dem2d_pair_desc *dem2di_law_of(const dem2d_world *world, int contact) {
+    const dem2di_key *key = &world->list.keys[contact];
+    int material = contact >= world->list.pairs ? (int)world->walls[key->b].desc.material.index
+                                                : world->bodies[key->b].material;
     return dem2di_law(world, world->bodies[key->a].material, material);
 }
 
@@ -7775,18 +7910,25 @@ static dem2d_result dem2di_check_law(const dem2d_env *env, double normal, double
     return result;
 }
 
-/* A wider table of laws with the old entries in place. */
+/* Wider tables of laws with the old entries in place. */
 static bool dem2di_widen_laws(dem2d_world *world, int side) {
     if (side <= world->laws_side) return true;
     int wider = side < 4 ? 4 : 2 * side, old = world->laws_side;
-    size_t cells = (size_t)wider * (size_t)wider;
-    dem2d_pair_desc *laws = (dem2d_pair_desc *)dem2di_allocate(&world->env, cells, sizeof *laws);
-    if (laws == NULL) return false;
-    memset(laws, 0, cells * sizeof *laws);
-    for (int i = 0; i < old; i++)
-        memcpy(&laws[i * wider], &world->laws[i * old], (size_t)old * sizeof *laws);
-    dem2di_release(&world->env, world->laws, (size_t)old * (size_t)old, sizeof *laws);
-    world->laws = laws;
+    size_t cells = (size_t)wider * (size_t)wider, was = (size_t)old * (size_t)old;
+    dem2d_pair_desc **tables[2] = {&world->laws, &world->used_laws}, *made[2];
+    for (int k = 0; k < 2; k++) {
+        made[k] = (dem2d_pair_desc *)dem2di_allocate(&world->env, cells, sizeof **made);
+        if (made[k] != NULL) continue;
+        if (k > 0) dem2di_release(&world->env, made[0], cells, sizeof **made);
+        return false;
+    }
+    for (int k = 0; k < 2; k++) {
+        memset(made[k], 0, cells * sizeof **made);
+        for (int i = 0; i < old; i++)
+            memcpy(&made[k][i * wider], *tables[k] + i * old, (size_t)old * sizeof **made);
+        dem2di_release(&world->env, *tables[k], was, sizeof **made);
+        *tables[k] = made[k];
+    }
     world->laws_side = wider;
     return true;
 }
@@ -7866,31 +8008,41 @@ static dem2d_result dem2di_check_particle(const dem2d_world *world,
     return result;
 }
 
-/* Mass and sizes of a particle from its template, material and scale. */
-static void dem2di_body_set(const dem2d_world *world, const dem2d_particle_desc *desc,
-                            dem2di_body *body) {
-    const dem2d_shape *shape = world->templates[desc->shape.index].shape;
-    double square = desc->scale * desc->scale;
-    body->shape_index = (int)desc->shape.index;
-    body->material = (int)desc->material.index;
-    body->motion = desc->motion;
-    body->scale = desc->scale;
-    body->radius = shape->circumscribed * desc->scale;
-    body->skin = body->radius * world->skin;
-    /* |p'| <= sqrt(R^2 - p^2) and p is at least the inscribed radius; of a circle p' is 0 */
-    double inner = shape->inscribed * desc->scale;
-    body->lever =
-        shape->type == DEM2D_CIRCLE ? 0 : sqrt(body->radius * body->radius - inner * inner);
-    body->mass = world->materials[body->material].density * shape->mass.area * square;
-    body->inertia =
-        world->materials[body->material].density * shape->mass.polar_moment * square * square;
-    body->listed = desc->position;
+static double dem2di_body_mass(const dem2d_world *world, const dem2di_body *body) {
+    double square = body->scale * body->scale;
+    return world->materials[body->material].density * body->shape->mass.area * square;
 }
 
-static int dem2di_free_body(const dem2d_world *world) {
-    int slot = world->holes > 0 ? 0 : world->body_count;
-    while (slot < world->body_count && world->bodies[slot].shape != NULL) slot++;
-    return slot;
+static double dem2di_body_inertia(const dem2d_world *world, const dem2di_body *body) {
+    double square = body->scale * body->scale;
+    return world->materials[body->material].density * body->shape->mass.polar_moment * square *
+           square;
+}
+
+static dem2di_inverse dem2di_inverse_of(const dem2d_world *world, const dem2di_body *body) {
+    dem2di_inverse inverse = {0, 0};
+    if (body->motion != DEM2D_FREE) return inverse;
+    inverse.mass = 1 / dem2di_body_mass(world, body);
+    inverse.inertia = 1 / dem2di_body_inertia(world, body);
+    return inverse;
+}
+
+/* The index of the next id: one that is free again, or a new one. */
+static int dem2di_name_take(dem2d_world *world) {
+    int index = world->free_name;
+    if (index < 0) {
+        index = world->name_count++;
+        world->names[index].generation = 0;
+    } else {
+        world->free_name = -2 - world->names[index].slot;
+    }
+    world->names[index].generation++;
+    return index;
+}
+
+static void dem2di_name_give(dem2d_world *world, int index) {
+    world->names[index].slot = -2 - world->free_name;
+    world->free_name = index;
 }
 
 DEM2D_API dem2d_result dem2d_world_add_particle(dem2d_world *world, const dem2d_particle_desc *desc,
@@ -7898,55 +8050,67 @@ DEM2D_API dem2d_result dem2d_world_add_particle(dem2d_world *world, const dem2d_
     if (world == NULL || desc == NULL || id == NULL) return DEM2D_NULL_ARGUMENT;
     dem2d_result result = dem2di_check_particle(world, desc);
     if (result != DEM2D_OK) return result;
-    dem2di_body made;
-    dem2di_body_set(world, desc, &made);
-    if (!(made.mass > 0 && made.inertia > 0) || !dem2di_finite(made.mass) ||
-        !dem2di_finite(made.inertia))
+    dem2di_body body;
+    body.shape = world->templates[desc->shape.index].shape;
+    body.scale = desc->scale;
+    body.shape_index = (int)desc->shape.index;
+    body.material = (uint16_t)desc->material.index;
+    body.motion = (uint8_t)desc->motion;
+    double mass = dem2di_body_mass(world, &body), inertia = dem2di_body_inertia(world, &body);
+    if (!(mass > 0 && inertia > 0 && dem2di_finite(mass) && dem2di_finite(inertia)))
         return dem2di_fail(&world->env, DEM2D_OUT_OF_RANGE, -1, "scale = %g gives mass %g",
-                           desc->scale, made.mass);
-    int slot = dem2di_free_body(world);
+                           desc->scale, mass);
+    int slot = world->body_count;
+    if (slot == 1 << 30)
+        return dem2di_fail(&world->env, DEM2D_OUT_OF_RANGE, -1, "more than %d particles", slot);
     if (!dem2di_reserve_bodies(world, slot + 1)) return dem2di_out_of_memory(world, "a particle");
-    made.generation = world->bodies[slot].generation + 1;
-    made.shape = world->templates[desc->shape.index].shape;
-    world->bodies[slot] = made;
+    body.index = dem2di_name_take(world);
+    world->names[body.index].slot = slot;
+    world->bodies[slot] = body;
+    world->inverse[slot] = dem2di_inverse_of(world, &body);
     world->templates[desc->shape.index].users++;
     dem2di_state state;
     state.x = desc->position;
     state.q = dem2d_rot_make(desc->angle);
     state.v = desc->velocity;
     state.w = desc->angular_velocity;
+    state.radius = body.shape->circumscribed * desc->scale;
     world->now[slot] = world->before[slot] = state;
-    memset(&world->load[slot], 0, sizeof *world->load);
-    world->travel[slot] = 0;
-    if (slot == world->body_count)
-        world->body_count++;
-    else
-        world->holes--;
+    world->watch[slot].listed = state.x;
+    world->watch[slot].skin = 0;
+    world->list.first[slot + 1] = world->list.first[slot]; /* no contacts yet */
+    world->body_count++;
     world->list_stale = true;
-    id->index = (uint32_t)slot;
-    id->generation = made.generation;
+    id->index = (uint32_t)body.index;
+    id->generation = world->names[body.index].generation;
     return DEM2D_OK;
 }
 
-/* Contacts of a particle, or of a wall, are forgotten. */
-static void dem2di_forget(dem2d_world *world, int body, int wall) {
-    for (int i = 0; i < world->pairs.keys.count; i++)
-        if (world->pairs.keys.key[i].a == body || world->pairs.keys.key[i].b == body)
-            memset(&world->pairs.now[i], 0, sizeof *world->pairs.now);
-    for (int i = 0; i < world->touches.keys.count; i++)
-        if (world->touches.keys.key[i].a == body || world->touches.keys.key[i].b == wall)
-            memset(&world->touches.now[i], 0, sizeof *world->touches.now);
+/* Contacts of a particle are forgotten. */
+static void dem2di_forget(dem2d_world *world, int slot) {
+    const dem2di_list *list = &world->list;
+    for (int k = list->first[slot]; k < list->first[slot + 1]; k++)
+        list->keys[list->incident[k] / 2].a = -1;
+    world->list_stale = true;
+}
+
+/* Contacts with a wall are forgotten. */
+static void dem2di_forget_wall(dem2d_world *world, int wall) {
+    for (int i = world->list.pairs; i < world->list.count; i++)
+        if (world->list.keys[i].b == wall) world->list.keys[i].a = -1;
     world->list_stale = true;
 }
 
 DEM2D_API dem2d_result dem2d_world_remove_particle(dem2d_world *world, dem2d_particle_id id) {
     if (world == NULL) return DEM2D_NULL_ARGUMENT;
-    if (!dem2di_particle_lives(world, id)) return dem2di_stale(world, "particle", id.index);
-    dem2di_body *body = &world->bodies[id.index];
+    int slot = dem2di_slot(world, id);
+    if (slot < 0) return dem2di_stale(world, "particle", id.index);
+    dem2di_body *body = &world->bodies[slot];
     world->templates[body->shape_index].users--;
     body->shape = NULL;
     world->holes++;
-    dem2di_forget(world, (int)id.index, -1);
+    dem2di_forget(world, slot);
+    dem2di_name_give(world, (int)id.index);
     return DEM2D_OK;
 }
 
@@ -7958,40 +8122,147 @@ static dem2d_pose dem2di_pose_of(const dem2d_world *world, const dem2di_state *s
     return pose;
 }
 
+static double dem2di_equivalent(const dem2d_world *world, int slot) {
+    const dem2di_body *body = &world->bodies[slot];
+    return body->scale * sqrt(body->shape->mass.area / DEM2DI_PI);
+}
+
+/* Two circles: the normal force along the line of centres, the tangential spring at the middle of
+   the overlap. Both are 0 when they are apart. */
+typedef struct dem2di_round {
+    dem2d_vec normal;
+    double depth, force;
+    double arm_a, arm_b; /* from the centres to the contact point */
+} dem2di_round;
+
+static DEM2DI_INLINE dem2di_round dem2di_round_make(const dem2di_state *a, const dem2di_state *b,
+                                                    double stiffness) {
+    dem2di_round round;
+    dem2d_vec d = dem2di_centre_line(a->x, b->x);
+    double square = dem2di_dot(d, d), distance = sqrt(square), reach = a->radius + b->radius;
+    if (square > 1e-280) { /* a normal number */
+        double f = 1 / distance;
+        round.normal = dem2di_vec(d.x * f, d.y * f);
+        round.depth = reach - distance;
+    } else {
+        round.depth = dem2di_circle_contact(d, distance, reach, &round.normal);
+    }
+    round.force = stiffness * dem2di_max(round.depth, 0);
+    round.arm_a = a->radius - round.depth / 2;
+    round.arm_b = b->radius - round.depth / 2;
+    return round;
+}
+
+static DEM2DI_INLINE void dem2di_round_pull(const dem2di_round *round, double shear,
+                                            dem2di_pull *pull) {
+    dem2d_vec n = round->normal;
+    pull->force.x = n.x * round->force - n.y * shear;
+    pull->force.y = n.y * round->force + n.x * shear;
+    pull->torque[0] = -(round->arm_a * shear);
+    pull->torque[1] = -(round->arm_b * shear);
+}
+
+/* What holds at the last force pass, or (`next`) in the one that is being made. */
+static const dem2di_state *dem2di_states_at(const dem2d_world *world, bool next) {
+    return next ? world->now : world->before;
+}
+
+static const dem2d_pair_desc *dem2di_law_at(const dem2d_world *world, int contact, bool next) {
+    const dem2d_pair_desc *laws = next ? world->laws : world->used_laws;
+    return &laws[dem2di_law_of(world, contact) - world->laws];
+}
+
+/* A listed contact then, and the contact point from B's centre (with walls 0); false when it is
+   closed. Of two circles only the tangential spring is kept, the rest follows from the positions
+   with the same bits. */
+static bool dem2di_link_at(const dem2d_world *world, int contact, bool next, dem2di_link *link,
+                           dem2d_vec *arm_b) {
+    const dem2di_list *list = &world->list;
+    const dem2di_key *key = &list->keys[contact];
+    const dem2di_state *states = dem2di_states_at(world, next);
+    if (key->a < 0) return false;
+    if (contact >= list->discs) {
+        *link = (next ? list->next_links : list->links)[contact - list->discs];
+        *arm_b = dem2di_vec(0, 0);
+        if (contact < list->pairs)
+            *arm_b =
+                dem2di_sub(link->point, dem2di_centre_line(states[key->a].x, states[key->b].x));
+        return link->depth > 0;
+    }
+    const dem2d_pair_desc *law = dem2di_law_at(world, contact, next);
+    dem2di_round round = dem2di_round_make(&states[key->a], &states[key->b], law->normal_stiffness);
+    link->normal = round.normal;
+    link->point = dem2di_scale(round.normal, round.arm_a);
+    link->depth = round.depth;
+    link->force = round.force;
+    link->shear = world->plan.friction ? (next ? list->next_shear : list->shear)[contact] : 0;
+    link->budget = 0;
+    *arm_b = dem2di_scale(round.normal, -round.arm_b);
+    return round.depth > 0;
+}
+
+/* The second point of a contact, beside its link; NULL where no contact has two. */
+static const dem2di_ends *dem2di_ends_at(const dem2d_world *world, int contact, bool next) {
+    const dem2di_list *list = &world->list;
+    if (!world->two_points || contact < list->discs) return NULL;
+    const dem2di_ends *ends = &(next ? list->next_ends : list->ends)[contact - list->discs];
+    return ends->weight[0] > 0 ? ends : NULL;
+}
+
+/* Sum of the contact forces on a particle at the last force pass, as the step adds them. */
+static dem2di_load dem2di_load_of(const dem2d_world *world, int slot) {
+    const dem2di_list *list = &world->list;
+    dem2di_load load = {{0, 0}, 0};
+    for (int k = list->first[slot]; k < list->first[slot + 1]; k++) {
+        int contact = list->incident[k] / 2, side = list->incident[k] & 1;
+        dem2di_link link;
+        dem2d_vec arm_b;
+        dem2di_pull pull;
+        if (!dem2di_link_at(world, contact, false, &link, &arm_b)) continue;
+        dem2di_link_pull(&link, arm_b, &pull);
+        load.force = dem2di_along(load.force, side ? 1 : -1, pull.force);
+        load.torque += pull.torque[side];
+    }
+    return load;
+}
+
 DEM2D_API dem2d_result dem2d_world_get_particle(const dem2d_world *world, dem2d_particle_id id,
                                                 dem2d_particle_info *info) {
     if (world == NULL || info == NULL) return DEM2D_NULL_ARGUMENT;
-    if (!dem2di_particle_lives(world, id)) return dem2di_stale(world, "particle", id.index);
-    const dem2di_body *body = &world->bodies[id.index];
-    const dem2di_state *now = &world->now[id.index];
+    int slot = dem2di_slot(world, id);
+    if (slot < 0) return dem2di_stale(world, "particle", id.index);
+    const dem2di_body *body = &world->bodies[slot];
+    const dem2di_state *now = &world->now[slot];
     info->shape.index = (uint32_t)body->shape_index;
     info->shape.generation = world->templates[body->shape_index].generation;
     info->material.index = (uint32_t)body->material;
     info->material.generation = 1;
-    info->motion = body->motion;
-    info->pose = dem2di_pose_of(world, world->now, (int)id.index);
+    info->motion = (dem2d_motion)body->motion;
+    info->pose = dem2di_pose_of(world, world->now, slot);
     info->velocity = now->v;
     info->angular_velocity = now->w;
-    info->force = world->load[id.index].force;
-    info->torque = world->load[id.index].torque;
-    info->mass = body->mass;
-    info->inertia = body->inertia;
-    info->radius = body->radius;
-    info->equivalent = body->scale * sqrt(body->shape->mass.area / DEM2DI_PI);
+    dem2di_load load = dem2di_load_of(world, slot);
+    info->force = load.force;
+    info->torque = load.torque;
+    info->mass = dem2di_body_mass(world, body);
+    info->inertia = dem2di_body_inertia(world, body);
+    info->radius = now->radius;
+    info->equivalent = dem2di_equivalent(world, slot);
     return DEM2D_OK;
 }
 
 DEM2D_API dem2d_result dem2d_world_move_particle(dem2d_world *world, dem2d_particle_id id,
                                                  dem2d_vec position, double angle) {
     if (world == NULL) return DEM2D_NULL_ARGUMENT;
-    if (!dem2di_particle_lives(world, id)) return dem2di_stale(world, "particle", id.index);
+    int slot = dem2di_slot(world, id);
+    if (slot < 0) return dem2di_stale(world, "particle", id.index);
     dem2d_result result = dem2di_check_vec(&world->env, "position", position);
     if (result == DEM2D_OK) result = dem2di_check_angle(&world->env, angle);
     if (result != DEM2D_OK) return result;
-    world->now[id.index].x = position;
-    world->now[id.index].q = dem2d_rot_make(angle);
-    world->before[id.index] = world->now[id.index];
-    dem2di_forget(world, (int)id.index, -1);
+    world->now[slot].x = position;
+    world->now[slot].q = dem2d_rot_make(angle);
+    world->before[slot] = world->now[slot];
+    dem2di_forget(world, slot);
     return DEM2D_OK;
 }
 
@@ -7999,12 +8270,14 @@ DEM2D_API dem2d_result dem2d_world_drive_particle(dem2d_world *world, dem2d_part
                                                   dem2d_motion motion, dem2d_vec velocity,
                                                   double angular_velocity) {
     if (world == NULL) return DEM2D_NULL_ARGUMENT;
-    if (!dem2di_particle_lives(world, id)) return dem2di_stale(world, "particle", id.index);
+    int slot = dem2di_slot(world, id);
+    if (slot < 0) return dem2di_stale(world, "particle", id.index);
     dem2d_result result = dem2di_check_motion(&world->env, motion, velocity, angular_velocity);
     if (result != DEM2D_OK) return result;
-    world->now[id.index].v = velocity;
-    world->now[id.index].w = angular_velocity;
-    world->bodies[id.index].motion = motion;
+    world->now[slot].v = velocity;
+    world->now[slot].w = angular_velocity;
+    world->bodies[slot].motion = (uint8_t)motion;
+    world->inverse[slot] = dem2di_inverse_of(world, &world->bodies[slot]);
     world->list_stale = true; /* pairs of two fixed ones are not listed */
     return DEM2D_OK;
 }
@@ -8079,6 +8352,7 @@ DEM2D_API dem2d_result dem2d_world_add_wall(dem2d_world *world, const dem2d_wall
     wall->alive = true;
     wall->generation++;
     wall->users = 0;
+    wall->skin = 0;
     memset(&world->wall_now[slot], 0, sizeof *world->wall_now);
     dem2di_wall_place(world, slot, desc);
     if (slot == world->wall_count) world->wall_count++;
@@ -8099,8 +8373,8 @@ DEM2D_API dem2d_result dem2d_world_set_wall(dem2d_world *world, dem2d_wall_id id
     dem2di_wall_unspan(world, wall);
     dem2di_wall_place(world, (int)id.index, desc);
     bool turned = normal.x != wall->desc.normal.x || normal.y != wall->desc.normal.y;
-    if (turned || fabs(dem2di_dot(moved, normal)) > world->wall_skin)
-        dem2di_forget(world, -1, (int)id.index);
+    if (turned || fabs(dem2di_dot(moved, normal)) > wall->skin)
+        dem2di_forget_wall(world, (int)id.index);
     return DEM2D_OK;
 }
 
@@ -8114,7 +8388,7 @@ DEM2D_API dem2d_result dem2d_world_remove_wall(dem2d_world *world, dem2d_wall_id
                            wall->users);
     dem2di_wall_unspan(world, wall);
     wall->alive = false;
-    dem2di_forget(world, -1, (int)id.index);
+    dem2di_forget_wall(world, (int)id.index);
     return DEM2D_OK;
 }
 
@@ -8170,131 +8444,677 @@ DEM2D_API dem2d_result dem2d_world_set_time_step(dem2d_world *world, double time
     return DEM2D_OK;
 }
 
-/* The contact each key of the new list had in the old one: both are in the order of keys. */
-static void dem2di_list_merge(const dem2di_list *list, const dem2di_key *keys, int count,
-                              dem2di_link *links, dem2di_ends *ends) {
-    int old = 0;
-    for (int i = 0; i < count; i++) {
-        dem2di_key key = keys[i];
-        while (old < list->keys.count &&
-               (list->keys.key[old].a < key.a ||
-                (list->keys.key[old].a == key.a && list->keys.key[old].b < key.b)))
-            old++;
-        bool known = old < list->keys.count && list->keys.key[old].a == key.a &&
-                     list->keys.key[old].b == key.b;
-        memset(&links[i], 0, sizeof links[i]);
-        if (known) links[i] = list->now[old];
-        if (ends == NULL) continue;
-        memset(&ends[i], 0, sizeof ends[i]);
-        if (known) ends[i] = list->ends[old];
+/* ============================================================================================
+   >>list  The list of contacts: particles in the order of space, partners, what they remember
+   uses: config, math, memory, contact, broad, law, motion, world
+   ============================================================================================ */
+
+/* Parallel work is cut into blocks of so many items: enough to pay for a call of the callback's,
+   few enough to share 10,000 particles out evenly. Contacts of other shapes take ten times longer
+   than those of circles. */
+#define DEM2DI_BLOCK 256
+#define DEM2DI_BLOCK_OTHERS 64
+
+static int dem2di_blocks(int items, int block) {
+    return items / block + (items % block > 0);
+}
+
+/* The end of a block that begins at `begin`. */
+static int dem2di_block_end(int begin, int block, int items) {
+    return items - begin < block ? items : begin + block;
+}
+
+/* All that takes time goes through here. A count of 1 is work that is not cut. */
+static void dem2di_run(const dem2d_world *world, dem2d_phase phase, int count, dem2d_task_fn *task,
+                       void *context) {
+    if (count == 0) return;
+    if (world->parallel_for == NULL)
+        task(context, 0, count);
+    else
+        world->parallel_for(world->parallel_user, phase, count, task, context);
+}
+
+/* Scratch memory, cut up from its start: places to fit into, or NULL to count only. */
+typedef struct dem2di_cutter {
+    char *memory;
+    size_t used;
+} dem2di_cutter;
+
+static void *dem2di_cut(dem2di_cutter *cutter, size_t count, size_t size) {
+    size_t at = cutter->used;
+    cutter->used += (count * size + DEM2DI_LINE - 1) / DEM2DI_LINE * DEM2DI_LINE;
+    return cutter->memory != NULL ? cutter->memory + at : NULL;
+}
+
+static bool dem2di_scratch_reserve(dem2d_world *world, size_t bytes) {
+    size_t lines = bytes / DEM2DI_LINE + (bytes % DEM2DI_LINE > 0);
+    if (lines > (size_t)INT_MAX) return false;
+    return dem2di_room(world, (void **)&world->scratch, &world->scratch_capacity, (int)lines,
+                       DEM2DI_LINE);
+}
+
+static int dem2di_contact_blocks(int discs, int count) {
+    return dem2di_blocks(discs, DEM2DI_BLOCK) + dem2di_blocks(count - discs, DEM2DI_BLOCK_OTHERS);
+}
+
+/* Room for what the blocks find, and for the overlaps of the contact-area rule: one for each block
+   that may run at the same time. */
+static bool dem2di_tallies_reserve(dem2d_world *world, int discs, int count) {
+    int blocks = dem2di_contact_blocks(discs, count);
+    int others = world->parallel_for != NULL ? dem2di_contact_blocks(0, count - discs) : 1;
+    if (world->overlap_size > 0 && others > INT_MAX / world->overlap_size) return false;
+    int bodies = dem2di_blocks(world->body_count, DEM2DI_BLOCK);
+    return dem2di_room(world, (void **)&world->tallies, &world->tally_capacity,
+                       blocks > bodies ? blocks : bodies, sizeof *world->tallies) &&
+           dem2di_room(world, (void **)&world->overlap, &world->overlap_capacity,
+                       others * world->overlap_size, sizeof *world->overlap);
+}
+
+/* Of a block of contacts that are not of circles. */
+static dem2di_overlap *dem2di_overlap_scratch(const dem2d_world *world, int block) {
+    if (world->parallel_for == NULL || world->overlap == NULL) return world->overlap;
+    return world->overlap + (size_t)block * (size_t)world->overlap_size;
+}
+
+/* What was next becomes the present. */
+static void dem2di_swap_contacts(dem2di_list *l) {
+    double *shear = l->shear;
+    dem2di_link *links = l->links;
+    dem2di_ends *ends = l->ends;
+    int capacity = l->shear_capacity;
+    l->shear = l->next_shear;
+    l->next_shear = shear;
+    l->shear_capacity = l->next_shear_capacity;
+    l->next_shear_capacity = capacity;
+    capacity = l->links_capacity;
+    l->links = l->next_links;
+    l->next_links = links;
+    l->links_capacity = l->next_links_capacity;
+    l->next_links_capacity = capacity;
+    capacity = l->ends_capacity;
+    l->ends = l->next_ends;
+    l->next_ends = ends;
+    l->ends_capacity = l->next_ends_capacity;
+    l->next_ends_capacity = capacity;
+}
+
+/* --- the contacts of each particle ------------------------------------------------------------ */
+
+/* What the partner of an entry is sorted by: its id, walls behind. */
+static uint32_t dem2di_incident_rank(const dem2d_world *world, int entry) {
+    const dem2di_key *key = &world->list.keys[entry / 2];
+    if (entry / 2 >= world->list.pairs) return ((uint32_t)1 << 30) + (uint32_t)key->b;
+    return (uint32_t)world->bodies[entry & 1 ? key->a : key->b].index;
+}
+
+/* Each particle's entries in order, by Shell's sort (Ciura's gaps): most have a handful, one that
+   is a hundred times larger than its neighbours has hundreds. */
+static void dem2di_incident_task(void *context, int begin, int end) {
+    static const int gaps[] = {301, 132, 57, 23, 10, 4, 1};
+    const dem2d_world *world = (const dem2d_world *)context;
+    int last = dem2di_block_end((end - 1) * DEM2DI_BLOCK, DEM2DI_BLOCK, world->body_count);
+    for (int slot = begin * DEM2DI_BLOCK; slot < last; slot++) {
+        int *run = world->list.incident + world->list.first[slot];
+        int count = world->list.first[slot + 1] - world->list.first[slot];
+        for (int g = 0; g < 7; g++) {
+            for (int i = gaps[g]; i < count; i++) {
+                int entry = run[i], k = i;
+                uint32_t rank = dem2di_incident_rank(world, entry);
+                for (; k >= gaps[g] && dem2di_incident_rank(world, run[k - gaps[g]]) > rank;
+                     k -= gaps[g])
+                    run[k] = run[k - gaps[g]];
+                run[k] = entry;
+            }
+        }
     }
 }
 
-static void dem2di_swap_links(dem2di_list *list) {
-    dem2di_link *links = list->now;
-    int capacity = list->now_capacity;
-    list->now = list->next;
-    list->now_capacity = list->next_capacity;
-    list->next = links;
-    list->next_capacity = capacity;
-    dem2di_ends *ends = list->ends;
-    capacity = list->ends_capacity;
-    list->ends = list->next_ends;
-    list->ends_capacity = list->next_ends_capacity;
-    list->next_ends = ends;
-    list->next_ends_capacity = capacity;
+static void dem2di_incident_fill_task(void *context, int begin, int end) {
+    dem2d_world *world = (dem2d_world *)context;
+    dem2di_list *list = &world->list;
+    int *first = list->first;
+    (void)begin;
+    (void)end;
+    memset(first, 0, ((size_t)world->body_count + 1) * sizeof *first);
+    for (int i = 0; i < list->count; i++) {
+        if (list->keys[i].a < 0) continue;
+        first[list->keys[i].a]++;
+        if (i < list->pairs) first[list->keys[i].b]++;
+    }
+    (void)dem2di_starts(first, world->body_count + 1);
+    for (int i = 0; i < list->count; i++) { /* first becomes where the next one begins */
+        if (list->keys[i].a < 0) continue;
+        list->incident[first[list->keys[i].a]++] = 2 * i;
+        if (i < list->pairs) list->incident[first[list->keys[i].b]++] = 2 * i + 1;
+    }
+    memmove(first + 1, first, (size_t)world->body_count * sizeof *first);
+    first[0] = 0;
 }
 
-/* Take the sorted keys in list->spare as the list from now on. */
-static void dem2di_list_renew(dem2di_list *list) {
-    dem2di_list_merge(list, list->spare.key, list->spare.count, list->next, list->next_ends);
-    dem2di_keys keys = list->keys;
-    list->keys = list->spare;
-    list->spare = keys;
-    dem2di_swap_links(list);
+static void dem2di_incident_make(dem2d_world *world) {
+    dem2di_run(world, DEM2D_PHASE_LIST, 1, dem2di_incident_fill_task, world);
+    dem2di_run(world, DEM2D_PHASE_LIST, dem2di_blocks(world->body_count, DEM2DI_BLOCK),
+               dem2di_incident_task, world);
 }
 
-/* Pairs of particles within their skins: into pairs.spare, sorted. */
-static bool dem2di_find_pairs(dem2d_world *world) {
-    dem2di_keys *found = &world->found;
+/* --- particles in the order of space ---------------------------------------------------------- */
+
+/* Places in memory from now on: of slot i to[i], -1 for a removed particle. Returns how many there
+   are. */
+static int dem2di_order_make(const dem2d_world *world, dem2di_order *items, dem2di_order *spare,
+                             int *to) {
+    dem2d_vec lower = dem2di_vec(0, 0), upper = lower;
+    int count = 0;
     for (int i = 0; i < world->body_count; i++) {
-        const dem2di_body *body = &world->bodies[i];
-        dem2di_disc *disc = &world->discs[i];
-        disc->centre = world->now[i].x;
-        disc->reach = body->shape != NULL ? body->radius + body->skin : -1;
-        disc->fixed = body->motion == DEM2D_FIXED;
+        dem2d_vec x = world->now[i].x;
+        to[i] = -1;
+        if (world->bodies[i].shape == NULL) continue;
+        lower.x = count == 0 ? x.x : dem2di_min(lower.x, x.x);
+        lower.y = count == 0 ? x.y : dem2di_min(lower.y, x.y);
+        upper.x = count == 0 ? x.x : dem2di_max(upper.x, x.x);
+        upper.y = count == 0 ? x.y : dem2di_max(upper.y, x.y);
+        items[count++].value = i;
     }
-    if (!dem2di_grid_pairs(&world->env, &world->grid, world->discs, world->body_count, found))
-        return false;
-    /* contacts of the last force pass stay listed for the queries, however far apart by now */
-    for (int i = 0; i < world->pairs.keys.count; i++) {
-        dem2di_key key = world->pairs.keys.key[i];
-        const dem2di_disc *a = &world->discs[key.a], *b = &world->discs[key.b];
-        dem2d_vec d = dem2di_centre_line(a->centre, b->centre);
-        double reach = a->reach + b->reach;
-        bool apart = dem2di_dot(d, d) >= reach * reach && !(a->fixed && b->fixed);
-        if (world->pairs.now[i].depth > 0 && apart &&
-            !dem2di_keys_add(&world->env, found, key.a, key.b))
-            return false;
+    if (world->scattered) {
+        double size = dem2di_max(upper.x - lower.x, upper.y - lower.y);
+        for (int k = 0; k < count; k++)
+            items[k].key = dem2di_curve_place(lower, size, world->now[items[k].value].x);
+        dem2di_sort(items, spare, count);
     }
-    if (!dem2di_list_reserve(world, &world->pairs, found->count)) return false;
-    dem2di_keys_sort(&world->grid, world->body_count, found, world->pairs.spare.key);
-    world->pairs.spare.count = found->count;
+    for (int k = 0; k < count; k++) to[items[k].value] = k;
+    return count;
+}
+
+/* One array in the new order, by way of spare memory for all of it. */
+static void dem2di_reorder(void *array, size_t size, const int *to, int slots, int count,
+                           void *spare) {
+    for (int i = 0; i < slots; i++)
+        if (to[i] >= 0)
+            memcpy((char *)spare + (size_t)to[i] * size, (const char *)array + (size_t)i * size,
+                   size);
+    if (count > 0) memcpy(array, spare, (size_t)count * size);
+}
+
+static void dem2di_arrange_task(void *context, int begin, int end) {
+    dem2d_world *w = (dem2d_world *)context;
+    size_t slots = (size_t)w->body_count;
+    dem2di_cutter cutter = {w->scratch, 0};
+    dem2di_order *items = (dem2di_order *)dem2di_cut(&cutter, slots, sizeof *items);
+    dem2di_order *spare = (dem2di_order *)dem2di_cut(&cutter, slots, sizeof *spare);
+    int *to = (int *)dem2di_cut(&cutter, slots, sizeof *to);
+    (void)begin;
+    (void)end;
+    int n = w->body_count, count = dem2di_order_make(w, items, spare, to);
+    dem2di_reorder(w->now, sizeof *w->now, to, n, count, w->next);
+    dem2di_reorder(w->before, sizeof *w->before, to, n, count, w->next);
+    dem2di_reorder(w->bodies, sizeof *w->bodies, to, n, count, w->next);
+    dem2di_reorder(w->inverse, sizeof *w->inverse, to, n, count, w->next);
+    dem2di_reorder(w->watch, sizeof *w->watch, to, n, count, w->next);
+    if (w->plan.travels) {
+        dem2di_reorder(w->travel, sizeof *w->travel, to, n, count, w->next);
+        dem2di_reorder(w->lever, sizeof *w->lever, to, n, count, w->next);
+    }
+    for (int i = 0; i < count; i++) w->names[w->bodies[i].index].slot = i;
+    for (int i = 0; i < w->list.count; i++) {
+        dem2di_key *key = &w->list.keys[i];
+        if (key->a < 0) continue;
+        key->a = to[key->a];
+        if (i < w->list.pairs) key->b = to[key->b];
+    }
+    w->body_count = count;
+    w->holes = 0;
+}
+
+/* Close the gaps that removed particles left, and sort the particles in space when partners are
+   far from each other in memory. Nothing that a caller can see changes. */
+static bool dem2di_arrange(dem2d_world *world) {
+    if (world->holes == 0 && !world->scattered) return true;
+    size_t slots = (size_t)world->body_count;
+    dem2di_cutter cutter = {NULL, 0};
+    (void)dem2di_cut(&cutter, slots, sizeof(dem2di_order));
+    (void)dem2di_cut(&cutter, slots, sizeof(dem2di_order));
+    (void)dem2di_cut(&cutter, slots, sizeof(int));
+    if (!dem2di_scratch_reserve(world, cutter.used)) return false;
+    dem2di_run(world, DEM2D_PHASE_LIST, 1, dem2di_arrange_task, world);
+    dem2di_incident_make(world);
     return true;
 }
 
-/* Particles within their own and the walls' skin of a wall, or in contact with it in the last
-   force pass: into touches.spare, sorted. */
-static bool dem2di_find_touches(dem2d_world *world) {
-    dem2di_keys *spare = &world->touches.spare;
-    const dem2di_list *list = &world->touches;
-    int old = 0;
-    spare->count = 0;
-    for (int i = 0; i < world->body_count; i++) {
-        const dem2di_body *body = &world->bodies[i];
-        bool listed = body->shape != NULL && body->motion != DEM2D_FIXED;
-        double reach = body->radius + body->skin + world->wall_skin;
-        for (int j = 0; j < world->wall_count; j++) {
-            const dem2di_wall *wall = &world->walls[j];
-            dem2d_vec from = dem2di_sub(world->now[i].x, world->wall_now[j].point);
-            bool near = listed && wall->alive && dem2di_dot(from, wall->desc.normal) < reach;
-            if (old < list->keys.count && list->keys.key[old].a == i &&
-                list->keys.key[old].b == j) {
-                near = near || list->now[old].depth > 0;
-                old++;
-            }
-            if (!near) continue;
-            if (!dem2di_reserve(&world->env, (void **)&spare->key, &spare->capacity,
-                                spare->count + 1, sizeof *spare->key))
-                return false;
-            spare->key[spare->count].a = i;
-            spare->key[spare->count++].b = j;
-        }
-    }
-    return dem2di_list_reserve(world, &world->touches, spare->count);
+/* --- skins -------------------------------------------------------------------------------------
+ */
+
+/* A step costs B/n for the list, which lasts n steps and takes as long to build as B looks at a
+   pair of circles apart, and 3.4 s looks for a skin of s radii: in a dense packing a particle's
+   reach grows by the ring 2 pi 2R 2s R, with 0.84/(pi R^2) partners in it, half of them its own.
+   With n = s/u, u being the speed at which skins are used up, the least is at
+   s^2 = (B/3.4) u. */
+#define DEM2DI_SKIN_COST 8.0 /* B = 27, measured on circles */
+#define DEM2DI_SKIN_LEAST (1.0 / 1024)
+#define DEM2DI_SKIN_MOST 0.5
+
+/* The skin for the next list, after one that was worn out. */
+static void dem2di_tune_skin(dem2d_world *world) {
+    double steps = (double)(world->steps - world->listed_at);
+    if (world->skin_fixed || !world->list_worn || !(steps > 0)) return;
+    double speed = world->skin / steps, best = sqrt(DEM2DI_SKIN_COST * speed);
+    best = dem2di_max(world->skin / 2, dem2di_min(world->skin * 2, best));
+    world->skin = dem2di_max(DEM2DI_SKIN_LEAST, dem2di_min(DEM2DI_SKIN_MOST, best));
+    world->interval = world->skin / speed;
 }
 
-/* Renew the lists. On failure the old ones stay. */
-static dem2d_result dem2di_build_lists(dem2d_world *world) {
-    double skin = 0;
-    for (int i = 0; i < world->body_count; i++)
-        if (world->bodies[i].shape != NULL) skin = dem2di_max(skin, world->bodies[i].skin);
-    world->wall_skin = skin;
-    if (!dem2di_find_pairs(world) || !dem2di_find_touches(world))
-        return dem2di_out_of_memory(world, "the list of pairs");
-    dem2di_list_renew(&world->pairs);
-    dem2di_list_renew(&world->touches);
-    for (int i = 0; i < world->pairs.keys.count; i++) { /* budgets count from here */
-        const dem2di_key *key = &world->pairs.keys.key[i];
-        world->pairs.now[i].budget -= world->travel[key->a] + world->travel[key->b];
-    }
+/* Skin of one particle or wall of a size: a fast one gets what it needs to last as long as the
+   others, up to a quarter of its size. */
+static double dem2di_skin_of(const dem2d_world *world, double size, dem2d_vec v) {
+    double skin = size * world->skin;
+    if (world->skin_fixed) return skin;
+    double path = dem2di_length(v) * world->time_step * world->interval;
+    return skin + dem2di_min(path, size / 4);
+}
+
+/* --- building ----------------------------------------------------------------------------------
+ */
+
+enum { DEM2DI_DISCS, DEM2DI_OTHERS, DEM2DI_TOUCHES, DEM2DI_KINDS };
+
+/* A list that is being made. */
+typedef struct dem2di_build {
+    dem2d_world *world;
+    dem2di_plan plan;
+    dem2di_grid grid;
+    int *count[DEM2DI_KINDS]; /* of each particle's finds; then where they go */
+    int total[DEM2DI_KINDS];
+    dem2di_key *keys;              /* as in the list */
+    dem2di_order *touches, *spare; /* wall and id of particle; slot */
+} dem2di_build;
+
+/* What the scene makes use of. */
+static dem2di_plan dem2di_plan_make(const dem2d_world *world) {
+    dem2di_plan plan = {false, false, false, true, false, false};
+    bool used[DEM2DI_MATERIALS] = {false}, met[DEM2DI_MATERIALS] = {false};
     for (int i = 0; i < world->body_count; i++) {
-        world->bodies[i].listed = world->now[i].x;
-        world->travel[i] = 0;
+        const dem2di_body *body = &world->bodies[i];
+        used[body->material] = true;
+        plan.spin = plan.spin || world->now[i].w != 0;
+        plan.travels = plan.travels || body->shape->type != DEM2D_CIRCLE;
+        plan.one_law = plan.one_law && body->material == world->bodies[0].material;
     }
-    for (int i = 0; i < world->wall_count; i++) world->walls[i].listed = world->wall_now[i].point;
-    world->list_stale = false;
+    for (int j = 0; j < world->wall_count; j++)
+        if (world->walls[j].alive) met[world->walls[j].desc.material.index] = true;
+    for (int a = 0; a < world->material_count; a++)
+        for (int b = 0; b < world->material_count; b++) {
+            const dem2d_pair_desc *law = dem2di_law(world, a, b);
+            bool rubs = law->friction > 0 && law->tangential_stiffness > 0;
+            plan.friction = plan.friction || (rubs && used[a] && (used[b] || met[b]));
+        }
+    plan.travels = plan.travels || world->faces == DEM2D_CONTACT_AREA;
+    plan.spin = plan.spin || plan.travels || plan.friction;
+    return plan;
+}
+
+/* How far apart the two of a contact are now, along its normal or line of centres. */
+static double dem2di_gap_now(const dem2d_world *world, int contact) {
+    const dem2di_key *key = &world->list.keys[contact];
+    const dem2di_state *a = &world->now[key->a];
+    if (contact >= world->list.pairs) {
+        dem2d_vec from = dem2di_sub(a->x, world->wall_now[key->b].point);
+        return dem2di_dot(from, world->walls[key->b].desc.normal) - a->radius;
+    }
+    const dem2di_state *b = &world->now[key->b];
+    return dem2di_length(dem2di_centre_line(a->x, b->x)) - (a->radius + b->radius);
+}
+
+/* The skin of a particle, wide enough for the contacts of the last force pass: they stay listed for
+   the queries, however far apart by now. */
+static double dem2di_skin_make(const dem2d_world *world, int slot) {
+    const dem2di_list *list = &world->list;
+    const dem2di_state *now = &world->now[slot];
+    double skin = dem2di_skin_of(world, now->radius, now->v);
+    for (int k = list->first[slot]; k < list->first[slot + 1]; k++) {
+        int contact = list->incident[k] / 2;
+        dem2di_link link;
+        dem2d_vec arm;
+        if (list->keys[contact].a < 0) continue;
+        double gap = dem2di_gap_now(world, contact);
+        if (gap > skin && dem2di_link_at(world, contact, false, &link, &arm))
+            skin = gap * (1 + DEM2DI_ROUNDING);
+    }
+    return skin;
+}
+
+static void dem2di_disc_task(void *context, int begin, int end) {
+    dem2di_build *build = (dem2di_build *)context;
+    dem2d_world *world = build->world;
+    for (int block = begin; block < end; block++) {
+        int first = block * DEM2DI_BLOCK;
+        double largest = 0;
+        for (int i = first; i < dem2di_block_end(first, DEM2DI_BLOCK, world->body_count); i++) {
+            const dem2di_body *body = &world->bodies[i];
+            dem2di_disc *disc = &build->grid.discs[i];
+            world->watch[i].skin = dem2di_skin_make(world, i);
+            disc->centre = world->now[i].x;
+            disc->reach = world->now[i].radius + world->watch[i].skin;
+            disc->fixed = body->motion == DEM2D_FIXED;
+            disc->round = body->shape->type == DEM2D_CIRCLE && world->faces != DEM2D_CONTACT_AREA;
+            largest = dem2di_max(largest, disc->reach);
+        }
+        world->tallies[block].reach = largest;
+    }
+}
+
+static void dem2di_place_task(void *context, int begin, int end) {
+    const dem2di_build *build = (const dem2di_build *)context;
+    int first = begin * DEM2DI_BLOCK;
+    int last = dem2di_block_end((end - 1) * DEM2DI_BLOCK, DEM2DI_BLOCK, build->grid.count);
+    dem2di_grid_place(&build->grid, first, last);
+}
+
+static void dem2di_grid_task(void *context, int begin, int end) {
+    (void)begin;
+    (void)end;
+    dem2di_grid_sort(&((dem2di_build *)context)->grid);
+}
+
+/* Walls within the skins of a particle: counted, and written where there is room. */
+static int dem2di_find_walls(const dem2d_world *world, const dem2di_disc *disc, int slot,
+                             dem2di_order *to) {
+    int count = 0;
+    if (disc->fixed) return 0;
+    for (int j = 0; j < world->wall_count; j++) {
+        const dem2di_wall *wall = &world->walls[j];
+        dem2d_vec from = dem2di_sub(disc->centre, world->wall_now[j].point);
+        if (!wall->alive || !(dem2di_dot(from, wall->desc.normal) < disc->reach + wall->skin))
+            continue;
+        if (to != NULL) {
+            to[count].key = (uint64_t)j << 32 | (uint64_t)world->bodies[slot].index;
+            to[count].value = slot;
+        }
+        count++;
+    }
+    return count;
+}
+
+static void dem2di_count_task(void *context, int begin, int end) {
+    const dem2di_build *build = (const dem2di_build *)context;
+    int last = dem2di_block_end((end - 1) * DEM2DI_BLOCK, DEM2DI_BLOCK, build->grid.count);
+    for (int i = begin * DEM2DI_BLOCK; i < last; i++) {
+        int count[2] = {0, 0};
+        dem2di_grid_partners(&build->grid, i, NULL, count);
+        build->count[DEM2DI_DISCS][i] = count[0];
+        build->count[DEM2DI_OTHERS][i] = count[1];
+        build->count[DEM2DI_TOUCHES][i] =
+            dem2di_find_walls(build->world, &build->grid.discs[i], i, NULL);
+    }
+}
+
+/* The contact that two partners had in the old list, or -1. */
+static int dem2di_listed(const dem2d_world *world, const dem2di_key *key, bool wall) {
+    const dem2di_list *list = &world->list;
+    for (int k = list->first[key->a]; k < list->first[key->a + 1]; k++) {
+        int contact = list->incident[k] / 2;
+        const dem2di_key *old = &list->keys[contact];
+        if (old->a == key->a && old->b == key->b && (contact >= list->pairs) == wall)
+            return contact;
+    }
+    return -1;
+}
+
+/* What a contact remembers, from the old list to its new place. */
+static void dem2di_recall(const dem2di_build *build, int place) {
+    const dem2d_world *world = build->world;
+    const dem2di_list *list = &world->list;
+    const dem2di_key *key = &build->keys[place];
+    int discs = build->total[DEM2DI_DISCS], pairs = discs + build->total[DEM2DI_OTHERS];
+    int old = dem2di_listed(world, key, place >= pairs);
+    if (place < discs) {
+        if (build->plan.friction)
+            list->next_shear[place] = old >= 0 && world->plan.friction ? list->shear[old] : 0;
+        return;
+    }
+    dem2di_link *link = &list->next_links[place - discs];
+    memset(link, 0, sizeof *link);
+    if (old >= 0) *link = list->links[old - list->discs];
+    if (place < pairs && world->plan.travels) /* budgets count from here */
+        link->budget -= world->travel[key->a] + world->travel[key->b];
+    if (!world->two_points) return;
+    dem2di_ends *ends = &list->next_ends[place - discs];
+    memset(ends, 0, sizeof *ends);
+    if (old >= 0) *ends = list->ends[old - list->discs];
+}
+
+static void dem2di_fill_task(void *context, int begin, int end) {
+    const dem2di_build *build = (const dem2di_build *)context;
+    const dem2d_world *world = build->world;
+    const dem2di_body *bodies = world->bodies;
+    for (int block = begin; block < end; block++) {
+        int first = block * DEM2DI_BLOCK;
+        int64_t spread = 0;
+        for (int i = first; i < dem2di_block_end(first, DEM2DI_BLOCK, build->grid.count); i++) {
+            dem2di_key *to[2];
+            int found[2] = {0, 0};
+            to[0] = build->keys + build->count[DEM2DI_DISCS][i];
+            to[1] = build->keys + build->total[DEM2DI_DISCS] + build->count[DEM2DI_OTHERS][i];
+            dem2di_grid_partners(&build->grid, i, to, found);
+            for (int kind = 0; kind < 2; kind++)
+                for (int k = 0; k < found[kind]; k++) {
+                    dem2di_key *key = &to[kind][k];
+                    int a = key->a, b = key->b;
+                    spread += a < b ? b - a : a - b;
+                    bool turned = bodies[a].index > bodies[b].index;
+                    key->a = turned ? b : a;
+                    key->b = turned ? a : b;
+                    dem2di_recall(build, (int)(key - build->keys));
+                }
+            (void)dem2di_find_walls(world, &build->grid.discs[i], i,
+                                    build->touches + build->count[DEM2DI_TOUCHES][i]);
+        }
+        world->tallies[block].spread = spread;
+    }
+}
+
+/* Contacts with walls, in the order of the walls and the particles' ids. */
+static void dem2di_touches_task(void *context, int begin, int end) {
+    const dem2di_build *build = (const dem2di_build *)context;
+    int count = build->total[DEM2DI_TOUCHES];
+    int pairs = build->total[DEM2DI_DISCS] + build->total[DEM2DI_OTHERS];
+    (void)begin;
+    (void)end;
+    dem2di_sort(build->touches, build->spare, count);
+    for (int i = 0; i < count; i++) {
+        build->keys[pairs + i].a = build->touches[i].value;
+        build->keys[pairs + i].b = (int)(build->touches[i].key >> 32);
+        dem2di_recall(build, pairs + i);
+    }
+}
+
+/* Particles count their way from here. */
+static void dem2di_listed_task(void *context, int begin, int end) {
+    dem2d_world *world = (dem2d_world *)context;
+    int last = dem2di_block_end((end - 1) * DEM2DI_BLOCK, DEM2DI_BLOCK, world->body_count);
+    for (int i = begin * DEM2DI_BLOCK; i < last; i++) {
+        world->watch[i].listed = world->now[i].x;
+        if (!world->plan.travels) continue;
+        /* |p'| <= sqrt(R^2 - p^2) and p is at least the inscribed radius; of a circle p' is 0 */
+        const dem2di_body *body = &world->bodies[i];
+        double radius = world->now[i].radius, inner = body->shape->inscribed * body->scale;
+        bool round = body->shape->type == DEM2D_CIRCLE;
+        world->travel[i] = 0;
+        world->lever[i] = round ? 0 : sqrt(radius * radius - inner * inner);
+    }
+}
+
+/* Scratch memory for the search, and then for what it found. */
+static bool dem2di_build_cut(dem2di_build *build) {
+    dem2d_world *world = build->world;
+    size_t n = (size_t)build->grid.count, walls = (size_t)build->total[DEM2DI_TOUCHES],
+           total = walls;
+    for (int kind = 0; kind < DEM2DI_TOUCHES; kind++) total += (size_t)build->total[kind];
+    for (int pass = 0; pass < 2; pass++) {
+        dem2di_cutter cutter = {pass == 0 ? NULL : world->scratch, 0};
+        dem2di_grid *grid = &build->grid;
+        grid->discs = (dem2di_disc *)dem2di_cut(&cutter, n, sizeof *grid->discs);
+        grid->slot = (int *)dem2di_cut(&cutter, n, sizeof *grid->slot);
+        grid->sorted = (int *)dem2di_cut(&cutter, n, sizeof *grid->sorted);
+        grid->heads = (int *)dem2di_cut(&cutter, (size_t)grid->table + 1, sizeof *grid->heads);
+        for (int kind = 0; kind < DEM2DI_KINDS; kind++)
+            build->count[kind] = (int *)dem2di_cut(&cutter, n, sizeof(int));
+        build->keys = (dem2di_key *)dem2di_cut(&cutter, total, sizeof *build->keys);
+        build->touches = (dem2di_order *)dem2di_cut(&cutter, walls, sizeof *build->touches);
+        build->spare = (dem2di_order *)dem2di_cut(&cutter, walls, sizeof *build->spare);
+        size_t step = total * sizeof *world->pulls;
+        if (pass == 0 && !dem2di_scratch_reserve(world, cutter.used > step ? cutter.used : step))
+            return false;
+    }
+    return true;
+}
+
+/* How many partners there are, and room for them. */
+static bool dem2di_build_search(dem2di_build *build) {
+    dem2d_world *world = build->world;
+    int blocks = dem2di_blocks(world->body_count, DEM2DI_BLOCK);
+    int64_t total = 0;
+    build->grid.count = world->body_count;
+    build->grid.table = dem2di_grid_table(world->body_count);
+    if (!dem2di_build_cut(build)) return false;
+    dem2di_run(world, DEM2D_PHASE_LIST, blocks, dem2di_disc_task, build);
+    build->grid.largest = 0;
+    for (int k = 0; k < blocks; k++)
+        build->grid.largest = dem2di_max(build->grid.largest, world->tallies[k].reach);
+    dem2di_run(world, DEM2D_PHASE_LIST, blocks, dem2di_place_task, build);
+    dem2di_run(world, DEM2D_PHASE_LIST, 1, dem2di_grid_task, build);
+    dem2di_run(world, DEM2D_PHASE_LIST, blocks, dem2di_count_task, build);
+    for (int kind = 0; kind < DEM2DI_KINDS; kind++) {
+        for (int i = 0; i < world->body_count; i++) total += build->count[kind][i];
+        if (total > INT_MAX / 2) return false;
+        build->total[kind] = dem2di_starts(build->count[kind], world->body_count);
+    }
+    if (!dem2di_build_cut(build)) return false;
+    int discs = build->total[DEM2DI_DISCS], pairs = discs + build->total[DEM2DI_OTHERS];
+    return dem2di_list_reserve(world, build->plan.friction, discs, pairs, (int)total) &&
+           dem2di_tallies_reserve(world, discs, (int)total);
+}
+
+/* The found contacts become the list. */
+static void dem2di_build_finish(dem2di_build *build) {
+    dem2d_world *world = build->world;
+    dem2di_list *list = &world->list;
+    list->discs = build->total[DEM2DI_DISCS];
+    list->pairs = list->discs + build->total[DEM2DI_OTHERS];
+    list->count = list->pairs + build->total[DEM2DI_TOUCHES];
+    if (list->count > 0) {
+        memcpy(list->keys, build->keys, (size_t)list->count * sizeof *list->keys);
+        memset(world->scratch, 0, (size_t)list->count * sizeof *world->pulls);
+    }
+    world->pulls = (dem2di_pull *)(void *)world->scratch;
+    world->plan = build->plan;
+    dem2di_swap_contacts(list);
+    dem2di_incident_make(world);
+    dem2di_run(world, DEM2D_PHASE_LIST, dem2di_blocks(world->body_count, DEM2DI_BLOCK),
+               dem2di_listed_task, world);
+    for (int j = 0; j < world->wall_count; j++) world->walls[j].listed = world->wall_now[j].point;
+    world->listed_at = world->steps;
+    world->list_stale = world->list_worn = false;
+}
+
+/* Particles twice as far from their partners in memory as when they were last sorted are worth
+   sorting again. */
+static void dem2di_watch_spread(dem2d_world *world, bool sorted) {
+    double sum = 0;
+    for (int k = 0; k < dem2di_blocks(world->body_count, DEM2DI_BLOCK); k++)
+        sum += (double)world->tallies[k].spread;
+    double mean = world->list.pairs > 0 ? sum / world->list.pairs : 0;
+    if (sorted) world->spread = mean;
+    world->scattered = mean > 2 * world->spread;
+}
+
+/* Renew the list. On failure the old one stays. */
+static dem2d_result dem2di_build_list(dem2d_world *world) {
+    dem2di_build build;
+    memset(&build, 0, sizeof build);
+    build.world = world;
+    double skin = world->skin, interval = world->interval, largest = 0;
+    bool sorted = world->scattered;
+    bool room = dem2di_tallies_reserve(world, 0, 0) && dem2di_arrange(world);
+    if (room) {
+        dem2di_tune_skin(world);
+        build.plan = dem2di_plan_make(world);
+        room = !build.plan.travels || dem2di_reserve_travel(world, world->body_count);
+        for (int i = 0; i < world->body_count; i++)
+            largest = dem2di_max(largest, world->now[i].radius);
+        for (int j = 0; j < world->wall_count; j++)
+            world->walls[j].skin = dem2di_skin_of(world, largest, world->wall_now[j].velocity);
+    }
+    if (!room || !dem2di_build_search(&build)) {
+        world->skin = skin;
+        world->interval = interval;
+        return dem2di_out_of_memory(world, "the list of contacts");
+    }
+    int blocks = dem2di_blocks(world->body_count, DEM2DI_BLOCK);
+    dem2di_run(world, DEM2D_PHASE_LIST, blocks, dem2di_fill_task, &build);
+    dem2di_run(world, DEM2D_PHASE_LIST, 1, dem2di_touches_task, &build);
+    dem2di_build_finish(&build);
+    dem2di_watch_spread(world, sorted);
     return DEM2D_OK;
+}
+
+/* ============================================================================================
+   >>step  Contacts, their sums, walls, motion; the stable time step
+   uses: config, math, memory, support, shapes, minimum, faces, contact, law, motion, world, list
+   ============================================================================================ */
+
+/* Circles, in closed form and without a branch but for what the scene has: the force is 0 where
+   they are apart, and with it the limit of the tangential spring. */
+static DEM2DI_INLINE void dem2di_disc_range(const dem2d_world *world, int begin, int end,
+                                            bool friction, bool spin, bool one_law,
+                                            dem2di_count *count) {
+    const dem2di_key *keys = world->list.keys;
+    const dem2di_state *now = world->now;
+    const double *shears = world->list.shear;
+    double *next_shears = world->list.next_shear, time_step = world->time_step;
+    dem2di_pull *pulls = world->pulls;
+    dem2d_pair_desc law = {0, 0, 0};
+    int open = 0;
+    if (begin < end) law = *dem2di_law_of(world, begin);
+    for (int i = begin; i < end; i++) {
+        const dem2di_state *a = &now[keys[i].a], *b = &now[keys[i].b];
+        if (!one_law) law = *dem2di_law_of(world, i);
+        dem2di_round round = dem2di_round_make(a, b, law.normal_stiffness);
+        double shear = 0;
+        open += round.depth > 0;
+        if (friction) {
+            double slip = dem2di_cross(round.normal, dem2di_sub(b->v, a->v)) -
+                          (round.arm_a * a->w + round.arm_b * b->w);
+            double limit = law.friction * round.force;
+            shear = shears[i] - law.tangential_stiffness * slip * time_step;
+            shear = dem2di_max(-limit, dem2di_min(limit, shear));
+            next_shears[i] = shear;
+        }
+        dem2di_pull *pull = &pulls[i];
+        pull->force.x = round.normal.x * round.force;
+        pull->force.y = round.normal.y * round.force;
+        if (friction) {
+            pull->force.x -= round.normal.y * shear;
+            pull->force.y += round.normal.x * shear;
+        }
+        if (!spin) continue;
+        pull->torque[0] = friction ? -(round.arm_a * shear) : 0;
+        pull->torque[1] = friction ? -(round.arm_b * shear) : 0;
+    }
+    count->looks += open;
+    count->proofs[DEM2D_BY_FORM] += open;
+}
+
+static void dem2di_disc_block(const dem2d_world *world, int begin, int end, dem2di_count *count) {
+    const dem2di_plan *plan = &world->plan;
+    if (plan->friction && plan->one_law)
+        dem2di_disc_range(world, begin, end, true, true, true, count);
+    else if (plan->friction)
+        dem2di_disc_range(world, begin, end, true, true, false, count);
+    else if (plan->spin)
+        dem2di_disc_range(world, begin, end, false, true, false, count);
+    else if (plan->one_law)
+        dem2di_disc_range(world, begin, end, false, false, true, count);
+    else
+        dem2di_disc_range(world, begin, end, false, false, false, count);
 }
 
 /* A pair found apart by a gap (m) stays so until its particles have travelled as far together. */
@@ -8310,9 +9130,9 @@ static int dem2di_pair_geometry(const dem2d_world *world, int a, int b, const de
                                 dem2di_link *link, dem2d_contact_point points[2],
                                 dem2di_count *count) {
     const dem2di_body *body_a = &world->bodies[a], *body_b = &world->bodies[b];
-    dem2d_vec d = dem2di_centre_line(world->now[a].x, world->now[b].x);
-    double reach = body_a->radius + body_b->radius, distance = dem2di_length(d);
-    link->branch = d;
+    const dem2di_state *state_a = &world->now[a], *state_b = &world->now[b];
+    dem2d_vec d = dem2di_centre_line(state_a->x, state_b->x);
+    double reach = state_a->radius + state_b->radius, distance = dem2di_length(d);
     link->normal = last->normal;
     link->budget = 0;
     if (distance >= reach) {
@@ -8320,18 +9140,12 @@ static int dem2di_pair_geometry(const dem2d_world *world, int a, int b, const de
         return 0;
     }
     count->looks++;
-    if (body_a->shape->type == DEM2D_CIRCLE && body_b->shape->type == DEM2D_CIRCLE) {
-        link->depth = dem2di_circle_contact(d, distance, reach, &link->normal);
-        points[0].position = dem2di_scale(link->normal, body_a->radius - link->depth / 2);
-        count->proofs[DEM2D_BY_FORM]++;
-        return 1;
-    }
     dem2di_pair pair;
     dem2di_search search;
     pair.a = body_a->shape;
     pair.b = body_b->shape;
-    pair.ra = world->now[a].q;
-    pair.rb = world->now[b].q;
+    pair.ra = state_a->q;
+    pair.rb = state_b->q;
     pair.scale_a = body_a->scale;
     pair.scale_b = body_b->scale;
     pair.d = d;
@@ -8355,17 +9169,19 @@ static int dem2di_pair_geometry(const dem2d_world *world, int a, int b, const de
     return 1;
 }
 
-/* Force of a contact whose geometry is known, from its springs before. */
-static void dem2di_link_load(const dem2d_world *world, const dem2di_list *list, int i,
-                             const dem2d_pair_desc *law, double slip, bool two) {
-    dem2di_link *link = &list->next[i];
+/* Force of a contact whose geometry is known, from its springs before. `at` is its place among
+   those that are not of circles. */
+static void dem2di_link_load(const dem2d_world *world, int at, const dem2d_pair_desc *law,
+                             double slip, bool two) {
+    const dem2di_list *list = &world->list;
+    dem2di_link *link = &list->next_links[at];
     if (two) {
-        dem2di_law_apply_ends(law, slip, world->time_step, &list->now[i], &list->ends[i],
-                              &list->next_ends[i], link);
+        dem2di_law_apply_ends(law, slip, world->time_step, &list->links[at], &list->ends[at],
+                              &list->next_ends[at], link);
         return;
     }
     if (world->faces != DEM2D_CONTACT_AREA) link->force = law->normal_stiffness * link->depth;
-    dem2di_law_apply(law, slip, world->time_step, list->now[i].shear, &list->next[i]);
+    dem2di_law_apply(law, slip, world->time_step, list->links[at].shear, link);
 }
 
 static dem2d_vec dem2di_outline_corner(const dem2d_world *world, int body, int i) {
@@ -8401,13 +9217,13 @@ static int dem2di_outline_range(const dem2d_world *world, int body, dem2d_vec u,
    the contact, cut by B's edges there. The contact's normal and depth tell where that is: all of
    the overlap is within the depth of the farthest corners of both. */
 static int dem2di_overlap_of(const dem2d_world *world, int a, int b, const dem2di_link *link,
-                             dem2d_vec d, dem2di_overlap **corners) {
+                             dem2d_vec d, dem2di_overlap *scratch, dem2di_overlap **corners) {
     int first, cuts = 1, start = 0;
     /* the polygons, grown to the shapes' areas, may stick out of them a little */
-    double depth = link->depth + 2e-3 * world->bodies[a].radius;
-    if (b >= 0) depth += 2e-3 * world->bodies[b].radius;
+    double depth = link->depth + 2e-3 * world->now[a].radius;
+    if (b >= 0) depth += 2e-3 * world->now[b].radius;
     dem2d_vec u = link->normal;
-    dem2di_overlap *from = world->overlap, *to = from + world->overlap_capacity / 2;
+    dem2di_overlap *from = scratch, *to = from + world->overlap_size / 2;
     int count = dem2di_outline_range(world, a, u, depth, &first);
     int n = world->templates[world->bodies[a].shape_index].corners;
     for (int i = 0; i < count; i++) {
@@ -8435,11 +9251,6 @@ static int dem2di_overlap_of(const dem2d_world *world, int a, int b, const dem2d
     return count;
 }
 
-static double dem2di_equivalent(const dem2d_world *world, int i) {
-    const dem2di_body *body = &world->bodies[i];
-    return body->scale * sqrt(body->shape->mass.area / DEM2DI_PI);
-}
-
 /* The contact-area rule (Feng, Owen 2004): energy kn area^2/(2 L^2), with L the mean equivalent
    radius, so that kn keeps its unit; its gradient is the force kn area width/L^2 across the chord
    between the crossings of both boundaries. Depth is area/width: the energy is half force times
@@ -8455,88 +9266,139 @@ static void dem2di_area_load(const dem2d_world *world, const dem2d_pair_desc *la
 }
 
 /* Points of a contact into its link, and beside it when there are two. */
-static void dem2di_link_place(const dem2di_list *list, int i, int count,
+static void dem2di_link_place(const dem2di_list *list, int at, int count,
                               const dem2d_contact_point points[2]) {
     if (count == 2)
-        dem2di_ends_set(points, &list->next_ends[i], &list->next[i]);
+        dem2di_ends_set(points, &list->next_ends[at], &list->next_links[at]);
     else
-        list->next[i].point = points[0].position;
+        list->next_links[at].point = points[0].position;
 }
 
-/* Geometry and force of every pair in the list, into list->next. */
-static void dem2di_pair_pass(dem2d_world *world, dem2di_count *count) {
-    const dem2di_list *list = &world->pairs;
+/* The contact-area rule for contact i, whose point and normal are known; B is at d. */
+static void dem2di_area_apply(const dem2d_world *world, int i, int b, dem2d_vec d,
+                              const dem2d_pair_desc *law, dem2di_overlap *scratch) {
+    dem2di_link *link = &world->list.next_links[i - world->list.discs];
+    int a = world->list.keys[i].a;
+    dem2di_overlap *overlap;
+    int corners = dem2di_overlap_of(world, a, b, link, d, scratch, &overlap);
+    dem2di_area_load(world, law, a, b, overlap, corners, link);
+}
+
+static void dem2di_no_pull(dem2di_pull *pull) {
+    memset(pull, 0, sizeof *pull);
+}
+
+/* Geometry and force of one listed pair that is not of two circles. */
+static void dem2di_pair_look(const dem2d_world *world, int i, dem2di_overlap *scratch,
+                             dem2di_count *count) {
+    const dem2di_list *list = &world->list;
+    int a = list->keys[i].a, b = list->keys[i].b, at = i - list->discs;
+    const dem2di_link *last = &list->links[at];
+    dem2di_link *link = &list->next_links[at];
     dem2d_contact_point points[2];
-    for (int i = 0; i < list->keys.count; i++) {
-        int a = list->keys.key[i].a, b = list->keys.key[i].b;
-        const dem2di_link *last = &list->now[i];
-        dem2di_link *link = &list->next[i];
-        link->force = link->shear = 0;
-        if (world->two_points) memset(&list->next_ends[i], 0, sizeof *list->next_ends);
-        if (world->travel[a] + world->travel[b] < last->budget) { /* surely still apart */
-            link->normal = last->normal;
-            link->budget = last->budget;
-            link->depth = -1;
+    if (world->travel[a] + world->travel[b] < last->budget) { /* surely still apart */
+        link->normal = last->normal;
+        link->budget = last->budget;
+        link->depth = -1;
+        link->shear = 0;
+        if (world->two_points) memset(&list->next_ends[at], 0, sizeof *list->next_ends);
+        return;
+    }
+    link->force = link->shear = 0;
+    if (world->two_points) memset(&list->next_ends[at], 0, sizeof *list->next_ends);
+    int found = dem2di_pair_geometry(world, a, b, last, link, points, count);
+    dem2di_no_pull(&world->pulls[i]);
+    if (!(link->depth > 0)) return;
+    const dem2di_state *sa = &world->now[a], *sb = &world->now[b];
+    const dem2d_pair_desc *law = dem2di_law_of(world, i);
+    dem2d_vec d = dem2di_centre_line(sa->x, sb->x);
+    dem2di_link_place(list, at, found, points);
+    if (world->faces == DEM2D_CONTACT_AREA) dem2di_area_apply(world, i, b, d, law, scratch);
+    if (!(link->depth > 0)) return;
+    dem2d_vec arm_b = dem2di_sub(link->point, d);
+    double slip = dem2di_slip(link, arm_b, sa->v, sa->w, sb->v, sb->w);
+    dem2di_link_load(world, at, law, slip, found == 2);
+    dem2di_link_pull(link, arm_b, &world->pulls[i]);
+}
+
+/* The same for a particle and a wall: one support call, none for a circle. */
+static void dem2di_touch_look(const dem2d_world *world, int i, dem2di_overlap *scratch,
+                              dem2di_count *count) {
+    const dem2di_list *list = &world->list;
+    int a = list->keys[i].a, j = list->keys[i].b, at = i - list->discs, found = 1;
+    const dem2di_body *body = &world->bodies[a];
+    const dem2di_state *state = &world->now[a];
+    const dem2di_wall_state *wall = &world->wall_now[j];
+    dem2di_link *link = &list->next_links[at];
+    dem2d_contact_point points[2];
+    dem2d_vec u = dem2di_negate(world->walls[j].desc.normal);
+    dem2d_vec support = dem2di_scale(u, state->radius);
+    memset(link, 0, sizeof *link);
+    link->normal = u;
+    if (world->two_points) memset(&list->next_ends[at], 0, sizeof *list->next_ends);
+    dem2di_no_pull(&world->pulls[i]);
+    double surface = dem2di_dot(dem2di_sub(wall->point, state->x), u);
+    link->depth = state->radius - surface;
+    if (!(link->depth > 0)) return;
+    if (body->shape->type != DEM2D_CIRCLE) {
+        dem2d_pose pose = dem2di_pose_of(world, world->now, a);
+        link->depth = dem2di_wall_depth(body->shape, &pose, wall->point, u, &support);
+        count->calls++;
+        if (!(link->depth > 0)) return;
+    }
+    points[0].position = dem2di_along(support, -link->depth, u);
+    if (world->two_points)
+        found = dem2di_wall_points(body->shape, state->q, body->scale, u, surface, support,
+                                   link->depth, points);
+    const dem2d_pair_desc *law = dem2di_law_of(world, i);
+    dem2di_link_place(list, at, found, points);
+    if (world->faces == DEM2D_CONTACT_AREA)
+        dem2di_area_apply(world, i, -1, dem2di_sub(wall->point, state->x), law, scratch);
+    if (!(link->depth > 0)) return;
+    dem2d_vec foot = dem2di_vec(0, 0); /* walls do not turn */
+    double slip = dem2di_slip(link, foot, state->v, state->w, wall->velocity, 0);
+    dem2di_link_load(world, at, law, slip, found == 2);
+    dem2di_link_pull(link, foot, &world->pulls[i]);
+}
+
+/* Blocks of the three kinds of contacts, one kind after the other. */
+static void dem2di_contact_task(void *context, int begin, int end) {
+    dem2d_world *world = (dem2d_world *)context;
+    const dem2di_list *list = &world->list;
+    int discs = dem2di_blocks(list->discs, DEM2DI_BLOCK);
+    for (int block = begin; block < end; block++) {
+        dem2di_count *count = &world->tallies[block].count;
+        memset(count, 0, sizeof *count);
+        if (block < discs) {
+            int first = block * DEM2DI_BLOCK;
+            dem2di_disc_block(world, first, dem2di_block_end(first, DEM2DI_BLOCK, list->discs),
+                              count);
             continue;
         }
-        int found = dem2di_pair_geometry(world, a, b, last, link, points, count);
-        if (!(link->depth > 0)) continue;
-        const dem2d_pair_desc *law = dem2di_law_of(world, &list->keys.key[i], false);
-        dem2di_link_place(list, i, found, points);
-        if (world->faces == DEM2D_CONTACT_AREA) {
-            dem2di_overlap *overlap;
-            int corners = dem2di_overlap_of(world, a, b, link, link->branch, &overlap);
-            dem2di_area_load(world, law, a, b, overlap, corners, link);
-            if (!(link->depth > 0)) continue;
-        }
-        const dem2di_state *sa = &world->now[a], *sb = &world->now[b];
-        double slip = dem2di_slip(link, sa->v, sa->w, sb->v, sb->w);
-        dem2di_link_load(world, list, i, law, slip, found == 2);
+        int first = list->discs + (block - discs) * DEM2DI_BLOCK_OTHERS;
+        int last = dem2di_block_end(first, DEM2DI_BLOCK_OTHERS, list->count);
+        dem2di_overlap *scratch = dem2di_overlap_scratch(world, block - discs);
+        for (int i = first; i < last; i++)
+            if (i < list->pairs)
+                dem2di_pair_look(world, i, scratch, count);
+            else
+                dem2di_touch_look(world, i, scratch, count);
     }
 }
 
-/* The same for particles and walls: one support call each, none for circles. */
-static void dem2di_touch_pass(dem2d_world *world, dem2di_count *count) {
-    const dem2di_list *list = &world->touches;
-    dem2d_contact_point points[2];
-    for (int i = 0; i < list->keys.count; i++) {
-        int a = list->keys.key[i].a, j = list->keys.key[i].b;
-        const dem2di_body *body = &world->bodies[a];
-        const dem2di_state *state = &world->now[a];
-        const dem2di_wall_state *wall = &world->wall_now[j];
-        dem2di_link *link = &list->next[i];
-        memset(link, 0, sizeof *link);
-        dem2d_vec u = dem2di_negate(world->walls[j].desc.normal);
-        dem2d_vec support = dem2di_scale(u, body->radius);
-        link->normal = u;
-        if (world->two_points) memset(&list->next_ends[i], 0, sizeof *list->next_ends);
-        double surface = dem2di_dot(dem2di_sub(wall->point, state->x), u);
-        link->depth = body->radius - surface;
-        if (!(link->depth > 0)) continue;
-        if (body->shape->type != DEM2D_CIRCLE) {
-            dem2d_pose pose = dem2di_pose_of(world, world->now, a);
-            link->depth = dem2di_wall_depth(body->shape, &pose, wall->point, u, &support);
-            count->calls++;
-            if (!(link->depth > 0)) continue;
-        }
-        int found = 1;
-        points[0].position = dem2di_along(support, -link->depth, u);
-        if (world->two_points)
-            found = dem2di_wall_points(body->shape, state->q, body->scale, u, surface, support,
-                                       link->depth, points);
-        const dem2d_pair_desc *law = dem2di_law_of(world, &list->keys.key[i], true);
-        dem2di_link_place(list, i, found, points);
-        if (world->faces == DEM2D_CONTACT_AREA) {
-            dem2di_overlap *overlap;
-            dem2d_vec foot = dem2di_sub(wall->point, state->x);
-            int corners = dem2di_overlap_of(world, a, -1, link, foot, &overlap);
-            dem2di_area_load(world, law, a, -1, overlap, corners, link);
-            if (!(link->depth > 0)) continue;
-        }
-        link->branch = link->point;
-        double slip = dem2di_slip(link, state->v, state->w, wall->velocity, 0);
-        dem2di_link_load(world, list, i, law, slip, found == 2);
-    }
+static void dem2di_count_add(dem2di_count *sum, const dem2di_count *part) {
+    sum->calls += part->calls;
+    sum->looks += part->looks;
+    sum->gaps += part->gaps;
+    for (int k = 0; k < DEM2D_PROOF_COUNT; k++) sum->proofs[k] += part->proofs[k];
+}
+
+/* Geometry and forces of all contacts, into what is next of the list. */
+static void dem2di_contact_pass(dem2d_world *world, dem2di_count *count) {
+    const dem2di_list *list = &world->list;
+    int blocks = dem2di_contact_blocks(list->discs, list->count);
+    dem2di_run(world, DEM2D_PHASE_CONTACTS, blocks, dem2di_contact_task, world);
+    for (int k = 0; k < blocks; k++) dem2di_count_add(count, &world->tallies[k].count);
 }
 
 /* Of a contact of one point. By area the force kn A w/L^2 rises as kn w^2/L^2 and with the width w
@@ -8552,41 +9414,22 @@ static double dem2di_ends_weight(const dem2di_ends *ends) {
     return ends->weight[0] + ends->weight[1];
 }
 
-/* Sums over the contacts of a list's next links: per particle, in the order of the partner. */
-static void dem2di_sum_pass(dem2d_world *world) {
-    dem2di_load *load = world->next_load;
-    if (world->body_count > 0) memset(load, 0, (size_t)world->body_count * sizeof *load);
-    for (int i = 0; i < world->pairs.keys.count; i++) {
-        const dem2di_link *link = &world->pairs.next[i];
-        if (!(link->depth > 0)) continue;
-        dem2di_load *a = &load[world->pairs.keys.key[i].a];
-        dem2di_load *b = &load[world->pairs.keys.key[i].b];
-        dem2d_vec force = dem2di_link_force(link);
-        a->force = dem2di_sub(a->force, force);
-        b->force = dem2di_add(b->force, force);
-        a->torque -= dem2di_cross(link->point, force);
-        b->torque += dem2di_cross(dem2di_sub(link->point, link->branch), force);
-    }
+/* Forces on the walls and stiffnesses behind them, in the order of the particles' ids. */
+static void dem2di_wall_sums(dem2d_world *world) {
+    const dem2di_list *list = &world->list;
     for (int j = 0; j < world->wall_count; j++) {
         world->wall_next[j] = world->wall_now[j];
         world->wall_next[j].force = dem2di_vec(0, 0);
         world->wall_next[j].stiffness = 0;
     }
-    for (int i = 0; i < world->touches.keys.count; i++) {
-        const dem2di_link *link = &world->touches.next[i];
+    for (int i = list->pairs; i < list->count; i++) {
+        const dem2di_link *link = &list->next_links[i - list->discs];
         if (!(link->depth > 0)) continue;
-        int body = world->touches.keys.key[i].a, j = world->touches.keys.key[i].b;
-        dem2di_load *a = &load[body];
-        dem2di_wall_state *wall = &world->wall_next[j];
-        dem2d_vec force = dem2di_link_force(link);
-        a->force = dem2di_sub(a->force, force);
-        a->torque -= dem2di_cross(link->point, force);
-        wall->force = dem2di_add(wall->force, force);
-        const dem2d_pair_desc *law = dem2di_law_of(world, &world->touches.keys.key[i], true);
-        double stiffness = dem2di_stiffness_of(world, law, link);
-        if (world->two_points && world->touches.next_ends[i].weight[0] > 0)
-            stiffness *= dem2di_ends_weight(&world->touches.next_ends[i]);
-        wall->stiffness += stiffness;
+        dem2di_wall_state *wall = &world->wall_next[list->keys[i].b];
+        wall->force = dem2di_add(wall->force, world->pulls[i].force);
+        double stiffness = dem2di_stiffness_of(world, dem2di_law_of(world, i), link);
+        const dem2di_ends *ends = dem2di_ends_at(world, i, true);
+        wall->stiffness += ends != NULL ? stiffness * dem2di_ends_weight(ends) : stiffness;
     }
 }
 
@@ -8627,114 +9470,255 @@ static bool dem2di_wall_pass(dem2d_world *world) {
         if (wall->desc.mode == DEM2D_WALL_SERVO) next->velocity = dem2di_servo_velocity(world, j);
         next->point = dem2di_along(next->point, world->time_step, next->velocity);
         dem2d_vec moved = dem2di_sub(next->point, wall->listed);
-        stale = stale || !(fabs(dem2di_dot(moved, wall->desc.normal)) <= world->wall_skin);
+        stale = stale || !(fabs(dem2di_dot(moved, wall->desc.normal)) <= wall->skin);
     }
     return stale;
 }
 
-/* New velocities and positions. Returns the particle whose state is not finite, or -1. */
-static int dem2di_motion_pass(dem2d_world *world, bool *stale) {
+/* Sum of the contact forces on a particle, in the order of the partners' ids. */
+static DEM2DI_INLINE dem2di_load dem2di_gather(const dem2d_world *world, int slot, bool spin) {
+    static const double sign[2] = {-1, 1};
+    const int *entry = world->list.incident + world->list.first[slot];
+    const int *end = world->list.incident + world->list.first[slot + 1];
+    const dem2di_pull *pulls = world->pulls;
+    dem2di_load load = {{0, 0}, 0};
+    for (; entry < end; entry++) {
+        int side = *entry & 1;
+        const dem2di_pull *pull = &pulls[*entry >> 1];
+        load.force = dem2di_along(load.force, sign[side], pull->force);
+        if (spin) load.torque += pull->torque[side];
+    }
+    return load;
+}
+
+/* New velocities and positions of the particles from begin to end. */
+static DEM2DI_INLINE void dem2di_motion_range(const dem2d_world *world, int begin, int end,
+                                              bool heavy, bool damped, bool spin, bool travels,
+                                              dem2di_tally *tally) {
     dem2di_damping damping =
         dem2di_damping_make(world->local_damping, world->global_damping, world->time_step);
-    for (int i = 0; i < world->body_count; i++) {
-        const dem2di_body *body = &world->bodies[i];
-        dem2di_state *next = &world->next[i];
-        *next = world->now[i];
-        world->next_travel[i] = world->travel[i];
-        if (body->shape == NULL || body->motion == DEM2D_FIXED) continue;
-        if (body->motion == DEM2D_FREE) {
-            const dem2di_load *load = &world->next_load[i];
-            dem2d_vec a = dem2di_along(world->gravity, 1 / body->mass, load->force);
-            next->v.x = dem2di_accelerate(&damping, next->v.x, a.x);
-            next->v.y = dem2di_accelerate(&damping, next->v.y, a.y);
-            next->w = dem2di_accelerate(&damping, next->w, load->torque / body->inertia);
+    const double time_step = world->time_step;
+    const dem2d_vec gravity = world->gravity;
+    double sound = 0;
+    int stale = 0;
+    for (int i = begin; i < end; i++) {
+        const dem2di_state *now = &world->now[i];
+        const dem2di_inverse *inverse = &world->inverse[i];
+        const dem2di_watch *watch = &world->watch[i];
+        dem2di_state next = *now;
+        if (inverse->mass > 0) {
+            dem2di_load load = dem2di_gather(world, i, spin);
+            dem2d_vec a = dem2di_scale(load.force, inverse->mass);
+            double turn = load.torque * inverse->inertia;
+            if (heavy) a = dem2di_add(gravity, a);
+            if (damped) {
+                next.v.x = dem2di_accelerate(&damping, next.v.x, a.x);
+                next.v.y = dem2di_accelerate(&damping, next.v.y, a.y);
+                if (spin) next.w = dem2di_accelerate(&damping, next.w, turn);
+            } else {
+                next.v = dem2di_along(next.v, time_step, a);
+                if (spin) next.w += time_step * turn;
+            }
         }
-        world->next_travel[i] =
-            dem2di_travel(next, body->lever, world->time_step, world->travel[i]);
-        *next = dem2di_move(next, world->time_step);
-        if (!dem2di_state_finite(next)) return i;
-        dem2d_vec moved = dem2di_sub(next->x, body->listed);
-        *stale = *stale || dem2di_dot(moved, moved) > body->skin * body->skin;
+        if (travels)
+            world->next_travel[i] =
+                dem2di_travel(&next, world->lever[i], time_step, world->travel[i]);
+        next.x = dem2di_along(now->x, time_step, next.v);
+        if (spin) next.q = dem2di_rotate(now->q, next.w * time_step);
+        world->next[i] = next;
+        dem2d_vec moved = dem2di_sub(next.x, watch->listed);
+        stale |= dem2di_dot(moved, moved) > watch->skin * watch->skin;
+        sound += 0 * next.x.x + 0 * next.x.y + 0 * next.w; /* NaN if one is not finite */
+    }
+    tally->stale = stale != 0;
+    tally->sound = sound == 0;
+}
+
+/* The loop for what the scene has. */
+static void dem2di_motion_block(const dem2d_world *w, int b, int e, dem2di_tally *t) {
+    int kind = w->plan.heavy + 2 * w->plan.damped + 4 * w->plan.spin + 8 * w->plan.travels;
+    switch (kind) {
+    case 0:
+        dem2di_motion_range(w, b, e, false, false, false, false, t);
+        break;
+    case 1:
+        dem2di_motion_range(w, b, e, true, false, false, false, t);
+        break;
+    case 2:
+        dem2di_motion_range(w, b, e, false, true, false, false, t);
+        break;
+    case 3:
+        dem2di_motion_range(w, b, e, true, true, false, false, t);
+        break;
+    case 4:
+        dem2di_motion_range(w, b, e, false, false, true, false, t);
+        break;
+    case 5:
+        dem2di_motion_range(w, b, e, true, false, true, false, t);
+        break;
+    case 6:
+        dem2di_motion_range(w, b, e, false, true, true, false, t);
+        break;
+    case 7:
+        dem2di_motion_range(w, b, e, true, true, true, false, t);
+        break;
+    case 12:
+        dem2di_motion_range(w, b, e, false, false, true, true, t);
+        break;
+    case 13:
+        dem2di_motion_range(w, b, e, true, false, true, true, t);
+        break;
+    case 14:
+        dem2di_motion_range(w, b, e, false, true, true, true, t);
+        break;
+    default:
+        dem2di_motion_range(w, b, e, true, true, true, true, t);
+        break;
+    }
+}
+
+static void dem2di_motion_task(void *context, int begin, int end) {
+    dem2d_world *world = (dem2d_world *)context;
+    for (int block = begin; block < end; block++) {
+        int first = block * DEM2DI_BLOCK;
+        dem2di_motion_block(world, first, dem2di_block_end(first, DEM2DI_BLOCK, world->body_count),
+                            &world->tallies[block]);
+    }
+}
+
+/* Sums of forces, velocities and positions. Returns the slot of a particle whose state is not
+   finite, or -1; `worn` when one has left its skin. */
+static int dem2di_motion_pass(dem2d_world *world, bool *worn) {
+    int blocks = dem2di_blocks(world->body_count, DEM2DI_BLOCK);
+    world->plan.heavy = world->gravity.x != 0 || world->gravity.y != 0;
+    world->plan.damped = world->local_damping > 0 || world->global_damping > 0;
+    dem2di_run(world, DEM2D_PHASE_MOTION, blocks, dem2di_motion_task, world);
+    for (int k = 0; k < blocks; k++) {
+        *worn = *worn || world->tallies[k].stale;
+        if (world->tallies[k].sound) continue;
+        for (int i = k * DEM2DI_BLOCK; i < world->body_count; i++)
+            if (!dem2di_state_finite(&world->next[i])) return i;
     }
     return -1;
 }
 
-/* Stiffness of one contact point on both sides. */
-static void dem2di_stiffness_point(const dem2d_world *world, const dem2di_key *key, bool wall,
-                                   double kn, double kt, const dem2di_link *link, dem2d_vec point) {
-    dem2d_vec t = dem2di_perp(link->normal), arm = dem2di_sub(point, link->branch);
-    dem2di_stiffness_add(&world->stiffness[key->a], kn, link->normal, point);
-    dem2di_stiffness_add(&world->stiffness[key->a], kt, t, point);
-    if (wall) return;
-    dem2di_stiffness_add(&world->stiffness[key->b], kn, link->normal, arm);
-    dem2di_stiffness_add(&world->stiffness[key->b], kt, t, arm);
+/* --- the stable time step -----------------------------------------------------------------------
+ */
+
+/* Stiffness of one contact on one of its particles, at one point (seen from its centre). */
+static void dem2di_stiffness_point(double kn, double kt, dem2d_vec normal, dem2d_vec arm,
+                                   dem2di_stiffness *sum) {
+    dem2di_stiffness_add(sum, kn, normal, arm);
+    dem2di_stiffness_add(sum, kt, dem2di_perp(normal), arm);
 }
 
-/* Stiffness of the contacts of one list; `shared` counts those between two free particles that
-   often. `next`: of the step that is being made. */
-static void dem2di_stiffness_list(const dem2d_world *world, bool walls, bool next, double shared) {
-    const dem2di_list *list = walls ? &world->touches : &world->pairs;
-    const dem2di_link *links = next ? list->next : list->now;
-    const dem2di_ends *ends = next ? list->next_ends : list->ends;
-    for (int i = 0; i < list->keys.count; i++) {
-        const dem2di_link *link = &links[i];
-        const dem2di_key *key = &list->keys.key[i];
-        if (!(link->depth > 0)) continue;
-        const dem2d_pair_desc *law = dem2di_law_of(world, key, walls);
-        bool both = !walls && world->bodies[key->a].motion == DEM2D_FREE &&
-                    world->bodies[key->b].motion == DEM2D_FREE;
-        double f = both ? shared : 1, kn = f * dem2di_stiffness_of(world, law, link);
-        /* one that slides does not resist: it counts for the safe bound only */
-        bool sticks = fabs(link->shear) < law->friction * link->force;
-        double kt = sticks || (law->friction > 0 && shared > 1) ? f * law->tangential_stiffness : 0;
-        if (!world->two_points || dem2di_ends_weight(&ends[i]) == 0) {
-            dem2di_stiffness_point(world, key, walls, kn, kt, link, link->point);
-            continue;
-        }
-        for (int k = 0; k < 2; k++) {
-            double w = ends[i].weight[k];
-            dem2d_vec p = dem2di_along(link->point, ends[i].offset[k], dem2di_perp(link->normal));
-            dem2di_stiffness_point(world, key, walls, w * kn, w * kt, link, p);
+/* Stiffness of the contacts of a particle for the limit (0) and for the safe bound (1), which
+   counts those between two free particles twice. One that slides does not resist: it counts for the
+   safe bound only. */
+static void dem2di_stiffness_sum(const dem2d_world *world, int slot, bool next,
+                                 dem2di_stiffness sum[2]) {
+    const dem2di_list *list = &world->list;
+    memset(sum, 0, 2 * sizeof *sum);
+    for (int k = list->first[slot]; k < list->first[slot + 1]; k++) {
+        int i = list->incident[k] / 2, side = list->incident[k] & 1;
+        dem2di_link link;
+        dem2d_vec arm_b;
+        if (!dem2di_link_at(world, i, next, &link, &arm_b)) continue;
+        const dem2di_key *key = &list->keys[i];
+        const dem2d_pair_desc *law = dem2di_law_at(world, i, next);
+        const dem2di_ends *ends = dem2di_ends_at(world, i, next);
+        bool shared = i < list->pairs && world->bodies[key->a].motion == DEM2D_FREE &&
+                      world->bodies[key->b].motion == DEM2D_FREE;
+        bool sticks = fabs(link.shear) < law->friction * link.force;
+        double kn = dem2di_stiffness_of(world, law, &link), kt = law->tangential_stiffness;
+        dem2d_vec arm = side ? arm_b : link.point, t = dem2di_perp(link.normal);
+        for (int bound = 0; bound < 2; bound++) {
+            double f = bound == 1 && shared ? 2 : 1;
+            double slide = sticks || (bound == 1 && law->friction > 0) ? f * kt : 0;
+            for (int p = 0; p < (ends != NULL ? 2 : 1); p++) {
+                double w = ends != NULL ? ends->weight[p] : 1;
+                dem2d_vec at = ends != NULL ? dem2di_along(arm, ends->offset[p], t) : arm;
+                dem2di_stiffness_point(w * f * kn, w * slide, link.normal, at, &sum[bound]);
+            }
         }
     }
 }
 
-/* Greatest eigenvalue of M_i^-1 sum_c f_c K_c over the free particles, and where; 0 without
-   contacts. f is `shared` between free particles and 1 against walls and others. */
-static double dem2di_stiffest(const dem2d_world *world, bool next, double shared, int *particle) {
-    double greatest = 0;
-    size_t count = (size_t)world->body_count;
-    if (count > 0) memset(world->stiffness, 0, count * sizeof *world->stiffness);
-    dem2di_stiffness_list(world, false, next, shared);
-    dem2di_stiffness_list(world, true, next, shared);
-    for (int i = 0; i < world->body_count; i++) {
+/* The greater of what is known and one more: of equal ones the lower id's, so that the order of the
+   particles in memory does not matter. */
+static void dem2di_stiffest_meet(const dem2d_world *world, dem2di_stiffest *so_far, int bound,
+                                 double value, int slot) {
+    bool equal = value == so_far->value[bound] && slot >= 0 && so_far->at[bound] >= 0;
+    if (!(value > so_far->value[bound]) &&
+        !(equal && world->bodies[slot].index < world->bodies[so_far->at[bound]].index))
+        return;
+    so_far->value[bound] = value;
+    so_far->at[bound] = slot;
+}
+
+/* Over free particles; with `loose` those without a contact count for the safe bound as if they had
+   one with their own kind. Eigenvalues below `enough` need not be known: their sum bounds them. */
+static void dem2di_stiffest_range(const dem2d_world *world, int begin, int end, bool next,
+                                  bool loose, double enough, dem2di_stiffest *stiffest) {
+    stiffest->value[0] = stiffest->value[1] = 0;
+    stiffest->at[0] = stiffest->at[1] = -1;
+    for (int i = begin; i < end; i++) {
         const dem2di_body *body = &world->bodies[i];
-        const dem2di_stiffness *k = &world->stiffness[i];
-        if (body->shape == NULL || body->motion != DEM2D_FREE || k->xx + k->yy == 0) continue;
-        double value = dem2di_largest_eigenvalue(k, body->mass, body->inertia);
-        if (!(value > greatest)) continue;
-        greatest = value;
-        *particle = i;
+        dem2di_stiffness sum[2];
+        if (body->shape == NULL || body->motion != DEM2D_FREE) continue;
+        dem2di_stiffness_sum(world, i, next, sum);
+        double mass = dem2di_body_mass(world, body), inertia = dem2di_body_inertia(world, body);
+        for (int bound = 0; bound < 2; bound++) {
+            const dem2di_stiffness *k = &sum[bound];
+            double value = (k->xx + k->yy) / mass + k->rr / inertia;
+            if (k->xx + k->yy > 0 && value > enough)
+                value = dem2di_largest_eigenvalue(k, mass, inertia);
+            dem2di_stiffest_meet(world, stiffest, bound, value, i);
+        }
+        if (!loose || sum[1].xx + sum[1].yy > 0) continue;
+        const dem2d_pair_desc *law = dem2di_law(world, body->material, body->material);
+        double arm = world->now[i].radius * world->now[i].radius / inertia;
+        double kt = law->friction > 0 ? law->tangential_stiffness : 0;
+        double value = 2 * dem2di_max(law->normal_stiffness, kt) * (1 / mass + arm);
+        dem2di_stiffest_meet(world, stiffest, 1, value, i);
     }
-    return greatest;
+}
+
+static void dem2di_stiffest_task(void *context, int begin, int end) {
+    dem2d_world *world = (dem2d_world *)context;
+    double enough = 4 / (world->time_step * world->time_step);
+    for (int block = begin; block < end; block++) {
+        int first = block * DEM2DI_BLOCK;
+        dem2di_stiffest_range(world, first,
+                              dem2di_block_end(first, DEM2DI_BLOCK, world->body_count), true, false,
+                              enough, &world->tallies[block].stiffest);
+    }
 }
 
 /* The step that is about to be made against both bounds: beyond the greater one it is refused,
    between the two it is noted. */
 static dem2d_result dem2di_check_step(dem2d_world *world, bool *slow) {
-    int particle = -1;
     double dt = world->time_step;
-    double limit = dem2di_stiffest(world, true, 1, &particle);
-    if (dt * dt * limit > 4)
-        return dem2di_fail(&world->env, DEM2D_TIME_STEP, particle,
+    dem2di_stiffest all = {{0, 0}, {-1, -1}};
+    int blocks = dem2di_blocks(world->body_count, DEM2DI_BLOCK);
+    dem2di_run(world, DEM2D_PHASE_LIST, blocks, dem2di_stiffest_task, world);
+    for (int k = 0; k < blocks; k++)
+        for (int bound = 0; bound < 2; bound++) {
+            const dem2di_stiffest *one = &world->tallies[k].stiffest;
+            dem2di_stiffest_meet(world, &all, bound, one->value[bound], one->at[bound]);
+        }
+    int particle[2];
+    for (int bound = 0; bound < 2; bound++)
+        particle[bound] = all.at[bound] >= 0 ? world->bodies[all.at[bound]].index : -1;
+    if (dt * dt * all.value[0] > 4)
+        return dem2di_fail(&world->env, DEM2D_TIME_STEP, particle[0],
                            "time_step = %g is above the limit %g of particle %d", dt,
-                           2 / sqrt(limit), particle);
-    double safe = dem2di_stiffest(world, true, 2, &particle);
-    *slow = dt * dt * safe > 4;
+                           2 / sqrt(all.value[0]), particle[0]);
+    *slow = dt * dt * all.value[1] > 4;
     if (*slow && world->slow_time_step == 0)
-        (void)dem2di_fail(&world->env, DEM2D_OK, particle,
+        (void)dem2di_fail(&world->env, DEM2D_OK, particle[1],
                           "time_step = %g may be unstable: %g is safe (particle %d)", dt,
-                          2 / sqrt(safe), particle);
+                          2 / sqrt(all.value[1]), particle[1]);
     return DEM2D_OK;
 }
 
@@ -8742,60 +9726,46 @@ DEM2D_API dem2d_result dem2d_world_time_step_bounds(const dem2d_world *world, do
                                                     double *limit,
                                                     dem2d_particle_id *limit_particle) {
     if (world == NULL || safe == NULL || limit == NULL) return DEM2D_NULL_ARGUMENT;
-    int particle = -1, unused = -1;
-    double slowest = dem2di_stiffest(world, false, 1, &particle);
-    double stiffest = dem2di_stiffest(world, false, 2, &unused);
-    for (int i = 0; i < world->body_count; i++) { /* the loose: one contact with their own kind */
-        const dem2di_body *body = &world->bodies[i];
-        const dem2di_stiffness *k = &world->stiffness[i];
-        if (body->shape == NULL || body->motion != DEM2D_FREE || k->xx + k->yy > 0) continue;
-        const dem2d_pair_desc *law = dem2di_law(world, body->material, body->material);
-        double arm = body->radius * body->radius / body->inertia;
-        double kt = law->friction > 0 ? law->tangential_stiffness : 0;
-        double value = 2 * dem2di_max(law->normal_stiffness, kt) * (1 / body->mass + arm);
-        stiffest = dem2di_max(stiffest, value);
-    }
-    *safe = stiffest > 0 ? 2 / sqrt(stiffest) : HUGE_VAL;
-    *limit = slowest > 0 ? 2 / sqrt(slowest) : HUGE_VAL;
-    if (limit_particle != NULL) {
-        limit_particle->index = particle >= 0 ? (uint32_t)particle : 0;
-        limit_particle->generation = particle >= 0 ? world->bodies[particle].generation : 0;
-    }
+    dem2di_stiffest all;
+    dem2di_stiffest_range(world, 0, world->body_count, false, true, 0, &all);
+    *safe = all.value[1] > 0 ? 2 / sqrt(all.value[1]) : HUGE_VAL;
+    *limit = all.value[0] > 0 ? 2 / sqrt(all.value[0]) : HUGE_VAL;
+    if (limit_particle == NULL) return DEM2D_OK;
+    limit_particle->index = limit_particle->generation = 0;
+    if (all.at[0] >= 0) *limit_particle = dem2di_particle_id(world, all.at[0]);
     return DEM2D_OK;
 }
+
+/* --- the step ------------------------------------------------------------------------------------
+ */
 
 /* Everything new becomes the present; the present becomes the state of the last force pass. */
 static void dem2di_commit(dem2d_world *world) {
     dem2di_state *state = world->before;
-    dem2di_load *load = world->load;
     dem2di_wall_state *wall = world->wall_before;
     world->before = world->now;
     world->now = world->next;
     world->next = state;
-    world->load = world->next_load;
-    world->next_load = load;
     double *travel = world->travel;
     world->travel = world->next_travel;
     world->next_travel = travel;
     world->wall_before = world->wall_now;
     world->wall_now = world->wall_next;
     world->wall_next = wall;
-    dem2di_swap_links(&world->pairs);
-    dem2di_swap_links(&world->touches);
+    dem2di_swap_contacts(&world->list);
     world->steps++;
 }
 
-/* The straight road: candidate pairs, contacts, sums, walls, motion; then commit. All results go
+/* The straight road: candidate pairs, contacts, walls, sums and motion; then commit. All results go
    to arrays beside the present ones, so that a failure only has to return. */
 static dem2d_result dem2di_step(dem2d_world *world) {
     dem2di_count count = world->count;
     bool slow = false, listed = world->list_stale;
     if (listed) {
-        dem2d_result result = dem2di_build_lists(world);
+        dem2d_result result = dem2di_build_list(world);
         if (result != DEM2D_OK) return result;
     }
-    dem2di_pair_pass(world, &count);
-    dem2di_touch_pass(world, &count);
+    dem2di_contact_pass(world, &count);
     if (listed && world->check_time_step) {
         dem2d_result result = dem2di_check_step(world, &slow);
         if (result != DEM2D_OK) {
@@ -8803,17 +9773,21 @@ static dem2d_result dem2di_step(dem2d_world *world) {
             return result;
         }
     }
-    dem2di_sum_pass(world);
-    bool stale = dem2di_wall_pass(world);
-    int particle = dem2di_motion_pass(world, &stale);
-    if (particle >= 0)
-        return dem2di_fail(&world->env, DEM2D_STATE, particle,
-                           "particle %d would get a state that is not finite", particle);
+    dem2di_wall_sums(world);
+    bool worn = dem2di_wall_pass(world);
+    int slot = dem2di_motion_pass(world, &worn);
+    if (slot >= 0)
+        return dem2di_fail(&world->env, DEM2D_STATE, world->bodies[slot].index,
+                           "particle %d would get a state that is not finite",
+                           world->bodies[slot].index);
     for (int j = 0; j < world->wall_count; j++)
         if (world->walls[j].alive && !dem2di_vec_finite(world->wall_next[j].point))
             return dem2di_fail(&world->env, DEM2D_STATE, j,
                                "wall %d would get a place that is not finite", j);
-    world->list_stale = stale;
+    if (listed && world->laws_side > 0)
+        memcpy(world->used_laws, world->laws,
+               (size_t)world->laws_side * (size_t)world->laws_side * sizeof *world->laws);
+    world->list_stale = world->list_worn = worn;
     world->rebuilds += listed;
     world->count = count;
     world->slow_time_step += slow;
@@ -8838,9 +9812,47 @@ DEM2D_API dem2d_result dem2d_world_step(dem2d_world *world, int count, int *done
    uses: config, math, memory, law, motion, world
    ============================================================================================ */
 
-static int dem2di_open_links(const dem2di_list *list) {
+/* A walk over the contacts of the last force pass in the order of their ids: those of particles, or
+   with `walls` those with walls. All else 0 at the start. */
+typedef struct dem2di_tour {
+    bool walls;
+    int index, entry; /* where it goes on */
+    int contact;      /* where it is, and the contact there */
+    dem2di_link link;
+    dem2d_vec branch; /* from A's centre to B's; to a wall: the contact point */
+} dem2di_tour;
+
+static bool dem2di_tour_next(const dem2d_world *world, dem2di_tour *walk) {
+    const dem2di_list *list = &world->list;
+    for (; walk->index < world->name_count; walk->index++, walk->entry = 0) {
+        int slot = world->names[walk->index].slot;
+        if (slot < 0) continue;
+        while (walk->entry < list->first[slot + 1] - list->first[slot]) {
+            int entry = list->incident[list->first[slot] + walk->entry++];
+            int contact = entry / 2;
+            dem2d_vec arm_b;
+            if (entry % 2 != 0 || (contact >= list->pairs) != walk->walls) continue;
+            if (!dem2di_link_at(world, contact, false, &walk->link, &arm_b)) continue;
+            walk->contact = contact;
+            walk->branch = dem2di_sub(walk->link.point, arm_b);
+            return true;
+        }
+    }
+    return false;
+}
+
+static dem2di_tour dem2di_tour_start(bool walls) {
+    dem2di_tour walk;
+    memset(&walk, 0, sizeof walk);
+    walk.walls = walls;
+    return walk;
+}
+
+static int dem2di_open_contacts(const dem2d_world *world, int begin, int end) {
     int open = 0;
-    for (int i = 0; i < list->keys.count; i++) open += list->now[i].depth > 0;
+    dem2di_link link;
+    dem2d_vec arm_b;
+    for (int i = begin; i < end; i++) open += dem2di_link_at(world, i, false, &link, &arm_b);
     return open;
 }
 
@@ -8857,18 +9869,12 @@ DEM2D_API dem2d_result dem2d_world_stats(const dem2d_world *world, dem2d_stats *
     stats->particles = world->body_count - world->holes;
     stats->walls = 0;
     for (int j = 0; j < world->wall_count; j++) stats->walls += world->walls[j].alive;
-    stats->pairs = world->pairs.keys.count + world->touches.keys.count;
-    stats->contacts = dem2di_open_links(&world->pairs);
-    stats->wall_contacts = dem2di_open_links(&world->touches);
+    stats->pairs = world->list.count;
+    stats->contacts = dem2di_open_contacts(world, 0, world->list.pairs);
+    stats->wall_contacts = dem2di_open_contacts(world, world->list.pairs, world->list.count);
+    stats->skin = world->skin;
     stats->bytes = world->bytes;
     return DEM2D_OK;
-}
-
-static dem2d_particle_id dem2di_particle_id(const dem2d_world *world, int i) {
-    dem2d_particle_id id;
-    id.index = (uint32_t)i;
-    id.generation = world->bodies[i].generation;
-    return id;
 }
 
 DEM2D_API dem2d_result dem2d_world_particles(const dem2d_world *world, dem2d_particle_id *ids,
@@ -8878,23 +9884,22 @@ DEM2D_API dem2d_result dem2d_world_particles(const dem2d_world *world, dem2d_par
     if (capacity < 0)
         return dem2di_fail(&world->env, DEM2D_OUT_OF_RANGE, -1, "capacity = %d", capacity);
     int alive = 0;
-    for (int i = 0; i < world->body_count; i++) {
-        if (world->bodies[i].shape == NULL) continue;
-        if (alive < capacity) ids[alive] = dem2di_particle_id(world, i);
+    for (int i = 0; i < world->name_count; i++) {
+        if (world->names[i].slot < 0) continue;
+        if (alive < capacity) ids[alive] = dem2di_particle_id(world, world->names[i].slot);
         alive++;
     }
     *count = alive;
     return DEM2D_OK;
 }
 
-static dem2d_contact_info dem2di_contact_of(const dem2d_world *world, const dem2di_list *list,
-                                            int i, bool wall) {
-    const dem2di_key *key = &list->keys.key[i];
-    const dem2di_link *link = &list->now[i];
+static dem2d_contact_info dem2di_contact_of(const dem2d_world *world, const dem2di_tour *walk) {
+    const dem2di_key *key = &world->list.keys[walk->contact];
+    const dem2di_link *link = &walk->link;
     dem2d_contact_info info;
     memset(&info, 0, sizeof info);
     info.a = dem2di_particle_id(world, key->a);
-    if (wall) {
+    if (walk->walls) {
         info.wall.index = (uint32_t)key->b;
         info.wall.generation = world->walls[key->b].generation;
     } else {
@@ -8902,8 +9907,8 @@ static dem2d_contact_info dem2di_contact_of(const dem2d_world *world, const dem2
     }
     info.normal = link->normal;
     info.point = dem2di_add(world->before[key->a].x, link->point);
-    info.branch = link->branch;
-    info.points = world->two_points && dem2di_ends_weight(&list->ends[i]) > 0 ? 2 : 1;
+    info.branch = walk->branch;
+    info.points = dem2di_ends_at(world, walk->contact, false) != NULL ? 2 : 1;
     info.depth = link->depth;
     info.normal_force = link->force;
     info.tangential_force = link->shear;
@@ -8918,31 +9923,27 @@ DEM2D_API dem2d_result dem2d_world_contacts(const dem2d_world *world, dem2d_cont
         return dem2di_fail(&world->env, DEM2D_OUT_OF_RANGE, -1, "capacity = %d", capacity);
     int open = 0;
     for (int wall = 0; wall < 2; wall++) {
-        const dem2di_list *list = wall ? &world->touches : &world->pairs;
-        for (int i = 0; i < list->keys.count; i++) {
-            if (!(list->now[i].depth > 0)) continue;
-            if (open < capacity) contacts[open] = dem2di_contact_of(world, list, i, wall == 1);
-            open++;
-        }
+        dem2di_tour walk = dem2di_tour_start(wall == 1);
+        for (; dem2di_tour_next(world, &walk); open++)
+            if (open < capacity) contacts[open] = dem2di_contact_of(world, &walk);
     }
     *count = open;
     return DEM2D_OK;
 }
 
-/* Energy in the springs of one list. */
-static void dem2di_spring_energy(const dem2d_world *world, const dem2di_list *list, bool walls,
-                                 dem2d_energy *energy) {
-    for (int i = 0; i < list->keys.count; i++) {
-        const dem2di_link *link = &list->now[i];
-        if (!(link->depth > 0)) continue;
-        const dem2d_pair_desc *law = dem2di_law_of(world, &list->keys.key[i], walls);
+/* Energy in the springs of the contacts of particles, or with walls. */
+static void dem2di_spring_energy(const dem2d_world *world, bool walls, dem2d_energy *energy) {
+    dem2di_tour walk = dem2di_tour_start(walls);
+    while (dem2di_tour_next(world, &walk)) {
+        const dem2di_link *link = &walk.link;
+        const dem2d_pair_desc *law = dem2di_law_at(world, walk.contact, false);
+        const dem2di_ends *ends = dem2di_ends_at(world, walk.contact, false);
         double kn = law->normal_stiffness, kt = law->tangential_stiffness;
-        if (!world->two_points || dem2di_ends_weight(&list->ends[i]) == 0) {
+        if (ends == NULL) {
             energy->normal += link->force * link->depth / 2;
             if (kt > 0) energy->tangential += link->shear * (link->shear / kt) / 2;
             continue;
         }
-        const dem2di_ends *ends = &list->ends[i];
         for (int k = 0; k < 2; k++) {
             if (!(ends->weight[k] > 0)) continue;
             energy->normal += ends->weight[k] * kn * ends->depth[k] * ends->depth[k] / 2;
@@ -8956,18 +9957,20 @@ static void dem2di_spring_energy(const dem2d_world *world, const dem2di_list *li
 DEM2D_API dem2d_result dem2d_world_energy(const dem2d_world *world, dem2d_energy *energy) {
     if (world == NULL || energy == NULL) return DEM2D_NULL_ARGUMENT;
     memset(energy, 0, sizeof *energy);
-    for (int i = 0; i < world->body_count; i++) {
+    for (int index = 0; index < world->name_count; index++) {
+        int i = world->names[index].slot;
+        if (i < 0) continue;
         const dem2di_body *body = &world->bodies[i];
-        if (body->shape == NULL) continue;
+        double mass = dem2di_body_mass(world, body), inertia = dem2di_body_inertia(world, body);
         const dem2di_state *half[2] = {&world->before[i], &world->now[i]};
         for (int k = 0; k < 2; k++) {
-            energy->translational += body->mass * dem2di_dot(half[k]->v, half[k]->v) / 4;
-            energy->rotational += body->inertia * half[k]->w * half[k]->w / 4;
+            energy->translational += mass * dem2di_dot(half[k]->v, half[k]->v) / 4;
+            energy->rotational += inertia * half[k]->w * half[k]->w / 4;
         }
-        energy->potential -= body->mass * dem2di_dot(world->gravity, world->before[i].x);
+        energy->potential -= mass * dem2di_dot(world->gravity, world->before[i].x);
     }
-    dem2di_spring_energy(world, &world->pairs, false, energy);
-    dem2di_spring_energy(world, &world->touches, true, energy);
+    dem2di_spring_energy(world, false, energy);
+    dem2di_spring_energy(world, true, energy);
     return DEM2D_OK;
 }
 
@@ -8978,15 +9981,13 @@ DEM2D_API dem2d_result dem2d_world_stress(const dem2d_world *world, double area,
     if (result != DEM2D_OK) return result;
     dem2d_stress sum = {0, 0, 0, 0};
     for (int wall = 0; wall < 2; wall++) {
-        const dem2di_list *list = wall ? &world->touches : &world->pairs;
-        for (int i = 0; i < list->keys.count; i++) {
-            const dem2di_link *link = &list->now[i];
-            if (!(link->depth > 0)) continue;
-            dem2d_vec force = dem2di_link_force(link);
-            sum.xx += link->branch.x * force.x;
-            sum.xy += link->branch.x * force.y;
-            sum.yx += link->branch.y * force.x;
-            sum.yy += link->branch.y * force.y;
+        dem2di_tour walk = dem2di_tour_start(wall == 1);
+        while (dem2di_tour_next(world, &walk)) {
+            dem2d_vec force = dem2di_link_force(&walk.link);
+            sum.xx += walk.branch.x * force.x;
+            sum.xy += walk.branch.x * force.y;
+            sum.yx += walk.branch.y * force.x;
+            sum.yy += walk.branch.y * force.y;
         }
     }
     stress->xx = sum.xx / area;
@@ -8996,25 +9997,26 @@ DEM2D_API dem2d_result dem2d_world_stress(const dem2d_world *world, double area,
     return DEM2D_OK;
 }
 
-/* Number of contacts of each particle with others, into the scratch of the list. */
-static void dem2di_count_contacts(const dem2d_world *world, dem2di_disc *counts) {
-    for (int i = 0; i < world->body_count; i++) counts[i].reach = 0;
-    for (int i = 0; i < world->pairs.keys.count; i++) {
-        if (!(world->pairs.now[i].depth > 0)) continue;
-        counts[world->pairs.keys.key[i].a].reach++;
-        counts[world->pairs.keys.key[i].b].reach++;
+/* Contacts of a particle with others. */
+static int dem2di_contacts_of(const dem2d_world *world, int slot) {
+    const dem2di_list *list = &world->list;
+    int open = 0;
+    for (int k = list->first[slot]; k < list->first[slot + 1]; k++) {
+        int contact = list->incident[k] / 2;
+        if (contact < list->pairs) open += dem2di_open_contacts(world, contact, contact + 1);
     }
+    return open;
 }
 
 DEM2D_API dem2d_result dem2d_world_packing(const dem2d_world *world, dem2d_packing *packing) {
     if (world == NULL || packing == NULL) return DEM2D_NULL_ARGUMENT;
     double ends = 0, loaded_ends = 0, overlap = 0, greatest = 0, area = 0;
     int alive = 0, loaded = 0, open = 0;
-    dem2di_count_contacts(world, world->discs);
-    for (int i = 0; i < world->body_count; i++) {
-        const dem2di_body *body = &world->bodies[i];
-        if (body->shape == NULL) continue;
-        double contacts = world->discs[i].reach;
+    for (int index = 0; index < world->name_count; index++) {
+        int slot = world->names[index].slot;
+        if (slot < 0) continue;
+        const dem2di_body *body = &world->bodies[slot];
+        int contacts = dem2di_contacts_of(world, slot);
         alive++;
         ends += contacts;
         loaded += contacts >= 2;
@@ -9022,12 +10024,12 @@ DEM2D_API dem2d_result dem2d_world_packing(const dem2d_world *world, dem2d_packi
         area += body->shape->mass.area * body->scale * body->scale;
     }
     for (int wall = 0; wall < 2; wall++) {
-        const dem2di_list *list = wall ? &world->touches : &world->pairs;
-        for (int i = 0; i < list->keys.count; i++) {
-            if (!(list->now[i].depth > 0)) continue;
-            double radius = dem2di_equivalent(world, list->keys.key[i].a);
-            if (!wall) radius = dem2di_min(radius, dem2di_equivalent(world, list->keys.key[i].b));
-            double relative = list->now[i].depth / radius;
+        dem2di_tour walk = dem2di_tour_start(wall == 1);
+        while (dem2di_tour_next(world, &walk)) {
+            const dem2di_key *key = &world->list.keys[walk.contact];
+            double radius = dem2di_equivalent(world, key->a);
+            if (!wall) radius = dem2di_min(radius, dem2di_equivalent(world, key->b));
+            double relative = walk.link.depth / radius;
             greatest = dem2di_max(greatest, relative);
             if (wall) continue;
             overlap += relative;
@@ -9054,7 +10056,7 @@ DEM2D_API dem2d_result dem2d_world_porosity(const dem2d_world *world, double are
 
 /* ============================================================================================
    >>writers  Pictures
-   uses: config, math, memory, mass, shapes, world
+   uses: config, math, memory, mass, shapes, world, measures
    ============================================================================================ */
 
 /* Bytes on their way to a callback or a file, and whether all went well. */
@@ -9099,8 +10101,9 @@ static dem2d_vec dem2di_pixel(const dem2di_view *view, dem2d_vec p) {
 static dem2di_view dem2di_view_make(const dem2d_world *world, double width) {
     dem2d_vec lower = dem2di_vec(0, 0), upper = dem2di_vec(1, 1);
     bool first = true;
-    for (int i = 0; i < world->body_count; i++) {
-        if (world->bodies[i].shape == NULL) continue;
+    for (int index = 0; index < world->name_count; index++) {
+        int i = world->names[index].slot;
+        if (i < 0) continue;
         dem2d_box box;
         dem2d_pose pose = dem2di_pose_of(world, world->before, i);
         (void)dem2d_shape_aabb(world->bodies[i].shape, pose, &box);
@@ -9165,26 +10168,21 @@ static void dem2di_draw_chains(const dem2d_world *world, const dem2di_view *view
                                dem2di_writer *writer) {
     double sum = 0;
     int open = 0;
-    for (int i = 0; i < world->pairs.keys.count; i++) {
-        if (!(world->pairs.now[i].depth > 0)) continue;
-        sum += world->pairs.now[i].force;
-        open++;
-    }
+    dem2di_tour walk = dem2di_tour_start(false);
+    for (; dem2di_tour_next(world, &walk); open++) sum += walk.link.force;
     double unit = sum > 0 ? view->width / 400 * open / sum : 0;
     dem2di_print(writer, "<g stroke=\"#7a0019\" stroke-opacity=\"0.75\" "
                          "stroke-linecap=\"round\">\n");
     for (int wall = 0; wall < 2; wall++) {
-        const dem2di_list *list = wall ? &world->touches : &world->pairs;
-        for (int i = 0; i < list->keys.count; i++) {
-            const dem2di_link *link = &list->now[i];
-            if (!(link->depth > 0)) continue;
-            dem2d_vec start = world->before[list->keys.key[i].a].x;
+        walk = dem2di_tour_start(wall == 1);
+        while (dem2di_tour_next(world, &walk)) {
+            dem2d_vec start = world->before[world->list.keys[walk.contact].a].x;
             dem2d_vec p = dem2di_pixel(view, start);
-            dem2d_vec q = dem2di_pixel(view, dem2di_add(start, link->branch));
+            dem2d_vec q = dem2di_pixel(view, dem2di_add(start, walk.branch));
             dem2di_print(writer,
                          "<line x1=\"%.2f\" y1=\"%.2f\" x2=\"%.2f\" y2=\"%.2f\" "
                          "stroke-width=\"%.3f\"/>\n",
-                         p.x, p.y, q.x, q.y, link->force * unit);
+                         p.x, p.y, q.x, q.y, walk.link.force * unit);
         }
     }
     dem2di_print(writer, "</g>\n");
@@ -9200,8 +10198,9 @@ static void dem2di_draw(const dem2d_world *world, const dem2d_svg_desc *desc,
                  "viewBox=\"0 0 %.2f %.2f\">\n<rect width=\"100%%\" height=\"100%%\" "
                  "fill=\"white\"/>\n<g stroke=\"#333\" stroke-width=\"%.3f\">\n",
                  view.width, view.height, view.width, view.height, view.width / 1600);
-    for (int i = 0; i < world->body_count && writer->good; i++)
-        if (world->bodies[i].shape != NULL) dem2di_draw_particle(world, &view, points, i, writer);
+    for (int i = 0; i < world->name_count && writer->good; i++)
+        if (world->names[i].slot >= 0)
+            dem2di_draw_particle(world, &view, points, world->names[i].slot, writer);
     dem2di_print(writer, "</g>\n");
     for (int j = 0; j < world->wall_count; j++)
         if (world->walls[j].alive) dem2di_draw_wall(world, &view, j, writer);
