@@ -1415,25 +1415,48 @@ static void dem2di_release(const dem2d_env *env, void *memory, size_t count, siz
         free(memory);
 }
 
-/* More room in an array, whose capacity in elements stands beside it. Content is kept. */
-static bool dem2di_enlarge(const dem2d_env *env, void **array, int *capacity, int grown,
-                           size_t size) {
-    void *memory = dem2di_allocate(env, (size_t)grown, size);
-    if (memory == NULL) return false;
-    if (*capacity > 0) memcpy(memory, *array, (size_t)*capacity * size);
-    memset((char *)memory + (size_t)*capacity * size, 0, (size_t)(grown - *capacity) * size);
-    dem2di_release(env, *array, (size_t)*capacity, size);
-    *array = memory;
+/* Arrays of one length, which grow together. */
+typedef struct dem2di_column {
+    void **array;
+    size_t size; /* of an element */
+} dem2di_column;
+
+#define DEM2DI_COLUMNS 8 /* at most */
+
+static bool dem2di_columns_reserve(const dem2d_env *env, const dem2di_column *columns, int count,
+                                   int *capacity, int grown) {
+    void *made[DEM2DI_COLUMNS];
+    size_t old = (size_t)*capacity, longer = (size_t)grown;
+    if (grown <= *capacity) return true;
+    for (int k = 0; k < count; k++) {
+        made[k] = dem2di_allocate(env, longer, columns[k].size);
+        if (made[k] != NULL) continue;
+        while (k-- > 0) dem2di_release(env, made[k], longer, columns[k].size);
+        return false;
+    }
+    for (int k = 0; k < count; k++) {
+        size_t size = columns[k].size;
+        if (old > 0) memcpy(made[k], *columns[k].array, old * size);
+        memset((char *)made[k] + old * size, 0, (longer - old) * size);
+        dem2di_release(env, *columns[k].array, old, size);
+        *columns[k].array = made[k];
+    }
     *capacity = grown;
     return true;
 }
 
-/* An array that grows element by element. */
+/* Room for `needed`, and for half as many again: for what grows one by one. */
+static int dem2di_growth(int capacity, int needed) {
+    int grown = capacity < INT_MAX / 2 ? capacity + capacity / 2 : INT_MAX;
+    return needed <= capacity ? capacity : grown < needed ? needed : grown;
+}
+
 static bool dem2di_reserve(const dem2d_env *env, void **array, int *capacity, int needed,
                            size_t size) {
-    if (needed <= *capacity) return true;
-    int grown = *capacity < INT_MAX / 2 ? *capacity + *capacity / 2 : INT_MAX;
-    return dem2di_enlarge(env, array, capacity, grown < needed ? needed : grown, size);
+    dem2di_column column;
+    column.array = array;
+    column.size = size;
+    return dem2di_columns_reserve(env, &column, 1, capacity, dem2di_growth(*capacity, needed));
 }
 
 /* Errors of numbers: each names the field and the value. */
@@ -7274,16 +7297,18 @@ static dem2d_vec dem2di_link_force(const dem2di_link *link) {
                         dem2di_perp(link->normal));
 }
 
-/* What a contact does to its two partners: the force on B, its opposite on A, and torques. */
-typedef struct dem2di_pull {
+/* Force and torque: of a contact on one of its partners, or their sum. */
+typedef struct dem2di_load {
     dem2d_vec force;
-    double torque[2]; /* on A, on B */
-} dem2di_pull;
+    double torque;
+} dem2di_load;
 
-static void dem2di_link_pull(const dem2di_link *link, dem2d_vec arm_b, dem2di_pull *pull) {
-    pull->force = dem2di_link_force(link);
-    pull->torque[0] = -dem2di_cross(link->point, pull->force);
-    pull->torque[1] = dem2di_cross(arm_b, pull->force);
+/* On both partners of a contact: on A, on B. */
+static void dem2di_link_loads(const dem2di_link *link, dem2d_vec arm_b, dem2di_load loads[2]) {
+    loads[1].force = dem2di_link_force(link);
+    loads[0].force = dem2di_negate(loads[1].force);
+    loads[0].torque = -dem2di_cross(link->point, loads[1].force);
+    loads[1].torque = dem2di_cross(arm_b, loads[1].force);
 }
 
 /* Stiffness of one particle: the upper triangle of a symmetric matrix in x, y, angle. */
@@ -7339,12 +7364,6 @@ typedef struct dem2di_state {
     double radius;
 } dem2di_state;
 
-/* Sum of contact forces on a particle. */
-typedef struct dem2di_load {
-    dem2d_vec force;
-    double torque;
-} dem2di_load;
-
 typedef struct dem2di_damping {
     double local;         /* Cundall's factor */
     double keep, receive; /* global: v <- keep v + receive F/m */
@@ -7359,12 +7378,12 @@ static dem2di_damping dem2di_damping_make(double local, double global, double ti
     return damping;
 }
 
-/* New velocity component under an acceleration. */
+/* New velocity component under an acceleration: the drag is against the velocity, and none at rest.
+ */
 static inline double dem2di_accelerate(const dem2di_damping *damping, double v,
                                        double acceleration) {
-    double drag = damping->local * fabs(acceleration);
-    acceleration += v > 0 ? -drag : v < 0 ? drag : 0;
-    return damping->keep * v + damping->receive * acceleration;
+    double drag = v != 0 ? damping->local * fabs(acceleration) : 0;
+    return damping->keep * v + damping->receive * (acceleration - copysign(drag, v));
 }
 
 /* q turned by an angle: tan(angle/2) = x (1 + x^2/3) with x = angle/2 to fourth order, and the
@@ -7412,9 +7431,9 @@ typedef struct dem2di_template {
 
 /* What does not change while a particle lives, but for its motion. */
 typedef struct dem2di_body {
-    const dem2d_shape *shape; /* NULL: removed, until the slots are put in order */
     double scale;
-    int shape_index, index; /* of the template, of the particle's id */
+    int shape_index; /* of the template; -1: removed, until the slots are put in order */
+    int index;       /* of the particle's id */
     uint16_t material;
     uint8_t motion; /* dem2d_motion */
 } dem2di_body;
@@ -7423,12 +7442,6 @@ typedef struct dem2di_body {
 typedef struct dem2di_inverse {
     double mass, inertia;
 } dem2di_inverse;
-
-/* The list holds while no particle is farther than its skin from where it was listed. */
-typedef struct dem2di_watch {
-    dem2d_vec listed;
-    double skin;
-} dem2di_watch;
 
 /* A particle's id: its slot, or where the next free id is: -2 - index, -1 at the end. */
 typedef struct dem2di_name {
@@ -7464,15 +7477,15 @@ typedef struct dem2di_list {
     dem2di_link *links, *next_links; /* all but circles: of contact i at i - discs */
     dem2di_ends *ends, *next_ends;   /* likewise, where contacts may have two points */
     int *incident; /* 2 i for the A of contact i, 2 i + 1 for its B: those of each particle in the
-                      order of the partner's id, walls last */
+                      order of the partner's id, walls last; then 2 count up to a whole gather */
     int *first;    /* of a slot's in incident; bodies + 1 */
-    int keys_capacity, shear_capacity, next_shear_capacity, links_capacity, next_links_capacity;
-    int ends_capacity, next_ends_capacity, incident_capacity, first_capacity;
+    int keys_capacity, springs_capacity, links_capacity, ends_capacity, incident_capacity;
 } dem2di_list;
 
 /* What the contact passes count. */
 typedef struct dem2di_count {
     int64_t calls, looks, gaps, proofs[DEM2D_PROOF_COUNT];
+    int64_t unsound; /* forces that are not finite */
 } dem2di_count;
 
 /* The greatest eigenvalues of M_i^-1 sum_c f_c K_c, for the limit of the time step and for the safe
@@ -7486,10 +7499,9 @@ typedef struct dem2di_stiffest {
 typedef struct dem2di_tally {
     dem2di_count count;
     dem2di_stiffest stiffest;
-    double reach;   /* greatest of the discs */
+    double most;    /* greatest reach of the discs; greatest square of speed over skin */
     int64_t spread; /* sum of the distances in memory of the partners found */
-    bool stale;     /* a particle has left its skin */
-    bool sound;     /* all states are finite */
+
 } dem2di_tally;
 
 /* What the scene makes use of: decided when the list is renewed, not per contact. */
@@ -7527,6 +7539,8 @@ struct dem2d_world {
     bool scattered;  /* particles that meet are far from each other in memory */
     double skin;     /* of the radius */
     double interval; /* steps that a list is expected to last */
+    double worn;     /* part of the skins used up since the list was built */
+    bool bounded;    /* no state can become infinite while the list lasts */
     double spread;   /* mean distance in memory of two partners when last sorted */
     int64_t steps, rebuilds, slow_time_step, listed_at, sorts;
     dem2di_count count;
@@ -7539,22 +7553,21 @@ struct dem2d_world {
 
     int body_count; /* slots in use, holes too */
     int holes, name_count, free_name;
-    dem2di_name *names;                /* by the index of an id */
-    dem2di_state *before, *now, *next; /* at the last force pass, present, being made */
+    dem2di_name *names;         /* by the index of an id */
+    dem2di_state *before, *now; /* at the last force pass, present; the next come over before */
     dem2di_body *bodies;
     dem2di_inverse *inverse;
-    dem2di_watch *watch;
+    double *wear; /* 1 / skin^2: the list holds until some path is as long as its skin */
     double *travel, *next_travel; /* since the list was built, see dem2di_travel */
     double *lever; /* a support value changes by at most this times the angle of a turn */
-    int name_capacity, before_capacity, now_capacity, next_capacity, body_capacity;
-    int inverse_capacity, watch_capacity, travel_capacity, next_travel_capacity, lever_capacity;
+    int body_capacity, travel_capacity;
 
     dem2di_wall *walls;
     dem2di_wall_state *wall_before, *wall_now, *wall_next;
-    int wall_count, wall_capacity, wall_before_capacity, wall_now_capacity, wall_next_capacity;
+    int wall_count, wall_capacity;
 
     dem2di_list list;
-    dem2di_pull *pulls; /* of each listed contact, in scratch */
+    dem2di_load *loads; /* of each listed contact on A and on B, and a 0 behind; in scratch */
     char *scratch;      /* what only a step or only the building of the list needs */
     dem2di_tally *tallies;
     dem2di_overlap *overlap; /* contact-area rule: for each block twice what one overlap may have */
@@ -7584,72 +7597,104 @@ static bool dem2di_grow(dem2d_world *world, void **array, int *capacity, int nee
     return dem2di_reserve(&world->env, array, capacity, needed, size);
 }
 
-/* As above without room to spare: what is renewed as a whole, and in large scenes most of it. */
-static bool dem2di_room(dem2d_world *world, void **array, int *capacity, int needed, size_t size) {
-    if (needed <= *capacity) return true;
-    needed = needed < INT_MAX - needed / 16 ? needed + needed / 16 : needed;
-    return dem2di_enlarge(&world->env, array, capacity, needed, size);
+/* As above with little to spare: for what is renewed as a whole, in large scenes most of it. */
+static int dem2di_room(int capacity, int needed) {
+    int spare = needed / 16;
+    return needed <= capacity ? capacity : needed < INT_MAX - spare ? needed + spare : needed;
 }
 
-static bool dem2di_list_reserve(dem2d_world *w, bool friction, int discs, int pairs, int count) {
-    dem2di_list *l = &w->list;
-    int others = count - discs, springs = friction ? discs : 0;
-    if (l->count - l->discs > others) others = l->count - l->discs; /* which are read once more */
-    int ends = w->two_points ? others : 0;
-    return dem2di_room(w, (void **)&l->keys, &l->keys_capacity, count, sizeof *l->keys) &&
-           dem2di_room(w, (void **)&l->shear, &l->shear_capacity, springs, sizeof *l->shear) &&
-           dem2di_room(w, (void **)&l->next_shear, &l->next_shear_capacity, springs,
-                       sizeof *l->next_shear) &&
-           dem2di_room(w, (void **)&l->links, &l->links_capacity, others, sizeof *l->links) &&
-           dem2di_room(w, (void **)&l->next_links, &l->next_links_capacity, others,
-                       sizeof *l->next_links) &&
-           dem2di_room(w, (void **)&l->ends, &l->ends_capacity, ends, sizeof *l->ends) &&
-           dem2di_room(w, (void **)&l->next_ends, &l->next_ends_capacity, ends,
-                       sizeof *l->next_ends) &&
-           dem2di_room(w, (void **)&l->incident, &l->incident_capacity, count + pairs,
-                       sizeof *l->incident);
+static bool dem2di_array_reserve(dem2d_world *world, void **array, int *capacity, int needed,
+                                 size_t size) {
+    dem2di_column column;
+    column.array = array;
+    column.size = size;
+    return dem2di_columns_reserve(&world->env, &column, 1, capacity,
+                                  dem2di_room(*capacity, needed));
 }
 
-static void dem2di_list_release(const dem2d_env *env, dem2di_list *l) {
-    dem2di_release(env, l->keys, (size_t)l->keys_capacity, sizeof *l->keys);
-    dem2di_release(env, l->shear, (size_t)l->shear_capacity, sizeof *l->shear);
-    dem2di_release(env, l->next_shear, (size_t)l->next_shear_capacity, sizeof *l->next_shear);
-    dem2di_release(env, l->links, (size_t)l->links_capacity, sizeof *l->links);
-    dem2di_release(env, l->next_links, (size_t)l->next_links_capacity, sizeof *l->next_links);
-    dem2di_release(env, l->ends, (size_t)l->ends_capacity, sizeof *l->ends);
-    dem2di_release(env, l->next_ends, (size_t)l->next_ends_capacity, sizeof *l->next_ends);
-    dem2di_release(env, l->incident, (size_t)l->incident_capacity, sizeof *l->incident);
-    dem2di_release(env, l->first, (size_t)l->first_capacity, sizeof *l->first);
+/* The arrays of a world, by their lengths. */
+typedef enum dem2di_group {
+    DEM2DI_BODIES,
+    DEM2DI_TRAVELS,
+    DEM2DI_WALLS,
+    DEM2DI_SPRINGS,
+    DEM2DI_LINKS,
+    DEM2DI_ENDS,
+    DEM2DI_GROUPS
+} dem2di_group;
+
+#define DEM2DI_COLUMN(pointer) \
+    (columns[count].array = (void **)&(pointer), columns[count++].size = sizeof *(pointer))
+
+static int dem2di_columns_of(dem2d_world *w, dem2di_group group, int **capacity,
+                             dem2di_column columns[DEM2DI_COLUMNS]) {
+    int count = 0;
+    if (group == DEM2DI_BODIES) {
+        *capacity = &w->body_capacity;
+        DEM2DI_COLUMN(w->names);
+        DEM2DI_COLUMN(w->before);
+        DEM2DI_COLUMN(w->now);
+        DEM2DI_COLUMN(w->bodies);
+        DEM2DI_COLUMN(w->inverse);
+        DEM2DI_COLUMN(w->wear);
+        DEM2DI_COLUMN(w->list.first);
+    } else if (group == DEM2DI_TRAVELS) {
+        *capacity = &w->travel_capacity;
+        DEM2DI_COLUMN(w->travel);
+        DEM2DI_COLUMN(w->next_travel);
+        DEM2DI_COLUMN(w->lever);
+    } else if (group == DEM2DI_WALLS) {
+        *capacity = &w->wall_capacity;
+        DEM2DI_COLUMN(w->walls);
+        DEM2DI_COLUMN(w->wall_before);
+        DEM2DI_COLUMN(w->wall_now);
+        DEM2DI_COLUMN(w->wall_next);
+    } else if (group == DEM2DI_SPRINGS) {
+        *capacity = &w->list.springs_capacity;
+        DEM2DI_COLUMN(w->list.shear);
+        DEM2DI_COLUMN(w->list.next_shear);
+    } else if (group == DEM2DI_LINKS) {
+        *capacity = &w->list.links_capacity;
+        DEM2DI_COLUMN(w->list.links);
+        DEM2DI_COLUMN(w->list.next_links);
+    } else {
+        *capacity = &w->list.ends_capacity;
+        DEM2DI_COLUMN(w->list.ends);
+        DEM2DI_COLUMN(w->list.next_ends);
+    }
+    return count;
 }
 
-static bool dem2di_reserve_bodies(dem2d_world *w, int count) {
-    dem2di_list *l = &w->list;
-    return dem2di_grow(w, (void **)&w->names, &w->name_capacity, count, sizeof *w->names) &&
-           dem2di_grow(w, (void **)&w->before, &w->before_capacity, count, sizeof *w->before) &&
-           dem2di_grow(w, (void **)&w->now, &w->now_capacity, count, sizeof *w->now) &&
-           dem2di_grow(w, (void **)&w->next, &w->next_capacity, count, sizeof *w->next) &&
-           dem2di_grow(w, (void **)&w->bodies, &w->body_capacity, count, sizeof *w->bodies) &&
-           dem2di_grow(w, (void **)&w->inverse, &w->inverse_capacity, count, sizeof *w->inverse) &&
-           dem2di_grow(w, (void **)&w->watch, &w->watch_capacity, count, sizeof *w->watch) &&
-           dem2di_grow(w, (void **)&l->first, &l->first_capacity, count + 1, sizeof *l->first);
+/* Room in all arrays of a group: with half to spare, or (`renewed`) with little. */
+static bool dem2di_group_reserve(dem2d_world *world, dem2di_group group, int needed, bool renewed) {
+    dem2di_column columns[DEM2DI_COLUMNS];
+    int *capacity, count = dem2di_columns_of(world, group, &capacity, columns);
+    int grown = renewed ? dem2di_room(*capacity, needed) : dem2di_growth(*capacity, needed);
+    return dem2di_columns_reserve(&world->env, columns, count, capacity, grown);
 }
 
-/* What pairs that may be skipped need beside. */
-static bool dem2di_reserve_travel(dem2d_world *w, int count) {
-    return dem2di_grow(w, (void **)&w->travel, &w->travel_capacity, count, sizeof *w->travel) &&
-           dem2di_grow(w, (void **)&w->next_travel, &w->next_travel_capacity, count,
-                       sizeof *w->next_travel) &&
-           dem2di_grow(w, (void **)&w->lever, &w->lever_capacity, count, sizeof *w->lever);
+static void dem2di_group_release(dem2d_world *world, dem2di_group group) {
+    dem2di_column columns[DEM2DI_COLUMNS];
+    int *capacity, count = dem2di_columns_of(world, group, &capacity, columns);
+    for (int k = 0; k < count; k++)
+        dem2di_release(&world->env, *columns[k].array, (size_t)*capacity, columns[k].size);
 }
 
-static bool dem2di_reserve_walls(dem2d_world *w, int count) {
-    return dem2di_grow(w, (void **)&w->walls, &w->wall_capacity, count, sizeof *w->walls) &&
-           dem2di_grow(w, (void **)&w->wall_before, &w->wall_before_capacity, count,
-                       sizeof *w->wall_before) &&
-           dem2di_grow(w, (void **)&w->wall_now, &w->wall_now_capacity, count,
-                       sizeof *w->wall_now) &&
-           dem2di_grow(w, (void **)&w->wall_next, &w->wall_next_capacity, count,
-                       sizeof *w->wall_next);
+/* A slot more than particles: list.first ends with the end of the last. */
+static bool dem2di_reserve_bodies(dem2d_world *world, int count) {
+    return dem2di_group_reserve(world, DEM2DI_BODIES, count + 1, false);
+}
+
+static bool dem2di_list_reserve(dem2d_world *world, bool friction, int discs, int count) {
+    dem2di_list *list = &world->list;
+    int others = count - discs;
+    /* the old ones are read once more */
+    if (list->count - list->discs > others) others = list->count - list->discs;
+    return dem2di_array_reserve(world, (void **)&list->keys, &list->keys_capacity, count,
+                                sizeof *list->keys) &&
+           dem2di_group_reserve(world, DEM2DI_SPRINGS, friction ? discs : 0, true) &&
+           dem2di_group_reserve(world, DEM2DI_LINKS, others, true) &&
+           dem2di_group_reserve(world, DEM2DI_ENDS, world->two_points ? others : 0, true);
 }
 
 static dem2d_result dem2di_out_of_memory(const dem2d_world *world, const char *what) {
@@ -7675,21 +7720,11 @@ DEM2D_API void dem2d_world_destroy(dem2d_world *world) {
     dem2di_release(env, w->materials, (size_t)w->material_capacity, sizeof *w->materials);
     dem2di_release(env, w->laws, side * side, sizeof *w->laws);
     dem2di_release(env, w->used_laws, side * side, sizeof *w->laws);
-    dem2di_release(env, w->names, (size_t)w->name_capacity, sizeof *w->names);
-    dem2di_release(env, w->before, (size_t)w->before_capacity, sizeof *w->before);
-    dem2di_release(env, w->now, (size_t)w->now_capacity, sizeof *w->now);
-    dem2di_release(env, w->next, (size_t)w->next_capacity, sizeof *w->next);
-    dem2di_release(env, w->bodies, (size_t)w->body_capacity, sizeof *w->bodies);
-    dem2di_release(env, w->inverse, (size_t)w->inverse_capacity, sizeof *w->inverse);
-    dem2di_release(env, w->watch, (size_t)w->watch_capacity, sizeof *w->watch);
-    dem2di_release(env, w->travel, (size_t)w->travel_capacity, sizeof *w->travel);
-    dem2di_release(env, w->next_travel, (size_t)w->next_travel_capacity, sizeof *w->next_travel);
-    dem2di_release(env, w->lever, (size_t)w->lever_capacity, sizeof *w->lever);
-    dem2di_release(env, w->walls, (size_t)w->wall_capacity, sizeof *w->walls);
-    dem2di_release(env, w->wall_before, (size_t)w->wall_before_capacity, sizeof *w->wall_before);
-    dem2di_release(env, w->wall_now, (size_t)w->wall_now_capacity, sizeof *w->wall_now);
-    dem2di_release(env, w->wall_next, (size_t)w->wall_next_capacity, sizeof *w->wall_next);
-    dem2di_list_release(env, &w->list);
+    for (int group = 0; group < DEM2DI_GROUPS; group++)
+        dem2di_group_release(w, (dem2di_group)group);
+    dem2di_release(env, w->list.keys, (size_t)w->list.keys_capacity, sizeof *w->list.keys);
+    dem2di_release(env, w->list.incident, (size_t)w->list.incident_capacity,
+                   sizeof *w->list.incident);
     dem2di_release(env, w->scratch, (size_t)w->scratch_capacity, DEM2DI_LINE);
     dem2di_release(env, w->tallies, (size_t)w->tally_capacity, sizeof *w->tallies);
     dem2di_release(env, w->overlap, (size_t)w->overlap_capacity, sizeof *w->overlap);
@@ -7761,8 +7796,7 @@ DEM2D_API dem2d_result dem2d_world_create(const dem2d_world_desc *desc, dem2d_wo
     made->faces = desc->faces;
     made->check_time_step = !desc->skip_time_step_check;
     if (!dem2di_reserve_bodies(made, desc->particle_capacity) ||
-        !dem2di_room(made, (void **)&made->list.keys, &made->list.keys_capacity,
-                     desc->pair_capacity, sizeof *made->list.keys)) {
+        !dem2di_list_reserve(made, true, desc->pair_capacity, desc->pair_capacity)) {
         result = dem2di_out_of_memory(made, "the capacities asked for");
         dem2d_world_destroy(made);
         return result;
@@ -8008,15 +8042,21 @@ static dem2d_result dem2di_check_particle(const dem2d_world *world,
     return result;
 }
 
+/* The template of a body that is there. */
+static const dem2d_shape *dem2di_shape_of(const dem2d_world *world, const dem2di_body *body) {
+    return world->templates[body->shape_index].shape;
+}
+
 static double dem2di_body_mass(const dem2d_world *world, const dem2di_body *body) {
     double square = body->scale * body->scale;
-    return world->materials[body->material].density * body->shape->mass.area * square;
+    return world->materials[body->material].density * dem2di_shape_of(world, body)->mass.area *
+           square;
 }
 
 static double dem2di_body_inertia(const dem2d_world *world, const dem2di_body *body) {
+    double moment = dem2di_shape_of(world, body)->mass.polar_moment;
     double square = body->scale * body->scale;
-    return world->materials[body->material].density * body->shape->mass.polar_moment * square *
-           square;
+    return world->materials[body->material].density * moment * square * square;
 }
 
 static dem2di_inverse dem2di_inverse_of(const dem2d_world *world, const dem2di_body *body) {
@@ -8051,7 +8091,7 @@ DEM2D_API dem2d_result dem2d_world_add_particle(dem2d_world *world, const dem2d_
     dem2d_result result = dem2di_check_particle(world, desc);
     if (result != DEM2D_OK) return result;
     dem2di_body body;
-    body.shape = world->templates[desc->shape.index].shape;
+
     body.scale = desc->scale;
     body.shape_index = (int)desc->shape.index;
     body.material = (uint16_t)desc->material.index;
@@ -8074,10 +8114,9 @@ DEM2D_API dem2d_result dem2d_world_add_particle(dem2d_world *world, const dem2d_
     state.q = dem2d_rot_make(desc->angle);
     state.v = desc->velocity;
     state.w = desc->angular_velocity;
-    state.radius = body.shape->circumscribed * desc->scale;
+    state.radius = dem2di_shape_of(world, &body)->circumscribed * desc->scale;
     world->now[slot] = world->before[slot] = state;
-    world->watch[slot].listed = state.x;
-    world->watch[slot].skin = 0;
+
     world->list.first[slot + 1] = world->list.first[slot]; /* no contacts yet */
     world->body_count++;
     world->list_stale = true;
@@ -8090,7 +8129,7 @@ DEM2D_API dem2d_result dem2d_world_add_particle(dem2d_world *world, const dem2d_
 static void dem2di_forget(dem2d_world *world, int slot) {
     const dem2di_list *list = &world->list;
     for (int k = list->first[slot]; k < list->first[slot + 1]; k++)
-        list->keys[list->incident[k] / 2].a = -1;
+        if (list->incident[k] / 2 < list->count) list->keys[list->incident[k] / 2].a = -1;
     world->list_stale = true;
 }
 
@@ -8107,7 +8146,7 @@ DEM2D_API dem2d_result dem2d_world_remove_particle(dem2d_world *world, dem2d_par
     if (slot < 0) return dem2di_stale(world, "particle", id.index);
     dem2di_body *body = &world->bodies[slot];
     world->templates[body->shape_index].users--;
-    body->shape = NULL;
+    body->shape_index = -1;
     world->holes++;
     dem2di_forget(world, slot);
     dem2di_name_give(world, (int)id.index);
@@ -8124,7 +8163,7 @@ static dem2d_pose dem2di_pose_of(const dem2d_world *world, const dem2di_state *s
 
 static double dem2di_equivalent(const dem2d_world *world, int slot) {
     const dem2di_body *body = &world->bodies[slot];
-    return body->scale * sqrt(body->shape->mass.area / DEM2DI_PI);
+    return body->scale * sqrt(dem2di_shape_of(world, body)->mass.area / DEM2DI_PI);
 }
 
 /* Two circles: the normal force along the line of centres, the tangential spring at the middle of
@@ -8140,8 +8179,8 @@ static DEM2DI_INLINE dem2di_round dem2di_round_make(const dem2di_state *a, const
     dem2di_round round;
     dem2d_vec d = dem2di_centre_line(a->x, b->x);
     double square = dem2di_dot(d, d), distance = sqrt(square), reach = a->radius + b->radius;
-    if (square > 1e-280) { /* a normal number */
-        double f = 1 / distance;
+    if (square > 1e-280) {                  /* a normal number */
+        double f = distance * (1 / square); /* root and division side by side */
         round.normal = dem2di_vec(d.x * f, d.y * f);
         round.depth = reach - distance;
     } else {
@@ -8151,15 +8190,6 @@ static DEM2DI_INLINE dem2di_round dem2di_round_make(const dem2di_state *a, const
     round.arm_a = a->radius - round.depth / 2;
     round.arm_b = b->radius - round.depth / 2;
     return round;
-}
-
-static DEM2DI_INLINE void dem2di_round_pull(const dem2di_round *round, double shear,
-                                            dem2di_pull *pull) {
-    dem2d_vec n = round->normal;
-    pull->force.x = n.x * round->force - n.y * shear;
-    pull->force.y = n.y * round->force + n.x * shear;
-    pull->torque[0] = -(round->arm_a * shear);
-    pull->torque[1] = -(round->arm_b * shear);
 }
 
 /* What holds at the last force pass, or (`next`) in the one that is being made. */
@@ -8180,7 +8210,7 @@ static bool dem2di_link_at(const dem2d_world *world, int contact, bool next, dem
     const dem2di_list *list = &world->list;
     const dem2di_key *key = &list->keys[contact];
     const dem2di_state *states = dem2di_states_at(world, next);
-    if (key->a < 0) return false;
+    if (contact == list->count || key->a < 0) return false; /* 2 count fills up a gather */
     if (contact >= list->discs) {
         *link = (next ? list->next_links : list->links)[contact - list->discs];
         *arm_b = dem2di_vec(0, 0);
@@ -8217,11 +8247,11 @@ static dem2di_load dem2di_load_of(const dem2d_world *world, int slot) {
         int contact = list->incident[k] / 2, side = list->incident[k] & 1;
         dem2di_link link;
         dem2d_vec arm_b;
-        dem2di_pull pull;
+        dem2di_load loads[2];
         if (!dem2di_link_at(world, contact, false, &link, &arm_b)) continue;
-        dem2di_link_pull(&link, arm_b, &pull);
-        load.force = dem2di_along(load.force, side ? 1 : -1, pull.force);
-        load.torque += pull.torque[side];
+        dem2di_link_loads(&link, arm_b, loads);
+        load.force = dem2di_add(load.force, loads[side].force);
+        load.torque += loads[side].torque;
     }
     return load;
 }
@@ -8347,7 +8377,8 @@ DEM2D_API dem2d_result dem2d_world_add_wall(dem2d_world *world, const dem2d_wall
     if (result != DEM2D_OK) return result;
     int slot = 0;
     while (slot < world->wall_count && world->walls[slot].alive) slot++;
-    if (!dem2di_reserve_walls(world, slot + 1)) return dem2di_out_of_memory(world, "a wall");
+    if (!dem2di_group_reserve(world, DEM2DI_WALLS, slot + 1, false))
+        return dem2di_out_of_memory(world, "a wall");
     dem2di_wall *wall = &world->walls[slot];
     wall->alive = true;
     wall->generation++;
@@ -8422,8 +8453,10 @@ DEM2D_API dem2d_result dem2d_world_get_wall(const dem2d_world *world, dem2d_wall
 DEM2D_API dem2d_result dem2d_world_set_gravity(dem2d_world *world, dem2d_vec gravity) {
     if (world == NULL) return DEM2D_NULL_ARGUMENT;
     dem2d_result result = dem2di_check_vec(&world->env, "gravity", gravity);
-    if (result == DEM2D_OK) world->gravity = gravity;
-    return result;
+    if (result != DEM2D_OK) return result;
+    world->gravity = gravity;
+    world->list_stale = true; /* with its bounds of the motion */
+    return DEM2D_OK;
 }
 
 DEM2D_API dem2d_result dem2d_world_set_damping(dem2d_world *world, double local, double global) {
@@ -8489,8 +8522,8 @@ static void *dem2di_cut(dem2di_cutter *cutter, size_t count, size_t size) {
 static bool dem2di_scratch_reserve(dem2d_world *world, size_t bytes) {
     size_t lines = bytes / DEM2DI_LINE + (bytes % DEM2DI_LINE > 0);
     if (lines > (size_t)INT_MAX) return false;
-    return dem2di_room(world, (void **)&world->scratch, &world->scratch_capacity, (int)lines,
-                       DEM2DI_LINE);
+    return dem2di_array_reserve(world, (void **)&world->scratch, &world->scratch_capacity,
+                                (int)lines, DEM2DI_LINE);
 }
 
 static int dem2di_contact_blocks(int discs, int count) {
@@ -8504,10 +8537,10 @@ static bool dem2di_tallies_reserve(dem2d_world *world, int discs, int count) {
     int others = world->parallel_for != NULL ? dem2di_contact_blocks(0, count - discs) : 1;
     if (world->overlap_size > 0 && others > INT_MAX / world->overlap_size) return false;
     int bodies = dem2di_blocks(world->body_count, DEM2DI_BLOCK);
-    return dem2di_room(world, (void **)&world->tallies, &world->tally_capacity,
-                       blocks > bodies ? blocks : bodies, sizeof *world->tallies) &&
-           dem2di_room(world, (void **)&world->overlap, &world->overlap_capacity,
-                       others * world->overlap_size, sizeof *world->overlap);
+    return dem2di_array_reserve(world, (void **)&world->tallies, &world->tally_capacity,
+                                blocks > bodies ? blocks : bodies, sizeof *world->tallies) &&
+           dem2di_array_reserve(world, (void **)&world->overlap, &world->overlap_capacity,
+                                others * world->overlap_size, sizeof *world->overlap);
 }
 
 /* Of a block of contacts that are not of circles. */
@@ -8517,31 +8550,23 @@ static dem2di_overlap *dem2di_overlap_scratch(const dem2d_world *world, int bloc
 }
 
 /* What was next becomes the present. */
-static void dem2di_swap_contacts(dem2di_list *l) {
-    double *shear = l->shear;
-    dem2di_link *links = l->links;
-    dem2di_ends *ends = l->ends;
-    int capacity = l->shear_capacity;
-    l->shear = l->next_shear;
-    l->next_shear = shear;
-    l->shear_capacity = l->next_shear_capacity;
-    l->next_shear_capacity = capacity;
-    capacity = l->links_capacity;
-    l->links = l->next_links;
-    l->next_links = links;
-    l->links_capacity = l->next_links_capacity;
-    l->next_links_capacity = capacity;
-    capacity = l->ends_capacity;
-    l->ends = l->next_ends;
-    l->next_ends = ends;
-    l->ends_capacity = l->next_ends_capacity;
-    l->next_ends_capacity = capacity;
+static void dem2di_swap_contacts(dem2di_list *list) {
+    double *shear = list->shear;
+    dem2di_link *links = list->links;
+    dem2di_ends *ends = list->ends;
+    list->shear = list->next_shear;
+    list->next_shear = shear;
+    list->links = list->next_links;
+    list->next_links = links;
+    list->ends = list->next_ends;
+    list->next_ends = ends;
 }
 
 /* --- the contacts of each particle ------------------------------------------------------------ */
 
 /* What the partner of an entry is sorted by: its id, walls behind. */
 static uint32_t dem2di_incident_rank(const dem2d_world *world, int entry) {
+    if (entry / 2 == world->list.count) return UINT32_MAX;
     const dem2di_key *key = &world->list.keys[entry / 2];
     if (entry / 2 >= world->list.pairs) return ((uint32_t)1 << 30) + (uint32_t)key->b;
     return (uint32_t)world->bodies[entry & 1 ? key->a : key->b].index;
@@ -8569,26 +8594,44 @@ static void dem2di_incident_task(void *context, int begin, int end) {
     }
 }
 
+/* Contacts are gathered so many at once, without a branch: few particles have more. */
+#define DEM2DI_GATHER 6
+
+static int dem2di_whole_gathers(int entries) {
+    return dem2di_blocks(entries, DEM2DI_GATHER) * DEM2DI_GATHER;
+}
+
+/* Entries of each of `slots` particles, in whole gathers; returns the sum, INT_MAX if it is more.
+ */
+static int dem2di_incident_count(const dem2di_key *keys, int pairs, int count, int *numbers,
+                                 int slots) {
+    int64_t sum = 0;
+    if (slots > 0) memset(numbers, 0, (size_t)slots * sizeof *numbers);
+    for (int i = 0; i < count; i++) {
+        if (keys[i].a < 0) continue;
+        numbers[keys[i].a]++;
+        if (i < pairs) numbers[keys[i].b]++;
+    }
+    for (int i = 0; i < slots; i++) sum += numbers[i] = dem2di_whole_gathers(numbers[i]);
+    return sum < INT_MAX ? (int)sum : INT_MAX;
+}
+
 static void dem2di_incident_fill_task(void *context, int begin, int end) {
     dem2d_world *world = (dem2d_world *)context;
     dem2di_list *list = &world->list;
-    int *first = list->first;
+    int *first = list->first, *last = first + 1, slots = world->body_count;
     (void)begin;
     (void)end;
-    memset(first, 0, ((size_t)world->body_count + 1) * sizeof *first);
+    int sum = dem2di_incident_count(list->keys, list->pairs, list->count, last, slots);
+    (void)dem2di_starts(last, slots);
+    for (int k = 0; k < sum; k++) list->incident[k] = 2 * list->count;
     for (int i = 0; i < list->count; i++) {
         if (list->keys[i].a < 0) continue;
-        first[list->keys[i].a]++;
-        if (i < list->pairs) first[list->keys[i].b]++;
+        list->incident[last[list->keys[i].a]++] = 2 * i;
+        if (i < list->pairs) list->incident[last[list->keys[i].b]++] = 2 * i + 1;
     }
-    (void)dem2di_starts(first, world->body_count + 1);
-    for (int i = 0; i < list->count; i++) { /* first becomes where the next one begins */
-        if (list->keys[i].a < 0) continue;
-        list->incident[first[list->keys[i].a]++] = 2 * i;
-        if (i < list->pairs) list->incident[first[list->keys[i].b]++] = 2 * i + 1;
-    }
-    memmove(first + 1, first, (size_t)world->body_count * sizeof *first);
     first[0] = 0;
+    for (int i = 0; i < slots; i++) last[i] = dem2di_whole_gathers(last[i]);
 }
 
 static void dem2di_incident_make(dem2d_world *world) {
@@ -8608,7 +8651,7 @@ static int dem2di_order_make(const dem2d_world *world, dem2di_order *items, dem2
     for (int i = 0; i < world->body_count; i++) {
         dem2d_vec x = world->now[i].x;
         to[i] = -1;
-        if (world->bodies[i].shape == NULL) continue;
+        if (world->bodies[i].shape_index < 0) continue;
         lower.x = count == 0 ? x.x : dem2di_min(lower.x, x.x);
         lower.y = count == 0 ? x.y : dem2di_min(lower.y, x.y);
         upper.x = count == 0 ? x.x : dem2di_max(upper.x, x.x);
@@ -8644,15 +8687,15 @@ static void dem2di_arrange_task(void *context, int begin, int end) {
     int *to = (int *)dem2di_cut(&cutter, slots, sizeof *to);
     (void)begin;
     (void)end;
+    char *room = (char *)dem2di_cut(&cutter, slots, sizeof *w->now);
     int n = w->body_count, count = dem2di_order_make(w, items, spare, to);
-    dem2di_reorder(w->now, sizeof *w->now, to, n, count, w->next);
-    dem2di_reorder(w->before, sizeof *w->before, to, n, count, w->next);
-    dem2di_reorder(w->bodies, sizeof *w->bodies, to, n, count, w->next);
-    dem2di_reorder(w->inverse, sizeof *w->inverse, to, n, count, w->next);
-    dem2di_reorder(w->watch, sizeof *w->watch, to, n, count, w->next);
+    dem2di_reorder(w->now, sizeof *w->now, to, n, count, room);
+    dem2di_reorder(w->before, sizeof *w->before, to, n, count, room);
+    dem2di_reorder(w->bodies, sizeof *w->bodies, to, n, count, room);
+    dem2di_reorder(w->inverse, sizeof *w->inverse, to, n, count, room);
     if (w->plan.travels) {
-        dem2di_reorder(w->travel, sizeof *w->travel, to, n, count, w->next);
-        dem2di_reorder(w->lever, sizeof *w->lever, to, n, count, w->next);
+        dem2di_reorder(w->travel, sizeof *w->travel, to, n, count, room);
+        dem2di_reorder(w->lever, sizeof *w->lever, to, n, count, room);
     }
     for (int i = 0; i < count; i++) w->names[w->bodies[i].index].slot = i;
     for (int i = 0; i < w->list.count; i++) {
@@ -8674,6 +8717,7 @@ static bool dem2di_arrange(dem2d_world *world) {
     (void)dem2di_cut(&cutter, slots, sizeof(dem2di_order));
     (void)dem2di_cut(&cutter, slots, sizeof(dem2di_order));
     (void)dem2di_cut(&cutter, slots, sizeof(int));
+    (void)dem2di_cut(&cutter, slots, sizeof *world->now);
     if (!dem2di_scratch_reserve(world, cutter.used)) return false;
     dem2di_run(world, DEM2D_PHASE_LIST, 1, dem2di_arrange_task, world);
     dem2di_incident_make(world);
@@ -8725,6 +8769,7 @@ typedef struct dem2di_build {
     int total[DEM2DI_KINDS];
     dem2di_key *keys;              /* as in the list */
     dem2di_order *touches, *spare; /* wall and id of particle; slot */
+    int incident;                  /* entries that the particles have together */
 } dem2di_build;
 
 /* What the scene makes use of. */
@@ -8735,7 +8780,7 @@ static dem2di_plan dem2di_plan_make(const dem2d_world *world) {
         const dem2di_body *body = &world->bodies[i];
         used[body->material] = true;
         plan.spin = plan.spin || world->now[i].w != 0;
-        plan.travels = plan.travels || body->shape->type != DEM2D_CIRCLE;
+        plan.travels = plan.travels || dem2di_shape_of(world, body)->type != DEM2D_CIRCLE;
         plan.one_law = plan.one_law && body->material == world->bodies[0].material;
     }
     for (int j = 0; j < world->wall_count; j++)
@@ -8773,7 +8818,7 @@ static double dem2di_skin_make(const dem2d_world *world, int slot) {
         int contact = list->incident[k] / 2;
         dem2di_link link;
         dem2d_vec arm;
-        if (list->keys[contact].a < 0) continue;
+        if (contact == list->count || list->keys[contact].a < 0) continue;
         double gap = dem2di_gap_now(world, contact);
         if (gap > skin && dem2di_link_at(world, contact, false, &link, &arm))
             skin = gap * (1 + DEM2DI_ROUNDING);
@@ -8790,14 +8835,16 @@ static void dem2di_disc_task(void *context, int begin, int end) {
         for (int i = first; i < dem2di_block_end(first, DEM2DI_BLOCK, world->body_count); i++) {
             const dem2di_body *body = &world->bodies[i];
             dem2di_disc *disc = &build->grid.discs[i];
-            world->watch[i].skin = dem2di_skin_make(world, i);
+            double skin = dem2di_skin_make(world, i);
+            world->wear[i] = 1 / (skin * skin);
             disc->centre = world->now[i].x;
-            disc->reach = world->now[i].radius + world->watch[i].skin;
+            disc->reach = world->now[i].radius + skin;
             disc->fixed = body->motion == DEM2D_FIXED;
-            disc->round = body->shape->type == DEM2D_CIRCLE && world->faces != DEM2D_CONTACT_AREA;
+            disc->round = dem2di_shape_of(world, body)->type == DEM2D_CIRCLE &&
+                          world->faces != DEM2D_CONTACT_AREA;
             largest = dem2di_max(largest, disc->reach);
         }
-        world->tallies[block].reach = largest;
+        world->tallies[block].most = largest;
     }
 }
 
@@ -8851,6 +8898,7 @@ static int dem2di_listed(const dem2d_world *world, const dem2di_key *key, bool w
     const dem2di_list *list = &world->list;
     for (int k = list->first[key->a]; k < list->first[key->a + 1]; k++) {
         int contact = list->incident[k] / 2;
+        if (contact == list->count) break;
         const dem2di_key *old = &list->keys[contact];
         if (old->a == key->a && old->b == key->b && (contact >= list->pairs) == wall)
             return contact;
@@ -8913,7 +8961,7 @@ static void dem2di_fill_task(void *context, int begin, int end) {
 
 /* Contacts with walls, in the order of the walls and the particles' ids. */
 static void dem2di_touches_task(void *context, int begin, int end) {
-    const dem2di_build *build = (const dem2di_build *)context;
+    dem2di_build *build = (dem2di_build *)context;
     int count = build->total[DEM2DI_TOUCHES];
     int pairs = build->total[DEM2DI_DISCS] + build->total[DEM2DI_OTHERS];
     (void)begin;
@@ -8924,22 +8972,53 @@ static void dem2di_touches_task(void *context, int begin, int end) {
         build->keys[pairs + i].b = (int)(build->touches[i].key >> 32);
         dem2di_recall(build, pairs + i);
     }
+    build->incident = dem2di_incident_count(build->keys, pairs, pairs + count, build->grid.slot,
+                                            build->grid.count); /* the grid is done with */
 }
 
-/* Particles count their way from here. */
-static void dem2di_listed_task(void *context, int begin, int end) {
+/* Travels count from here. */
+static void dem2di_travel_task(void *context, int begin, int end) {
     dem2d_world *world = (dem2d_world *)context;
     int last = dem2di_block_end((end - 1) * DEM2DI_BLOCK, DEM2DI_BLOCK, world->body_count);
     for (int i = begin * DEM2DI_BLOCK; i < last; i++) {
-        world->watch[i].listed = world->now[i].x;
-        if (!world->plan.travels) continue;
         /* |p'| <= sqrt(R^2 - p^2) and p is at least the inscribed radius; of a circle p' is 0 */
-        const dem2di_body *body = &world->bodies[i];
-        double radius = world->now[i].radius, inner = body->shape->inscribed * body->scale;
-        bool round = body->shape->type == DEM2D_CIRCLE;
+        const dem2d_shape *shape = dem2di_shape_of(world, &world->bodies[i]);
+        double radius = world->now[i].radius, inner = shape->inscribed * world->bodies[i].scale;
+        bool round = shape->type == DEM2D_CIRCLE;
         world->travel[i] = 0;
         world->lever[i] = round ? 0 : sqrt(radius * radius - inner * inner);
     }
+}
+
+/* Can no state become infinite before the next list? Particles and walls stay within their skins,
+   so no overlap exceeds the scene, and no force its stiffness times that. With `steps` steps, this
+   is true of any sane scene; where it is not, each step is tried before it is taken. */
+#define DEM2DI_LIST_STEPS (1 << 20)
+static bool dem2di_bounded(const dem2d_world *world) {
+    double far = 0, size = 0, speed = 0, spin = 0, light = 0, slender = 0, stiff = 0;
+    for (int i = 0; i < world->body_count; i++) {
+        const dem2di_state *now = &world->now[i];
+        far = dem2di_max(far, fabs(now->x.x) + fabs(now->x.y));
+        speed = dem2di_max(speed, fabs(now->v.x) + fabs(now->v.y));
+        spin = dem2di_max(spin, fabs(now->w));
+        size = dem2di_max(size, now->radius);
+        light = dem2di_max(light, world->inverse[i].mass);
+        slender = dem2di_max(slender, world->inverse[i].inertia);
+    }
+    for (int j = 0; j < world->wall_count; j++) {
+        dem2d_vec point = world->wall_now[j].point;
+        far = dem2di_max(far, fabs(point.x) + fabs(point.y));
+    }
+    for (int k = 0; k < world->laws_side * world->laws_side; k++) {
+        const dem2d_pair_desc *law = &world->laws[k];
+        stiff = dem2di_max(stiff, law->normal_stiffness * (1 + law->friction));
+    }
+    double depth = 2 * (far + 2 * size), force = (world->list.count + 1.0) * stiff * depth;
+    double time = DEM2DI_LIST_STEPS * world->time_step; /* damping at most doubles */
+    speed += 2 * time * (fabs(world->gravity.x) + fabs(world->gravity.y) + force * light);
+    spin += 2 * time * (force * 2 * size * slender);
+    return far + time * speed < 1e300 && spin * world->time_step < 1e50 && /* its cube is finite */
+           world->faces != DEM2D_CONTACT_AREA;
 }
 
 /* Scratch memory for the search, and then for what it found. */
@@ -8960,7 +9039,7 @@ static bool dem2di_build_cut(dem2di_build *build) {
         build->keys = (dem2di_key *)dem2di_cut(&cutter, total, sizeof *build->keys);
         build->touches = (dem2di_order *)dem2di_cut(&cutter, walls, sizeof *build->touches);
         build->spare = (dem2di_order *)dem2di_cut(&cutter, walls, sizeof *build->spare);
-        size_t step = total * sizeof *world->pulls;
+        size_t step = (2 * total + 1) * sizeof *world->loads;
         if (pass == 0 && !dem2di_scratch_reserve(world, cutter.used > step ? cutter.used : step))
             return false;
     }
@@ -8978,7 +9057,7 @@ static bool dem2di_build_search(dem2di_build *build) {
     dem2di_run(world, DEM2D_PHASE_LIST, blocks, dem2di_disc_task, build);
     build->grid.largest = 0;
     for (int k = 0; k < blocks; k++)
-        build->grid.largest = dem2di_max(build->grid.largest, world->tallies[k].reach);
+        build->grid.largest = dem2di_max(build->grid.largest, world->tallies[k].most);
     dem2di_run(world, DEM2D_PHASE_LIST, blocks, dem2di_place_task, build);
     dem2di_run(world, DEM2D_PHASE_LIST, 1, dem2di_grid_task, build);
     dem2di_run(world, DEM2D_PHASE_LIST, blocks, dem2di_count_task, build);
@@ -8988,8 +9067,8 @@ static bool dem2di_build_search(dem2di_build *build) {
         build->total[kind] = dem2di_starts(build->count[kind], world->body_count);
     }
     if (!dem2di_build_cut(build)) return false;
-    int discs = build->total[DEM2DI_DISCS], pairs = discs + build->total[DEM2DI_OTHERS];
-    return dem2di_list_reserve(world, build->plan.friction, discs, pairs, (int)total) &&
+    int discs = build->total[DEM2DI_DISCS];
+    return dem2di_list_reserve(world, build->plan.friction, discs, (int)total) &&
            dem2di_tallies_reserve(world, discs, (int)total);
 }
 
@@ -9000,18 +9079,19 @@ static void dem2di_build_finish(dem2di_build *build) {
     list->discs = build->total[DEM2DI_DISCS];
     list->pairs = list->discs + build->total[DEM2DI_OTHERS];
     list->count = list->pairs + build->total[DEM2DI_TOUCHES];
-    if (list->count > 0) {
-        memcpy(list->keys, build->keys, (size_t)list->count * sizeof *list->keys);
-        memset(world->scratch, 0, (size_t)list->count * sizeof *world->pulls);
-    }
-    world->pulls = (dem2di_pull *)(void *)world->scratch;
+    if (list->count > 0) memcpy(list->keys, build->keys, (size_t)list->count * sizeof *list->keys);
+    world->loads = (dem2di_load *)(void *)world->scratch;
+    memset(world->loads, 0, (2 * (size_t)list->count + 1) * sizeof *world->loads);
     world->plan = build->plan;
     dem2di_swap_contacts(list);
     dem2di_incident_make(world);
-    dem2di_run(world, DEM2D_PHASE_LIST, dem2di_blocks(world->body_count, DEM2DI_BLOCK),
-               dem2di_listed_task, world);
+    if (world->plan.travels)
+        dem2di_run(world, DEM2D_PHASE_LIST, dem2di_blocks(world->body_count, DEM2DI_BLOCK),
+                   dem2di_travel_task, world);
+    world->bounded = dem2di_bounded(world);
     for (int j = 0; j < world->wall_count; j++) world->walls[j].listed = world->wall_now[j].point;
     world->listed_at = world->steps;
+    world->worn = 0;
     world->list_stale = world->list_worn = false;
 }
 
@@ -9026,6 +9106,12 @@ static void dem2di_watch_spread(dem2d_world *world, bool sorted) {
     world->scattered = mean > 2 * world->spread;
 }
 
+static dem2d_result dem2di_list_failed(dem2d_world *world, double skin, double interval) {
+    world->skin = skin;
+    world->interval = interval;
+    return dem2di_out_of_memory(world, "the list of contacts");
+}
+
 /* Renew the list. On failure the old one stays. */
 static dem2d_result dem2di_build_list(dem2d_world *world) {
     dem2di_build build;
@@ -9037,20 +9123,20 @@ static dem2d_result dem2di_build_list(dem2d_world *world) {
     if (room) {
         dem2di_tune_skin(world);
         build.plan = dem2di_plan_make(world);
-        room = !build.plan.travels || dem2di_reserve_travel(world, world->body_count);
+        room = !build.plan.travels ||
+               dem2di_group_reserve(world, DEM2DI_TRAVELS, world->body_count, false);
         for (int i = 0; i < world->body_count; i++)
             largest = dem2di_max(largest, world->now[i].radius);
         for (int j = 0; j < world->wall_count; j++)
             world->walls[j].skin = dem2di_skin_of(world, largest, world->wall_now[j].velocity);
     }
-    if (!room || !dem2di_build_search(&build)) {
-        world->skin = skin;
-        world->interval = interval;
-        return dem2di_out_of_memory(world, "the list of contacts");
-    }
+    if (!room || !dem2di_build_search(&build)) return dem2di_list_failed(world, skin, interval);
     int blocks = dem2di_blocks(world->body_count, DEM2DI_BLOCK);
     dem2di_run(world, DEM2D_PHASE_LIST, blocks, dem2di_fill_task, &build);
     dem2di_run(world, DEM2D_PHASE_LIST, 1, dem2di_touches_task, &build);
+    if (!dem2di_array_reserve(world, (void **)&world->list.incident, &world->list.incident_capacity,
+                              build.incident, sizeof *world->list.incident))
+        return dem2di_list_failed(world, skin, interval);
     dem2di_build_finish(&build);
     dem2di_watch_spread(world, sorted);
     return DEM2D_OK;
@@ -9070,7 +9156,7 @@ static DEM2DI_INLINE void dem2di_disc_range(const dem2d_world *world, int begin,
     const dem2di_state *now = world->now;
     const double *shears = world->list.shear;
     double *next_shears = world->list.next_shear, time_step = world->time_step;
-    dem2di_pull *pulls = world->pulls;
+    dem2di_load *loads = world->loads;
     dem2d_pair_desc law = {0, 0, 0};
     int open = 0;
     if (begin < end) law = *dem2di_law_of(world, begin);
@@ -9088,16 +9174,13 @@ static DEM2DI_INLINE void dem2di_disc_range(const dem2d_world *world, int begin,
             shear = dem2di_max(-limit, dem2di_min(limit, shear));
             next_shears[i] = shear;
         }
-        dem2di_pull *pull = &pulls[i];
-        pull->force.x = round.normal.x * round.force;
-        pull->force.y = round.normal.y * round.force;
-        if (friction) {
-            pull->force.x -= round.normal.y * shear;
-            pull->force.y += round.normal.x * shear;
-        }
+        dem2d_vec force = dem2di_scale(round.normal, round.force);
+        if (friction) force = dem2di_along(force, shear, dem2di_perp(round.normal));
+        loads[2 * i].force = dem2di_negate(force);
+        loads[2 * i + 1].force = force;
         if (!spin) continue;
-        pull->torque[0] = friction ? -(round.arm_a * shear) : 0;
-        pull->torque[1] = friction ? -(round.arm_b * shear) : 0;
+        loads[2 * i].torque = friction ? -(round.arm_a * shear) : 0;
+        loads[2 * i + 1].torque = friction ? -(round.arm_b * shear) : 0;
     }
     count->looks += open;
     count->proofs[DEM2D_BY_FORM] += open;
@@ -9142,8 +9225,8 @@ static int dem2di_pair_geometry(const dem2d_world *world, int a, int b, const de
     count->looks++;
     dem2di_pair pair;
     dem2di_search search;
-    pair.a = body_a->shape;
-    pair.b = body_b->shape;
+    pair.a = dem2di_shape_of(world, body_a);
+    pair.b = dem2di_shape_of(world, body_b);
     pair.ra = state_a->q;
     pair.rb = state_b->q;
     pair.scale_a = body_a->scale;
@@ -9284,8 +9367,17 @@ static void dem2di_area_apply(const dem2d_world *world, int i, int b, dem2d_vec 
     dem2di_area_load(world, law, a, b, overlap, corners, link);
 }
 
-static void dem2di_no_pull(dem2di_pull *pull) {
-    memset(pull, 0, sizeof *pull);
+/* Nothing acts. */
+static void dem2di_no_loads(dem2di_load loads[2]) {
+    memset(loads, 0, 2 * sizeof *loads);
+}
+
+static void dem2di_set_loads(const dem2d_world *world, int i, dem2d_vec arm_b,
+                             dem2di_count *count) {
+    dem2di_load *loads = &world->loads[2 * i];
+    dem2di_link_loads(&world->list.next_links[i - world->list.discs], arm_b, loads);
+    double sum = loads[1].force.x + loads[1].force.y + loads[0].torque + loads[1].torque;
+    count->unsound += !dem2di_finite(sum);
 }
 
 /* Geometry and force of one listed pair that is not of two circles. */
@@ -9307,7 +9399,7 @@ static void dem2di_pair_look(const dem2d_world *world, int i, dem2di_overlap *sc
     link->force = link->shear = 0;
     if (world->two_points) memset(&list->next_ends[at], 0, sizeof *list->next_ends);
     int found = dem2di_pair_geometry(world, a, b, last, link, points, count);
-    dem2di_no_pull(&world->pulls[i]);
+    dem2di_no_loads(&world->loads[2 * i]);
     if (!(link->depth > 0)) return;
     const dem2di_state *sa = &world->now[a], *sb = &world->now[b];
     const dem2d_pair_desc *law = dem2di_law_of(world, i);
@@ -9318,7 +9410,7 @@ static void dem2di_pair_look(const dem2d_world *world, int i, dem2di_overlap *sc
     dem2d_vec arm_b = dem2di_sub(link->point, d);
     double slip = dem2di_slip(link, arm_b, sa->v, sa->w, sb->v, sb->w);
     dem2di_link_load(world, at, law, slip, found == 2);
-    dem2di_link_pull(link, arm_b, &world->pulls[i]);
+    dem2di_set_loads(world, i, arm_b, count);
 }
 
 /* The same for a particle and a wall: one support call, none for a circle. */
@@ -9327,6 +9419,7 @@ static void dem2di_touch_look(const dem2d_world *world, int i, dem2di_overlap *s
     const dem2di_list *list = &world->list;
     int a = list->keys[i].a, j = list->keys[i].b, at = i - list->discs, found = 1;
     const dem2di_body *body = &world->bodies[a];
+    const dem2d_shape *shape = dem2di_shape_of(world, body);
     const dem2di_state *state = &world->now[a];
     const dem2di_wall_state *wall = &world->wall_now[j];
     dem2di_link *link = &list->next_links[at];
@@ -9336,20 +9429,20 @@ static void dem2di_touch_look(const dem2d_world *world, int i, dem2di_overlap *s
     memset(link, 0, sizeof *link);
     link->normal = u;
     if (world->two_points) memset(&list->next_ends[at], 0, sizeof *list->next_ends);
-    dem2di_no_pull(&world->pulls[i]);
+    dem2di_no_loads(&world->loads[2 * i]);
     double surface = dem2di_dot(dem2di_sub(wall->point, state->x), u);
     link->depth = state->radius - surface;
     if (!(link->depth > 0)) return;
-    if (body->shape->type != DEM2D_CIRCLE) {
+    if (shape->type != DEM2D_CIRCLE) {
         dem2d_pose pose = dem2di_pose_of(world, world->now, a);
-        link->depth = dem2di_wall_depth(body->shape, &pose, wall->point, u, &support);
+        link->depth = dem2di_wall_depth(shape, &pose, wall->point, u, &support);
         count->calls++;
         if (!(link->depth > 0)) return;
     }
     points[0].position = dem2di_along(support, -link->depth, u);
     if (world->two_points)
-        found = dem2di_wall_points(body->shape, state->q, body->scale, u, surface, support,
-                                   link->depth, points);
+        found = dem2di_wall_points(shape, state->q, body->scale, u, surface, support, link->depth,
+                                   points);
     const dem2d_pair_desc *law = dem2di_law_of(world, i);
     dem2di_link_place(list, at, found, points);
     if (world->faces == DEM2D_CONTACT_AREA)
@@ -9358,7 +9451,7 @@ static void dem2di_touch_look(const dem2d_world *world, int i, dem2di_overlap *s
     dem2d_vec foot = dem2di_vec(0, 0); /* walls do not turn */
     double slip = dem2di_slip(link, foot, state->v, state->w, wall->velocity, 0);
     dem2di_link_load(world, at, law, slip, found == 2);
-    dem2di_link_pull(link, foot, &world->pulls[i]);
+    dem2di_set_loads(world, i, foot, count);
 }
 
 /* Blocks of the three kinds of contacts, one kind after the other. */
@@ -9390,6 +9483,7 @@ static void dem2di_count_add(dem2di_count *sum, const dem2di_count *part) {
     sum->calls += part->calls;
     sum->looks += part->looks;
     sum->gaps += part->gaps;
+    sum->unsound += part->unsound;
     for (int k = 0; k < DEM2D_PROOF_COUNT; k++) sum->proofs[k] += part->proofs[k];
 }
 
@@ -9426,7 +9520,7 @@ static void dem2di_wall_sums(dem2d_world *world) {
         const dem2di_link *link = &list->next_links[i - list->discs];
         if (!(link->depth > 0)) continue;
         dem2di_wall_state *wall = &world->wall_next[list->keys[i].b];
-        wall->force = dem2di_add(wall->force, world->pulls[i].force);
+        wall->force = dem2di_add(wall->force, world->loads[2 * i + 1].force);
         double stiffness = dem2di_stiffness_of(world, dem2di_law_of(world, i), link);
         const dem2di_ends *ends = dem2di_ends_at(world, i, true);
         wall->stiffness += ends != NULL ? stiffness * dem2di_ends_weight(ends) : stiffness;
@@ -9475,129 +9569,114 @@ static bool dem2di_wall_pass(dem2d_world *world) {
     return stale;
 }
 
-/* Sum of the contact forces on a particle, in the order of the partners' ids. */
-static DEM2DI_INLINE dem2di_load dem2di_gather(const dem2d_world *world, int slot, bool spin) {
-    static const double sign[2] = {-1, 1};
-    const int *entry = world->list.incident + world->list.first[slot];
-    const int *end = world->list.incident + world->list.first[slot + 1];
-    const dem2di_pull *pulls = world->pulls;
-    dem2di_load load = {{0, 0}, 0};
-    for (; entry < end; entry++) {
-        int side = *entry & 1;
-        const dem2di_pull *pull = &pulls[*entry >> 1];
-        load.force = dem2di_along(load.force, sign[side], pull->force);
-        if (spin) load.torque += pull->torque[side];
-    }
-    return load;
+static DEM2DI_INLINE void dem2di_load_add(dem2di_load *sum, const dem2di_load *load, bool spin) {
+    sum->force = dem2di_add(sum->force, load->force);
+    if (spin) sum->torque += load->torque;
 }
 
-/* New velocities and positions of the particles from begin to end. */
-static DEM2DI_INLINE void dem2di_motion_range(const dem2d_world *world, int begin, int end,
-                                              bool heavy, bool damped, bool spin, bool travels,
-                                              dem2di_tally *tally) {
+/* Sum of the contact forces on a particle, in the order of the partners' ids. */
+static DEM2DI_INLINE dem2di_load dem2di_gather(const dem2d_world *world, int slot, bool spin) {
+    const int *entry = world->list.incident + world->list.first[slot];
+    const int *end = world->list.incident + world->list.first[slot + 1];
+    const dem2di_load *loads = world->loads;
+    dem2di_load sum = {{0, 0}, 0};
+    for (; entry < end; entry += DEM2DI_GATHER) {
+        dem2di_load_add(&sum, &loads[entry[0]], spin);
+        dem2di_load_add(&sum, &loads[entry[1]], spin);
+        dem2di_load_add(&sum, &loads[entry[2]], spin);
+        dem2di_load_add(&sum, &loads[entry[3]], spin);
+        dem2di_load_add(&sum, &loads[entry[4]], spin);
+        dem2di_load_add(&sum, &loads[entry[5]], spin);
+    }
+    return sum;
+}
+
+/* A particle a step later. */
+static DEM2DI_INLINE dem2di_state dem2di_next_state(const dem2d_world *world, int slot,
+                                                    const dem2di_damping *damping, bool heavy,
+                                                    bool damped, bool spin) {
+    const double time_step = world->time_step;
+    const dem2di_inverse *inverse = &world->inverse[slot];
+    dem2di_state next = world->now[slot];
+    if (inverse->mass > 0) {
+        dem2di_load load = dem2di_gather(world, slot, spin);
+        dem2d_vec a = dem2di_scale(load.force, inverse->mass);
+        double turn = load.torque * inverse->inertia;
+        if (heavy) a = dem2di_add(world->gravity, a);
+        if (damped) {
+            next.v.x = dem2di_accelerate(damping, next.v.x, a.x);
+            next.v.y = dem2di_accelerate(damping, next.v.y, a.y);
+            if (spin) next.w = dem2di_accelerate(damping, next.w, turn);
+        } else {
+            next.v = dem2di_along(next.v, time_step, a);
+            if (spin) next.w += time_step * turn;
+        }
+    }
+    next.x = dem2di_along(next.x, time_step, next.v);
+    if (spin) next.q = dem2di_rotate(next.q, next.w * time_step);
+    return next;
+}
+
+/* New velocities and positions of the particles from begin to end, over the states of the last
+   force pass. Returns the greatest square of speed over skin. */
+static DEM2DI_INLINE double dem2di_motion_range(const dem2d_world *world, int begin, int end,
+                                                bool heavy, bool damped, bool spin, bool travels) {
     dem2di_damping damping =
         dem2di_damping_make(world->local_damping, world->global_damping, world->time_step);
-    const double time_step = world->time_step;
-    const dem2d_vec gravity = world->gravity;
-    double sound = 0;
-    int stale = 0;
+    double most = 0;
     for (int i = begin; i < end; i++) {
-        const dem2di_state *now = &world->now[i];
-        const dem2di_inverse *inverse = &world->inverse[i];
-        const dem2di_watch *watch = &world->watch[i];
-        dem2di_state next = *now;
-        if (inverse->mass > 0) {
-            dem2di_load load = dem2di_gather(world, i, spin);
-            dem2d_vec a = dem2di_scale(load.force, inverse->mass);
-            double turn = load.torque * inverse->inertia;
-            if (heavy) a = dem2di_add(gravity, a);
-            if (damped) {
-                next.v.x = dem2di_accelerate(&damping, next.v.x, a.x);
-                next.v.y = dem2di_accelerate(&damping, next.v.y, a.y);
-                if (spin) next.w = dem2di_accelerate(&damping, next.w, turn);
-            } else {
-                next.v = dem2di_along(next.v, time_step, a);
-                if (spin) next.w += time_step * turn;
-            }
-        }
+        dem2di_state next = dem2di_next_state(world, i, &damping, heavy, damped, spin);
         if (travels)
             world->next_travel[i] =
-                dem2di_travel(&next, world->lever[i], time_step, world->travel[i]);
-        next.x = dem2di_along(now->x, time_step, next.v);
-        if (spin) next.q = dem2di_rotate(now->q, next.w * time_step);
-        world->next[i] = next;
-        dem2d_vec moved = dem2di_sub(next.x, watch->listed);
-        stale |= dem2di_dot(moved, moved) > watch->skin * watch->skin;
-        sound += 0 * next.x.x + 0 * next.x.y + 0 * next.w; /* NaN if one is not finite */
+                dem2di_travel(&next, world->lever[i], world->time_step, world->travel[i]);
+        world->before[i] = next;
+        most = dem2di_max(most, dem2di_dot(next.v, next.v) * world->wear[i]);
     }
-    tally->stale = stale != 0;
-    tally->sound = sound == 0;
+    return most;
 }
 
 /* The loop for what the scene has. */
-static void dem2di_motion_block(const dem2d_world *w, int b, int e, dem2di_tally *t) {
-    int kind = w->plan.heavy + 2 * w->plan.damped + 4 * w->plan.spin + 8 * w->plan.travels;
-    switch (kind) {
-    case 0:
-        dem2di_motion_range(w, b, e, false, false, false, false, t);
-        break;
-    case 1:
-        dem2di_motion_range(w, b, e, true, false, false, false, t);
-        break;
-    case 2:
-        dem2di_motion_range(w, b, e, false, true, false, false, t);
-        break;
-    case 3:
-        dem2di_motion_range(w, b, e, true, true, false, false, t);
-        break;
-    case 4:
-        dem2di_motion_range(w, b, e, false, false, true, false, t);
-        break;
-    case 5:
-        dem2di_motion_range(w, b, e, true, false, true, false, t);
-        break;
-    case 6:
-        dem2di_motion_range(w, b, e, false, true, true, false, t);
-        break;
-    case 7:
-        dem2di_motion_range(w, b, e, true, true, true, false, t);
-        break;
-    case 12:
-        dem2di_motion_range(w, b, e, false, false, true, true, t);
-        break;
-    case 13:
-        dem2di_motion_range(w, b, e, true, false, true, true, t);
-        break;
-    case 14:
-        dem2di_motion_range(w, b, e, false, true, true, true, t);
-        break;
-    default:
-        dem2di_motion_range(w, b, e, true, true, true, true, t);
-        break;
-    }
+static double dem2di_motion_block(const dem2d_world *w, int b, int e) {
+    const dem2di_plan *p = &w->plan;
+#define DEM2DI_MOTION(spin, travels)                                                    \
+    (p->heavy    ? p->damped ? dem2di_motion_range(w, b, e, true, true, spin, travels)  \
+                             : dem2di_motion_range(w, b, e, true, false, spin, travels) \
+        : p->damped ? dem2di_motion_range(w, b, e, false, true, spin, travels)          \
+                 : dem2di_motion_range(w, b, e, false, false, spin, travels))
+    if (p->travels) return DEM2DI_MOTION(true, true);
+    if (p->spin) return DEM2DI_MOTION(true, false);
+    return DEM2DI_MOTION(false, false);
+#undef DEM2DI_MOTION
 }
 
 static void dem2di_motion_task(void *context, int begin, int end) {
     dem2d_world *world = (dem2d_world *)context;
     for (int block = begin; block < end; block++) {
         int first = block * DEM2DI_BLOCK;
-        dem2di_motion_block(world, first, dem2di_block_end(first, DEM2DI_BLOCK, world->body_count),
-                            &world->tallies[block]);
+        int last = dem2di_block_end(first, DEM2DI_BLOCK, world->body_count);
+        world->tallies[block].most = dem2di_motion_block(world, first, last);
     }
 }
 
-/* Sums of forces, velocities and positions. Returns the slot of a particle whose state is not
-   finite, or -1; `worn` when one has left its skin. */
-static int dem2di_motion_pass(dem2d_world *world, bool *worn) {
+/* Sums of forces, velocities and positions. Returns the part of a skin used up so far: path lengths
+   are sums of speeds, here of the greatest for its skin in each step. */
+static double dem2di_motion_pass(dem2d_world *world) {
     int blocks = dem2di_blocks(world->body_count, DEM2DI_BLOCK);
+    double most = 0;
     world->plan.heavy = world->gravity.x != 0 || world->gravity.y != 0;
     world->plan.damped = world->local_damping > 0 || world->global_damping > 0;
     dem2di_run(world, DEM2D_PHASE_MOTION, blocks, dem2di_motion_task, world);
-    for (int k = 0; k < blocks; k++) {
-        *worn = *worn || world->tallies[k].stale;
-        if (world->tallies[k].sound) continue;
-        for (int i = k * DEM2DI_BLOCK; i < world->body_count; i++)
-            if (!dem2di_state_finite(&world->next[i])) return i;
+    for (int k = 0; k < blocks; k++) most = dem2di_max(most, world->tallies[k].most);
+    return world->worn + sqrt(most) * world->time_step;
+}
+
+/* A particle that the step would give a state that is not finite, or -1. */
+static int dem2di_unsound(const dem2d_world *world) {
+    dem2di_damping damping =
+        dem2di_damping_make(world->local_damping, world->global_damping, world->time_step);
+    for (int i = 0; i < world->body_count; i++) {
+        dem2di_state next = dem2di_next_state(world, i, &damping, true, true, true);
+        if (!dem2di_state_finite(&next)) return i;
     }
     return -1;
 }
@@ -9665,7 +9744,7 @@ static void dem2di_stiffest_range(const dem2d_world *world, int begin, int end, 
     for (int i = begin; i < end; i++) {
         const dem2di_body *body = &world->bodies[i];
         dem2di_stiffness sum[2];
-        if (body->shape == NULL || body->motion != DEM2D_FREE) continue;
+        if (body->shape_index < 0 || body->motion != DEM2D_FREE) continue;
         dem2di_stiffness_sum(world, i, next, sum);
         double mass = dem2di_body_mass(world, body), inertia = dem2di_body_inertia(world, body);
         for (int bound = 0; bound < 2; bound++) {
@@ -9744,8 +9823,7 @@ static void dem2di_commit(dem2d_world *world) {
     dem2di_state *state = world->before;
     dem2di_wall_state *wall = world->wall_before;
     world->before = world->now;
-    world->now = world->next;
-    world->next = state;
+    world->now = state;
     double *travel = world->travel;
     world->travel = world->next_travel;
     world->next_travel = travel;
@@ -9757,7 +9835,8 @@ static void dem2di_commit(dem2d_world *world) {
 }
 
 /* The straight road: candidate pairs, contacts, walls, sums and motion; then commit. All results go
-   to arrays beside the present ones, so that a failure only has to return. */
+   to arrays beside the present ones, and what can fail does so before the motion, which comes over
+   the states of the last force pass: a failure only has to return. */
 static dem2d_result dem2di_step(dem2d_world *world) {
     dem2di_count count = world->count;
     bool slow = false, listed = world->list_stale;
@@ -9775,7 +9854,7 @@ static dem2d_result dem2di_step(dem2d_world *world) {
     }
     dem2di_wall_sums(world);
     bool worn = dem2di_wall_pass(world);
-    int slot = dem2di_motion_pass(world, &worn);
+    int slot = world->bounded && count.unsound == 0 ? -1 : dem2di_unsound(world);
     if (slot >= 0)
         return dem2di_fail(&world->env, DEM2D_STATE, world->bodies[slot].index,
                            "particle %d would get a state that is not finite",
@@ -9784,9 +9863,13 @@ static dem2d_result dem2di_step(dem2d_world *world) {
         if (world->walls[j].alive && !dem2di_vec_finite(world->wall_next[j].point))
             return dem2di_fail(&world->env, DEM2D_STATE, j,
                                "wall %d would get a place that is not finite", j);
+    double path = dem2di_motion_pass(world); /* nothing fails from here on */
+    worn = worn || path > 1 - DEM2DI_LIST_STEPS * DBL_EPSILON ||
+           world->steps - world->listed_at >= DEM2DI_LIST_STEPS;
     if (listed && world->laws_side > 0)
         memcpy(world->used_laws, world->laws,
                (size_t)world->laws_side * (size_t)world->laws_side * sizeof *world->laws);
+    world->worn = path;
     world->list_stale = world->list_worn = worn;
     world->rebuilds += listed;
     world->count = count;
@@ -10021,7 +10104,7 @@ DEM2D_API dem2d_result dem2d_world_packing(const dem2d_world *world, dem2d_packi
         ends += contacts;
         loaded += contacts >= 2;
         if (contacts >= 2) loaded_ends += contacts;
-        area += body->shape->mass.area * body->scale * body->scale;
+        area += dem2di_shape_of(world, body)->mass.area * body->scale * body->scale;
     }
     for (int wall = 0; wall < 2; wall++) {
         dem2di_tour walk = dem2di_tour_start(wall == 1);
@@ -10106,7 +10189,7 @@ static dem2di_view dem2di_view_make(const dem2d_world *world, double width) {
         if (i < 0) continue;
         dem2d_box box;
         dem2d_pose pose = dem2di_pose_of(world, world->before, i);
-        (void)dem2d_shape_aabb(world->bodies[i].shape, pose, &box);
+        (void)dem2d_shape_aabb(dem2di_shape_of(world, &world->bodies[i]), pose, &box);
         lower.x = first ? box.lower.x : dem2di_min(lower.x, box.lower.x);
         lower.y = first ? box.lower.y : dem2di_min(lower.y, box.lower.y);
         upper.x = first ? box.upper.x : dem2di_max(upper.x, box.upper.x);
@@ -10127,7 +10210,7 @@ static void dem2di_draw_particle(const dem2d_world *world, const dem2di_view *vi
                                  int i, dem2di_writer *writer) {
     static const char *const colour[] = {"#e8c468", "#8fb9d8", "#b9a3d6",
                                          "#94c99b", "#e59a83", "#c9c9c9"};
-    const dem2d_shape *shape = world->bodies[i].shape;
+    const dem2d_shape *shape = dem2di_shape_of(world, &world->bodies[i]);
     dem2d_pose pose = dem2di_pose_of(world, world->before, i);
     if (shape->type == DEM2D_CIRCLE) {
         dem2d_vec c = dem2di_pixel(view, pose.position);
