@@ -1198,6 +1198,17 @@ DEM2D_API dem2d_result dem2d_world_write_svg(const dem2d_world *world, const dem
 #define DEM2DI_INLINE inline
 #endif
 
+/* Around loops that are worth vector instructions, which gcc leaves out at -O2. */
+#if defined(__GNUC__) && !defined(__clang__)
+#define DEM2DI_VECTORS_BEGIN    \
+    _Pragma("GCC push_options") \
+        _Pragma("GCC optimize(\"tree-loop-vectorize\", \"vect-cost-model=dynamic\")")
+#define DEM2DI_VECTORS_END _Pragma("GCC pop_options")
+#else
+#define DEM2DI_VECTORS_BEGIN
+#define DEM2DI_VECTORS_END
+#endif
+
 #define DEM2DI_PI 3.14159265358979323846
 
 /* Rounding of a support value of A minus B, in units of R_A + R_B + |d|: two rotations, two
@@ -7027,15 +7038,20 @@ typedef struct dem2di_disc {
 /* The discs sorted by the cells of their centres. The arrays are the caller's. */
 typedef struct dem2di_grid {
     dem2di_disc *discs;
-    int *slot;   /* of the table, for each disc */
+    int *slot;   /* of the table, for each disc; once sorted, its place in sorted */
     int *sorted; /* discs by slot */
     int *heads;  /* table + 1: where each slot begins in sorted */
     int count, table;
-    double largest;  /* reach */
-    uint32_t levels; /* bit mask of those in use */
+    double size;      /* of the cells of level 0 */
+    dem2d_vec origin; /* cells are counted from here, so that far scenes lose nothing */
+    uint32_t levels;  /* bit mask of those in use */
 } dem2di_grid;
 
 #define DEM2DI_LEVELS 31
+
+/* Cells are a little wider than two reaches, so that the rounding of a cell number up to 2^42 can't
+   part two discs that overlap by more than one cell. */
+#define DEM2DI_CELL (2 * (1 + 1.0 / 1024))
 
 /* Slots for so many discs: a power of two, so that about one disc is in each. */
 static int dem2di_grid_table(int count) {
@@ -7045,14 +7061,15 @@ static int dem2di_grid_table(int count) {
 }
 
 static double dem2di_cell_size(const dem2di_grid *grid, int level) {
-    return 2 * ldexp(grid->largest, -level);
+    return grid->size / (double)((uint32_t)1 << level);
 }
 
 /* Cell number of a coordinate; far beyond 2^62 cells all are one, which is slow but right. */
-static int64_t dem2di_cell_of(double coordinate, double size) {
-    double cell = floor(coordinate / size), limit = 4611686018427387904.0;
-    if (!(cell < limit)) return (int64_t)1 << 62;
-    return cell > -limit ? (int64_t)cell : -((int64_t)1 << 62);
+static inline int64_t dem2di_cell_of(double coordinate, double size) {
+    double cell = coordinate / size, limit = 4611686018427387904.0;
+    if (!(fabs(cell) < limit)) return cell > 0 ? (int64_t)1 << 62 : -((int64_t)1 << 62);
+    int64_t whole = (int64_t)cell;
+    return whole - (cell < (double)whole);
 }
 
 /* Slot of a cell: squares of 8 x 8 cells are scattered by a hash, the cells of a square lie side
@@ -7067,17 +7084,17 @@ static int dem2di_cell_slot(const dem2di_grid *grid, int64_t x, int64_t y, int l
     return (int)(slot & (uint64_t)(grid->table - 1));
 }
 
-/* Level and slot of the discs from begin to end; largest is known. */
+/* Level and slot of the discs from begin to end, whose centres are from the origin from now on. */
 static void dem2di_grid_place(const dem2di_grid *grid, int begin, int end) {
     for (int i = begin; i < end; i++) {
         dem2di_disc *disc = &grid->discs[i];
-        double size = grid->largest / 2;
+        double size = grid->size;
         disc->level = 0;
-        while (disc->reach <= size && disc->level < DEM2DI_LEVELS - 1) {
+        while (disc->reach * (2 * DEM2DI_CELL) <= size && disc->level < DEM2DI_LEVELS - 1) {
             size /= 2;
             disc->level++;
         }
-        size = dem2di_cell_size(grid, disc->level);
+        disc->centre = dem2di_sub(disc->centre, grid->origin);
         int64_t x = dem2di_cell_of(disc->centre.x, size), y = dem2di_cell_of(disc->centre.y, size);
         grid->slot[i] = dem2di_cell_slot(grid, x, y, disc->level);
     }
@@ -7103,48 +7120,75 @@ static void dem2di_grid_sort(dem2di_grid *grid) {
         grid->heads[grid->slot[i] + 1]++;
     }
     for (int s = 0; s < grid->table; s++) grid->heads[s + 1] += grid->heads[s];
-    for (int i = grid->count - 1; i >= 0; i--) grid->sorted[--grid->heads[grid->slot[i] + 1]] = i;
+    for (int i = grid->count - 1; i >= 0; i--) {
+        int place = --grid->heads[grid->slot[i] + 1];
+        grid->sorted[place] = i;
+        grid->slot[i] = place;
+    }
     /* the start of slot s now stands at s + 1 */
     memmove(grid->heads, grid->heads + 1, (size_t)grid->table * sizeof *grid->heads);
     grid->heads[grid->table] = grid->count;
 }
 
-/* The partners of disc i on one level: counted by kind, and written as (i, j) where there is room.
-   On its own level each pair is met from both sides and taken from the lower disc's. */
-static void dem2di_grid_level(const dem2di_grid *grid, int i, int level, dem2di_key *to[2],
-                              int count[2]) {
-    const dem2di_disc *own = &grid->discs[i];
-    double size = dem2di_cell_size(grid, level), reach = own->reach + size / 2;
-    int64_t x0 = dem2di_cell_of(own->centre.x - reach, size);
-    int64_t x1 = dem2di_cell_of(own->centre.x + reach, size);
-    int64_t y0 = dem2di_cell_of(own->centre.y - reach, size);
-    int64_t y1 = dem2di_cell_of(own->centre.y + reach, size);
-    int least = level == own->level ? i : -1;
-    for (int64_t y = y0; y <= y1; y++)
-        for (int64_t x = x0; x <= x1; x++) {
-            int slot = dem2di_cell_slot(grid, x, y, level);
-            for (int k = grid->heads[slot]; k < grid->heads[slot + 1]; k++) {
-                int j = grid->sorted[k];
-                const dem2di_disc *other = &grid->discs[j];
-                if (j <= least || other->level != level) continue;
-                dem2d_vec d = dem2di_sub(other->centre, own->centre);
-                double both = own->reach + other->reach;
-                if (!(dem2di_dot(d, d) < both * both) || (own->fixed && other->fixed)) continue;
-                int kind = !(own->round && other->round);
-                if (to != NULL) {
-                    to[kind][count[kind]].a = i;
-                    to[kind][count[kind]].b = j;
-                }
-                count[kind]++;
-            }
+/* Where the partners of a disc go: counted by kind, and written as (own, other) where there is
+ * room. */
+typedef struct dem2di_finds {
+    int own, count[2];
+    dem2di_key *to[2]; /* or NULL */
+} dem2di_finds;
+
+/* The partners among the discs from begin to end of those sorted. */
+static inline void dem2di_grid_look(const dem2di_grid *grid, int begin, int end, int level,
+                                    dem2di_finds *finds) {
+    const dem2di_disc *own = &grid->discs[finds->own];
+    for (int k = begin; k < end; k++) {
+        int j = grid->sorted[k];
+        const dem2di_disc *other = &grid->discs[j];
+        dem2d_vec d = dem2di_sub(other->centre, own->centre);
+        double both = own->reach + other->reach;
+        if (!(dem2di_dot(d, d) < both * both) || other->level != level) continue;
+        if (own->fixed && other->fixed) continue;
+        int kind = !(own->round && other->round);
+        if (finds->to[kind] != NULL) {
+            finds->to[kind][finds->count[kind]].a = finds->own;
+            finds->to[kind][finds->count[kind]].b = j;
         }
+        finds->count[kind]++;
+    }
 }
 
-/* All partners of a disc that it finds: of its level and of coarser ones, where at most three
-   cells a side are within reach: linear for any mixture of sizes. */
-static void dem2di_grid_partners(const dem2di_grid *grid, int i, dem2di_key *to[2], int count[2]) {
-    for (int level = 0; level <= grid->discs[i].level; level++)
-        if (grid->levels >> level & 1) dem2di_grid_level(grid, i, level, to, count);
+/* The cells of a row from x0 to x1: those of one square at once. */
+static void dem2di_grid_row(const dem2di_grid *grid, int64_t x0, int64_t x1, int64_t y, int level,
+                            dem2di_finds *finds) {
+    while (x0 <= x1) {
+        int64_t run = 8 - (x0 & 7), left = x1 - x0 + 1;
+        if (run > left) run = left;
+        int slot = dem2di_cell_slot(grid, x0, y, level);
+        dem2di_grid_look(grid, grid->heads[slot], grid->heads[slot + run], level, finds);
+        x0 += run;
+    }
+}
+
+/* All partners of a disc that it finds: on its level those that come after it, in its cell, to the
+   right and above; on coarser levels all around. Two discs that overlap are at most one cell apart:
+   linear for any mixture of sizes. */
+static void dem2di_grid_partners(const dem2di_grid *grid, dem2di_finds *finds) {
+    const dem2di_disc *own = &grid->discs[finds->own];
+    finds->count[0] = finds->count[1] = 0;
+    for (int level = 0; level <= own->level; level++) {
+        if (!(grid->levels >> level & 1)) continue;
+        double size = dem2di_cell_size(grid, level);
+        int64_t x = dem2di_cell_of(own->centre.x, size), y = dem2di_cell_of(own->centre.y, size);
+        dem2di_grid_row(grid, x - 1, x + 1, y + 1, level, finds);
+        if (level < own->level) {
+            dem2di_grid_row(grid, x - 1, x + 1, y, level, finds);
+            dem2di_grid_row(grid, x - 1, x + 1, y - 1, level, finds);
+            continue;
+        }
+        int slot = dem2di_cell_slot(grid, x, y, level), place = grid->slot[finds->own];
+        dem2di_grid_look(grid, place + 1, grid->heads[slot + 1], level, finds);
+        dem2di_grid_row(grid, x + 1, x + 1, y, level, finds);
+    }
 }
 
 /* A number to sort by and what it stands for. */
@@ -7209,8 +7253,8 @@ typedef struct dem2di_ends {
 
 /* Velocity of B against A at the contact point, along the tangent; arm_b is the point seen from
    B's centre. */
-static double dem2di_slip(const dem2di_link *link, dem2d_vec arm_b, dem2d_vec va, double wa,
-                          dem2d_vec vb, double wb) {
+static inline double dem2di_slip(const dem2di_link *link, dem2d_vec arm_b, dem2d_vec va, double wa,
+                                 dem2d_vec vb, double wb) {
     dem2d_vec a = dem2di_along(va, wa, dem2di_perp(link->point));
     dem2d_vec b = dem2di_along(vb, wb, dem2di_perp(arm_b));
     return dem2di_cross(link->normal, dem2di_sub(b, a));
@@ -7218,8 +7262,8 @@ static double dem2di_slip(const dem2di_link *link, dem2d_vec arm_b, dem2d_vec va
 
 /* [F] eq. 8-10 for a given normal force, with the tangential one held within both limits. The
    spring is a scalar along perp(normal), so that it turns with the contact. */
-static void dem2di_law_apply(const dem2d_pair_desc *law, double slip, double time_step,
-                             double last_shear, dem2di_link *link) {
+static inline void dem2di_law_apply(const dem2d_pair_desc *law, double slip, double time_step,
+                                    double last_shear, dem2di_link *link) {
     double limit = law->friction * link->force;
     link->shear = last_shear - law->tangential_stiffness * slip * time_step;
     link->shear = dem2di_max(-limit, dem2di_min(limit, link->shear));
@@ -7292,23 +7336,25 @@ static void dem2di_ends_set(const dem2d_contact_point points[2], dem2di_ends *en
 }
 
 /* Force on B. */
-static dem2d_vec dem2di_link_force(const dem2di_link *link) {
+static inline dem2d_vec dem2di_link_force(const dem2di_link *link) {
     return dem2di_along(dem2di_scale(link->normal, link->force), link->shear,
                         dem2di_perp(link->normal));
 }
 
-/* Force and torque: of a contact on one of its partners, or their sum. */
+/* Force and torque of contacts on a particle. */
 typedef struct dem2di_load {
     dem2d_vec force;
     double torque;
 } dem2di_load;
 
-/* On both partners of a contact: on A, on B. */
-static void dem2di_link_loads(const dem2di_link *link, dem2d_vec arm_b, dem2di_load loads[2]) {
-    loads[1].force = dem2di_link_force(link);
-    loads[0].force = dem2di_negate(loads[1].force);
-    loads[0].torque = -dem2di_cross(link->point, loads[1].force);
-    loads[1].torque = dem2di_cross(arm_b, loads[1].force);
+/* What a contact does to its partners A (0) and B (1). */
+static inline void dem2di_link_loads(const dem2di_link *link, dem2d_vec arm_b,
+                                     dem2di_load loads[2]) {
+    dem2d_vec force = dem2di_link_force(link);
+    loads[0].force = dem2di_negate(force);
+    loads[0].torque = -dem2di_cross(link->point, force);
+    loads[1].force = force;
+    loads[1].torque = dem2di_cross(arm_b, force);
 }
 
 /* Stiffness of one particle: the upper triangle of a symmetric matrix in x, y, angle. */
@@ -7354,8 +7400,8 @@ static double dem2di_largest_eigenvalue(const dem2di_stiffness *k, double mass, 
    uses: config, math
    ============================================================================================ */
 
-/* What moves of a particle, with the radius of its bounding circle: all that a look at a pair of
-   circles needs is in one line of a cache. */
+/* What moves of a particle (q: see dem2di_orientation), with the radius of its bounding circle: all
+   that a look at a pair of circles needs is in one line of a cache. */
 typedef struct dem2di_state {
     dem2d_vec x;
     dem2d_rot q;
@@ -7386,18 +7432,25 @@ static inline double dem2di_accelerate(const dem2di_damping *damping, double v,
     return damping->keep * v + damping->receive * (acceleration - copysign(drag, v));
 }
 
-/* q turned by an angle: tan(angle/2) = x (1 + x^2/3) with x = angle/2 to fourth order, and the
-   rational rotation of it; one Newton step of 1/|q| keeps the length at 1 to rounding. */
+/* q turned by an angle: t = tan(angle/2) = x (1 + x^2/3) with x = angle/2 to fourth order, and the
+   rational rotation of it; below t^2 = 2^-17 the third power of t^2 is nothing. One Newton step of
+   1/|q| keeps the length at 1 to rounding; it is that of the old q, so as not to wait for the new.
+ */
 static inline dem2d_rot dem2di_rotate(dem2d_rot q, double angle) {
-    double x = angle / 2, t = x * (1 + x * x * (1.0 / 3)), f = 1 / (1 + t * t);
-    double c = (1 - t * t) * f, s = 2 * t * f;
+    double x = angle / 2, t = x * (1 + x * x * (1.0 / 3)), square = t * t;
+    double f = square < 1.0 / 131072 ? 1 - square * (1 - square) : 1 / (1 + square);
+    double c = 1 - square, s = 2 * t;
     dem2d_rot r;
-    r.c = q.c * c - q.s * s;
-    r.s = q.s * c + q.c * s;
-    f = 1.5 - (r.c * r.c + r.s * r.s) / 2;
-    r.c *= f;
-    r.s *= f;
+    f *= 1.5 - (q.c * q.c + q.s * q.s) / 2;
+    r.c = (q.c * c - q.s * s) * f;
+    r.s = (q.s * c + q.c * s) * f;
     return r;
+}
+
+/* An angle turned further, about once around at most. */
+static inline double dem2di_turned(double angle, double by) {
+    angle += by;
+    return fabs(angle) > DEM2DI_PI ? fmod(angle, 2 * DEM2DI_PI) : angle;
 }
 
 /* Bound of how far a point of the support moves with a particle in a step: its path, by the
@@ -7508,8 +7561,8 @@ typedef struct dem2di_tally {
 typedef struct dem2di_plan {
     bool friction; /* some law between the materials in use has it */
     bool spin;     /* something turns, or may be turned */
-    bool travels;  /* some particle is no circle: pairs are skipped by what they have travelled */
-    bool one_law;  /* all particles are of one material */
+    bool turns; /* some particle is no circle: rotations matter, and pairs are skipped by travel */
+    bool one_law;       /* all particles are of one material */
     bool heavy, damped; /* gravity, damping: as they are set at the step */
 } dem2di_plan;
 
@@ -7567,8 +7620,9 @@ struct dem2d_world {
     int wall_count, wall_capacity;
 
     dem2di_list list;
-    dem2di_load *loads; /* of each listed contact on A and on B, and a 0 behind; in scratch */
-    char *scratch;      /* what only a step or only the building of the list needs */
+    double *load_x, *load_y, *load_turn; /* force and torque of contact i on its A at 2 i, on its B
+                                            at 2 i + 1, and 0 behind the last; in scratch */
+    char *scratch; /* what only a step or only the building of the list needs */
     dem2di_tally *tallies;
     dem2di_overlap *overlap; /* contact-area rule: for each block twice what one overlap may have */
     int scratch_capacity, tally_capacity, overlap_capacity, overlap_size;
@@ -7923,12 +7977,12 @@ static dem2d_pair_desc dem2di_mix(const dem2d_material_desc *a, const dem2d_mate
     return law;
 }
 
-static dem2d_pair_desc *dem2di_law(const dem2d_world *world, int a, int b) {
+static inline dem2d_pair_desc *dem2di_law(const dem2d_world *world, int a, int b) {
     return &world->laws[a * world->laws_side + b];
 }
 
 /* How the two of a listed contact meet; B is a particle or a wall. */
-static const dem2d_pair_desc *dem2di_law_of(const dem2d_world *world, int contact) {
+static inline const dem2d_pair_desc *dem2di_law_of(const dem2d_world *world, int contact) {
     const dem2di_key *key = &world->list.keys[contact];
     int material = contact >= world->list.pairs ? (int)world->walls[key->b].desc.material.index
                                                 : world->bodies[key->b].material;
@@ -8067,6 +8121,13 @@ static dem2di_inverse dem2di_inverse_of(const dem2d_world *world, const dem2di_b
     return inverse;
 }
 
+/* As states hold it: while there are only circles, whose rotation nothing but a query asks for, the
+   angle itself, in c. */
+static dem2d_rot dem2di_orientation(const dem2d_world *world, double angle) {
+    dem2d_rot q = {angle, 0};
+    return world->plan.turns ? dem2d_rot_make(angle) : q;
+}
+
 /* The index of the next id: one that is free again, or a new one. */
 static int dem2di_name_take(dem2d_world *world) {
     int index = world->free_name;
@@ -8111,7 +8172,7 @@ DEM2D_API dem2d_result dem2d_world_add_particle(dem2d_world *world, const dem2d_
     world->templates[desc->shape.index].users++;
     dem2di_state state;
     state.x = desc->position;
-    state.q = dem2d_rot_make(desc->angle);
+    state.q = dem2di_orientation(world, desc->angle);
     state.v = desc->velocity;
     state.w = desc->angular_velocity;
     state.radius = dem2di_shape_of(world, &body)->circumscribed * desc->scale;
@@ -8156,7 +8217,7 @@ DEM2D_API dem2d_result dem2d_world_remove_particle(dem2d_world *world, dem2d_par
 static dem2d_pose dem2di_pose_of(const dem2d_world *world, const dem2di_state *states, int i) {
     dem2d_pose pose;
     pose.position = states[i].x;
-    pose.rotation = states[i].q;
+    pose.rotation = world->plan.turns ? states[i].q : dem2d_rot_make(states[i].q.c);
     pose.scale = world->bodies[i].scale;
     return pose;
 }
@@ -8166,29 +8227,33 @@ static double dem2di_equivalent(const dem2d_world *world, int slot) {
     return body->scale * sqrt(dem2di_shape_of(world, body)->mass.area / DEM2DI_PI);
 }
 
+/* From the centre of one circle to another's, never so short that its square is no normal number.
+ */
+static DEM2DI_INLINE dem2d_vec dem2di_disc_line(const dem2di_state *a, const dem2di_state *b) {
+    dem2d_vec d = dem2di_centre_line(a->x, b->x), u;
+    if (dem2di_dot(d, d) > 1e-280) return d;
+    return dem2di_scale(dem2di_unit(d, &u) ? u : dem2di_vec(1, 0), 1e-139);
+}
+
 /* Two circles: the normal force along the line of centres, the tangential spring at the middle of
-   the overlap. Both are 0 when they are apart. */
+   the overlap. The force is 0 when they are apart. */
 typedef struct dem2di_round {
     dem2d_vec normal;
     double depth, force;
     double arm_a, arm_b; /* from the centres to the contact point */
 } dem2di_round;
 
-static DEM2DI_INLINE dem2di_round dem2di_round_make(const dem2di_state *a, const dem2di_state *b,
+static DEM2DI_INLINE dem2di_round dem2di_round_make(dem2d_vec d, double radius_a, double radius_b,
                                                     double stiffness) {
     dem2di_round round;
-    dem2d_vec d = dem2di_centre_line(a->x, b->x);
-    double square = dem2di_dot(d, d), distance = sqrt(square), reach = a->radius + b->radius;
-    if (square > 1e-280) {                  /* a normal number */
-        double f = distance * (1 / square); /* root and division side by side */
-        round.normal = dem2di_vec(d.x * f, d.y * f);
-        round.depth = reach - distance;
-    } else {
-        round.depth = dem2di_circle_contact(d, distance, reach, &round.normal);
-    }
-    round.force = stiffness * dem2di_max(round.depth, 0);
-    round.arm_a = a->radius - round.depth / 2;
-    round.arm_b = b->radius - round.depth / 2;
+    double square = d.x * d.x + d.y * d.y, distance = sqrt(square);
+    double f = distance * (1 / square); /* root and division side by side */
+    round.normal.x = d.x * f;
+    round.normal.y = d.y * f;
+    round.depth = radius_a + radius_b - distance;
+    round.force = stiffness * (round.depth > 0 ? round.depth : 0);
+    round.arm_a = radius_a - round.depth / 2;
+    round.arm_b = radius_b - round.depth / 2;
     return round;
 }
 
@@ -8220,7 +8285,9 @@ static bool dem2di_link_at(const dem2d_world *world, int contact, bool next, dem
         return link->depth > 0;
     }
     const dem2d_pair_desc *law = dem2di_law_at(world, contact, next);
-    dem2di_round round = dem2di_round_make(&states[key->a], &states[key->b], law->normal_stiffness);
+    const dem2di_state *a = &states[key->a], *b = &states[key->b];
+    dem2di_round round =
+        dem2di_round_make(dem2di_disc_line(a, b), a->radius, b->radius, law->normal_stiffness);
     link->normal = round.normal;
     link->point = dem2di_scale(round.normal, round.arm_a);
     link->depth = round.depth;
@@ -8247,8 +8314,8 @@ static dem2di_load dem2di_load_of(const dem2d_world *world, int slot) {
         int contact = list->incident[k] / 2, side = list->incident[k] & 1;
         dem2di_link link;
         dem2d_vec arm_b;
-        dem2di_load loads[2];
         if (!dem2di_link_at(world, contact, false, &link, &arm_b)) continue;
+        dem2di_load loads[2];
         dem2di_link_loads(&link, arm_b, loads);
         load.force = dem2di_add(load.force, loads[side].force);
         load.torque += loads[side].torque;
@@ -8290,7 +8357,7 @@ DEM2D_API dem2d_result dem2d_world_move_particle(dem2d_world *world, dem2d_parti
     if (result == DEM2D_OK) result = dem2di_check_angle(&world->env, angle);
     if (result != DEM2D_OK) return result;
     world->now[slot].x = position;
-    world->now[slot].q = dem2d_rot_make(angle);
+    world->now[slot].q = dem2di_orientation(world, angle);
     world->before[slot] = world->now[slot];
     dem2di_forget(world, slot);
     return DEM2D_OK;
@@ -8581,7 +8648,7 @@ static void dem2di_incident_task(void *context, int begin, int end) {
     for (int slot = begin * DEM2DI_BLOCK; slot < last; slot++) {
         int *run = world->list.incident + world->list.first[slot];
         int count = world->list.first[slot + 1] - world->list.first[slot];
-        for (int g = 0; g < 7; g++) {
+        for (int g = count > 10 ? 0 : 5; g < 7; g++) {
             for (int i = gaps[g]; i < count; i++) {
                 int entry = run[i], k = i;
                 uint32_t rank = dem2di_incident_rank(world, entry);
@@ -8693,7 +8760,7 @@ static void dem2di_arrange_task(void *context, int begin, int end) {
     dem2di_reorder(w->before, sizeof *w->before, to, n, count, room);
     dem2di_reorder(w->bodies, sizeof *w->bodies, to, n, count, room);
     dem2di_reorder(w->inverse, sizeof *w->inverse, to, n, count, room);
-    if (w->plan.travels) {
+    if (w->plan.turns) {
         dem2di_reorder(w->travel, sizeof *w->travel, to, n, count, room);
         dem2di_reorder(w->lever, sizeof *w->lever, to, n, count, room);
     }
@@ -8780,7 +8847,7 @@ static dem2di_plan dem2di_plan_make(const dem2d_world *world) {
         const dem2di_body *body = &world->bodies[i];
         used[body->material] = true;
         plan.spin = plan.spin || world->now[i].w != 0;
-        plan.travels = plan.travels || dem2di_shape_of(world, body)->type != DEM2D_CIRCLE;
+        plan.turns = plan.turns || dem2di_shape_of(world, body)->type != DEM2D_CIRCLE;
         plan.one_law = plan.one_law && body->material == world->bodies[0].material;
     }
     for (int j = 0; j < world->wall_count; j++)
@@ -8791,8 +8858,8 @@ static dem2di_plan dem2di_plan_make(const dem2d_world *world) {
             bool rubs = law->friction > 0 && law->tangential_stiffness > 0;
             plan.friction = plan.friction || (rubs && used[a] && (used[b] || met[b]));
         }
-    plan.travels = plan.travels || world->faces == DEM2D_CONTACT_AREA;
-    plan.spin = plan.spin || plan.travels || plan.friction;
+    plan.turns = plan.turns || world->faces == DEM2D_CONTACT_AREA;
+    plan.spin = plan.spin || plan.turns || plan.friction;
     return plan;
 }
 
@@ -8868,7 +8935,7 @@ static int dem2di_find_walls(const dem2d_world *world, const dem2di_disc *disc, 
     if (disc->fixed) return 0;
     for (int j = 0; j < world->wall_count; j++) {
         const dem2di_wall *wall = &world->walls[j];
-        dem2d_vec from = dem2di_sub(disc->centre, world->wall_now[j].point);
+        dem2d_vec from = dem2di_sub(world->now[slot].x, world->wall_now[j].point);
         if (!wall->alive || !(dem2di_dot(from, wall->desc.normal) < disc->reach + wall->skin))
             continue;
         if (to != NULL) {
@@ -8884,10 +8951,10 @@ static void dem2di_count_task(void *context, int begin, int end) {
     const dem2di_build *build = (const dem2di_build *)context;
     int last = dem2di_block_end((end - 1) * DEM2DI_BLOCK, DEM2DI_BLOCK, build->grid.count);
     for (int i = begin * DEM2DI_BLOCK; i < last; i++) {
-        int count[2] = {0, 0};
-        dem2di_grid_partners(&build->grid, i, NULL, count);
-        build->count[DEM2DI_DISCS][i] = count[0];
-        build->count[DEM2DI_OTHERS][i] = count[1];
+        dem2di_finds finds = {i, {0, 0}, {NULL, NULL}};
+        dem2di_grid_partners(&build->grid, &finds);
+        build->count[DEM2DI_DISCS][i] = finds.count[0];
+        build->count[DEM2DI_OTHERS][i] = finds.count[1];
         build->count[DEM2DI_TOUCHES][i] =
             dem2di_find_walls(build->world, &build->grid.discs[i], i, NULL);
     }
@@ -8921,7 +8988,7 @@ static void dem2di_recall(const dem2di_build *build, int place) {
     dem2di_link *link = &list->next_links[place - discs];
     memset(link, 0, sizeof *link);
     if (old >= 0) *link = list->links[old - list->discs];
-    if (place < pairs && world->plan.travels) /* budgets count from here */
+    if (place < pairs && world->plan.turns) /* budgets count from here */
         link->budget -= world->travel[key->a] + world->travel[key->b];
     if (!world->two_points) return;
     dem2di_ends *ends = &list->next_ends[place - discs];
@@ -8937,14 +9004,14 @@ static void dem2di_fill_task(void *context, int begin, int end) {
         int first = block * DEM2DI_BLOCK;
         int64_t spread = 0;
         for (int i = first; i < dem2di_block_end(first, DEM2DI_BLOCK, build->grid.count); i++) {
-            dem2di_key *to[2];
-            int found[2] = {0, 0};
-            to[0] = build->keys + build->count[DEM2DI_DISCS][i];
-            to[1] = build->keys + build->total[DEM2DI_DISCS] + build->count[DEM2DI_OTHERS][i];
-            dem2di_grid_partners(&build->grid, i, to, found);
+            dem2di_finds finds;
+            finds.own = i;
+            finds.to[0] = build->keys + build->count[DEM2DI_DISCS][i];
+            finds.to[1] = build->keys + build->total[DEM2DI_DISCS] + build->count[DEM2DI_OTHERS][i];
+            dem2di_grid_partners(&build->grid, &finds);
             for (int kind = 0; kind < 2; kind++)
-                for (int k = 0; k < found[kind]; k++) {
-                    dem2di_key *key = &to[kind][k];
+                for (int k = 0; k < finds.count[kind]; k++) {
+                    dem2di_key *key = &finds.to[kind][k];
                     int a = key->a, b = key->b;
                     spread += a < b ? b - a : a - b;
                     bool turned = bodies[a].index > bodies[b].index;
@@ -9039,7 +9106,7 @@ static bool dem2di_build_cut(dem2di_build *build) {
         build->keys = (dem2di_key *)dem2di_cut(&cutter, total, sizeof *build->keys);
         build->touches = (dem2di_order *)dem2di_cut(&cutter, walls, sizeof *build->touches);
         build->spare = (dem2di_order *)dem2di_cut(&cutter, walls, sizeof *build->spare);
-        size_t step = (2 * total + 1) * sizeof *world->loads;
+        size_t step = 3 * (2 * total + 1) * sizeof *world->load_x;
         if (pass == 0 && !dem2di_scratch_reserve(world, cutter.used > step ? cutter.used : step))
             return false;
     }
@@ -9055,9 +9122,9 @@ static bool dem2di_build_search(dem2di_build *build) {
     build->grid.table = dem2di_grid_table(world->body_count);
     if (!dem2di_build_cut(build)) return false;
     dem2di_run(world, DEM2D_PHASE_LIST, blocks, dem2di_disc_task, build);
-    build->grid.largest = 0;
     for (int k = 0; k < blocks; k++)
-        build->grid.largest = dem2di_max(build->grid.largest, world->tallies[k].most);
+        build->grid.size = dem2di_max(build->grid.size, world->tallies[k].most * DEM2DI_CELL);
+    if (world->body_count > 0) build->grid.origin = world->now[0].x;
     dem2di_run(world, DEM2D_PHASE_LIST, blocks, dem2di_place_task, build);
     dem2di_run(world, DEM2D_PHASE_LIST, 1, dem2di_grid_task, build);
     dem2di_run(world, DEM2D_PHASE_LIST, blocks, dem2di_count_task, build);
@@ -9072,6 +9139,21 @@ static bool dem2di_build_search(dem2di_build *build) {
            dem2di_tallies_reserve(world, discs, (int)total);
 }
 
+/* Rotations for angles, or the other way, when the first particle that is no circle comes, or the
+   last one is gone. */
+static void dem2di_reorient(dem2d_world *world, bool turns) {
+    dem2di_state *states[2];
+    states[0] = world->before;
+    states[1] = world->now;
+    for (int k = 0; k < 2; k++)
+        for (int i = 0; i < world->body_count; i++) {
+            dem2d_rot *q = &states[k][i].q;
+            double angle = turns ? q->c : dem2d_rot_angle(*q);
+            world->plan.turns = turns;
+            *q = dem2di_orientation(world, angle);
+        }
+}
+
 /* The found contacts become the list. */
 static void dem2di_build_finish(dem2di_build *build) {
     dem2d_world *world = build->world;
@@ -9080,12 +9162,16 @@ static void dem2di_build_finish(dem2di_build *build) {
     list->pairs = list->discs + build->total[DEM2DI_OTHERS];
     list->count = list->pairs + build->total[DEM2DI_TOUCHES];
     if (list->count > 0) memcpy(list->keys, build->keys, (size_t)list->count * sizeof *list->keys);
-    world->loads = (dem2di_load *)(void *)world->scratch;
-    memset(world->loads, 0, (2 * (size_t)list->count + 1) * sizeof *world->loads);
+    size_t loads = 2 * (size_t)list->count + 1;
+    world->load_x = (double *)(void *)world->scratch;
+    world->load_y = world->load_x + loads;
+    world->load_turn = world->load_y + loads;
+    memset(world->load_x, 0, 3 * loads * sizeof *world->load_x);
+    if (world->plan.turns != build->plan.turns) dem2di_reorient(world, build->plan.turns);
     world->plan = build->plan;
     dem2di_swap_contacts(list);
     dem2di_incident_make(world);
-    if (world->plan.travels)
+    if (world->plan.turns)
         dem2di_run(world, DEM2D_PHASE_LIST, dem2di_blocks(world->body_count, DEM2DI_BLOCK),
                    dem2di_travel_task, world);
     world->bounded = dem2di_bounded(world);
@@ -9123,7 +9209,7 @@ static dem2d_result dem2di_build_list(dem2d_world *world) {
     if (room) {
         dem2di_tune_skin(world);
         build.plan = dem2di_plan_make(world);
-        room = !build.plan.travels ||
+        room = !build.plan.turns ||
                dem2di_group_reserve(world, DEM2DI_TRAVELS, world->body_count, false);
         for (int i = 0; i < world->body_count; i++)
             largest = dem2di_max(largest, world->now[i].radius);
@@ -9147,57 +9233,136 @@ static dem2d_result dem2di_build_list(dem2d_world *world) {
    uses: config, math, memory, support, shapes, minimum, faces, contact, law, motion, world, list
    ============================================================================================ */
 
-/* Circles, in closed form and without a branch but for what the scene has: the force is 0 where
-   they are apart, and with it the limit of the tangential spring. */
-static DEM2DI_INLINE void dem2di_disc_range(const dem2d_world *world, int begin, int end,
-                                            bool friction, bool spin, bool one_law,
-                                            dem2di_count *count) {
-    const dem2di_key *keys = world->list.keys;
-    const dem2di_state *now = world->now;
-    const double *shears = world->list.shear;
-    double *next_shears = world->list.next_shear, time_step = world->time_step;
-    dem2di_load *loads = world->loads;
-    dem2d_pair_desc law = {0, 0, 0};
-    int open = 0;
-    if (begin < end) law = *dem2di_law_of(world, begin);
-    for (int i = begin; i < end; i++) {
-        const dem2di_state *a = &now[keys[i].a], *b = &now[keys[i].b];
-        if (!one_law) law = *dem2di_law_of(world, i);
-        dem2di_round round = dem2di_round_make(a, b, law.normal_stiffness);
-        double shear = 0;
-        open += round.depth > 0;
-        if (friction) {
-            double slip = dem2di_cross(round.normal, dem2di_sub(b->v, a->v)) -
-                          (round.arm_a * a->w + round.arm_b * b->w);
-            double limit = law.friction * round.force;
-            shear = shears[i] - law.tangential_stiffness * slip * time_step;
-            shear = dem2di_max(-limit, dem2di_min(limit, shear));
-            next_shears[i] = shear;
+/* Contacts of circles are taken in batches: what they need is fetched, all are computed by a loop
+   that compilers turn into vector instructions, and the forces are put where they belong. There is
+   no branch but for what the scene has: the force is 0 where two are apart, and with it the limit
+   of the tangential spring. */
+#define DEM2DI_BATCH 32 /* 2 to 3 kB of arrays, little of the innermost cache */
+
+typedef struct dem2di_batch {
+    double dx[DEM2DI_BATCH], dy[DEM2DI_BATCH]; /* from A to B */
+    double radius_a[DEM2DI_BATCH], radius_b[DEM2DI_BATCH];
+    double vx[DEM2DI_BATCH], vy[DEM2DI_BATCH]; /* of B against A */
+    double wa[DEM2DI_BATCH], wb[DEM2DI_BATCH];
+    double shear[DEM2DI_BATCH], depth[DEM2DI_BATCH];
+    double fx[DEM2DI_BATCH], fy[DEM2DI_BATCH]; /* on B */
+    double ta[DEM2DI_BATCH], tb[DEM2DI_BATCH];
+    double kn[DEM2DI_BATCH], kt[DEM2DI_BATCH], mu[DEM2DI_BATCH];
+} dem2di_batch;
+
+static DEM2DI_INLINE void dem2di_batch_fetch(const dem2d_world *world, int first, int count,
+                                             bool friction, bool laws, dem2di_batch *batch) {
+    const dem2di_key *keys = world->list.keys + first;
+    for (int k = 0; k < count; k++) {
+        const dem2di_state *a = &world->now[keys[k].a], *b = &world->now[keys[k].b];
+        dem2d_vec d = dem2di_disc_line(a, b);
+        batch->dx[k] = d.x;
+        batch->dy[k] = d.y;
+        batch->radius_a[k] = a->radius;
+        batch->radius_b[k] = b->radius;
+        if (laws) {
+            const dem2d_pair_desc *law = dem2di_law_of(world, first + k);
+            batch->kn[k] = law->normal_stiffness;
+            batch->kt[k] = law->tangential_stiffness;
+            batch->mu[k] = law->friction;
         }
-        dem2d_vec force = dem2di_scale(round.normal, round.force);
-        if (friction) force = dem2di_along(force, shear, dem2di_perp(round.normal));
-        loads[2 * i].force = dem2di_negate(force);
-        loads[2 * i + 1].force = force;
-        if (!spin) continue;
-        loads[2 * i].torque = friction ? -(round.arm_a * shear) : 0;
-        loads[2 * i + 1].torque = friction ? -(round.arm_b * shear) : 0;
+        if (!friction) continue;
+        batch->vx[k] = b->v.x - a->v.x;
+        batch->vy[k] = b->v.y - a->v.y;
+        batch->wa[k] = a->w;
+        batch->wb[k] = b->w;
+        batch->shear[k] = world->list.shear[first + k];
     }
-    count->looks += open;
-    count->proofs[DEM2D_BY_FORM] += open;
 }
 
-static void dem2di_disc_block(const dem2d_world *world, int begin, int end, dem2di_count *count) {
-    const dem2di_plan *plan = &world->plan;
+DEM2DI_VECTORS_BEGIN
+/* [F] eq. 8-10 for all of a batch. */
+static DEM2DI_INLINE void dem2di_batch_loop(dem2di_batch *batch, int count, double time_step,
+                                            const dem2d_pair_desc *law, bool friction,
+                                            bool one_law) {
+    for (int k = 0; k < count; k++) {
+        double kn = one_law ? law->normal_stiffness : batch->kn[k];
+        double kt = one_law ? law->tangential_stiffness : batch->kt[k];
+        double mu = one_law ? law->friction : batch->mu[k];
+        dem2d_vec d;
+        d.x = batch->dx[k];
+        d.y = batch->dy[k];
+        dem2di_round r = dem2di_round_make(d, batch->radius_a[k], batch->radius_b[k], kn);
+        batch->depth[k] = r.depth;
+        batch->fx[k] = r.normal.x * r.force;
+        batch->fy[k] = r.normal.y * r.force;
+        if (!friction) continue;
+        double slip = r.normal.x * batch->vy[k] - r.normal.y * batch->vx[k] -
+                      (r.arm_a * batch->wa[k] + r.arm_b * batch->wb[k]);
+        double limit = mu * r.force, spring = batch->shear[k] - kt * slip * time_step;
+        spring = limit < spring ? limit : spring;
+        spring = -limit > spring ? -limit : spring;
+        batch->shear[k] = spring;
+        batch->fx[k] -= r.normal.y * spring;
+        batch->fy[k] += r.normal.x * spring;
+        batch->ta[k] = -(r.arm_a * spring);
+        batch->tb[k] = -(r.arm_b * spring);
+    }
+}
+
+/* The loop for what the scene has. */
+static void dem2di_batch_solve(dem2di_batch *batch, int count, double time_step,
+                               const dem2d_pair_desc *law, const dem2di_plan *plan) {
     if (plan->friction && plan->one_law)
-        dem2di_disc_range(world, begin, end, true, true, true, count);
+        dem2di_batch_loop(batch, count, time_step, law, true, true);
     else if (plan->friction)
-        dem2di_disc_range(world, begin, end, true, true, false, count);
-    else if (plan->spin)
-        dem2di_disc_range(world, begin, end, false, true, false, count);
+        dem2di_batch_loop(batch, count, time_step, law, true, false);
     else if (plan->one_law)
-        dem2di_disc_range(world, begin, end, false, false, true, count);
+        dem2di_batch_loop(batch, count, time_step, law, false, true);
     else
-        dem2di_disc_range(world, begin, end, false, false, false, count);
+        dem2di_batch_loop(batch, count, time_step, law, false, false);
+}
+DEM2DI_VECTORS_END
+
+/* Loads on A and B by turns. Returns how many are closed. */
+static DEM2DI_INLINE int dem2di_batch_put(const dem2d_world *world, int first, int count,
+                                          bool friction, bool spin, const dem2di_batch *batch) {
+    double *x = world->load_x + 2 * first, *y = world->load_y + 2 * first;
+    double *turn = world->load_turn + 2 * first;
+    int closed = 0;
+    for (int k = 0; k < count; k++) {
+        closed += batch->depth[k] > 0;
+        x[2 * k] = -batch->fx[k];
+        x[2 * k + 1] = batch->fx[k];
+        y[2 * k] = -batch->fy[k];
+        y[2 * k + 1] = batch->fy[k];
+        if (friction) world->list.next_shear[first + k] = batch->shear[k];
+        if (!spin) continue;
+        turn[2 * k] = friction ? batch->ta[k] : 0;
+        turn[2 * k + 1] = friction ? batch->tb[k] : 0;
+    }
+    return closed;
+}
+
+static DEM2DI_INLINE int dem2di_disc_batch(const dem2d_world *world, int first, int count,
+                                           bool friction, bool spin, bool one_law) {
+    dem2di_batch batch;
+    dem2di_batch_fetch(world, first, count, friction, !one_law, &batch);
+    dem2di_batch_solve(&batch, count, world->time_step, dem2di_law_of(world, first), &world->plan);
+    return dem2di_batch_put(world, first, count, friction, spin, &batch);
+}
+
+static void dem2di_disc_range(const dem2d_world *world, int begin, int end, dem2di_count *count) {
+    const dem2di_plan *plan = &world->plan;
+    int closed = 0;
+    for (int first = begin; first < end; first += DEM2DI_BATCH) {
+        int n = dem2di_block_end(first, DEM2DI_BATCH, end) - first;
+        if (plan->friction && plan->one_law)
+            closed += dem2di_disc_batch(world, first, n, true, true, true);
+        else if (plan->friction)
+            closed += dem2di_disc_batch(world, first, n, true, true, false);
+        else if (plan->spin)
+            closed += dem2di_disc_batch(world, first, n, false, true, plan->one_law);
+        else
+            closed += dem2di_disc_batch(world, first, n, false, false, plan->one_law);
+    }
+    count->looks += closed;
+    count->proofs[DEM2D_BY_FORM] += closed;
 }
 
 /* A pair found apart by a gap (m) stays so until its particles have travelled as far together. */
@@ -9367,15 +9532,25 @@ static void dem2di_area_apply(const dem2d_world *world, int i, int b, dem2d_vec 
     dem2di_area_load(world, law, a, b, overlap, corners, link);
 }
 
-/* Nothing acts. */
-static void dem2di_no_loads(dem2di_load loads[2]) {
-    memset(loads, 0, 2 * sizeof *loads);
+static inline void dem2di_load_set(const dem2d_world *world, int at, dem2di_load load) {
+    world->load_x[at] = load.force.x;
+    world->load_y[at] = load.force.y;
+    world->load_turn[at] = load.torque;
 }
 
-static void dem2di_set_loads(const dem2d_world *world, int i, dem2d_vec arm_b,
-                             dem2di_count *count) {
-    dem2di_load *loads = &world->loads[2 * i];
+/* Nothing acts. */
+static void dem2di_no_loads(const dem2d_world *world, int i) {
+    dem2di_load none = {{0, 0}, 0};
+    dem2di_load_set(world, 2 * i, none);
+    dem2di_load_set(world, 2 * i + 1, none);
+}
+
+static inline void dem2di_set_loads(const dem2d_world *world, int i, dem2d_vec arm_b,
+                                    dem2di_count *count) {
+    dem2di_load loads[2];
     dem2di_link_loads(&world->list.next_links[i - world->list.discs], arm_b, loads);
+    dem2di_load_set(world, 2 * i, loads[0]);
+    dem2di_load_set(world, 2 * i + 1, loads[1]);
     double sum = loads[1].force.x + loads[1].force.y + loads[0].torque + loads[1].torque;
     count->unsound += !dem2di_finite(sum);
 }
@@ -9399,7 +9574,7 @@ static void dem2di_pair_look(const dem2d_world *world, int i, dem2di_overlap *sc
     link->force = link->shear = 0;
     if (world->two_points) memset(&list->next_ends[at], 0, sizeof *list->next_ends);
     int found = dem2di_pair_geometry(world, a, b, last, link, points, count);
-    dem2di_no_loads(&world->loads[2 * i]);
+    dem2di_no_loads(world, i);
     if (!(link->depth > 0)) return;
     const dem2di_state *sa = &world->now[a], *sb = &world->now[b];
     const dem2d_pair_desc *law = dem2di_law_of(world, i);
@@ -9426,10 +9601,11 @@ static void dem2di_touch_look(const dem2d_world *world, int i, dem2di_overlap *s
     dem2d_contact_point points[2];
     dem2d_vec u = dem2di_negate(world->walls[j].desc.normal);
     dem2d_vec support = dem2di_scale(u, state->radius);
-    memset(link, 0, sizeof *link);
-    link->normal = u;
+    link->normal.x = u.x;
+    link->normal.y = u.y;
+    link->shear = 0;
     if (world->two_points) memset(&list->next_ends[at], 0, sizeof *list->next_ends);
-    dem2di_no_loads(&world->loads[2 * i]);
+    if (list->links[at].depth > 0) dem2di_no_loads(world, i);
     double surface = dem2di_dot(dem2di_sub(wall->point, state->x), u);
     link->depth = state->radius - surface;
     if (!(link->depth > 0)) return;
@@ -9439,12 +9615,14 @@ static void dem2di_touch_look(const dem2d_world *world, int i, dem2di_overlap *s
         count->calls++;
         if (!(link->depth > 0)) return;
     }
-    points[0].position = dem2di_along(support, -link->depth, u);
-    if (world->two_points)
+    link->point.x = support.x - link->depth * u.x;
+    link->point.y = support.y - link->depth * u.y;
+    if (world->two_points && shape->flat) {
         found = dem2di_wall_points(shape, state->q, body->scale, u, surface, support, link->depth,
                                    points);
+        dem2di_link_place(list, at, found, points);
+    }
     const dem2d_pair_desc *law = dem2di_law_of(world, i);
-    dem2di_link_place(list, at, found, points);
     if (world->faces == DEM2D_CONTACT_AREA)
         dem2di_area_apply(world, i, -1, dem2di_sub(wall->point, state->x), law, scratch);
     if (!(link->depth > 0)) return;
@@ -9464,7 +9642,7 @@ static void dem2di_contact_task(void *context, int begin, int end) {
         memset(count, 0, sizeof *count);
         if (block < discs) {
             int first = block * DEM2DI_BLOCK;
-            dem2di_disc_block(world, first, dem2di_block_end(first, DEM2DI_BLOCK, list->discs),
+            dem2di_disc_range(world, first, dem2di_block_end(first, DEM2DI_BLOCK, list->discs),
                               count);
             continue;
         }
@@ -9520,7 +9698,8 @@ static void dem2di_wall_sums(dem2d_world *world) {
         const dem2di_link *link = &list->next_links[i - list->discs];
         if (!(link->depth > 0)) continue;
         dem2di_wall_state *wall = &world->wall_next[list->keys[i].b];
-        wall->force = dem2di_add(wall->force, world->loads[2 * i + 1].force);
+        wall->force.x += world->load_x[2 * i + 1];
+        wall->force.y += world->load_y[2 * i + 1];
         double stiffness = dem2di_stiffness_of(world, dem2di_law_of(world, i), link);
         const dem2di_ends *ends = dem2di_ends_at(world, i, true);
         wall->stiffness += ends != NULL ? stiffness * dem2di_ends_weight(ends) : stiffness;
@@ -9569,24 +9748,21 @@ static bool dem2di_wall_pass(dem2d_world *world) {
     return stale;
 }
 
-static DEM2DI_INLINE void dem2di_load_add(dem2di_load *sum, const dem2di_load *load, bool spin) {
-    sum->force = dem2di_add(sum->force, load->force);
-    if (spin) sum->torque += load->torque;
+/* Sum of six numbers; the first of a particle's partners, in the order of their ids, by pairs. */
+static DEM2DI_INLINE double dem2di_gather_six(const double *from, const int *entry) {
+    return (from[entry[0]] + from[entry[1]]) +
+           ((from[entry[2]] + from[entry[3]]) + (from[entry[4]] + from[entry[5]]));
 }
 
-/* Sum of the contact forces on a particle, in the order of the partners' ids. */
+/* Sum of the contact forces on a particle. */
 static DEM2DI_INLINE dem2di_load dem2di_gather(const dem2d_world *world, int slot, bool spin) {
     const int *entry = world->list.incident + world->list.first[slot];
     const int *end = world->list.incident + world->list.first[slot + 1];
-    const dem2di_load *loads = world->loads;
     dem2di_load sum = {{0, 0}, 0};
     for (; entry < end; entry += DEM2DI_GATHER) {
-        dem2di_load_add(&sum, &loads[entry[0]], spin);
-        dem2di_load_add(&sum, &loads[entry[1]], spin);
-        dem2di_load_add(&sum, &loads[entry[2]], spin);
-        dem2di_load_add(&sum, &loads[entry[3]], spin);
-        dem2di_load_add(&sum, &loads[entry[4]], spin);
-        dem2di_load_add(&sum, &loads[entry[5]], spin);
+        sum.force.x += dem2di_gather_six(world->load_x, entry);
+        sum.force.y += dem2di_gather_six(world->load_y, entry);
+        if (spin) sum.torque += dem2di_gather_six(world->load_turn, entry);
     }
     return sum;
 }
@@ -9594,7 +9770,7 @@ static DEM2DI_INLINE dem2di_load dem2di_gather(const dem2d_world *world, int slo
 /* A particle a step later. */
 static DEM2DI_INLINE dem2di_state dem2di_next_state(const dem2d_world *world, int slot,
                                                     const dem2di_damping *damping, bool heavy,
-                                                    bool damped, bool spin) {
+                                                    bool damped, bool spin, bool turns) {
     const double time_step = world->time_step;
     const dem2di_inverse *inverse = &world->inverse[slot];
     dem2di_state next = world->now[slot];
@@ -9613,20 +9789,21 @@ static DEM2DI_INLINE dem2di_state dem2di_next_state(const dem2d_world *world, in
         }
     }
     next.x = dem2di_along(next.x, time_step, next.v);
-    if (spin) next.q = dem2di_rotate(next.q, next.w * time_step);
+    if (spin && turns) next.q = dem2di_rotate(next.q, next.w * time_step);
+    if (spin && !turns) next.q.c = dem2di_turned(next.q.c, next.w * time_step);
     return next;
 }
 
 /* New velocities and positions of the particles from begin to end, over the states of the last
    force pass. Returns the greatest square of speed over skin. */
 static DEM2DI_INLINE double dem2di_motion_range(const dem2d_world *world, int begin, int end,
-                                                bool heavy, bool damped, bool spin, bool travels) {
+                                                bool heavy, bool damped, bool spin, bool turns) {
     dem2di_damping damping =
         dem2di_damping_make(world->local_damping, world->global_damping, world->time_step);
     double most = 0;
     for (int i = begin; i < end; i++) {
-        dem2di_state next = dem2di_next_state(world, i, &damping, heavy, damped, spin);
-        if (travels)
+        dem2di_state next = dem2di_next_state(world, i, &damping, heavy, damped, spin, turns);
+        if (turns)
             world->next_travel[i] =
                 dem2di_travel(&next, world->lever[i], world->time_step, world->travel[i]);
         world->before[i] = next;
@@ -9638,12 +9815,12 @@ static DEM2DI_INLINE double dem2di_motion_range(const dem2d_world *world, int be
 /* The loop for what the scene has. */
 static double dem2di_motion_block(const dem2d_world *w, int b, int e) {
     const dem2di_plan *p = &w->plan;
-#define DEM2DI_MOTION(spin, travels)                                                    \
-    (p->heavy    ? p->damped ? dem2di_motion_range(w, b, e, true, true, spin, travels)  \
-                             : dem2di_motion_range(w, b, e, true, false, spin, travels) \
-        : p->damped ? dem2di_motion_range(w, b, e, false, true, spin, travels)          \
-                 : dem2di_motion_range(w, b, e, false, false, spin, travels))
-    if (p->travels) return DEM2DI_MOTION(true, true);
+#define DEM2DI_MOTION(spin, turns)                                                    \
+    (p->heavy    ? p->damped ? dem2di_motion_range(w, b, e, true, true, spin, turns)  \
+                             : dem2di_motion_range(w, b, e, true, false, spin, turns) \
+        : p->damped ? dem2di_motion_range(w, b, e, false, true, spin, turns)          \
+                 : dem2di_motion_range(w, b, e, false, false, spin, turns))
+    if (p->turns) return DEM2DI_MOTION(true, true);
     if (p->spin) return DEM2DI_MOTION(true, false);
     return DEM2DI_MOTION(false, false);
 #undef DEM2DI_MOTION
@@ -9675,7 +9852,8 @@ static int dem2di_unsound(const dem2d_world *world) {
     dem2di_damping damping =
         dem2di_damping_make(world->local_damping, world->global_damping, world->time_step);
     for (int i = 0; i < world->body_count; i++) {
-        dem2di_state next = dem2di_next_state(world, i, &damping, true, true, true);
+        dem2di_state next =
+            dem2di_next_state(world, i, &damping, true, true, true, world->plan.turns);
         if (!dem2di_state_finite(&next)) return i;
     }
     return -1;
@@ -9735,16 +9913,45 @@ static void dem2di_stiffest_meet(const dem2d_world *world, dem2di_stiffest *so_f
     so_far->at[bound] = slot;
 }
 
+/* kn + kt of any two materials; by area the stiffness depends on the overlap. */
+static double dem2di_greatest_stiffness(const dem2d_world *world) {
+    double greatest = 0;
+    for (int a = 0; a < world->material_count; a++)
+        for (int b = 0; b < world->material_count; b++) {
+            const dem2d_pair_desc *law = dem2di_law(world, a, b);
+            greatest = dem2di_max(greatest, law->normal_stiffness + law->tangential_stiffness);
+        }
+    return world->faces == DEM2D_CONTACT_AREA ? HUGE_VAL : greatest;
+}
+
+/* No eigenvalue of a particle is above the sum of the traces of its contacts, each of which is at
+   most 2 (kn + kt) (1/m + R^2/I) with one point within its circle, twice that with two. Walls may
+   reach deeper. */
+static bool dem2di_surely_soft(const dem2d_world *world, int slot, double stiffness,
+                               double enough) {
+    const dem2di_list *list = &world->list;
+    int begin = list->first[slot], end = list->first[slot + 1], contacts = 0;
+    double radius = world->now[slot].radius;
+    for (; begin < end && list->incident[begin] / 2 < list->pairs; begin++) contacts++;
+    if (begin < end && list->incident[begin] / 2 < list->count) return false;
+    double each = 2 * stiffness * (world->two_points ? 2 : 1);
+    return contacts * each *
+               (world->inverse[slot].mass + radius * radius * world->inverse[slot].inertia) <=
+           enough;
+}
+
 /* Over free particles; with `loose` those without a contact count for the safe bound as if they had
    one with their own kind. Eigenvalues below `enough` need not be known: their sum bounds them. */
 static void dem2di_stiffest_range(const dem2d_world *world, int begin, int end, bool next,
                                   bool loose, double enough, dem2di_stiffest *stiffest) {
     stiffest->value[0] = stiffest->value[1] = 0;
     stiffest->at[0] = stiffest->at[1] = -1;
+    double stiffness = enough > 0 ? dem2di_greatest_stiffness(world) : 0;
     for (int i = begin; i < end; i++) {
         const dem2di_body *body = &world->bodies[i];
         dem2di_stiffness sum[2];
         if (body->shape_index < 0 || body->motion != DEM2D_FREE) continue;
+        if (enough > 0 && dem2di_surely_soft(world, i, stiffness, enough)) continue;
         dem2di_stiffness_sum(world, i, next, sum);
         double mass = dem2di_body_mass(world, body), inertia = dem2di_body_inertia(world, body);
         for (int bound = 0; bound < 2; bound++) {
