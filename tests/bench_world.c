@@ -6,24 +6,28 @@
    time against error by dt, order (of Fourier series) and skin. --most leaves out larger scenes.
 
    Scenes. Circles of equal area have diameters uniform in 0.04 to 0.06 m; density 2700, kn = kt =
-   1e7 N/m, friction 0.2, time step 1e-4 s. Settled: a box N / 500 m wide; grains are laid in rows,
-   a bounding circle from each other, and fall for 0.7 s under gravity 9.8 with local damping 0.3
-   (an eighth of that with 0.9 first and last); what is timed goes on with 0.3. Biaxial: a settled
-   bed without gravity between smooth walls, squeezed by servo walls to 100 kPa, then timed while
-   the top comes down at a tenth of its height per second, local damping 0.7 as in the papers.
-   Above a few thousand grains the bed is made of copies of a smaller one, side by side (biaxial:
-   in columns and rows), which adapt to each other for some hundred steps with damping 0.7 before
-   the clock starts; they are added row by row across all copies, so neighbours are not together.
-   Friction starts from nothing in a copy, and in what LAMMPS gets.
+   1e7 N/m, friction 0.2, time step 1e-4 s, an own scale for each grain and 32 templates a model.
+   Settled: a box N / 500 m wide; grains are laid in rows, bounding circle by bounding circle, and
+   fall under gravity 9.8, 7,000 steps with local damping 0.3 and 9,000 (--quick: 5,000) with 0.7.
+   What is timed goes on with 0.3. Biaxial: a settled bed without weight between smooth walls,
+   squeezed by servo walls to 100 kPa; timed while the top comes down at 0.1 m/s, local damping 0.7
+   throughout, as in the papers.
+
+   Up to 5,000 grains (--quick: 500) a bed is made so in full. Larger ones are mirrored copies of
+   it, side by side, biaxial ones in columns and rows. They are added row by row across all copies:
+   neighbours are not together in memory unless the library puts them there. All beds adapt, with
+   damping 0.7, before the clock starts: 1,000 steps, 300 above 20,000 grains and with --quick, 100
+   above 200,000. Friction starts from nothing then, as it does in LAMMPS. How far from rest a bed
+   is at the end says its root mean square speed.
 
    Figures are medians over batches of steps; batches of one thread, two threads and LAMMPS take
    turns. Phases are clocked in a run of their own. After the same steps one and two threads must
    have the same bits.
 
    LAMMPS, if `lmp` is installed: the same settled beds in gran/hooke/history and, as polygons
-   shrunk by a tenth and rounded by as much, body/rounded/polygon; 2D, one process, wall friction as
-   between grains; the skin is the fastest of four. Dashpots stand there for local damping. Its
-   figure is the "Loop time", which leaves out the list that each run starts with.
+   shrunk by a tenth and rounded by as much, in body/rounded/polygon; 2D, one process; the skin is
+   the fastest of four. Dashpots stand there for local damping. Its figure is the "Loop time", which
+   leaves out the list that each run starts with; settled beds need no other, here or there.
 
    Writes world.csv, dt.csv, order.csv, skin.csv and, where gnuplot is installed, pictures of them
    to OUTDIR, build/bench_world by default. Exit status: 0, 1 if bits differed, 2 if something
@@ -54,7 +58,8 @@
 #define DENSITY 2700   /* kg/m2 */
 #define STIFFNESS 1e7  /* N/m, both */
 #define FRICTION 0.2
-#define STRESS 1e5 /* Pa, biaxial */
+#define STRESS 1e5    /* Pa, biaxial */
+#define TOP_SPEED 0.1 /* m/s, biaxial */
 #define ARCS 10
 #define ORDER 8
 #define MOST_CORNERS 7
@@ -376,12 +381,28 @@ static void control_walls(run *r) {
     }
 }
 
-/* From now on the top comes down. */
+static dem2d_particle_info get_particle(const run *r, int i) {
+    dem2d_particle_info info;
+    memset(&info, 0, sizeof info);
+    check(dem2d_world_get_particle(r->world, r->ids[i], &info), "particle");
+    return info;
+}
+
+/* From now on the top comes down, and the grains below it in proportion: else only its neighbours
+   would move at first in a large bed. */
 static void compress(run *r) {
     dem2d_wall_desc wall = wall_desc(r, TOP, wall_place(r, TOP));
+    const double height = wall.point.y - r->bed->bottom;
     wall.mode = DEM2D_WALL_MOVING;
-    wall.velocity.y = -0.1 * (wall.point.y - r->bed->bottom);
+    wall.velocity.y = -TOP_SPEED;
     check(dem2d_world_set_wall(r->world, r->walls[TOP], &wall), "wall");
+    for (int i = 0; i < r->bed->count; i++) {
+        const dem2d_particle_info now = get_particle(r, i);
+        dem2d_vec v = now.velocity;
+        v.y -= TOP_SPEED * (now.pose.position.y - r->bed->bottom) / height;
+        check(dem2d_world_drive_particle(r->world, r->ids[i], DEM2D_FREE, v, now.angular_velocity),
+              "velocity");
+    }
 }
 
 static run open_run(const bed *b, const setup *s) {
@@ -414,13 +435,6 @@ static double take_steps(run *r, int count) {
 
 static void damp(run *r, double local) {
     check(dem2d_world_set_damping(r->world, local, 0), "damping");
-}
-
-static dem2d_particle_info get_particle(const run *r, int i) {
-    dem2d_particle_info info;
-    memset(&info, 0, sizeof info);
-    check(dem2d_world_get_particle(r->world, r->ids[i], &info), "particle");
-    return info;
 }
 
 /* Where the grains are now; walls too. */
@@ -476,13 +490,13 @@ static int tile_size(void) {
 }
 
 static bed settle(bed b) {
-    enum { FALL = 7000, REST = 3000 };
+    const int fall = 7000, rest = opt.quick ? 5000 : 9000;
     const setup s = plain_setup(SETTLED, 0.3);
     lay_rows(&b);
     run r = open_run(&b, &s);
-    take_steps(&r, FALL);
+    take_steps(&r, fall);
     damp(&r, 0.7);
-    take_steps(&r, REST);
+    take_steps(&r, rest);
     const bed settled = save_bed(&r, SETTLED);
     close_run(&r);
     free(b.grains);
@@ -953,38 +967,62 @@ static void count_things(bench *b) {
 }
 
 static void print_head(FILE *csv) {
-    printf("%-8s %-8s %8s | %7s %-15s | %7s %6s %-9s | %5s %5s %5s %5s | %5s %8s %6s %7s | %s\n",
-           "scene", "test", "N", "ns", "(min-max)", "2 thr.", "ratio", "bits", "list%", "cont%",
-           "move%", "rest%", "c/N", "Mcont./s", "B/N", "mm/s", "LAMMPS ns (min-max), skin, ratio");
-    fprintf(csv,
-            "scene,test,particles,batch_steps,ns,ns_min,ns_max,ns_2,ns_2_min,ns_2_max,same_bits,"
-            "share_list,share_contacts,share_motion,share_rest,contacts_per_particle,"
-            "contacts_per_second,bytes_per_particle,rms_speed_mm_per_s,lammps_ns,"
-            "lammps_min,lammps_max,lammps_skin_m\n");
+    printf("ns per particle-step: median (min-max) of %d batches\n", BATCHES);
+    printf("%-8s %-7s %8s | %7s %-12s | %9s %-12s %5s %-9s | %s\n", "scene", "test", "N", "ns",
+           "(min-max)", "2 threads", "(min-max)", "times", "bits", "LAMMPS (min-max), skin, times");
+    fprintf(csv, "scene,test,particles,batch_steps,ns,ns_min,ns_max,ns_2,ns_2_min,ns_2_max,");
+    fprintf(csv, "same_bits,share_list,share_contacts,share_motion,share_rest,");
+    fprintf(csv, "contacts_per_particle,contacts_per_second,bytes_per_particle,");
+    fprintf(csv, "rms_speed_mm_per_s,lammps_ns,lammps_min,lammps_max,lammps_skin_m\n");
 }
 
-static void print_row(FILE *csv, const row *r) {
-    char range[32];
-    snprintf(range, sizeof range, "(%.0f-%.0f)", r->one.low, r->one.high);
-    printf("%-8s %-8s %8d | %7.1f %-15s | %7.1f %6.2f %-9s | %5.1f %5.1f %5.1f %5.1f | %5.2f %8.2f "
-           "%6.0f %7.2f |",
-           part_names[r->scene], test_names[r->test], r->count, r->one.median, range, r->two.median,
-           r->one.median / r->two.median, r->same ? "same bits" : "DIFFER", 100 * r->share[0],
-           100 * r->share[1], 100 * r->share[2], 100 * r->rest, r->contacts, 1e-6 * r->rate,
-           r->bytes, r->speed);
+static const char *range_text(const figure *f, char *text, size_t size) {
+    snprintf(text, size, "(%.0f-%.0f)", f->low, f->high);
+    return text;
+}
+
+static void print_row(const row *r) {
+    char one[32], two[32], lammps[32];
+    printf("%-8s %-7s %8d | %7.1f %-12s | %9.1f %-12s %5.2f %-9s |", part_names[r->scene],
+           test_names[r->test], r->count, r->one.median, range_text(&r->one, one, sizeof one),
+           r->two.median, range_text(&r->two, two, sizeof two), r->one.median / r->two.median,
+           r->same ? "same bits" : "DIFFER");
     if (!isnan(r->lammps.median))
-        printf(" %.0f (%.0f-%.0f), %g mm, %.2f", r->lammps.median, r->lammps.low, r->lammps.high,
-               1000 * r->lammps_skin, r->lammps.median / r->one.median);
+        printf(" %.1f %s, %g mm, %.2f", r->lammps.median,
+               range_text(&r->lammps, lammps, sizeof lammps), 1000 * r->lammps_skin,
+               r->lammps.median / r->one.median);
     printf("\n");
-    fprintf(csv,
-            "%s,%s,%d,%d,%.6g,%.6g,%.6g,%.6g,%.6g,%.6g,%d,%.4f,%.4f,%.4f,%.4f,%.4f,%.6g,%.6g,"
-            "%.6g,%.6g,%.6g,%.6g,%g\n",
-            part_names[r->scene], test_names[r->test], r->count, r->steps, r->one.median,
-            r->one.low, r->one.high, r->two.median, r->two.low, r->two.high, r->same, r->share[0],
-            r->share[1], r->share[2], r->rest, r->contacts, r->rate, r->bytes, r->speed,
-            r->lammps.median, r->lammps.low, r->lammps.high, r->lammps_skin);
     fflush(stdout);
+}
+
+static void write_row(FILE *csv, const row *r) {
+    fprintf(csv, "%s,%s,%d,%d,%.6g,%.6g,%.6g,%.6g,%.6g,%.6g,%d", part_names[r->scene],
+            test_names[r->test], r->count, r->steps, r->one.median, r->one.low, r->one.high,
+            r->two.median, r->two.low, r->two.high, r->same);
+    for (int i = 0; i < DEM2D_PHASE_COUNT; i++) fprintf(csv, ",%.4f", r->share[i]);
+    fprintf(csv, ",%.4f,%.4f,%.6g,%.6g,%.6g,", r->rest, r->contacts, r->rate, r->bytes, r->speed);
+    if (isnan(r->lammps.median))
+        fprintf(csv, ",,,\n");
+    else
+        fprintf(csv, "%.6g,%.6g,%.6g,%g\n", r->lammps.median, r->lammps.low, r->lammps.high,
+                r->lammps_skin);
     fflush(csv);
+}
+
+static void print_phases(void) {
+    printf(
+        "\nShares of a step in %%; contacts, walls included; bytes; root mean square speed at the "
+        "end\n");
+    printf("%-8s %-7s %8s | %5s %8s %6s %5s | %10s %9s | %7s | %7s\n", "scene", "test", "N", "list",
+           "contacts", "motion", "rest", "contacts/N", "million/s", "bytes/N", "mm/s");
+    for (int i = 0; i < row_count; i++) {
+        const row *r = &rows[i];
+        printf("%-8s %-7s %8d | %5.1f %8.1f %6.1f %5.1f | %10.2f %9.2f | %7.0f | %7.2f\n",
+               part_names[r->scene], test_names[r->test], r->count,
+               100 * r->share[DEM2D_PHASE_LIST], 100 * r->share[DEM2D_PHASE_CONTACTS],
+               100 * r->share[DEM2D_PHASE_MOTION], 100 * r->rest, r->contacts, 1e-6 * r->rate,
+               r->bytes, r->speed);
+    }
 }
 
 static void measure(int scene, int test, int count, FILE *csv) {
@@ -1002,7 +1040,8 @@ static void measure(int scene, int test, int count, FILE *csv) {
     clock_phases(&b);
     free(start.grains);
     free(b.adapted.grains);
-    print_row(csv, b.row);
+    print_row(b.row);
+    write_row(csv, b.row);
 }
 
 /* The sizes asked for, and those LAMMPS is compared at. */
@@ -1023,6 +1062,7 @@ static void measure_scenes(void) {
             for (int i = 0; i < COUNT_OF(sizes); i++)
                 if (has_size(scene, test, sizes[i])) measure(scene, test, sizes[i], csv);
     fclose(csv);
+    print_phases();
 }
 
 /* --- time against error: dt ------------------------------------------------------------------- */
@@ -1033,6 +1073,8 @@ typedef struct dt_row {
     double dt, error,
         cost; /* error: of positions, over R; cost: microseconds per grain and second */
 } dt_row;
+
+#define IMPACT 0.08 /* s: both impacts are over, none has come again */
 
 static dt_row dt_rows[MODELS][STEPS_SIZES];
 
@@ -1067,17 +1109,16 @@ static bed impact_bed(int model) {
     return b;
 }
 
-/* Positions after 0.2 s; the least time of some runs. */
+/* Positions at the end; the least time of some runs. */
 static double run_impacts(const bed *b, double dt, int repeats, dem2d_vec *places) {
-    const double duration = 0.2;
     double least = HUGE_VAL;
     for (int k = 0; k < repeats; k++) {
         run r = open_impacts(b, dt);
-        least = fmin(least, take_steps(&r, (int)(duration / dt + 0.5)));
+        least = fmin(least, take_steps(&r, (int)(IMPACT / dt + 0.5)));
         for (int i = 0; i < DT_GRAINS; i++) places[i] = get_particle(&r, i).pose.position;
         close_run(&r);
     }
-    return 1e6 * least / duration / DT_GRAINS;
+    return 1e6 * least / IMPACT / DT_GRAINS;
 }
 
 static void measure_dt_of(int model, FILE *csv) {
@@ -1100,8 +1141,9 @@ static void measure_dt_of(int model, FILE *csv) {
 
 static void measure_dt(void) {
     FILE *csv = create("dt.csv");
-    printf("\nTime step: a fall on the floor, two grains that meet; error of positions after 0.2 s "
-           "over R,\nagainst a sixteenth of the least step; microseconds per grain and second\n");
+    printf(
+        "\nTime step: a fall on the floor, two grains that meet; error of positions after 0.08 s "
+        "over R,\nagainst a sixteenth of the least step; microseconds per grain and second\n");
     printf("%-8s %10s %12s %12s\n", "model", "dt, s", "error", "cost");
     fprintf(csv, "model,dt_s,error_over_radius,microseconds_per_grain_second\n");
     for (int m = 0; m < MODELS; m++) measure_dt_of(m, csv);
@@ -1110,24 +1152,29 @@ static void measure_dt(void) {
 
 /* --- time against error: order of Fourier series ---------------------------------------------- */
 
-enum { ORIGINALS = 8, FULL_ORDER = 64 };
+enum { ORIGINALS = 8 };
 
-static const int fit_orders[] = {2, 3, 4, 6, 8, 12, 16, 24, 32, FULL_ORDER};
+static const int fit_orders[] = {2, 3, 4, 6, 8, 12, 16, 24, 32, 64};
 
 enum { ORDERS = COUNT_OF(fit_orders) };
 
 typedef struct order_row {
-    double error, hausdorff; /* 1 - coverage, mean; over R, greatest */
+    double error, hausdorff; /* 1 - coverage, mean; m, R about 0.9, greatest */
     figure ns;
 } order_row;
 
 static order_row order_rows[ORDERS];
 
+/* Corners on a circle, rounded by a seventh of it. */
 static dem2d_shape *make_original(void) {
-    double a[FULL_ORDER + 1], b[FULL_ORDER + 1];
+    const int count = 4 + (int)uniform(0, MOST_CORNERS - 3);
+    dem2d_vec points[MOST_CORNERS];
     dem2d_shape *shape;
-    draw_series(FULL_ORDER, 0.004, a, b);
-    check(dem2d_shape_create_fourier(NULL, a, b, FULL_ORDER, &shape), "series");
+    for (int i = 0; i < count; i++) {
+        const double angle = 2 * PI * (i + uniform(-0.25, 0.25)) / count;
+        points[i].x = 0.9 * cos(angle), points[i].y = 0.9 * sin(angle);
+    }
+    check(dem2d_shape_create_polygon(NULL, points, count, 0.15, &shape), "polygon");
     return shape;
 }
 
@@ -1148,7 +1195,7 @@ static void fit_originals(dem2d_shape *const *originals, int order, dem2d_shape 
         dem2d_fit_report report;
         fits[i] = fit(originals[i], order, &report);
         r->error += (1 - report.coverage) / ORIGINALS;
-        r->hausdorff = fmax(r->hausdorff, report.hausdorff); /* originals have R = 1 */
+        r->hausdorff = fmax(r->hausdorff, report.hausdorff);
     }
 }
 
@@ -1180,9 +1227,9 @@ static void time_orders(run *runs, bed *beds) {
 
 static void print_orders(void) {
     FILE *csv = create("order.csv");
-    printf("\nFourier series: %d grains of order %d and their fits; 500 of them settled\n"
+    printf("\nFourier series: fits to %d rounded polygons; 500 of them settled\n"
            "%5s %12s %12s %8s %s\n",
-           ORIGINALS, FULL_ORDER, "order", "1 - coverage", "Hausdorff/R", "ns", "(min-max)");
+           ORIGINALS, "order", "1 - coverage", "Hausdorff/R", "ns", "(min-max)");
     fprintf(csv, "order,one_less_coverage,hausdorff_over_radius,ns,ns_min,ns_max\n");
     for (int k = 0; k < ORDERS; k++) {
         const order_row *r = &order_rows[k];
@@ -1450,7 +1497,7 @@ static void draw_times(void) {
 static void draw_dt(void) {
     FILE *file = create_plot("dt", "Time step: each point half of the one before it, from 4e-4 s",
                              "microseconds per grain and simulated second",
-                             "error of position after 0.2 s / R");
+                             "error of position after 0.08 s / R");
     fprintf(file, "set logscale xy\nset format xy '10^{%%L}'\n");
     for (int m = 0; m < MODELS; m++) {
         fprintf(file, "$m%d << EOD\n", m);
@@ -1467,7 +1514,7 @@ static void draw_dt(void) {
 }
 
 static void draw_orders(void) {
-    FILE *file = create_plot("order", "Fourier series fitted to grains of order 64: by order",
+    FILE *file = create_plot("order", "Fourier series fitted to rounded polygons, by order",
                              "ns per particle-step, 500 settled grains", "error");
     fprintf(file, "set logscale y\nset format y '10^{%%L}'\n$o << EOD\n");
     for (int k = 0; k < ORDERS; k++)
