@@ -6,7 +6,7 @@
    time against error by dt, order (of Fourier series) and skin. --most leaves out larger scenes.
 
    Scenes. Circles of equal area have diameters uniform in 0.04 to 0.06 m; density 2700, kn = kt =
-   1e7 N/m, friction 0.2, time step 1e-4 s, an own scale for each grain and 32 templates a model.
+   1e7 N/m, friction 0.2, time step 1e-4 s, 32 templates a model, scaled.
    Settled: a box N / 500 m wide; grains are laid in rows, bounding circle by bounding circle, and
    fall under gravity 9.8, 7,000 steps with local damping 0.3 and 9,000 (--quick: 5,000) with 0.7.
    What is timed goes on with 0.3. Biaxial: a settled bed without weight between smooth walls,
@@ -21,13 +21,15 @@
    is at the end says its root mean square speed.
 
    Figures are medians over batches of steps; batches of one thread, two threads and LAMMPS take
-   turns. Phases are clocked in a run of their own. After the same steps one and two threads must
-   have the same bits.
+   turns. Those of one thread and of LAMMPS are time on a core, so that what else the machine does
+   hardly counts; two threads are compared with one by the clock, on an idle machine. Phases are
+   clocked in a run of their own. After the same steps one and two threads must have the same bits.
 
    LAMMPS, if `lmp` is installed: the same settled beds in gran/hooke/history and, as polygons
    shrunk by a tenth and rounded by as much, in body/rounded/polygon; 2D, one process; the skin is
-   the fastest of four. Dashpots stand there for local damping. Its figure is the "Loop time", which
-   leaves out the list that each run starts with; settled beds need no other, here or there.
+   the fastest of four. Dashpots stand there for local damping. Its figure is the "Loop time" times
+   the "CPU use", which leaves out the list that each run starts with; settled beds need no other,
+   here or there.
 
    Writes world.csv, dt.csv, order.csv, skin.csv and, where gnuplot is installed, pictures of them
    to OUTDIR, build/bench_world by default. Exit status: 0, 1 if bits differed, 2 if something
@@ -105,10 +107,19 @@ static FILE *create(const char *path) {
     return file;
 }
 
-static double seconds(void) {
+static double read_clock(clockid_t clock) {
     struct timespec now;
-    clock_gettime(CLOCK_MONOTONIC, &now);
+    clock_gettime(clock, &now);
     return (double)now.tv_sec + 1e-9 * (double)now.tv_nsec;
+}
+
+static double seconds(void) {
+    return read_clock(CLOCK_MONOTONIC);
+}
+
+/* On a core, of this thread. */
+static double busy_seconds(void) {
+    return read_clock(CLOCK_THREAD_CPUTIME_ID);
 }
 
 static uint64_t random_state;
@@ -426,11 +437,11 @@ static void close_run(run *r) {
     free(r->ids);
 }
 
-/* Returns seconds. */
+/* Returns seconds, of this thread on a core. */
 static double take_steps(run *r, int count) {
-    const double start = seconds();
+    const double start = busy_seconds();
     check(dem2d_world_step(r->world, count, NULL), "step");
-    return seconds() - start;
+    return busy_seconds() - start;
 }
 
 static void damp(run *r, double local) {
@@ -666,20 +677,20 @@ typedef struct phase_clock {
 static void run_clocked(void *user, dem2d_phase phase, int count, dem2d_task_fn *task,
                         void *context) {
     phase_clock *c = user;
-    const double start = seconds();
+    const double start = busy_seconds();
     if (count > 0) task(context, 0, count);
-    c->seconds[phase] += seconds() - start;
+    c->seconds[phase] += busy_seconds() - start;
 }
 
 /* --- LAMMPS ----------------------------------------------------------------------------------- */
 
 /* A process that takes its commands from a pipe; after each run it writes an empty file. */
-typedef struct lammps {
+typedef struct peer {
     bool on;
     pid_t process;
     FILE *commands;
     int runs;
-} lammps;
+} peer;
 
 static const double lammps_skins[SKINS] = {0.001, 0.002, 0.004, 0.008}; /* m */
 
@@ -759,7 +770,7 @@ static void send_polygons(FILE *to, const bed *b) {
     fprintf(to, "fix floor all %s yplane %.17g 1000\n", wall, b->bottom);
 }
 
-static bool lammps_done(const lammps *l) {
+static bool lammps_done(const peer *l) {
     char name[64];
     snprintf(name, sizeof name, "lammps.done.%d", l->runs);
     if (access(name, F_OK) != 0) return false;
@@ -767,7 +778,7 @@ static bool lammps_done(const lammps *l) {
     return true;
 }
 
-static void stop_lammps(lammps *l) {
+static void stop_lammps(peer *l) {
     if (!l->on) return;
     fclose(l->commands);
     waitpid(l->process, NULL, 0);
@@ -775,7 +786,7 @@ static void stop_lammps(lammps *l) {
 }
 
 /* false when it has ended before its time. */
-static bool run_lammps(lammps *l, double skin, int steps) {
+static bool run_lammps(peer *l, double skin, int steps) {
     const struct timespec pause = {0, 1000000};
     fprintf(l->commands, "neighbor %g bin\nrun %d\nprint done file lammps.done.%d\n", skin, steps,
             ++l->runs);
@@ -801,8 +812,8 @@ static void be_lammps(int input) {
     _exit(127);
 }
 
-static lammps start_lammps(const bed *b, int scene) {
-    lammps l = {true, 0, NULL, 0};
+static peer start_lammps(const bed *b, int scene) {
+    peer l = {true, 0, NULL, 0};
     int ends[2];
     FILE *data = create("lammps.data");
     (scene == DISCS ? write_discs : write_polygons)(data, b);
@@ -825,15 +836,17 @@ static lammps start_lammps(const bed *b, int scene) {
     return l;
 }
 
-/* Loop times of the runs after the first, which let the bed adapt. */
+/* Loop times of the runs after the first, which let the bed adapt, less what others had of the
+   core: "Loop time of 0.5 on 1 procs" is followed by "99.8% CPU use with". */
 static int read_loop_times(double *times, int room) {
     char line[512];
+    double time = 0, percent;
     int count = -1;
     FILE *log = fopen("lammps.log", "r");
     while (log && fgets(line, sizeof line, log)) {
-        double time;
-        if (sscanf(line, "Loop time of %lf", &time) != 1) continue;
-        if (count >= 0 && count < room) times[count] = time;
+        sscanf(line, "Loop time of %lf", &time);
+        if (sscanf(line, "%lf%% CPU use", &percent) != 1 || !strstr(line, "CPU use")) continue;
+        if (count >= 0 && count < room) times[count] = time * percent / 100;
         count++;
     }
     if (log) fclose(log);
@@ -842,26 +855,27 @@ static int read_loop_times(double *times, int room) {
 
 /* --- one scene -------------------------------------------------------------------------------- */
 
-typedef struct row {
+typedef struct timing {
     int scene, test, count, steps; /* steps: of a batch */
-    figure one, two, lammps;       /* ns per particle-step */
+    figure one, lammps;            /* ns per particle-step, time on a core */
+    figure wall, two;              /* the same by the clock: one thread, two */
     double lammps_skin;            /* m */
     double share[DEM2D_PHASE_COUNT], rest;
     double contacts, rate, bytes, speed; /* contacts, bytes: per particle; rate: 1/s */
     bool same;
-} row;
+} timing;
 
-static row rows[SCENES * TESTS * 8];
+static timing rows[SCENES * TESTS * 8];
 static int row_count;
 
 /* What a row needs while it is measured. */
 typedef struct bench {
-    row *row;
+    timing *row;
     run one, two;
     pool pool;
     bed adapted; /* after the steps before the clock */
-    lammps lammps;
-    double ns[2][BATCHES];
+    peer lammps;
+    double ns[3][BATCHES];
 } bench;
 
 /* Fewer for large beds: they are copies that fit but for their seams. */
@@ -883,7 +897,7 @@ static void begin_timed(run *r, int test) {
 }
 
 static void open_bench(bench *b, const bed *start) {
-    row *row = b->row;
+    timing *row = b->row;
     const int steps = adapting_steps(row->count);
     setup s = plain_setup(row->test, 0.7);
     open_pool(&b->pool);
@@ -904,12 +918,12 @@ static void open_bench(bench *b, const bed *start) {
 }
 
 /* As long as dem2d's batches, if it were as fast. */
-static int lammps_steps(const row *row) {
+static int lammps_steps(const timing *row) {
     const int steps = row->scene == POLYGONS ? row->steps / 8 : row->steps / 2;
     return steps < 10 ? 10 : steps;
 }
 
-static void read_lammps(row *row) {
+static void read_lammps(timing *row) {
     double times[BATCHES * SKINS], ns[BATCHES];
     if (read_loop_times(times, COUNT_OF(times)) != COUNT_OF(times)) return;
     for (int k = 0; k < SKINS; k++) {
@@ -921,24 +935,29 @@ static void read_lammps(row *row) {
 }
 
 static void run_batches(bench *b) {
-    row *row = b->row;
+    timing *row = b->row;
     const double per_batch = (double)row->count * row->steps;
     for (int i = 0; i < BATCHES; i++) {
+        double start = seconds();
         b->ns[0][i] = 1e9 * take_steps(&b->one, row->steps) / per_batch;
-        b->ns[1][i] = 1e9 * take_steps(&b->two, row->steps) / per_batch;
+        b->ns[1][i] = 1e9 * (seconds() - start) / per_batch;
+        start = seconds();
+        take_steps(&b->two, row->steps);
+        b->ns[2][i] = 1e9 * (seconds() - start) / per_batch;
         for (int k = 0; k < SKINS && b->lammps.on; k++)
             run_lammps(&b->lammps, lammps_skins[k], lammps_steps(row));
     }
     const bool finished = b->lammps.on;
     stop_lammps(&b->lammps);
     row->one = summary(b->ns[0], BATCHES);
-    row->two = summary(b->ns[1], BATCHES);
+    row->wall = summary(b->ns[1], BATCHES);
+    row->two = summary(b->ns[2], BATCHES);
     row->lammps = no_figure;
     if (finished) read_lammps(row);
 }
 
 static void clock_phases(bench *b) {
-    row *row = b->row;
+    timing *row = b->row;
     phase_clock c = {{0}};
     setup s = plain_setup(row->test, 0.7);
     s.parallel = run_clocked, s.user = &c;
@@ -956,7 +975,7 @@ static void clock_phases(bench *b) {
 }
 
 static void count_things(bench *b) {
-    row *row = b->row;
+    timing *row = b->row;
     dem2d_stats stats;
     check(dem2d_world_stats(b->one.world, &stats), "stats");
     row->contacts = (double)(stats.contacts + stats.wall_contacts) / row->count;
@@ -967,13 +986,17 @@ static void count_things(bench *b) {
 }
 
 static void print_head(FILE *csv) {
-    printf("ns per particle-step: median (min-max) of %d batches\n", BATCHES);
-    printf("%-8s %-7s %8s | %7s %-12s | %9s %-12s %5s %-9s | %s\n", "scene", "test", "N", "ns",
-           "(min-max)", "2 threads", "(min-max)", "times", "bits", "LAMMPS (min-max), skin, times");
-    fprintf(csv, "scene,test,particles,batch_steps,ns,ns_min,ns_max,ns_2,ns_2_min,ns_2_max,");
-    fprintf(csv, "same_bits,share_list,share_contacts,share_motion,share_rest,");
-    fprintf(csv, "contacts_per_particle,contacts_per_second,bytes_per_particle,");
-    fprintf(csv, "rms_speed_mm_per_s,lammps_ns,lammps_min,lammps_max,lammps_skin_m\n");
+    printf("ns per particle-step: median (min-max) of %d batches. One thread and LAMMPS: time on a "
+           "core.\nwall: one thread by the clock; two threads and the ratio: by the clock.\n",
+           BATCHES);
+    printf("%-8s %-7s %8s | %7s %-12s %7s | %9s %-12s %5s %-9s | %s\n", "scene", "test", "N", "ns",
+           "(min-max)", "wall", "2 threads", "(min-max)", "times", "bits",
+           "LAMMPS (min-max), skin, times");
+    fprintf(csv, "scene,test,particles,batch_steps,ns,ns_min,ns_max,wall_ns,wall_min,wall_max,");
+    fprintf(csv, "two_threads_ns,two_threads_min,two_threads_max,same_bits,");
+    fprintf(csv, "share_list,share_contacts,share_motion,share_rest,contacts_per_particle,");
+    fprintf(csv, "contacts_per_second,bytes_per_particle,rms_speed_mm_per_s,");
+    fprintf(csv, "lammps_ns,lammps_min,lammps_max,lammps_skin_m\n");
 }
 
 static const char *range_text(const figure *f, char *text, size_t size) {
@@ -981,30 +1004,36 @@ static const char *range_text(const figure *f, char *text, size_t size) {
     return text;
 }
 
-static void print_row(const row *r) {
-    char one[32], two[32], lammps[32];
-    printf("%-8s %-7s %8d | %7.1f %-12s | %9.1f %-12s %5.2f %-9s |", part_names[r->scene],
+static double speedup(const timing *r) {
+    return r->wall.median / r->two.median;
+}
+
+static void print_row(const timing *r) {
+    char one[32], two[32], peer_range[32];
+    printf("%-8s %-7s %8d | %7.1f %-12s %7.1f | %9.1f %-12s %5.2f %-9s |", part_names[r->scene],
            test_names[r->test], r->count, r->one.median, range_text(&r->one, one, sizeof one),
-           r->two.median, range_text(&r->two, two, sizeof two), r->one.median / r->two.median,
+           r->wall.median, r->two.median, range_text(&r->two, two, sizeof two), speedup(r),
            r->same ? "same bits" : "DIFFER");
     if (!isnan(r->lammps.median))
         printf(" %.1f %s, %g mm, %.2f", r->lammps.median,
-               range_text(&r->lammps, lammps, sizeof lammps), 1000 * r->lammps_skin,
+               range_text(&r->lammps, peer_range, sizeof peer_range), 1000 * r->lammps_skin,
                r->lammps.median / r->one.median);
     printf("\n");
     fflush(stdout);
 }
 
-static void write_row(FILE *csv, const row *r) {
-    fprintf(csv, "%s,%s,%d,%d,%.6g,%.6g,%.6g,%.6g,%.6g,%.6g,%d", part_names[r->scene],
-            test_names[r->test], r->count, r->steps, r->one.median, r->one.low, r->one.high,
-            r->two.median, r->two.low, r->two.high, r->same);
+static void write_row(FILE *csv, const timing *r) {
+    const figure *figures[] = {&r->one, &r->wall, &r->two, &r->lammps};
+    fprintf(csv, "%s,%s,%d,%d", part_names[r->scene], test_names[r->test], r->count, r->steps);
+    for (int i = 0; i < 3; i++)
+        fprintf(csv, ",%.6g,%.6g,%.6g", figures[i]->median, figures[i]->low, figures[i]->high);
+    fprintf(csv, ",%d", r->same);
     for (int i = 0; i < DEM2D_PHASE_COUNT; i++) fprintf(csv, ",%.4f", r->share[i]);
-    fprintf(csv, ",%.4f,%.4f,%.6g,%.6g,%.6g,", r->rest, r->contacts, r->rate, r->bytes, r->speed);
+    fprintf(csv, ",%.4f,%.4f,%.6g,%.6g,%.6g", r->rest, r->contacts, r->rate, r->bytes, r->speed);
     if (isnan(r->lammps.median))
-        fprintf(csv, ",,,\n");
+        fprintf(csv, ",,,,\n");
     else
-        fprintf(csv, "%.6g,%.6g,%.6g,%g\n", r->lammps.median, r->lammps.low, r->lammps.high,
+        fprintf(csv, ",%.6g,%.6g,%.6g,%g\n", r->lammps.median, r->lammps.low, r->lammps.high,
                 r->lammps_skin);
     fflush(csv);
 }
@@ -1016,7 +1045,7 @@ static void print_phases(void) {
     printf("%-8s %-7s %8s | %5s %8s %6s %5s | %10s %9s | %7s | %7s\n", "scene", "test", "N", "list",
            "contacts", "motion", "rest", "contacts/N", "million/s", "bytes/N", "mm/s");
     for (int i = 0; i < row_count; i++) {
-        const row *r = &rows[i];
+        const timing *r = &rows[i];
         printf("%-8s %-7s %8d | %5.1f %8.1f %6.1f %5.1f | %10.2f %9.2f | %7.0f | %7.2f\n",
                part_names[r->scene], test_names[r->test], r->count,
                100 * r->share[DEM2D_PHASE_LIST], 100 * r->share[DEM2D_PHASE_CONTACTS],
@@ -1178,12 +1207,12 @@ static dem2d_shape *make_original(void) {
     return shape;
 }
 
-static dem2d_shape *fit(const dem2d_shape *grain, int order, dem2d_fit_report *report) {
+static dem2d_shape *fit(const dem2d_shape *original, int order, dem2d_fit_report *report) {
     dem2d_vec outline[OUTLINE];
     dem2d_fit_desc desc = {0};
     dem2d_shape *shape;
     desc.model = DEM2D_FOURIER, desc.count = order;
-    check(dem2d_shape_outline(grain, dem2d_pose_make(0, 0, 0, 1), OUTLINE, outline), "outline");
+    check(dem2d_shape_outline(original, dem2d_pose_make(0, 0, 0, 1), OUTLINE, outline), "outline");
     check(dem2d_outline_fit(NULL, outline, OUTLINE, &desc, &shape, report), "fit");
     return shape;
 }
@@ -1341,7 +1370,7 @@ static void measure_skins(void) {
 
 /* --- aims ------------------------------------------------------------------------------------- */
 
-static const row *find_row(int scene, int test, int count) {
+static const timing *find_row(int scene, int test, int count) {
     for (int i = 0; i < row_count; i++)
         if (rows[i].scene == scene && rows[i].test == test && rows[i].count == count)
             return &rows[i];
@@ -1355,12 +1384,12 @@ static void aim(const char *what, double value, double bound, bool at_most) {
            : met        ? "PASS"
                         : "MISS",
            what, at_most ? "<=" : ">=", bound);
-    printf(isnan(value) ? "nothing\n" : "%.3g\n", value);
+    printf(isnan(value) ? "nothing\n" : "%.4g\n", value);
 }
 
 static void aim_lammps(int scene, int count, double times) {
     char text[96];
-    const row *r = find_row(scene, SETTLED, count);
+    const timing *r = find_row(scene, SETTLED, count);
     snprintf(text, sizeof text, "%d %s settled, LAMMPS / dem2d", count, part_names[scene]);
     aim(text, r ? r->lammps.median / r->one.median : NAN, times, false);
 }
@@ -1378,7 +1407,8 @@ static void aim_ns(int scene, int tests, double ns) {
 }
 
 static void aim_million(void) {
-    const row *large = find_row(DISCS, SETTLED, 1000000), *small = find_row(DISCS, SETTLED, 10000);
+    const timing *large = find_row(DISCS, SETTLED, 1000000),
+                 *small = find_row(DISCS, SETTLED, 10000);
     aim("1000000 discs, time per particle-step over that of 10000",
         large && small ? large->one.median / small->one.median : NAN, 2, true);
     aim("1000000 discs, bytes per particle", large ? large->bytes : NAN, 400, true);
@@ -1389,7 +1419,7 @@ static void aim_million(void) {
 static void aim_threads(void) {
     double least = NAN;
     for (int i = 0; i < row_count; i++) {
-        const double ratio = rows[i].one.median / rows[i].two.median;
+        const double ratio = speedup(&rows[i]);
         if (rows[i].count >= 10000 && !(ratio >= least)) least = ratio;
     }
     aim("two threads, speedup, least of all with 10000 or more", least, 1.7, false);
@@ -1452,7 +1482,7 @@ static bool has_rows(int scene, int test, bool lammps) {
 static void write_times(FILE *file, int scene, int test) {
     fprintf(file, "$s%dt%d << EOD\n", scene, test);
     for (int i = 0; i < row_count; i++) {
-        const row *r = &rows[i];
+        const timing *r = &rows[i];
         if (r->scene != scene || r->test != test) continue;
         fprintf(file, "%d %.6g %.6g %.6g ", r->count, r->one.median, r->one.low, r->one.high);
         if (isnan(r->lammps.median))
