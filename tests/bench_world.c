@@ -571,7 +571,7 @@ static bed get_bed(int scene, int test, int count) {
 
 /* A job goes from OPEN to JOINED, by the helper, or to IDLE, by the caller: a helper that wakes too
    late finds nothing to do, and the caller need not wait for it. */
-enum { IDLE, OPEN, JOINED, LEFT_ALONE };
+enum { IDLE, OPEN, JOINED, HELPED };
 
 typedef struct pool {
     pthread_t thread;
@@ -618,7 +618,7 @@ static void *help(void *user) {
     for (int spins = 0; !__atomic_load_n(&p->closed, __ATOMIC_RELAXED); spins++) {
         if (__atomic_load_n(&p->job, __ATOMIC_RELAXED) == OPEN && change_job(p, OPEN, JOINED)) {
             work(p);
-            __atomic_store_n(&p->job, LEFT_ALONE, __ATOMIC_RELEASE);
+            __atomic_store_n(&p->job, HELPED, __ATOMIC_RELEASE);
             spins = 0;
         } else if (spins == SPINS) {
             sleep_until_open(p);
@@ -631,7 +631,7 @@ static void *help(void *user) {
 }
 
 static void wait_for_helper(pool *p) {
-    for (int spins = 0; __atomic_load_n(&p->job, __ATOMIC_ACQUIRE) != LEFT_ALONE; spins++) {
+    for (int spins = 0; __atomic_load_n(&p->job, __ATOMIC_ACQUIRE) != HELPED; spins++) {
         relax_core();
         if (spins > 10000) sched_yield(); /* someone else has its core */
     }
