@@ -1207,7 +1207,7 @@ static const int fit_orders[] = {2, 3, 4, 6, 8, 12, 16, 24, 32, 64};
 enum { ORDERS = COUNT_OF(fit_orders) };
 
 typedef struct order_row {
-    double error, hausdorff; /* 1 - coverage, mean; m, R about 0.9, greatest */
+    double error, hausdorff; /* 1 - coverage, mean; over the radius, greatest */
     figure ns;
 } order_row;
 
@@ -1241,9 +1241,11 @@ static void fit_originals(dem2d_shape *const *originals, int order, dem2d_shape 
     r->error = 0, r->hausdorff = 0;
     for (int i = 0; i < ORIGINALS; i++) {
         dem2d_fit_report report;
+        dem2d_shape_info info;
+        check(dem2d_shape_get(originals[i], &info), "original");
         fits[i] = fit(originals[i], order, &report);
         r->error += (1 - report.coverage) / ORIGINALS;
-        r->hausdorff = fmax(r->hausdorff, report.hausdorff);
+        r->hausdorff = fmax(r->hausdorff, report.hausdorff / info.equivalent);
     }
 }
 
