@@ -1,0 +1,32 @@
+/* threads_openmp.c - a world that runs on the threads of OpenMP: the same bits as on one.
+
+       build/threads_openmp [THREADS] [PARTICLES] [STEPS]
+
+   Drops mixed grains into a box, on one thread and on several, and prints both times. Exit status:
+   0 if all poses and velocities are the same bits, 1 if not, 2 for bad usage. Built without
+   -fopenmp, the loop below is an ordinary one.
+*/
+#define _POSIX_C_SOURCE 200809L
+#define DEM2D_IMPLEMENTATION
+#include "dem2d.h"
+#include "common.h"
+
+/* The dem2d_parallel_fn; `user` is the number of threads. */
+static void run_by_openmp(void *user, dem2d_phase phase, int count, dem2d_task_fn *task,
+                          void *context) {
+    const int threads = *(const int *)user;
+    (void)phase, (void)threads;
+#ifdef _OPENMP
+#pragma omp parallel for schedule(dynamic) num_threads(threads)
+#endif
+    for (int i = 0; i < count; i++) task(context, i, i + 1);
+}
+
+int main(int count, char **arguments) {
+    example_name = "threads_openmp";
+    fall f = parse_fall(count, arguments);
+#ifndef _OPENMP
+    f.threads = 1;
+#endif
+    return compare_falls(&f, run_by_openmp, &f.threads);
+}
