@@ -846,11 +846,18 @@ typedef struct fall {
     int threads, particles, steps;
 } fall;
 
-/* Arguments [THREADS] [PARTICLES] [STEPS]. As many threads as processors, at most 8: this scene
-   has no work for more. */
+/* As many threads as processors, at most 8: the scene has no work for more. */
+static inline int default_threads(void) {
+    long processors = 2;
+#ifdef _SC_NPROCESSORS_ONLN // not POSIX, but nearly everywhere
+    processors = sysconf(_SC_NPROCESSORS_ONLN);
+#endif
+    return processors < 1 ? 1 : processors > 8 ? 8 : (int)processors;
+}
+
+/* Arguments [THREADS] [PARTICLES] [STEPS]. */
 static inline fall parse_fall(int count, char **arguments) {
-    const long processors = sysconf(_SC_NPROCESSORS_ONLN);
-    fall f = {processors < 1 ? 1 : processors > 8 ? 8 : (int)processors, 3000, 2000};
+    fall f = {default_threads(), 3000, 2000};
     if (count > 1 && strcmp(arguments[1], "--help") == 0) {
         printf("usage: %s [THREADS] [PARTICLES] [STEPS]     (%d %d %d)\n", example_name, f.threads,
                f.particles, f.steps);

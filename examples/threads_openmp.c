@@ -4,7 +4,9 @@
 
    Drops mixed grains into a box, on one thread and on several, and prints both times. Exit status:
    0 if all poses and velocities are the same bits, 1 if not, 2 for bad usage. Built without
-   -fopenmp, the loop below is an ordinary one.
+   -fopenmp, the loop below is an ordinary one. At the end of a loop OpenMP's threads may wait for
+   each other without giving the processor away: where other programs run, too, that can take longer
+   than the work, and OMP_WAIT_POLICY=passive in the environment helps.
 */
 #define _POSIX_C_SOURCE 200809L
 #define DEM2D_IMPLEMENTATION
