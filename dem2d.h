@@ -8786,6 +8786,8 @@ static bool dem2di_arrange(dem2d_world *world) {
     (void)dem2di_cut(&cutter, slots, sizeof(int));
     (void)dem2di_cut(&cutter, slots, sizeof *world->now);
     if (!dem2di_scratch_reserve(world, cutter.used)) return false;
+    if (world->plan.turns && !dem2di_group_reserve(world, DEM2DI_TRAVELS, world->body_count, false))
+        return false;
     dem2di_run(world, DEM2D_PHASE_LIST, 1, dem2di_arrange_task, world);
     dem2di_incident_make(world);
     return true;
