@@ -7563,6 +7563,7 @@ typedef struct dem2di_plan {
     bool spin;     /* something turns, or may be turned */
     bool turns; /* some particle is no circle: rotations matter, and pairs are skipped by travel */
     bool one_law;       /* all particles are of one material */
+    bool faces;         /* contacts may have two points: by the rule, and some particle has faces */
     bool heavy, damped; /* gravity, damping: as they are set at the step */
 } dem2di_plan;
 
@@ -7584,7 +7585,7 @@ struct dem2d_world {
     int max_iterations;
     dem2d_solver solver;
     dem2d_face_rule faces;
-    bool two_points; /* contacts may have two: by the rule, and some template has faces */
+
     bool check_time_step;
     bool list_stale; /* the list must be built before the next force pass */
     bool list_worn;  /* because something has left its skin */
@@ -7739,16 +7740,16 @@ static bool dem2di_reserve_bodies(dem2d_world *world, int count) {
     return dem2di_group_reserve(world, DEM2DI_BODIES, count + 1, false);
 }
 
-static bool dem2di_list_reserve(dem2d_world *world, bool friction, int discs, int count) {
+static bool dem2di_list_reserve(dem2d_world *world, const dem2di_plan *plan, int discs, int count) {
     dem2di_list *list = &world->list;
     int others = count - discs;
     /* the old ones are read once more */
     if (list->count - list->discs > others) others = list->count - list->discs;
     return dem2di_array_reserve(world, (void **)&list->keys, &list->keys_capacity, count,
                                 sizeof *list->keys) &&
-           dem2di_group_reserve(world, DEM2DI_SPRINGS, friction ? discs : 0, true) &&
+           dem2di_group_reserve(world, DEM2DI_SPRINGS, plan->friction ? discs : 0, true) &&
            dem2di_group_reserve(world, DEM2DI_LINKS, others, true) &&
-           dem2di_group_reserve(world, DEM2DI_ENDS, world->two_points ? others : 0, true);
+           dem2di_group_reserve(world, DEM2DI_ENDS, plan->faces ? others : 0, true);
 }
 
 static dem2d_result dem2di_out_of_memory(const dem2d_world *world, const char *what) {
@@ -7849,8 +7850,10 @@ DEM2D_API dem2d_result dem2d_world_create(const dem2d_world_desc *desc, dem2d_wo
     made->solver = desc->solver;
     made->faces = desc->faces;
     made->check_time_step = !desc->skip_time_step_check;
+    dem2di_plan capacities = made->plan;
+    capacities.friction = true;
     if (!dem2di_reserve_bodies(made, desc->particle_capacity) ||
-        !dem2di_list_reserve(made, true, desc->pair_capacity, desc->pair_capacity)) {
+        !dem2di_list_reserve(made, &capacities, desc->pair_capacity, desc->pair_capacity)) {
         result = dem2di_out_of_memory(made, "the capacities asked for");
         dem2d_world_destroy(made);
         return result;
@@ -7937,10 +7940,6 @@ DEM2D_API dem2d_result dem2d_world_add_shape(dem2d_world *world, const dem2d_sha
     place->generation++;
     place->users = 0;
     if (slot == world->template_count) world->template_count++;
-    if (copy->flat && world->faces == DEM2D_TWO_POINTS && !world->two_points) {
-        world->two_points = true;
-        world->list_stale = true; /* so that there is room for second points */
-    }
     id->index = (uint32_t)slot;
     id->generation = place->generation;
     return DEM2D_OK;
@@ -8301,7 +8300,7 @@ static bool dem2di_link_at(const dem2d_world *world, int contact, bool next, dem
 /* The second point of a contact, beside its link; NULL where no contact has two. */
 static const dem2di_ends *dem2di_ends_at(const dem2d_world *world, int contact, bool next) {
     const dem2di_list *list = &world->list;
-    if (!world->two_points || contact < list->discs) return NULL;
+    if (!world->plan.faces || contact < list->discs) return NULL;
     const dem2di_ends *ends = &(next ? list->next_ends : list->ends)[contact - list->discs];
     return ends->weight[0] > 0 ? ends : NULL;
 }
@@ -8843,13 +8842,17 @@ typedef struct dem2di_build {
 
 /* What the scene makes use of. */
 static dem2di_plan dem2di_plan_make(const dem2d_world *world) {
-    dem2di_plan plan = {false, false, false, true, false, false};
+    dem2di_plan plan;
+    memset(&plan, 0, sizeof plan);
+    plan.one_law = true;
     bool used[DEM2DI_MATERIALS] = {false}, met[DEM2DI_MATERIALS] = {false};
     for (int i = 0; i < world->body_count; i++) {
         const dem2di_body *body = &world->bodies[i];
         used[body->material] = true;
         plan.spin = plan.spin || world->now[i].w != 0;
-        plan.turns = plan.turns || dem2di_shape_of(world, body)->type != DEM2D_CIRCLE;
+        const dem2d_shape *shape = dem2di_shape_of(world, body);
+        plan.turns = plan.turns || shape->type != DEM2D_CIRCLE;
+        plan.faces = plan.faces || (shape->flat && world->faces == DEM2D_TWO_POINTS);
         plan.one_law = plan.one_law && body->material == world->bodies[0].material;
     }
     for (int j = 0; j < world->wall_count; j++)
@@ -8992,10 +8995,10 @@ static void dem2di_recall(const dem2di_build *build, int place) {
     if (old >= 0) *link = list->links[old - list->discs];
     if (place < pairs && world->plan.turns) /* budgets count from here */
         link->budget -= world->travel[key->a] + world->travel[key->b];
-    if (!world->two_points) return;
+    if (!build->plan.faces) return;
     dem2di_ends *ends = &list->next_ends[place - discs];
     memset(ends, 0, sizeof *ends);
-    if (old >= 0) *ends = list->ends[old - list->discs];
+    if (old >= 0 && world->plan.faces) *ends = list->ends[old - list->discs];
 }
 
 static void dem2di_fill_task(void *context, int begin, int end) {
@@ -9137,7 +9140,7 @@ static bool dem2di_build_search(dem2di_build *build) {
     }
     if (!dem2di_build_cut(build)) return false;
     int discs = build->total[DEM2DI_DISCS];
-    return dem2di_list_reserve(world, build->plan.friction, discs, (int)total) &&
+    return dem2di_list_reserve(world, &build->plan, discs, (int)total) &&
            dem2di_tallies_reserve(world, discs, (int)total);
 }
 
@@ -9414,7 +9417,7 @@ static int dem2di_pair_geometry(const dem2d_world *world, int a, int b, const de
     }
     count->proofs[search.proof]++;
     link->depth = search.upper;
-    if (world->two_points) return dem2di_pair_points(&pair, &search, points);
+    if (world->plan.faces) return dem2di_pair_points(&pair, &search, points);
     points[0].position = dem2di_scale(dem2di_add(search.a, dem2di_add(search.b, d)), 0.5);
     return 1;
 }
@@ -9570,11 +9573,11 @@ static void dem2di_pair_look(const dem2d_world *world, int i, dem2di_overlap *sc
         link->budget = last->budget;
         link->depth = -1;
         link->shear = 0;
-        if (world->two_points) memset(&list->next_ends[at], 0, sizeof *list->next_ends);
+        if (world->plan.faces) memset(&list->next_ends[at], 0, sizeof *list->next_ends);
         return;
     }
     link->force = link->shear = 0;
-    if (world->two_points) memset(&list->next_ends[at], 0, sizeof *list->next_ends);
+    if (world->plan.faces) memset(&list->next_ends[at], 0, sizeof *list->next_ends);
     int found = dem2di_pair_geometry(world, a, b, last, link, points, count);
     dem2di_no_loads(world, i);
     if (!(link->depth > 0)) return;
@@ -9606,7 +9609,7 @@ static void dem2di_touch_look(const dem2d_world *world, int i, dem2di_overlap *s
     link->normal.x = u.x;
     link->normal.y = u.y;
     link->shear = 0;
-    if (world->two_points) memset(&list->next_ends[at], 0, sizeof *list->next_ends);
+    if (world->plan.faces) memset(&list->next_ends[at], 0, sizeof *list->next_ends);
     if (list->links[at].depth > 0) dem2di_no_loads(world, i);
     double surface = dem2di_dot(dem2di_sub(wall->point, state->x), u);
     link->depth = state->radius - surface;
@@ -9619,7 +9622,7 @@ static void dem2di_touch_look(const dem2d_world *world, int i, dem2di_overlap *s
     }
     link->point.x = support.x - link->depth * u.x;
     link->point.y = support.y - link->depth * u.y;
-    if (world->two_points && shape->flat) {
+    if (world->plan.faces && shape->flat) {
         found = dem2di_wall_points(shape, state->q, body->scale, u, surface, support, link->depth,
                                    points);
         dem2di_link_place(list, at, found, points);
@@ -9936,7 +9939,7 @@ static bool dem2di_surely_soft(const dem2d_world *world, int slot, double stiffn
     double radius = world->now[slot].radius;
     for (; begin < end && list->incident[begin] / 2 < list->pairs; begin++) contacts++;
     if (begin < end && list->incident[begin] / 2 < list->count) return false;
-    double each = 2 * stiffness * (world->two_points ? 2 : 1);
+    double each = 2 * stiffness * (world->plan.faces ? 2 : 1);
     return contacts * each *
                (world->inverse[slot].mass + radius * radius * world->inverse[slot].inertia) <=
            enough;
