@@ -1893,6 +1893,20 @@ static double dem2di_floor_between(const dem2d_shape *shape, dem2d_vec from, dem
     return least;
 }
 
+/* One of two values without a branch, where which one can't be predicted. */
+static inline double dem2di_either(bool first, double a, double b) {
+    double value[2];
+    value[0] = b;
+    value[1] = a;
+    return value[first];
+}
+
+/* Index one step (+1 or -1) from k around a polygon, likewise. */
+static inline int dem2di_around(int count, int k, int step) {
+    k += step;
+    return k + count * ((k < 0) - (k == count));
+}
+
 /* The corner (polygon) or arc (Bezier) that holds the support point: go on while the next end
    still gains in the direction. */
 static inline int dem2di_sector_find(const dem2d_shape *shape, dem2d_vec u) {
@@ -5379,6 +5393,12 @@ typedef struct dem2di_vertex {
     dem2d_vec w, a, b;
 } dem2di_vertex;
 
+/* What meets of two polygons: an edge of one and a corner of the other, or two corners. */
+typedef struct dem2di_feature {
+    int own;       /* whose edge: 0 A's, 1 B's; -1: none, or not known */
+    int corner[2]; /* of both: the corner, or the first of the edge; -1: not known */
+} dem2di_feature;
+
 /* What a search knows: h(normal) = upper is the least support value met, the true depth is not
    below lower; points on both shapes that belong to it. */
 typedef struct dem2di_search {
@@ -5390,7 +5410,7 @@ typedef struct dem2di_search {
     double upper, lower;
     dem2d_vec a, b;
     dem2d_proof proof;
-    int corner[2]; /* of polygons, where the point belongs to; -1: not known */
+    dem2di_feature feature;
 } dem2di_search;
 
 /* d in one place: a periodic cell would change only this. */
@@ -5526,6 +5546,10 @@ static void dem2di_witness(dem2di_search *search, const dem2di_vertex *v0,
     search->b = dem2di_along(v0->b, t, dem2di_sub(v1->b, v0->b));
 }
 
+static void dem2di_feature_clear(dem2di_search *search) {
+    search->feature.own = search->feature.corner[0] = search->feature.corner[1] = -1;
+}
+
 /* The state when the sign is known: rounding is taken into account. */
 static dem2d_contact_state dem2di_judge(const dem2di_pair *pair, const dem2di_search *search) {
     double rounding = DEM2DI_ROUNDING * pair->size;
@@ -5542,7 +5566,7 @@ static void dem2di_gjk(dem2di_pair *pair, dem2d_vec start, double tolerance, int
     double rounding = DEM2DI_ROUNDING * pair->size, distance;
     dem2d_vec u = start;
     search->iterations = 0;
-    search->corner[0] = search->corner[1] = -1;
+    dem2di_feature_clear(search);
     search->proof = DEM2D_BY_RADIUS; /* of a gap */
     search->upper = HUGE_VAL;
     search->normal = u;
@@ -5826,11 +5850,6 @@ typedef struct dem2di_beside {
     double h; /* support value at its normal */
 } dem2di_beside;
 
-static int dem2di_core_beside(const dem2di_core *core, int k, int side) {
-    k += side;
-    return k == core->count ? 0 : k < 0 ? core->count - 1 : k;
-}
-
 static inline void dem2di_core_corner(const dem2di_core *core, int k, dem2d_vec *p) {
     dem2d_vec v = dem2di_turn(core->q, core->corners[k]);
     p->x = v.x * core->scale;
@@ -5843,7 +5862,7 @@ static inline void dem2di_core_tangent(const dem2di_core *core, int k, int side,
         t->x = t->y = 0;
         return;
     }
-    dem2d_vec v = core->tangents[side > 0 ? k : dem2di_core_beside(core, k, -1)];
+    dem2d_vec v = core->tangents[side > 0 ? k : dem2di_around(core->count, k, -1)];
     t->x = core->sign * (core->q.c * v.x - core->q.s * v.y);
     t->y = core->sign * (core->q.s * v.x + core->q.c * v.y);
 }
@@ -5876,7 +5895,7 @@ static inline void dem2di_walk_on(const dem2di_pair *pair, const dem2di_core cor
         edge->p[j].x = walk->p[j].x;
         edge->p[j].y = walk->p[j].y;
     }
-    walk->k[i] = dem2di_core_beside(&core[i], walk->k[i], side);
+    walk->k[i] = dem2di_around(core[i].count, walk->k[i], side);
     dem2di_core_corner(&core[i], walk->k[i], &walk->p[i]);
     dem2di_core_tangent(&core[i], walk->k[i], side, &walk->t[i]);
     edge->to.x = walk->p[i].x;
@@ -5913,7 +5932,7 @@ static void dem2di_edge_report(const dem2di_pair *pair, const dem2di_core core[2
     double t = dem2di_edge_foot(pair, edge);
     if (t < 0 || t > 1) {
         int side = edge->side, k[2] = {edge->k[0], edge->k[1]};
-        if (t > 1) k[edge->own] = dem2di_core_beside(&core[edge->own], k[edge->own], side);
+        if (t > 1) k[edge->own] = dem2di_around(core[edge->own].count, k[edge->own], side);
         if (t < 0) side = -side;
         dem2di_walk beyond;
         dem2di_walk_set(pair, core, k[0], k[1], side, &beyond);
@@ -5931,8 +5950,11 @@ static void dem2di_edge_report(const dem2di_pair *pair, const dem2di_core core[2
     double off = dem2di_dot(dem2di_sub(dem2di_add(p[0], p[1]), pair->d), edge->tangent);
     if (fabs(off) > DEM2DI_ROUNDING * pair->size)
         p[1 - edge->own] = dem2di_along(p[1 - edge->own], -off, edge->tangent);
-    search->corner[0] = edge->k[0];
-    search->corner[1] = edge->k[1];
+    search->feature.own = edge->own;
+    for (int i = 0; i < 2; i++) search->feature.corner[i] = edge->k[i];
+    if (edge->side < 0)
+        search->feature.corner[edge->own] =
+            dem2di_around(core[edge->own].count, edge->k[edge->own], -1);
     dem2di_core_report(core, p[0], p[1], dem2di_right(edge->tangent), edge->h, search);
 }
 
@@ -5961,8 +5983,9 @@ static void dem2di_cores_apart(const dem2di_pair *pair, const dem2di_core core[2
     /* two corners; so close that rounding hides the direction, the separating one is kept */
     dem2d_vec away;
     if (dem2di_length(walk.w) > rounding && dem2di_unit(walk.w, &away)) u = dem2di_negate(away);
-    search->corner[0] = walk.k[0];
-    search->corner[1] = walk.k[1];
+    search->feature.own = -1;
+    search->feature.corner[0] = walk.k[0];
+    search->feature.corner[1] = walk.k[1];
     dem2di_core_report(core, walk.p[0], walk.p[1], u, dem2di_dot(walk.w, u), search);
 }
 
@@ -5986,50 +6009,76 @@ static bool dem2di_ends_outweigh(const dem2di_pair *pair, const dem2d_vec w[2],
            dem2di_walk_outweighs(w[0], n[0], -1, dem2di_negate(across), pair->distance, least);
 }
 
-/* The edge whose normal is nearest to u, of the four beside the corners k; its sine to u. */
-static double dem2di_edge_near(const dem2di_core core[2], const int k[2], dem2d_vec u,
-                               dem2di_beside *edge) {
-    double least = HUGE_VAL;
-    for (int i = 0; i < 2; i++) {
-        if (core[i].count == 1) continue;
-        dem2d_vec v = dem2di_turn_back(core[i].q, dem2di_scale(u, core[i].sign));
-        int before = dem2di_core_beside(&core[i], k[i], -1);
-        double ahead = fabs(dem2di_dot(core[i].tangents[k[i]], v));
-        double back = fabs(dem2di_dot(core[i].tangents[before], v));
-        double sine = dem2di_min(ahead, back);
-        bool nearer = sine < least;
-        least = nearer ? sine : least;
-        edge->own = nearer ? i : edge->own;
-        edge->side = nearer ? (ahead < back ? 1 : -1) : edge->side;
-    }
-    return least;
+/* Of the edges before and after corner k, the one whose normal is nearer to v, named by its first
+   corner; returns the sine between them. */
+static inline double dem2di_edge_near(const dem2di_core *core, int k, dem2d_vec v, int *edge) {
+    if (core->count == 1) return HUGE_VAL;
+    int before = dem2di_around(core->count, k, -1);
+    double ahead = fabs(dem2di_dot(core->tangents[k], v));
+    double back = fabs(dem2di_dot(core->tangents[before], v));
+    *edge = ahead < back ? k : before;
+    return dem2di_min(ahead, back);
 }
 
-/* A start near an edge's normal, as contacts of faces have it: that edge is the answer when the
-   origin's foot is on it and its ends outweigh the rest. */
-static bool dem2di_edge_warm(const dem2di_pair *pair, const dem2di_core core[2], const int k[2],
-                             dem2d_vec u, dem2di_search *search) {
-    dem2di_beside edge;
-    dem2d_vec w[2], n[2];
-    edge.own = edge.side = 0;
-    if (dem2di_edge_near(core, k, u, &edge) > DEM2DI_SNAP) return false;
-    int i = edge.own, low = edge.side > 0 ? 0 : 1;
-    for (int j = 0; j < 2; j++) {
-        edge.k[j] = k[j];
-        dem2di_core_corner(&core[j], k[j], &edge.p[j]);
+/* An edge of one core and the corner of the other that is farthest along its normal n: the answer
+   when the origin's foot is on the edge and its ends outweigh the rest. Along n and the tangent t
+   lengths need no corner turned but the other core's. With `look` the corner is checked first. */
+static bool dem2di_feature_holds(const dem2di_pair *pair, const dem2di_core core[2],
+                                 const dem2di_feature *feature, bool look, dem2di_search *search) {
+    int i = feature->own, edge = feature->corner[i], k = feature->corner[1 - i];
+    const dem2di_core *own = &core[i], *other = &core[1 - i];
+    dem2d_vec t, p, along = own->tangents[edge], c0 = own->corners[edge];
+    dem2d_vec c1 = own->corners[dem2di_around(own->count, edge, 1)];
+    dem2di_core_tangent(own, edge, 1, &t);
+    dem2d_vec n = dem2di_right(t);
+    if (look && other->count > 1) {
+        dem2d_vec v = dem2di_turn_back(other->q, dem2di_scale(n, other->sign));
+        bool ahead = dem2di_dot(other->tangents[k], v) <= 0;
+        if (!(ahead & (dem2di_dot(other->tangents[dem2di_around(other->count, k, -1)], v) >= 0)))
+            return false;
     }
-    dem2di_core_corner(&core[i], dem2di_core_beside(&core[i], k[i], edge.side), &edge.to);
-    dem2di_core_tangent(&core[i], k[i], edge.side, &edge.tangent);
-    w[low] = dem2di_sub(dem2di_add(edge.p[0], edge.p[1]), pair->d);
-    w[1 - low] = dem2di_add(w[low], dem2di_sub(edge.to, edge.p[i]));
-    n[0] = n[1] = dem2di_right(edge.tangent);
-    edge.h = dem2di_dot(w[low], n[0]);
-    if (!(edge.h >= 0 && dem2di_dot(w[0], edge.tangent) <= 0 &&
-          dem2di_dot(w[1], edge.tangent) >= 0 &&
-          dem2di_ends_outweigh(pair, w, n, edge.h, edge.h + (core[0].radius + core[1].radius))))
-        return false;
-    dem2di_edge_report(pair, core, &edge, search);
+    dem2di_core_corner(other, k, &p);
+    double scale = own->scale * own->sign, height = dem2di_cross(c0, along) * scale;
+    double dn = dem2di_dot(pair->d, n), dt = dem2di_dot(pair->d, t), at = dt - dem2di_dot(p, t);
+    double low = dem2di_dot(c0, along) * scale - at, high = dem2di_dot(c1, along) * scale - at;
+    double h = height + (dem2di_dot(p, n) - dn);
+    double radii = core[0].radius + core[1].radius;
+    double inner = pair->a->inscribed * pair->scale_a + pair->b->inscribed * pair->scale_b;
+    double least = h * pair->distance, turned = h * dt;
+    bool foot = (h >= 0) & (low <= 0) & (high >= 0);
+    bool ends = (dn > 0) & (dn * high - turned >= least) & (turned - dn * low >= least);
+    if (!(foot & ends & (h + radii <= inner))) return false;
+    dem2d_vec q = dem2di_along(dem2di_scale(n, height), at, t);
+    search->feature = *feature;
+    dem2di_core_report(core, i == 0 ? q : p, i == 0 ? p : q, n, h, search);
     return true;
+}
+
+/* A start near an edge's normal, as contacts of faces have it. The corners k are the farthest along
+   the start, which is v in the coordinates of each core. */
+static bool dem2di_edge_warm(const dem2di_pair *pair, const dem2di_core core[2], const int k[2],
+                             const dem2d_vec v[2], dem2di_search *search) {
+    dem2di_feature near;
+    int edges[2] = {0, 0};
+    double near_a = dem2di_edge_near(&core[0], k[0], v[0], &edges[0]);
+    double near_b = dem2di_edge_near(&core[1], k[1], v[1], &edges[1]);
+    if (!(dem2di_min(near_a, near_b) <= DEM2DI_SNAP)) return false;
+    int i = near_b < near_a;
+    near.own = i;
+    near.corner[i] = edges[i];
+    near.corner[1 - i] = k[1 - i];
+    /* a sine may be that of nearly half a turn */
+    return dem2di_cross(v[i], core[i].tangents[edges[i]]) > 0 &&
+           dem2di_feature_holds(pair, core, &near, false, search);
+}
+
+/* The feature of the last step, where it still is the answer; false says nothing. */
+static bool dem2di_edge_again(const dem2di_pair *pair, const dem2di_core core[2],
+                              const dem2di_feature *last, dem2di_search *search) {
+    return last != NULL && last->own >= 0 && core[last->own].count > 1 &&
+           (unsigned)last->corner[0] < (unsigned)core[0].count &&
+           (unsigned)last->corner[1] < (unsigned)core[1].count &&
+           dem2di_feature_holds(pair, core, last, true, search);
 }
 
 /* Edges passed to each side before branch and bound is cheaper, measured: 24 take as long as the
@@ -6040,26 +6089,29 @@ static bool dem2di_edge_warm(const dem2di_pair *pair, const dem2di_core core[2],
    normal. Edges are passed to both sides of the start until their ends outweigh what is left of
    the cone; with `beside` the better of the next two is known to be the one. False when there are
    too many: large polygons far from round. */
-static bool dem2di_edges_solve(dem2di_pair *pair, dem2d_vec u, bool beside, dem2di_search *search) {
+static bool dem2di_edges_solve(dem2di_pair *pair, const dem2di_feature *last, dem2d_vec u,
+                               bool beside, dem2di_search *search) {
     dem2di_core core[2];
     dem2di_walk walk[2];
     dem2di_beside edge[2]; /* the best, and the last */
     int best = 0;
     dem2d_vec end[2], n[2];
     bool cone = false;
-    /* from behind both sides would seem to be past the cone */
-    if (!(dem2di_dot(u, pair->d) > 0)) u = dem2di_centres(pair);
     dem2di_core_set(pair->a, pair->ra, pair->scale_a, 1, &core[0]);
     dem2di_core_set(pair->b, pair->rb, pair->scale_b, -1, &core[1]);
-    int k[2] = {0, 0};
-    for (int i = 0; i < 2; i++) {
-        const dem2d_shape *shape = i == 0 ? pair->a : pair->b;
-        dem2d_vec v = dem2di_turn_back(core[i].q, dem2di_scale(u, core[i].sign));
-        if (core[i].count > 1) k[i] = dem2di_polygon_corner(shape, v);
-    }
     pair->calls++;
     search->proof = DEM2D_BY_FORM;
-    if (!beside && dem2di_edge_warm(pair, core, k, u, search)) return true;
+    if (dem2di_edge_again(pair, core, last, search)) return true;
+    /* from behind both sides would seem to be past the cone */
+    if (!(dem2di_dot(u, pair->d) > 0)) u = dem2di_centres(pair);
+    int k[2] = {0, 0};
+    dem2d_vec v[2];
+    for (int i = 0; i < 2; i++) {
+        const dem2d_shape *shape = i == 0 ? pair->a : pair->b;
+        v[i] = dem2di_turn_back(core[i].q, dem2di_scale(u, core[i].sign));
+        if (core[i].count > 1) k[i] = dem2di_polygon_corner(shape, v[i]);
+    }
+    if (!beside && dem2di_edge_warm(pair, core, k, v, search)) return true;
     for (int i = 0; i < 2; i++) dem2di_walk_set(pair, core, k[0], k[1], i > 0 ? 1 : -1, &walk[i]);
     if (dem2di_dot(walk[0].w, u) < 0) {
         dem2di_cores_apart(pair, core, k[0], k[1], u, search);
@@ -6145,11 +6197,6 @@ static dem2d_vec dem2di_polygon_view(const dem2di_polygon *p, dem2d_vec u) {
     return dem2di_turn_back(p->q, p->first ? u : dem2di_negate(u));
 }
 
-static int dem2di_corner_beside(const dem2di_polygon *p, int k, int step) {
-    k += step;
-    return k == p->shape->count ? 0 : k < 0 ? p->shape->count - 1 : k;
-}
-
 /* The same for a polygon and another shape: at corner `low`, or in u along the normal of the edge
    from corner `low` to `high`. */
 static void dem2di_see_polygon(dem2di_pair *pair, const dem2di_polygon *p, dem2d_vec u, int low,
@@ -6182,13 +6229,13 @@ static void dem2di_see_edge(dem2di_pair *pair, const dem2di_polygon *p, int edge
                             dem2di_sight *sight) {
     dem2d_vec u = dem2di_turn(p->q, dem2di_right(p->shape->ends[edge]));
     dem2di_see_polygon(pair, p, p->first ? u : dem2di_negate(u), edge,
-                       dem2di_corner_beside(p, edge, 1), sight);
+                       dem2di_around(p->shape->count, edge, 1), sight);
 }
 
 static void dem2di_see_first(dem2di_pair *pair, const dem2di_polygon *p, dem2d_vec u,
                              dem2di_sight *sight) {
     dem2d_vec v = dem2di_polygon_view(p, u);
-    int k = dem2di_polygon_corner(p->shape, v), before = dem2di_corner_beside(p, k, -1);
+    int k = dem2di_polygon_corner(p->shape, v), before = dem2di_around(p->shape->count, k, -1);
     double ahead = -dem2di_dot(p->shape->ends[k], v), back = dem2di_dot(p->shape->ends[before], v);
     if (dem2di_min(ahead, back) < DEM2DI_SNAP)
         dem2di_see_edge(pair, p, ahead < back ? k : before, sight);
@@ -6204,7 +6251,8 @@ static void dem2di_see_towards(dem2di_pair *pair, const dem2di_polygon *p, dem2d
     if (k == sight->corner[0])
         dem2di_see_polygon(pair, p, u, k, k, sight);
     else
-        dem2di_see_edge(pair, p, dem2di_cross(sight->u, u) > 0 ? dem2di_corner_beside(p, k, -1) : k,
+        dem2di_see_edge(pair, p,
+                        dem2di_cross(sight->u, u) > 0 ? dem2di_around(p->shape->count, k, -1) : k,
                         sight);
 }
 
@@ -6501,7 +6549,7 @@ static void dem2di_branch(dem2di_pair *pair, double tolerance, double angle, int
     if (search->state == DEM2D_UNRESOLVED) return;
     dem2di_search last = *search;
     if (dem2di_has_core(pair->a) && dem2di_has_core(pair->b)) {
-        (void)dem2di_edges_solve(pair, search->normal, true, &last);
+        (void)dem2di_edges_solve(pair, NULL, search->normal, true, &last);
         if (last.upper > search->upper + tolerance) return;
         last.lower = dem2di_min(last.upper, search->lower);
     } else {
@@ -6524,8 +6572,8 @@ static void dem2di_branch(dem2di_pair *pair, double tolerance, double angle, int
 #define DEM2DI_WARM 6
 
 /* Least overlap or greatest gap, certified. With `detect` any direction that separates will do. */
-static void dem2di_certified(dem2di_pair *pair, dem2d_vec start, double tolerance, int cap,
-                             bool detect, dem2di_search *search) {
+static void dem2di_certified(dem2di_pair *pair, const dem2di_feature *last, dem2d_vec start,
+                             double tolerance, int cap, bool detect, dem2di_search *search) {
     /* Newton's last step leaves about the square of its angle in the normal: a hundredth of the
        tolerance. 64 looks are more than halving the cone down to rounding needs. */
     double relative = dem2di_max(tolerance, DEM2DI_ROUNDING);
@@ -6534,9 +6582,9 @@ static void dem2di_certified(dem2di_pair *pair, dem2d_vec start, double toleranc
     search->iterations = 0;
     search->upper = HUGE_VAL;
     search->normal = start;
-    search->corner[0] = search->corner[1] = -1;
+    dem2di_feature_clear(search);
     if (dem2di_has_core(pair->a) && dem2di_has_core(pair->b)) {
-        if (dem2di_edges_solve(pair, start, false, search)) {
+        if (dem2di_edges_solve(pair, last, start, false, search)) {
             search->state = dem2di_judge(pair, search);
             return;
         }
@@ -6579,41 +6627,47 @@ static void dem2di_certified(dem2di_pair *pair, dem2d_vec start, double toleranc
    uses: config, math, support, gjk, edges
    ============================================================================================ */
 
-/* The face of a shape that a contact is at or near: from the support point to the face's other
-   end, both from the shape's centre. Its weight is 1 for a face along the contact and falls to 0
-   where the face on the other side of the support point is as close. */
+/* The face of a shape that a contact along u is at or near: heights along u over places along
+   perp(u). The face on the other side of the support point is farther from the contact. */
 typedef struct dem2di_face {
-    dem2d_vec near, far;
-    double weight;
+    double x0, x1;    /* extent, x0 < x1 */
+    double y0, rise;  /* height at x0; per place */
+    double more, sum; /* difference and sum of the sines of both faces to the contact */
 } dem2di_face;
 
-/* With angles (sines) of both faces to the contact: 1 up to a third of the other, 0 when equal. */
-static double dem2di_face_weight(double angle, double other) {
-    if (other >= 3 * angle) return other > 0 ? 1 : 0;
-    return 2 * (other - angle) / (other + angle);
+/* 1 for a face along the contact, up to a third of the other's angle, and 0 when they are equal. */
+static double dem2di_face_weight(const dem2di_face *face) {
+    return dem2di_min(1, 2 * face->more / face->sum);
 }
 
 /* A straight arc whose end is round counts up to this angle (sine): a tenth of a radian is tilt, a
    third is another contact. */
 #define DEM2DI_FLAT_ANGLE 0.3
 
-static bool dem2di_polygon_face(const dem2d_shape *shape, dem2d_vec v, int corner,
-                                dem2di_face *face) {
-    int n = shape->count, k = corner >= 0 ? corner : dem2di_polygon_corner(shape, v);
-    int before = k > 0 ? k - 1 : n - 1, after = k + 1 < n ? k + 1 : 0;
+/* Ends of the face counter-clockwise, in the shape's coordinates, of the face beside
+   corner k that is nearer to the contact. */
+static void dem2di_polygon_face(const dem2d_shape *shape, dem2d_vec v, int k, dem2di_face *face,
+                                dem2d_vec *from, dem2d_vec *to) {
+    if (k < 0) k = dem2di_polygon_corner(shape, v);
+    int before = dem2di_around(shape->count, k, -1);
     dem2d_vec out = shape->ends[k], in = shape->ends[before];
     double ahead = dem2di_max(0, -dem2di_dot(out, v)), back = dem2di_max(0, dem2di_dot(in, v));
-    if (dem2di_cross(v, out) < 0) ahead = 2 - ahead; /* beyond a right angle sines fall again */
-    if (dem2di_cross(v, in) < 0) back = 2 - back;
-    face->near = shape->corners[k];
-    face->far = shape->corners[ahead < back ? after : before];
-    face->weight = dem2di_face_weight(dem2di_min(ahead, back), dem2di_max(ahead, back));
-    return face->weight > 0;
+    /* beyond a right angle sines fall again */
+    ahead = dem2di_either(dem2di_cross(v, out) < 0, 2 - ahead, ahead);
+    back = dem2di_either(dem2di_cross(v, in) < 0, 2 - back, back);
+    face->more = fabs(ahead - back);
+    face->sum = ahead + back;
+    k -= (k - before) * !(ahead < back);
+    *from = shape->corners[k];
+    *to = shape->corners[dem2di_around(shape->count, k, 1)];
 }
 
-static bool dem2di_arc_face(const dem2d_shape *shape, dem2d_vec v, dem2di_face *face) {
+static void dem2di_arc_face(const dem2d_shape *shape, dem2d_vec v, dem2di_face *face,
+                            dem2d_vec *from, dem2d_vec *to) {
     int n = shape->count, k = dem2di_sector_find(shape, v);
+    dem2d_vec near = dem2di_bezier_support(shape, v, NULL);
     double least = DEM2DI_FLAT_ANGLE;
+    *from = *to = near;
     for (int i = -1; i <= 1; i++) {
         const dem2di_arc *arc = &shape->arcs[(k + n + i) % n];
         if (!dem2di_arc_straight(shape, arc)) continue;
@@ -6622,97 +6676,118 @@ static bool dem2di_arc_face(const dem2d_shape *shape, dem2d_vec v, dem2di_face *
         double sine = dem2di_dot(along, v);
         if (!(fabs(sine) < least)) continue;
         least = fabs(sine);
-        face->far = sine > 0 ? arc->start : dem2di_add(arc->start, chord);
+        *from = sine > 0 ? arc->start : near;
+        *to = sine > 0 ? near : dem2di_add(arc->start, chord);
     }
-    face->near = dem2di_bezier_support(shape, v, NULL);
-    face->weight = dem2di_face_weight(least, DEM2DI_FLAT_ANGLE);
-    return face->weight > 0;
+    face->more = DEM2DI_FLAT_ANGLE - least;
+    face->sum = DEM2DI_FLAT_ANGLE + least;
 }
 
-/* The face of a posed shape towards u; false when there is none. */
+/* Where a face from one point to another, counter-clockwise, is along v; false when nowhere. */
+static inline bool dem2di_face_set(const dem2d_shape *shape, double scale, dem2d_vec v,
+                                   dem2d_vec from, dem2d_vec to, dem2di_face *face) {
+    double x0 = dem2di_cross(v, from), x1 = dem2di_cross(v, to), width = x1 - x0;
+    double y0 = dem2di_dot(v, from), y1 = dem2di_dot(v, to);
+    face->x0 = x0 * scale;
+    face->x1 = x1 * scale;
+    face->y0 = (y0 + shape->rounding) * scale;
+    face->rise = (y1 - y0) / width;
+    return width > 0;
+}
+
+/* The face of a shape of a scale and rotation towards u, seen from its centre; false when there is
+   none. */
 static bool dem2di_face_of(const dem2d_shape *shape, dem2d_rot q, double scale, dem2d_vec u,
                            int corner, dem2di_face *face) {
     if (!shape->flat) return false;
-    dem2d_vec v = dem2di_turn_back(q, u);
-    bool found = shape->type == DEM2D_POLYGON ? dem2di_polygon_face(shape, v, corner, face)
-                                              : dem2di_arc_face(shape, v, face);
-    face->near = dem2di_scale(dem2di_turn(q, face->near), scale);
-    face->far = dem2di_scale(dem2di_turn(q, face->far), scale);
-    return found;
+    dem2d_vec v = dem2di_turn_back(q, u), from, to;
+    if (shape->type == DEM2D_POLYGON)
+        dem2di_polygon_face(shape, v, corner, face, &from, &to);
+    else
+        dem2di_arc_face(shape, v, face, &from, &to);
+    return dem2di_face_set(shape, scale, v, from, to, face) && face->more > 0;
 }
 
-/* Height of a face along u at the place x along t = perp(u). */
-typedef struct dem2di_slope {
-    double x0, x1; /* extent, x0 < x1 */
-    double y0, rise;
-} dem2di_slope;
-
-static dem2di_slope dem2di_face_slope(const dem2di_face *face, dem2d_vec u, dem2d_vec shift) {
-    dem2d_vec t = dem2di_perp(u), p = dem2di_add(face->near, shift);
-    dem2d_vec q = dem2di_add(face->far, shift);
-    double xp = dem2di_dot(p, t), xq = dem2di_dot(q, t);
-    double yp = dem2di_dot(p, u), yq = dem2di_dot(q, u);
-    dem2di_slope line;
-    line.x0 = dem2di_min(xp, xq);
-    line.x1 = dem2di_max(xp, xq);
-    line.y0 = xp < xq ? yp : yq;
-    line.rise = xp != xq ? (yq - yp) / (xq - xp) : 0;
-    return line;
+/* The same of a polygon whose edge the contact is along. */
+static bool dem2di_face_edge(const dem2d_shape *shape, dem2d_rot q, double scale, dem2d_vec u,
+                             int edge, dem2di_face *face) {
+    face->more = face->sum = 1;
+    return dem2di_face_set(shape, scale, dem2di_turn_back(q, u), shape->corners[edge],
+                           shape->corners[dem2di_around(shape->count, edge, 1)], face);
 }
 
-static double dem2di_height(const dem2di_slope *line, double x) {
-    return line->y0 + line->rise * (x - line->x0);
+/* B's face towards -u, seen along u from A's centre. */
+static void dem2di_face_turn(dem2d_vec d, dem2d_vec u, dem2di_face *face) {
+    double place = dem2di_cross(u, d), left = place - face->x1;
+    face->y0 = dem2di_dot(u, d) - (face->y0 + face->rise * (face->x1 - face->x0));
+    face->x1 = place - face->x0;
+    face->x0 = left;
 }
 
 /* A common part of up to so many depths is one of two corners, not of faces: it could slide apart
    almost as soon as be pressed apart, and one point alone conserves energy there. */
 #define DEM2DI_SHORT_FACE 16.0
 
-/* The two points of a contact along u, in the coordinates of the slopes: ends of the common part
-   of both faces, each with its own depth. The deeper one has weight 1, and the other comes in with
-   the faces' weight. As the common part becomes short, and the depths equal, both go to a half: one
-   point is left and nothing lost. Force and moment change steadily all the way. False when only
-   one point touches. */
-static bool dem2di_face_points(const dem2di_slope *a, const dem2di_slope *b, double weight,
-                               double depth, dem2d_vec u, dem2d_contact_point points[2]) {
-    double x[2];
-    x[0] = dem2di_max(a->x0, b->x0);
-    x[1] = dem2di_min(a->x1, b->x1);
-    if (!(x[1] > x[0]) || !(weight > 0) || !(depth > 0)) return false;
-    for (int i = 0; i < 2; i++) {
-        double ya = dem2di_height(a, x[i]), yb = dem2di_height(b, x[i]);
-        points[i].depth = ya - yb;
-        points[i].position = dem2di_along(dem2di_scale(u, (ya + yb) / 2), x[i], dem2di_perp(u));
-    }
-    double common = ((x[1] - x[0]) / depth - DEM2DI_SHORT_FACE) / (3 * DEM2DI_SHORT_FACE);
+/* The middle of two faces at a place. */
+static dem2d_vec dem2di_face_middle(const dem2di_face *a, const dem2di_face *b, double x,
+                                    dem2d_vec u) {
+    double ya = a->y0 + a->rise * (x - a->x0), yb = b->y0 + b->rise * (x - b->x0);
+    return dem2di_along(dem2di_scale(u, (ya + yb) / 2), x, dem2di_perp(u));
+}
+
+/* The two points of a contact along u: ends of the common part of both faces. The deeper one is as
+   deep as the contact, and has weight 1; the other is less deep by the faces' tilt and comes in
+   with their weight. As the common part becomes short, and the depths equal, both go to a half:
+   one point is left and nothing lost. Force and moment change steadily all the way. False when
+   only one point touches. */
+static bool dem2di_face_points(const dem2di_face *a, const dem2di_face *b, double depth,
+                               dem2d_vec u, dem2d_contact_point points[2]) {
+    double x0 = dem2di_max(a->x0, b->x0), x1 = dem2di_min(a->x1, b->x1), width = x1 - x0;
+    double tilt = a->rise - b->rise, shallow = depth - fabs(tilt) * width;
+    if (!(width > 0) || !(shallow > 0)) return false;
+    double weight = dem2di_face_weight(a) * dem2di_face_weight(b);
+    double common = (width / depth - DEM2DI_SHORT_FACE) / (3 * DEM2DI_SHORT_FACE);
     common = dem2di_max(0, dem2di_min(1, common));
-    int deeper = points[1].depth > points[0].depth;
-    /* the deeper one is as deep as the contact, but for the normal's error times the face */
-    double lift = depth - points[deeper].depth;
-    points[0].depth += lift;
-    points[1].depth += lift;
-    double other = points[1 - deeper].depth;
-    if (!(other > 0)) return false;
-    points[deeper].weight = 1 - weight * (1 - common) / 2 * (other / depth);
+    int deeper = tilt > 0;
+    points[0].position = dem2di_face_middle(a, b, x0, u);
+    points[1].position = dem2di_face_middle(a, b, x1, u);
+    points[deeper].depth = depth;
+    points[deeper].weight = 1 - weight * (1 - common) / 2 * (shallow / depth);
+    points[1 - deeper].depth = shallow;
     points[1 - deeper].weight = weight * (1 + common) / 2;
     return true;
+}
+
+/* The faces of both shapes, each seen from its own centre. */
+static bool dem2di_pair_faces(const dem2di_pair *pair, const dem2di_feature *feature, dem2d_vec u,
+                              dem2di_face face[2]) {
+    int own = feature->own, other = own == 0;
+    const dem2d_shape *shape[2] = {pair->a, pair->b};
+    const dem2d_rot *q[2] = {&pair->ra, &pair->rb};
+    const double scale[2] = {pair->scale_a, pair->scale_b}, sign[2] = {1, -1};
+    dem2d_vec out = dem2di_scale(u, sign[other]), back = dem2di_negate(out);
+    if (!dem2di_face_of(shape[other], *q[other], scale[other], out, feature->corner[other],
+                        &face[other]))
+        return false;
+    int i = 1 - other;
+    if (own >= 0)
+        return dem2di_face_edge(shape[i], *q[i], scale[i], back, feature->corner[i], &face[i]);
+    return dem2di_face_of(shape[i], *q[i], scale[i], back, feature->corner[i], &face[i]);
 }
 
 /* Contact points of an overlapping pair, from A's centre: how many. */
 static int dem2di_pair_points(const dem2di_pair *pair, const dem2di_search *search,
                               dem2d_contact_point points[2]) {
-    dem2di_face fa, fb;
-    dem2d_vec u = search->normal, down = dem2di_negate(u);
-    if (dem2di_face_of(pair->a, pair->ra, pair->scale_a, u, search->corner[0], &fa) &&
-        dem2di_face_of(pair->b, pair->rb, pair->scale_b, down, search->corner[1], &fb)) {
-        double ra = pair->a->rounding * pair->scale_a, rb = pair->b->rounding * pair->scale_b;
-        dem2di_slope a = dem2di_face_slope(&fa, u, dem2di_scale(u, ra));
-        dem2di_slope b = dem2di_face_slope(&fb, u, dem2di_along(pair->d, -rb, u));
-        if (dem2di_face_points(&a, &b, fa.weight * fb.weight, search->upper, u, points)) return 2;
+    dem2di_face face[2];
+    dem2d_vec u = search->normal;
+    if (dem2di_pair_faces(pair, &search->feature, u, face)) {
+        dem2di_face_turn(pair->d, u, &face[1]);
+        if (dem2di_face_points(&face[0], &face[1], search->upper, u, points)) return 2;
     }
     points[0].depth = search->upper;
     points[0].weight = 1;
-    points[0].position = dem2di_scale(dem2di_add(search->a, dem2di_add(search->b, pair->d)), 0.5);
+    points[0].position.x = (search->a.x + (search->b.x + pair->d.x)) * 0.5;
+    points[0].position.y = (search->a.y + (search->b.y + pair->d.y)) * 0.5;
     return 1;
 }
 
@@ -6723,11 +6798,11 @@ static int dem2di_wall_points(const dem2d_shape *shape, dem2d_rot q, double scal
                               dem2d_contact_point points[2]) {
     dem2di_face face;
     if (dem2di_face_of(shape, q, scale, u, -1, &face)) {
-        dem2di_slope a = dem2di_face_slope(&face, u, dem2di_scale(u, shape->rounding * scale));
-        dem2di_slope wall = a;
+        dem2di_face wall = face;
         wall.y0 = surface;
         wall.rise = 0;
-        if (dem2di_face_points(&a, &wall, face.weight, depth, u, points)) {
+        wall.more = wall.sum = 1;
+        if (dem2di_face_points(&face, &wall, depth, u, points)) {
             for (int i = 0; i < 2; i++)
                 points[i].position = dem2di_along(points[i].position, -points[i].depth / 2, u);
             return 2;
@@ -6821,13 +6896,20 @@ static void dem2di_gjk_epa(dem2di_pair *pair, dem2d_vec start, double tolerance,
     search->lower = dem2di_max(search->lower, dem2di_min(0, search->upper)); /* by GJK */
 }
 
-/* Depth when shapes overlap, else separation (with `detect`) or distance. */
-static void dem2di_contact_solve(dem2di_pair *pair, dem2d_solver solver, dem2d_vec start,
-                                 double tolerance, int cap, bool detect, dem2di_search *search) {
+/* Depth when shapes overlap, else separation (with `detect`) or distance. What met in the last step
+   (may be NULL) is tried first; any feature of any pair is safe, 0 too. */
+static void dem2di_contact_again(dem2di_pair *pair, dem2d_solver solver, const dem2di_feature *last,
+                                 dem2d_vec start, double tolerance, int cap, bool detect,
+                                 dem2di_search *search) {
     if (solver == DEM2D_GJK_EPA)
         dem2di_gjk_epa(pair, start, tolerance, cap, detect, search);
     else
-        dem2di_certified(pair, start, tolerance, cap, detect, search);
+        dem2di_certified(pair, last, start, tolerance, cap, detect, search);
+}
+
+static void dem2di_contact_solve(dem2di_pair *pair, dem2d_solver solver, dem2d_vec start,
+                                 double tolerance, int cap, bool detect, dem2di_search *search) {
+    dem2di_contact_again(pair, solver, NULL, start, tolerance, cap, detect, search);
 }
 
 /* Two circles in closed form: centres apart by d. Concentric circles get the normal (1, 0). */
