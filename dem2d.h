@@ -1799,8 +1799,8 @@ typedef struct dem2di_block {
     double a[4], b[4], na[4], nb[4], square[4];
 } dem2di_block;
 
-/* Sectors of directions that have a lower bound of rho: 1/16 of a quadrant each. */
-#define DEM2DI_FLOORS 64
+/* Sectors of directions that have a lower bound of rho: 1/32 of a quadrant each. */
+#define DEM2DI_FLOORS 128
 
 struct dem2d_shape {
     dem2d_shape_type type;
@@ -1859,13 +1859,10 @@ static void dem2di_shape_layout(dem2d_shape *shape) {
     shape->bytes = (size_t)(next - (char *)shape);
 }
 
-/* The angle y/(|x| + |y|) of a quadrant, unwrapped to [0, 4): monotone, without trigonometry, and
-   without branches, as the quadrant can't be predicted. */
+/* The angle y/(|x| + |y|) of a quadrant, unwrapped, and a turn (4): in [3, 7]. Monotone, without
+   trigonometry, and without branches, as the quadrant can't be predicted. */
 static inline double dem2di_pseudo_angle(dem2d_vec u) {
-    double f = u.y / (fabs(u.x) + fabs(u.y)), value[2];
-    value[0] = f + 4 * (f < 0);
-    value[1] = 2 - f;
-    return value[u.x < 0];
+    return 5 - copysign(1 - u.y / (fabs(u.x) + fabs(u.y)), u.x);
 }
 
 /* The sector of floors that holds a direction. */
@@ -1873,11 +1870,15 @@ static int dem2di_floor_sector(dem2d_vec u) {
     return (int)(dem2di_pseudo_angle(u) * (DEM2DI_FLOORS / 4)) & (DEM2DI_FLOORS - 1);
 }
 
-/* Lower bound of rho from a direction on, over one sector's width to a side (+1 or -1). */
-static double dem2di_floor(const dem2d_shape *shape, dem2d_vec u, int side) {
-    if (shape->floors == NULL) return shape->rho_min;
+/* Lower bounds of rho from a direction on, over one sector's width clockwise and the other way. */
+static inline void dem2di_floor(const dem2d_shape *shape, dem2d_vec u, double floor[2]) {
+    if (shape->floors == NULL) {
+        floor[0] = floor[1] = shape->rho_min;
+        return;
+    }
     int k = dem2di_floor_sector(u);
-    return shape->floors[(side > 0 ? k : k - 1) & (DEM2DI_FLOORS - 1)];
+    floor[0] = shape->floors[(k - 1) & (DEM2DI_FLOORS - 1)];
+    floor[1] = shape->floors[k];
 }
 
 /* Lower bound of rho over the directions from one to another, counter-clockwise, at most half a
@@ -6445,59 +6446,78 @@ static void dem2di_settle(const dem2di_pair *pair, const dem2di_sight *sight,
     search->b.y = v->b.y - sight->rho[1] * dy;
 }
 
-/* Steps of the march below turn by 2 atan(1/32), which is less than any sector of floors. */
-#define DEM2DI_MARCH_COS (1023.0 / 1025)
-#define DEM2DI_MARCH_SIN (64.0 / 1025)
+/* The same of a pair. */
+static inline void dem2di_pair_floors(const dem2di_pair *pair, dem2d_vec u, double floor[2]) {
+    double a[2], b[2];
+    dem2di_floor(pair->a, dem2di_turn_back(pair->ra, u), a);
+    dem2di_floor(pair->b, dem2di_turn_back(pair->rb, dem2di_negate(u)), b);
+    for (int i = 0; i < 2; i++) floor[i] = a[i] * pair->scale_a + b[i] * pair->scale_b;
+}
 
-/* Is h nowhere below its value at rest (less the tolerance), from there to the end v of the cone
-   on one side (0 clockwise, 1 counter-clockwise)? With rho at least r, h is at least the support
-   value of a circle of radius r that fits value and slope, and so on from sector to sector. Where
-   the support point reached keeps above the value up to v, nothing in between is below it. */
-static bool dem2di_outweighs(const dem2di_pair *pair, const dem2di_sight *sight, int side,
-                             dem2d_vec v, double tolerance) {
+/* Steps of the march below turn by 2 atan(1/64), which is less than any sector of floors. */
+#define DEM2DI_MARCH_COS (4095.0 / 4097)
+#define DEM2DI_MARCH_SIN (128.0 / 4097)
+
+/* Is h nowhere below its value at rest (less the tolerance), from there to the end v (of a length)
+   of the cone on one side (0 clockwise, 1 counter-clockwise)? With rho at least r, h is at least
+   the support value of a circle of radius r that fits value and slope, and so on from sector to
+   sector; r is given for the first. Where the support point reached keeps above the value up to v,
+   nothing in between is below it. */
+static bool dem2di_outweighs(const dem2di_pair *pair, const dem2di_sight *sight, int side, double r,
+                             dem2d_vec v, double length, double tolerance) {
     int turn = side > 0 ? 1 : -1;
-    double h = sight->h, slope = turn * sight->slope[side], least = h - tolerance;
+    double h = sight->h, slope = turn * sight->slope[side], least = (h - tolerance) * length;
+    double along = dem2di_dot(sight->u, v), ahead = turn * dem2di_cross(sight->u, v), floor[2];
+    const double c = DEM2DI_MARCH_COS, s = DEM2DI_MARCH_SIN;
     dem2d_vec u = sight->u;
     dem2d_rot step;
-    step.c = DEM2DI_MARCH_COS;
-    step.s = turn * DEM2DI_MARCH_SIN;
-    for (int i = 0; i < 10; i++) { /* 10 steps are 36 degrees: a support point farther is rare */
-        double ahead = turn * dem2di_cross(u, v);
-        if (!(ahead > 0)) return dem2di_dot(u, v) > 0;
-        if (h * dem2di_dot(u, v) + slope * ahead >= least && h > 0) return true;
-        double r = dem2di_floor(pair->a, dem2di_turn_back(pair->ra, u), turn) * pair->scale_a +
-                   dem2di_floor(pair->b, dem2di_turn_back(pair->rb, dem2di_negate(u)), turn) *
-                       pair->scale_b;
-        /* at rest but for a last small slope, which lowers h by slope^2/(2 (r - h)) */
-        if (i == 0 && !(sight->edge ? slope >= 0 : slope * slope <= 2 * tolerance * (r - h)))
-            return false;
-        double next = r + (h - r) * step.c + slope * DEM2DI_MARCH_SIN;
-        slope = (r - h) * DEM2DI_MARCH_SIN + slope * step.c;
-        if (!(slope >= 0)) return false;
+    step.c = c;
+    step.s = turn * s;
+    /* at rest but for a last small slope, which lowers h by slope^2/(2 (r - h)) */
+    if (!(sight->edge ? slope >= 0 : slope * slope <= 2 * tolerance * (r - h))) return false;
+    for (int i = 0; i < 20; i++) { /* 20 steps are 36 degrees: a support point farther is rare */
+        double next = r + (h - r) * c + slope * s, rest = ahead * c - along * s;
+        slope = (r - h) * s + slope * c;
+        along = along * c + ahead * s;
         h = next;
+        ahead = rest;
+        if (!(slope >= 0)) return false;
+        if (!(ahead > 0)) return along > 0;
+        if (h * along + slope * ahead >= least && h > 0) return true;
         u = dem2di_turn(step, u);
+        dem2di_pair_floors(pair, u, floor);
+        r = floor[side];
     }
     return false;
 }
 
 /* Is the minimum at rest the least of all? With r <= rho everywhere, r - |s - r u| <= depth (A
    minus B eroded by r is convex, and its distance from the origin bounds the depth); else the
-   boundary beside it must outweigh the cone. */
+   boundary beside it must outweigh the cone: a right angle to each side of d, which does for
+   depths below the inscribed radii and needs no root, or the true one. */
 static bool dem2di_certify(const dem2di_pair *pair, const dem2di_sight *sight, double tolerance,
                            dem2di_search *search) {
     double r = pair->a->rho_min * pair->scale_a + pair->b->rho_min * pair->scale_b;
     double h = sight->h, square = sight->edge ? 0 : sight->slope[0] * sight->slope[0];
+    double inner = pair->a->inscribed * pair->scale_a + pair->b->inscribed * pair->scale_b;
+    double floor[2], allowed = sight->edge ? 0 : tolerance;
     dem2d_vec end[2];
     if (r > h && square <= 2 * tolerance * (r - h)) {
         search->lower = search->upper - square / (2 * (r - h));
         search->proof = DEM2D_BY_RADIUS;
         return true;
     }
-    if (sight->edge) tolerance = 0;
-    if (!dem2di_cone(pair, h, end) || !dem2di_outweighs(pair, sight, 0, end[0], tolerance) ||
-        !dem2di_outweighs(pair, sight, 1, end[1], tolerance))
+    dem2di_pair_floors(pair, sight->u, floor);
+    end[1] = dem2di_perp(pair->d);
+    end[0] = dem2di_negate(end[1]);
+    if (!(h <= inner &&
+          dem2di_outweighs(pair, sight, 0, floor[0], end[0], pair->distance, allowed) &&
+          dem2di_outweighs(pair, sight, 1, floor[1], end[1], pair->distance, allowed)) &&
+        !(dem2di_cone(pair, h, end) &&
+          dem2di_outweighs(pair, sight, 0, floor[0], end[0], 1, allowed) &&
+          dem2di_outweighs(pair, sight, 1, floor[1], end[1], 1, allowed)))
         return false;
-    search->lower = search->upper - tolerance;
+    search->lower = search->upper - allowed;
     search->proof = DEM2D_BY_ARC;
     return true;
 }
@@ -6575,9 +6595,10 @@ static void dem2di_branch(dem2di_pair *pair, double tolerance, double angle, int
 static void dem2di_certified(dem2di_pair *pair, const dem2di_feature *last, dem2d_vec start,
                              double tolerance, int cap, bool detect, dem2di_search *search) {
     /* Newton's last step leaves about the square of its angle in the normal: a hundredth of the
-       tolerance. 64 looks are more than halving the cone down to rounding needs. */
+       tolerance; a tenth in a step (`detect`), where that saves every fifth look. 64 looks are more
+       than halving the cone down to rounding needs. */
     double relative = dem2di_max(tolerance, DEM2DI_ROUNDING);
-    double absolute = relative * pair->size, angle = 0.1 * sqrt(relative);
+    double absolute = relative * pair->size, angle = (detect ? 0.3 : 0.1) * sqrt(relative);
     if (dem2di_unseen(pair->a) || dem2di_unseen(pair->b)) angle *= 0.01;
     search->iterations = 0;
     search->upper = HUGE_VAL;
