@@ -6022,8 +6022,10 @@ static inline double dem2di_edge_near(const dem2di_core *core, int k, dem2d_vec 
 }
 
 /* An edge of one core and the corner of the other that is farthest along its normal n: the answer
-   when the origin's foot is on the edge and its ends outweigh the rest. Along n and the tangent t
-   lengths need no corner turned but the other core's. With `look` the corner is checked first. */
+   when the origin's foot is on the edge, and the cores are apart or the edge's ends outweigh the
+   rest of a right angle to each side of d; that holds the true cone where the depth is below the
+   inscribed radii. Along n and the tangent t lengths need no corner turned but the other core's.
+   With `look` the corner is checked first. */
 static bool dem2di_feature_holds(const dem2di_pair *pair, const dem2di_core core[2],
                                  const dem2di_feature *feature, bool look, dem2di_search *search) {
     int i = feature->own, edge = feature->corner[i], k = feature->corner[1 - i];
@@ -6046,9 +6048,8 @@ static bool dem2di_feature_holds(const dem2di_pair *pair, const dem2di_core core
     double radii = core[0].radius + core[1].radius;
     double inner = pair->a->inscribed * pair->scale_a + pair->b->inscribed * pair->scale_b;
     double least = h * pair->distance, turned = h * dt;
-    bool foot = (h >= 0) & (low <= 0) & (high >= 0);
     bool ends = (dn > 0) & (dn * high - turned >= least) & (turned - dn * low >= least);
-    if (!(foot & ends & (h + radii <= inner))) return false;
+    if (!((low <= 0) & (high >= 0) & ((h < 0) | (ends & (h + radii <= inner))))) return false;
     dem2d_vec q = dem2di_along(dem2di_scale(n, height), at, t);
     search->feature = *feature;
     dem2di_core_report(core, i == 0 ? q : p, i == 0 ? p : q, n, h, search);
@@ -6801,7 +6802,7 @@ static int dem2di_pair_points(const dem2di_pair *pair, const dem2di_search *sear
                               dem2d_contact_point points[2]) {
     dem2di_face face[2];
     dem2d_vec u = search->normal;
-    if (dem2di_pair_faces(pair, &search->feature, u, face)) {
+    if (pair->a->flat && pair->b->flat && dem2di_pair_faces(pair, &search->feature, u, face)) {
         dem2di_face_turn(pair->d, u, &face[1]);
         if (dem2di_face_points(&face[0], &face[1], search->upper, u, points)) return 2;
     }
