@@ -6077,7 +6077,7 @@ static bool dem2di_edge_warm(const dem2di_pair *pair, const dem2di_core core[2],
 /* The feature of the last step, where it still is the answer; false says nothing. */
 static bool dem2di_edge_again(const dem2di_pair *pair, const dem2di_core core[2],
                               const dem2di_feature *last, dem2di_search *search) {
-    return last != NULL && last->own >= 0 && core[last->own].count > 1 &&
+    return last != NULL && (unsigned)last->own < 2 && core[last->own].count > 1 &&
            (unsigned)last->corner[0] < (unsigned)core[0].count &&
            (unsigned)last->corner[1] < (unsigned)core[1].count &&
            dem2di_feature_holds(pair, core, last, true, search);
