@@ -6042,9 +6042,11 @@ static bool dem2di_feature_holds(const dem2di_pair *pair, const dem2di_core core
     }
     dem2di_core_corner(other, k, &p);
     double scale = own->scale * own->sign, height = dem2di_cross(c0, along) * scale;
-    double dn = dem2di_dot(pair->d, n), dt = dem2di_dot(pair->d, t), at = dt - dem2di_dot(p, t);
+    double dn = dem2di_dot(pair->d, n), dt = dem2di_dot(pair->d, t);
+    dem2d_vec from = dem2di_sub(pair->d, p); /* the edge passes here where the depth is 0 */
+    double at = dem2di_dot(from, t);
     double low = dem2di_dot(c0, along) * scale - at, high = dem2di_dot(c1, along) * scale - at;
-    double h = height + (dem2di_dot(p, n) - dn);
+    double h = height - dem2di_dot(from, n);
     double radii = core[0].radius + core[1].radius;
     double inner = pair->a->inscribed * pair->scale_a + pair->b->inscribed * pair->scale_b;
     double least = h * pair->distance, turned = h * dt;
