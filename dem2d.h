@@ -7341,12 +7341,13 @@ static uint64_t dem2di_curve_place(dem2d_vec corner, double size, dem2d_vec poin
 
 /* A contact. Closed (depth <= 0) ones keep the normal for the next warm start. */
 typedef struct dem2di_link {
-    dem2d_vec normal; /* from A to B; 0 before the first look */
-    dem2d_vec point;  /* contact point from A's centre */
-    double depth;     /* m; closed: at most 0 */
-    double force;     /* normal, N/m */
-    double shear;     /* on B along perp(normal), N/m: the tangential spring */
-    double budget;    /* the pair is apart until both have travelled this far together */
+    dem2d_vec normal;       /* from A to B; 0 before the first look */
+    dem2d_vec point;        /* contact point from A's centre */
+    double depth;           /* m; closed: at most 0 */
+    double force;           /* normal, N/m */
+    double shear;           /* on B along perp(normal), N/m: the tangential spring */
+    double budget;          /* the pair is apart until both have travelled this far together */
+    dem2di_feature feature; /* of two polygons, that carried it: tried first in the next step */
 } dem2di_link;
 
 /* What a contact of two points has beside its link, which holds the sums, and as its point the
@@ -9476,6 +9477,12 @@ static void dem2di_disc_range(const dem2d_world *world, int begin, int end, dem2
     count->proofs[DEM2D_BY_FORM] += closed;
 }
 
+/* What a pair starts from in the next step. */
+static inline void dem2di_link_keep(const dem2di_link *last, dem2di_link *link) {
+    link->normal = last->normal;
+    link->feature = last->feature;
+}
+
 /* A pair found apart by a gap (m) stays so until its particles have travelled as far together. */
 static void dem2di_link_apart(const dem2d_world *world, int a, int b, double gap, double size,
                               dem2di_link *link) {
@@ -9492,7 +9499,7 @@ static int dem2di_pair_geometry(const dem2d_world *world, int a, int b, const de
     const dem2di_state *state_a = &world->now[a], *state_b = &world->now[b];
     dem2d_vec d = dem2di_centre_line(state_a->x, state_b->x);
     double reach = state_a->radius + state_b->radius, distance = dem2di_length(d);
-    link->normal = last->normal;
+    dem2di_link_keep(last, link);
     link->budget = 0;
     if (distance >= reach) {
         dem2di_link_apart(world, a, b, distance - reach, distance + reach, link);
@@ -9512,10 +9519,13 @@ static int dem2di_pair_geometry(const dem2d_world *world, int a, int b, const de
     pair.size = reach + distance;
     pair.calls = 0;
     bool warm = last->normal.x != 0 || last->normal.y != 0;
-    dem2di_contact_solve(&pair, world->solver, warm ? last->normal : dem2di_centres(&pair),
-                         world->tolerance, world->max_iterations, true, &search);
+    dem2di_contact_again(&pair, world->solver, &last->feature,
+                         warm ? last->normal : dem2di_centres(&pair), world->tolerance,
+                         world->max_iterations, true, &search);
     count->calls += pair.calls;
-    link->normal = search.normal;
+    link->normal.x = search.normal.x; /* not as one: it has just been stored in two */
+    link->normal.y = search.normal.y;
+    link->feature = search.feature;
     if (!(search.upper > 0)) {
         count->gaps++;
         dem2di_link_apart(world, a, b, -search.upper, pair.size, link);
@@ -9625,12 +9635,15 @@ static void dem2di_area_load(const dem2d_world *world, const dem2d_pair_desc *la
 }
 
 /* Points of a contact into its link, and beside it when there are two. */
-static void dem2di_link_place(const dem2di_list *list, int at, int count,
-                              const dem2d_contact_point points[2]) {
-    if (count == 2)
-        dem2di_ends_set(points, &list->next_ends[at], &list->next_links[at]);
-    else
-        list->next_links[at].point = points[0].position;
+static inline void dem2di_link_place(const dem2di_list *list, int at, int count,
+                                     const dem2d_contact_point points[2]) {
+    dem2di_link *link = &list->next_links[at];
+    if (count == 2) {
+        dem2di_ends_set(points, &list->next_ends[at], link);
+        return;
+    }
+    link->point.x = points[0].position.x;
+    link->point.y = points[0].position.y;
 }
 
 /* The contact-area rule for contact i, whose point and normal are known; B is at d. */
@@ -9675,7 +9688,7 @@ static void dem2di_pair_look(const dem2d_world *world, int i, dem2di_overlap *sc
     dem2di_link *link = &list->next_links[at];
     dem2d_contact_point points[2];
     if (world->travel[a] + world->travel[b] < last->budget) { /* surely still apart */
-        link->normal = last->normal;
+        dem2di_link_keep(last, link);
         link->budget = last->budget;
         link->depth = -1;
         link->shear = 0;
@@ -9685,14 +9698,19 @@ static void dem2di_pair_look(const dem2d_world *world, int i, dem2di_overlap *sc
     link->force = link->shear = 0;
     if (world->plan.faces) memset(&list->next_ends[at], 0, sizeof *list->next_ends);
     int found = dem2di_pair_geometry(world, a, b, last, link, points, count);
-    dem2di_no_loads(world, i);
-    if (!(link->depth > 0)) return;
+    if (!(link->depth > 0)) {
+        dem2di_no_loads(world, i);
+        return;
+    }
     const dem2di_state *sa = &world->now[a], *sb = &world->now[b];
     const dem2d_pair_desc *law = dem2di_law_of(world, i);
     dem2d_vec d = dem2di_centre_line(sa->x, sb->x);
     dem2di_link_place(list, at, found, points);
-    if (world->faces == DEM2D_CONTACT_AREA) dem2di_area_apply(world, i, b, d, law, scratch);
-    if (!(link->depth > 0)) return;
+    if (world->faces == DEM2D_CONTACT_AREA) {
+        dem2di_no_loads(world, i);
+        dem2di_area_apply(world, i, b, d, law, scratch);
+        if (!(link->depth > 0)) return;
+    }
     dem2d_vec arm_b = dem2di_sub(link->point, d);
     double slip = dem2di_slip(link, arm_b, sa->v, sa->w, sb->v, sb->w);
     dem2di_link_load(world, at, law, slip, found == 2);
