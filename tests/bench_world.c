@@ -3,7 +3,8 @@
 
    PARTS: the scenes discs, polygons (4 to 7 sides), ellipses (aspect 1 to 2.5), beziers (10 arcs),
    fourier (order 8) and mixed (all five), each settled under gravity and in the biaxial test; and
-   time against error by dt, order (of Fourier series) and skin. --most leaves out larger scenes.
+   time against error by dt, order (of Fourier series) and skin; and the time of a list of pairs by
+   sizes (ratio of radii). --most leaves out larger scenes.
 
    Scenes. Circles of equal area have diameters uniform in 0.04 to 0.06 m; density 2700, kn = kt =
    1e7 N/m, friction 0.2, time step 1e-4 s, 32 templates a model, scaled.
@@ -31,9 +32,9 @@
    the "CPU use": without the list that each run starts with. The figures of dem2d have the lists
    that fall into their batches.
 
-   Writes world.csv, dt.csv, order.csv, skin.csv and, where gnuplot is installed, pictures of them
-   to OUTDIR, build/bench_world by default. Exit status: 0, 1 if bits differed, 2 if something
-   failed. Speed never fails. */
+   Writes world.csv, dt.csv, order.csv, skin.csv, sizes.csv and, where gnuplot is installed,
+   pictures of them to OUTDIR, build/bench_world by default. Exit status: 0, 1 if bits differed, 2
+   if something failed. Speed never fails. */
 #define _POSIX_C_SOURCE 200809L
 #define DEM2D_IMPLEMENTATION
 #include "dem2d.h"
@@ -72,13 +73,13 @@
 
 enum { CIRCLE, ELLIPSE, POLYGON, BEZIER, FS, MODELS };
 enum { DISCS, POLYGONS, ELLIPSES, BEZIERS, FOURIERS, MIXED, SCENES };
-enum { PART_DT = SCENES, PART_ORDER, PART_SKIN, PARTS };
+enum { PART_DT = SCENES, PART_ORDER, PART_SKIN, PART_SIZES, PARTS };
 enum { SETTLED, BIAXIAL, TESTS };
 enum { LEFT, RIGHT, BOTTOM, TOP, WALLS };
 
 static const char *const model_names[MODELS] = {"circle", "ellipse", "polygon", "bezier", "fs"};
 static const char *const part_names[PARTS] = {"discs", "polygons", "ellipses", "beziers", "fourier",
-                                              "mixed", "dt",       "order",    "skin"};
+                                              "mixed", "dt",       "order",    "skin",    "sizes"};
 static const char *const test_names[TESTS] = {"settled", "biaxial"};
 
 static void fail(const char *format, ...) {
@@ -1606,6 +1607,78 @@ static int usage(void) {
     return 2;
 }
 
+/* --- lists of discs of several sizes --- */
+
+/* A world of discs at random places, radii drawn so that each power of two between 1 and 1/ratio
+   takes the same area, together half of the square; none moves, but all pairs are listed. */
+static dem2d_world *open_sizes(int count, double ratio) {
+    dem2d_world *world;
+    dem2d_material_desc stone = {DENSITY, 1e7, 0, 0};
+    dem2d_particle_desc grain = {0};
+    dem2d_world_desc scene = {0};
+    scene.time_step = TIME_STEP;
+    scene.particle_capacity = count;
+    scene.skip_time_step_check = true;
+    check(dem2d_world_create(&scene, &world), "world");
+    check(dem2d_world_add_material(world, &stone, &grain.material), "material");
+    check(dem2d_world_add_shape(world, templates[0], &grain.shape), "shape");
+    grain.motion = DEM2D_DRIVEN;
+    double area = 0, *radii = get_memory((size_t)count, sizeof *radii);
+    for (int i = 0; i < count; i++) { /* 1/r^2 uniform: a number for each r that falls as r^-3 */
+        radii[i] = 1 / sqrt(uniform(1, ratio * ratio));
+        area += PI * radii[i] * radii[i];
+    }
+    const double side = sqrt(2 * area);
+    for (int i = 0; i < count; i++) {
+        dem2d_particle_id id;
+        grain.scale = radii[i];
+        grain.position.x = uniform(0, side);
+        grain.position.y = uniform(0, side);
+        check(dem2d_world_add_particle(world, &grain, &id), "particle");
+    }
+    free(radii);
+    return world;
+}
+
+/* Seconds on the core to renew the list once. */
+static double time_list(dem2d_world *world) {
+    enum { TRIES = 5 };
+    double times[TRIES];
+    for (int k = 0; k < TRIES; k++) {
+        check(dem2d_world_set_time_step(world, TIME_STEP), "time step"); /* makes it stale */
+        const double before = busy_seconds();
+        check(dem2d_world_step(world, 1, NULL), "step");
+        times[k] = busy_seconds() - before;
+        check(dem2d_world_step(world, 1, NULL), "step"); /* one without, to be taken off */
+        times[k] -= busy_seconds() - before - times[k];
+    }
+    return summary(times, TRIES).median;
+}
+
+static void measure_sizes(void) {
+    static const double ratios[] = {1, 10, 100};
+    static const int counts[] = {10000, 40000, 160000};
+    FILE *csv = create("sizes.csv");
+    printf("\nRenewing the list: discs at random, half of the area, ratio of greatest to least "
+           "radius\n%8s %6s %16s %16s\n",
+           "N", "ratio", "ns per particle", "pairs each");
+    fprintf(csv, "particles,ratio,ns_per_particle,pairs_per_particle\n");
+    for (int i = 0; i < COUNT_OF(counts); i++)
+        for (int k = 0; k < COUNT_OF(ratios); k++) {
+            dem2d_world *world = open_sizes(opt.quick ? counts[i] / 8 : counts[i], ratios[k]);
+            dem2d_stats stats;
+            check(dem2d_world_step(world, 2, NULL), "step");
+            const double list = time_list(world);
+            check(dem2d_world_stats(world, &stats), "stats");
+            const double ns = 1e9 * list / stats.particles;
+            const double pairs = (double)stats.pairs / stats.particles;
+            printf("%8d %6g %16.0f %16.2f\n", stats.particles, ratios[k], ns, pairs);
+            fprintf(csv, "%d,%g,%.6g,%.6g\n", stats.particles, ratios[k], ns, pairs);
+            dem2d_world_destroy(world);
+        }
+    fclose(csv);
+}
+
 static bool parse_parts(char *list) {
     for (char *name = strtok(list, ","); name; name = strtok(NULL, ",")) {
         int i = 0;
@@ -1663,6 +1736,7 @@ int main(int argc, char **argv) {
     if (opt.parts[PART_DT]) measure_dt();
     if (opt.parts[PART_ORDER]) measure_orders();
     if (opt.parts[PART_SKIN]) measure_skins();
+    if (opt.parts[PART_SIZES]) measure_sizes();
     const int differ = print_aims();
     printf("\n");
     draw_times();
