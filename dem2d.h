@@ -1235,6 +1235,14 @@ DEM2D_API dem2d_result dem2d_world_write_svg(const dem2d_world *world, const dem
 #define DEM2DI_VECTORS_END
 #endif
 
+/* Memory that is wanted soon; beyond an array's end it does no harm. */
+#if defined(__GNUC__)
+#define DEM2DI_PREFETCH(array, ahead) \
+    __builtin_prefetch((const void *)((uintptr_t)(array) + (ahead) * sizeof *(array)))
+#else
+#define DEM2DI_PREFETCH(array, ahead) ((void)0)
+#endif
+
 #define DEM2DI_PI 3.14159265358979323846
 
 /* Rounding of a support value of A minus B, in units of R_A + R_B + |d|: two rotations, two
@@ -7695,7 +7703,8 @@ typedef struct dem2di_plan {
     bool friction; /* some law between the materials in use has it */
     bool spin;     /* something turns, or may be turned */
     bool turns; /* some particle is no circle: rotations matter, and pairs are skipped by travel */
-    bool one_law;       /* all particles are of one material */
+    bool one_law; /* all particles are of one material: */
+    int material;
     bool faces;         /* contacts may have two points: by the rule, and some particle has faces */
     bool heavy, damped; /* gravity, damping: as they are set at the step */
 } dem2di_plan;
@@ -8986,7 +8995,8 @@ static dem2di_plan dem2di_plan_make(const dem2d_world *world) {
         const dem2d_shape *shape = dem2di_shape_of(world, body);
         plan.turns = plan.turns || shape->type != DEM2D_CIRCLE;
         plan.faces = plan.faces || (shape->flat && world->faces == DEM2D_TWO_POINTS);
-        plan.one_law = plan.one_law && body->material == world->bodies[0].material;
+        plan.material = world->bodies[0].material;
+        plan.one_law = plan.one_law && body->material == plan.material;
     }
     for (int j = 0; j < world->wall_count; j++)
         if (world->walls[j].alive) met[world->walls[j].desc.material.index] = true;
@@ -9394,6 +9404,8 @@ static DEM2DI_INLINE void dem2di_batch_fetch(const dem2d_world *world, int first
     for (int k = 0; k < count; k++) {
         const dem2di_state *a = &world->now[keys[k].a], *b = &world->now[keys[k].b];
         dem2d_vec d = dem2di_disc_line(a, b);
+        DEM2DI_PREFETCH(a, DEM2DI_BATCH);
+        DEM2DI_PREFETCH(b, DEM2DI_BATCH);
         batch->dx[k] = d.x;
         batch->dy[k] = d.y;
         batch->radius_a[k] = a->radius;
@@ -9481,7 +9493,8 @@ static DEM2DI_INLINE int dem2di_disc_batch(const dem2d_world *world, int first, 
                                            bool friction, bool spin, bool one_law) {
     dem2di_batch batch;
     dem2di_batch_fetch(world, first, count, friction, !one_law, &batch);
-    dem2di_batch_solve(&batch, count, world->time_step, dem2di_law_of(world, first), &world->plan);
+    dem2di_batch_solve(&batch, count, world->time_step,
+                       dem2di_law(world, world->plan.material, world->plan.material), &world->plan);
     return dem2di_batch_put(world, first, count, friction, spin, &batch);
 }
 
