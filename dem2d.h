@@ -6131,7 +6131,7 @@ static bool dem2di_edges_solve(dem2di_pair *pair, const dem2di_feature *last, de
                                bool beside, dem2di_search *search) {
     dem2di_core core[2];
     dem2di_walk walk[2];
-    dem2di_beside edge[2]; /* the best, and the last */
+    dem2di_beside edge[2]; /* the best, and the last passed */
     int best = 0;
     dem2d_vec end[2], n[2];
     bool cone = false;
@@ -6165,12 +6165,12 @@ static bool dem2di_edges_solve(dem2di_pair *pair, const dem2di_feature *last, de
             if (cone && dem2di_walk_outweighs(here->w, n[side], turn, end[side], 1, edge[best].h))
                 continue;
             open = true;
-            dem2di_beside *last = &edge[1 - best];
-            dem2di_walk_on(pair, core, turn, here, last);
-            n[side].x = last->tangent.y;
-            n[side].y = -last->tangent.x;
-            best = last->h < edge[best].h ? 1 - best : best;
-            if (!(last->h < 0)) continue;
+            dem2di_beside *passed = &edge[1 - best];
+            dem2di_walk_on(pair, core, turn, here, passed);
+            n[side].x = passed->tangent.y;
+            n[side].y = -passed->tangent.x;
+            best = passed->h < edge[best].h ? 1 - best : best;
+            if (!(passed->h < 0)) continue;
             dem2di_cores_apart(pair, core, here->k[0], here->k[1], n[side], search);
             return true;
         }
