@@ -64,7 +64,9 @@ WHAT IT DOES NOT DO
     heat; its own threads, files of grains, windows, random numbers or clocks.
 
 LIMITS
-    * Doubles only. At most 2^30 particles. Sizes and coordinates are best within 1e-60 to 1e60.
+    * Doubles only. At most 2^30 particles, and as many listed contacts. Sizes and coordinates are
+      best within 1e-60 to 1e60.
+    * Rotations of a step are right to angle^5/120: a particle should not turn by more than 0.01.
     * A custom support function that is not convex can't be detected; contacts are then wrong.
     * Two points carry a contact of faces. A box on a wall then conserves its energy; between two
       free polygons, where the reference edge changes, no rule of points does exactly.
@@ -268,7 +270,7 @@ OPTIONS (zero means: physical zero for physical fields; "library default" where 
     dem2d_particle_desc     material              -      none       a material of this world
     dem2d_particle_desc     motion                -      FREE
     dem2d_particle_desc     position              m      0          finite
-    dem2d_particle_desc     angle                 rad    0          finite
+    dem2d_particle_desc     angle                 rad    0          at most 2^30
     dem2d_particle_desc     velocity              m/s    0          finite; 0 when FIXED
     dem2d_particle_desc     angular_velocity      rad/s  0          finite; 0 when FIXED
     dem2d_wall_desc         length                m      none       > 0 for a servo with no spans
@@ -300,8 +302,9 @@ THREADS
     takes time to desc.parallel_for, if there is one, in blocks of some hundred contacts or
     particles: any thread system will do (examples/threads_posix.c, threads_openmp.c). Blocks write
     only what is their own and sums are taken in the order of ids, so that the number of threads,
-    and who does what, can't change a bit. Custom support functions are then called by those
-    threads; allocation and log only by the one that called the step.
+    and who does what, can't change a bit. Left to one thread are short loops over all particles
+    when the list is renewed, and the sums of the forces on walls. Custom support functions are
+    called by those threads; allocation and log only by the one that called the step.
 
 COSTS (instructions per circle and step of a settled bed with 2.2 contacts each, gcc -O2, by
 `make -C tests bench-cost`; what is not there is decided when the list is renewed and costs nothing)
@@ -322,8 +325,9 @@ COSTS (instructions per circle and step of a settled bed with 2.2 contacts each,
 MEMORY
     All of it comes through dem2d_env (malloc and free by default); release gets the size. Nothing
     is allocated in a step once the list of pairs has stopped growing; dem2d_world_stats tells the
-    bytes in use. Give capacities to reserve beforehand. A circle takes about 390 bytes with its
-    contacts; another shape 250 bytes more for each pair that is listed. Particles are now and then
+    bytes in use. Give capacities to reserve beforehand. A circle takes about 400 bytes with its
+    contacts if particle_capacity is given, else up to a half more; another shape 300 bytes more for
+    each pair that is listed. Particles are now and then
     sorted in memory by their place in space; ids, orders and results do not change by it.
 
 DETERMINISM
@@ -894,8 +898,8 @@ typedef enum dem2d_phase {
 typedef void dem2d_task_fn(void *context, int begin, int end);
 
 /// Calls task(context, begin, end) on ranges that cover 0 to count - 1 once, on any threads, in
-/// any order and number, and returns when all are done. An item is a block of some hundred
-/// contacts or particles. user is the desc's parallel_user.
+/// any order and number, and returns when all are done. An item is a block of 64 or more contacts
+/// or particles, or, where count is 1, work that can't be shared. user is the desc's parallel_user.
 typedef void dem2d_parallel_fn(void *user, dem2d_phase phase, int count, dem2d_task_fn *task,
                                void *context);
 
@@ -1303,6 +1307,7 @@ static double dem2di_length(dem2d_vec a) {
     return sqrt(dem2di_dot(a, a));
 }
 
+/* A NaN in a is left out, one in b comes out. */
 static double dem2di_max(double a, double b) {
     return a > b ? a : b;
 }
@@ -7212,6 +7217,17 @@ static inline int64_t dem2di_cell_of(double coordinate, double size) {
     return whole - (cell < (double)whole);
 }
 
+typedef struct dem2di_cell {
+    int64_t x, y;
+} dem2di_cell;
+
+static inline dem2di_cell dem2di_cell_at(const dem2di_grid *grid, dem2d_vec point, double size) {
+    dem2di_cell cell;
+    cell.x = dem2di_cell_of(point.x - grid->origin.x, size);
+    cell.y = dem2di_cell_of(point.y - grid->origin.y, size);
+    return cell;
+}
+
 /* Slot of a cell: squares of 8 x 8 cells are scattered by a hash, the cells of a square lie side
    by side, so that neighbours in space are neighbours in memory. Of 8 cells in a row no two share
    a slot, whatever the hash does. */
@@ -7224,7 +7240,7 @@ static int dem2di_cell_slot(const dem2di_grid *grid, int64_t x, int64_t y, int l
     return (int)(slot & (uint64_t)(grid->table - 1));
 }
 
-/* Level and slot of the discs from begin to end, whose centres are from the origin from now on. */
+/* Level and slot of the discs from begin to end. */
 static void dem2di_grid_place(const dem2di_grid *grid, int begin, int end) {
     for (int i = begin; i < end; i++) {
         dem2di_disc *disc = &grid->discs[i];
@@ -7234,9 +7250,8 @@ static void dem2di_grid_place(const dem2di_grid *grid, int begin, int end) {
             size /= 2;
             disc->level++;
         }
-        disc->centre = dem2di_sub(disc->centre, grid->origin);
-        int64_t x = dem2di_cell_of(disc->centre.x, size), y = dem2di_cell_of(disc->centre.y, size);
-        grid->slot[i] = dem2di_cell_slot(grid, x, y, disc->level);
+        dem2di_cell cell = dem2di_cell_at(grid, disc->centre, size);
+        grid->slot[i] = dem2di_cell_slot(grid, cell.x, cell.y, disc->level);
     }
 }
 
@@ -7318,7 +7333,8 @@ static void dem2di_grid_partners(const dem2di_grid *grid, dem2di_finds *finds) {
     for (int level = 0; level <= own->level; level++) {
         if (!(grid->levels >> level & 1)) continue;
         double size = dem2di_cell_size(grid, level);
-        int64_t x = dem2di_cell_of(own->centre.x, size), y = dem2di_cell_of(own->centre.y, size);
+        dem2di_cell cell = dem2di_cell_at(grid, own->centre, size);
+        int64_t x = cell.x, y = cell.y;
         dem2di_grid_row(grid, x - 1, x + 1, y + 1, level, finds);
         if (level < own->level) {
             dem2di_grid_row(grid, x - 1, x + 1, y, level, finds);
@@ -7649,6 +7665,7 @@ typedef struct dem2di_wall {
     int span[2];          /* indices, or -1 */
     dem2d_vec listed;     /* point when the list was built */
     double skin;          /* how far it may move before the next time */
+    int used_material;    /* at the last force pass */
     uint32_t generation;
     int users; /* walls that span to it */
     bool alive;
@@ -7695,7 +7712,6 @@ typedef struct dem2di_tally {
     dem2di_stiffest stiffest;
     double most;    /* greatest reach of the discs; greatest square of speed over skin */
     int64_t spread; /* sum of the distances in memory of the partners found */
-
 } dem2di_tally;
 
 /* What the scene makes use of: decided when the list is renewed, not per contact. */
@@ -7705,6 +7721,7 @@ typedef struct dem2di_plan {
     bool turns; /* some particle is no circle: rotations matter, and pairs are skipped by travel */
     bool one_law; /* all particles are of one material: */
     int material;
+    bool again;         /* friction is only there for the springs of the last list: look again */
     bool faces;         /* contacts may have two points: by the rule, and some particle has faces */
     bool heavy, damped; /* gravity, damping: as they are set at the step */
 } dem2di_plan;
@@ -7736,6 +7753,8 @@ struct dem2d_world {
     double skin;     /* of the radius */
     double interval; /* steps that a list is expected to last */
     double worn;     /* part of the skins used up since the list was built */
+    double creep;    /* part of a skin that the rounding of a position may use up in a step */
+    double rounding; /* m, of a position */
     bool bounded;    /* no state can become infinite while the list lasts */
     double spread;   /* mean distance in memory of two partners when last sorted */
     int64_t steps, rebuilds, slow_time_step, listed_at, sorts;
@@ -8106,7 +8125,8 @@ DEM2D_API const dem2d_shape *dem2d_world_shape(const dem2d_world *world, dem2d_s
 
 /* Springs in series, doubled: two equal materials meet with their own stiffness. */
 static double dem2di_mean_stiffness(double a, double b) {
-    return a + b > 0 ? 2 * a * (b / (a + b)) : 0;
+    double mean = a / 2 + b / 2; /* of the greatest numbers, too */
+    return mean > 0 ? a * (b / mean) : 0;
 }
 
 static dem2d_pair_desc dem2di_mix(const dem2d_material_desc *a, const dem2d_material_desc *b) {
@@ -8293,7 +8313,6 @@ DEM2D_API dem2d_result dem2d_world_add_particle(dem2d_world *world, const dem2d_
     dem2d_result result = dem2di_check_particle(world, desc);
     if (result != DEM2D_OK) return result;
     dem2di_body body;
-
     body.scale = desc->scale;
     body.shape_index = (int)desc->shape.index;
     body.material = (uint16_t)desc->material.index;
@@ -8333,6 +8352,19 @@ static void dem2di_forget(dem2d_world *world, int slot) {
     for (int k = list->first[slot]; k < list->first[slot + 1]; k++)
         if (list->incident[k] / 2 < list->count) list->keys[list->incident[k] / 2].a = -1;
     world->list_stale = true;
+}
+
+/* Contacts of a fixed particle with others that are fixed are forgotten. */
+static void dem2di_forget_fixed(dem2d_world *world, int slot) {
+    const dem2di_list *list = &world->list;
+    for (int k = list->first[slot]; k < list->first[slot + 1]; k++) {
+        int contact = list->incident[k] / 2;
+        if (contact >= list->pairs || list->keys[contact].a < 0) continue;
+        dem2di_key *key = &list->keys[contact];
+        if (world->bodies[key->a].motion == DEM2D_FIXED &&
+            world->bodies[key->b].motion == DEM2D_FIXED)
+            key->a = -1;
+    }
 }
 
 /* Contacts with a wall are forgotten. */
@@ -8404,8 +8436,11 @@ static const dem2di_state *dem2di_states_at(const dem2d_world *world, bool next)
 }
 
 static const dem2d_pair_desc *dem2di_law_at(const dem2d_world *world, int contact, bool next) {
-    const dem2d_pair_desc *laws = next ? world->laws : world->used_laws;
-    return &laws[dem2di_law_of(world, contact) - world->laws];
+    if (next) return dem2di_law_of(world, contact);
+    const dem2di_key *key = &world->list.keys[contact];
+    int material = contact >= world->list.pairs ? world->walls[key->b].used_material
+                                                : world->bodies[key->b].material;
+    return &world->used_laws[world->bodies[key->a].material * world->laws_side + material];
 }
 
 /* A listed contact then, and the contact point from B's centre (with walls 0); false when it is
@@ -8447,7 +8482,7 @@ static const dem2di_ends *dem2di_ends_at(const dem2d_world *world, int contact, 
     return ends->weight[0] > 0 ? ends : NULL;
 }
 
-/* Sum of the contact forces on a particle at the last force pass, as the step adds them. */
+/* Sum of the contact forces on a particle at the last force pass, in the order of the step. */
 static dem2di_load dem2di_load_of(const dem2d_world *world, int slot) {
     const dem2di_list *list = &world->list;
     dem2di_load load = {{0, 0}, 0};
@@ -8515,6 +8550,7 @@ DEM2D_API dem2d_result dem2d_world_drive_particle(dem2d_world *world, dem2d_part
     world->now[slot].v = velocity;
     world->now[slot].w = angular_velocity;
     world->bodies[slot].motion = (uint8_t)motion;
+    if (motion == DEM2D_FIXED) dem2di_forget_fixed(world, slot);
     world->inverse[slot] = dem2di_inverse_of(world, &world->bodies[slot]);
     world->list_stale = true; /* pairs of two fixed ones are not listed */
     return DEM2D_OK;
@@ -9006,7 +9042,12 @@ static dem2di_plan dem2di_plan_make(const dem2d_world *world) {
             bool rubs = law->friction > 0 && law->tangential_stiffness > 0;
             plan.friction = plan.friction || (rubs && used[a] && (used[b] || met[b]));
         }
+    /* springs and rotations of the last force pass must outlast a step that is refused */
+    bool outlasted = world->plan.again && world->steps > world->listed_at;
+    plan.again = !plan.friction && world->plan.friction && !outlasted;
+    plan.friction = plan.friction || plan.again;
     plan.turns = plan.turns || world->faces == DEM2D_CONTACT_AREA;
+    plan.turns = plan.turns || (world->plan.turns && world->body_count > 0);
     plan.spin = plan.spin || plan.turns || plan.friction;
     return plan;
 }
@@ -9050,7 +9091,8 @@ static void dem2di_disc_task(void *context, int begin, int end) {
         for (int i = first; i < dem2di_block_end(first, DEM2DI_BLOCK, world->body_count); i++) {
             const dem2di_body *body = &world->bodies[i];
             dem2di_disc *disc = &build->grid.discs[i];
-            double skin = dem2di_skin_make(world, i);
+            double skin =
+                dem2di_max(dem2di_skin_make(world, i), DEM2DI_ROUNDING * world->now[i].radius);
             world->wear[i] = 1 / (skin * skin);
             disc->centre = world->now[i].x;
             disc->reach = world->now[i].radius + skin;
@@ -9209,8 +9251,8 @@ static void dem2di_travel_task(void *context, int begin, int end) {
    so no overlap exceeds the scene, and no force its stiffness times that. With `steps` steps, this
    is true of any sane scene; where it is not, each step is tried before it is taken. */
 #define DEM2DI_LIST_STEPS (1 << 20)
-static bool dem2di_bounded(const dem2d_world *world) {
-    double far = 0, size = 0, speed = 0, spin = 0, light = 0, slender = 0, stiff = 0;
+static bool dem2di_bounded(dem2d_world *world) {
+    double far = 0, size = 0, speed = 0, spin = 0, light = 0, slender = 0, stiff = 0, wear = 0;
     for (int i = 0; i < world->body_count; i++) {
         const dem2di_state *now = &world->now[i];
         far = dem2di_max(far, fabs(now->x.x) + fabs(now->x.y));
@@ -9219,7 +9261,11 @@ static bool dem2di_bounded(const dem2d_world *world) {
         size = dem2di_max(size, now->radius);
         light = dem2di_max(light, world->inverse[i].mass);
         slender = dem2di_max(slender, world->inverse[i].inertia);
+        wear = dem2di_max(wear, world->wear[i]);
     }
+    world->rounding =
+        2 * DBL_EPSILON * (far + size); /* half an ulp of both coordinates, and more */
+    world->creep = world->rounding * sqrt(wear);
     for (int j = 0; j < world->wall_count; j++) {
         dem2d_vec point = world->wall_now[j].point;
         far = dem2di_max(far, fabs(point.x) + fabs(point.y));
@@ -9287,8 +9333,8 @@ static bool dem2di_build_search(dem2di_build *build) {
            dem2di_tallies_reserve(world, discs, (int)total);
 }
 
-/* Rotations for angles, or the other way, when the first particle that is no circle comes, or the
-   last one is gone. */
+/* Rotations for angles when the first particle that is no circle comes: what queries say stays the
+   same to the last bit. There is no way back, but for a world that is empty. */
 static void dem2di_reorient(dem2d_world *world, bool turns) {
     dem2di_state *states[2];
     states[0] = world->before;
@@ -9296,9 +9342,8 @@ static void dem2di_reorient(dem2d_world *world, bool turns) {
     for (int k = 0; k < 2; k++)
         for (int i = 0; i < world->body_count; i++) {
             dem2d_rot *q = &states[k][i].q;
-            double angle = turns ? q->c : dem2d_rot_angle(*q);
             world->plan.turns = turns;
-            *q = dem2di_orientation(world, angle);
+            *q = dem2di_orientation(world, q->c);
         }
 }
 
@@ -9369,7 +9414,7 @@ static dem2d_result dem2di_build_list(dem2d_world *world) {
     dem2di_run(world, DEM2D_PHASE_LIST, blocks, dem2di_fill_task, &build);
     dem2di_run(world, DEM2D_PHASE_LIST, 1, dem2di_touches_task, &build);
     if (!dem2di_array_reserve(world, (void **)&world->list.incident, &world->list.incident_capacity,
-                              build.incident, sizeof *world->list.incident))
+                              build.incident + 1, sizeof *world->list.incident))
         return dem2di_list_failed(world, skin, interval);
     dem2di_build_finish(&build);
     dem2di_watch_spread(world, sorted);
@@ -9916,10 +9961,11 @@ static bool dem2di_wall_pass(dem2d_world *world) {
     return stale;
 }
 
-/* Sum of six numbers; the first of a particle's partners, in the order of their ids, by pairs. */
-static DEM2DI_INLINE double dem2di_gather_six(const double *from, const int *entry) {
-    return (from[entry[0]] + from[entry[1]]) +
-           ((from[entry[2]] + from[entry[3]]) + (from[entry[4]] + from[entry[5]]));
+/* One after the other, in the order of the partners' ids: contacts that are apart add nothing, so
+   that it does not matter which of them are listed. */
+static DEM2DI_INLINE double dem2di_gather_six(double sum, const double *from, const int *entry) {
+    sum = sum + from[entry[0]] + from[entry[1]] + from[entry[2]];
+    return sum + from[entry[3]] + from[entry[4]] + from[entry[5]];
 }
 
 /* Sum of the contact forces on a particle. */
@@ -9928,9 +9974,9 @@ static DEM2DI_INLINE dem2di_load dem2di_gather(const dem2d_world *world, int slo
     const int *end = world->list.incident + world->list.first[slot + 1];
     dem2di_load sum = {{0, 0}, 0};
     for (; entry < end; entry += DEM2DI_GATHER) {
-        sum.force.x += dem2di_gather_six(world->load_x, entry);
-        sum.force.y += dem2di_gather_six(world->load_y, entry);
-        if (spin) sum.torque += dem2di_gather_six(world->load_turn, entry);
+        sum.force.x = dem2di_gather_six(sum.force.x, world->load_x, entry);
+        sum.force.y = dem2di_gather_six(sum.force.y, world->load_y, entry);
+        if (spin) sum.torque = dem2di_gather_six(sum.torque, world->load_turn, entry);
     }
     return sum;
 }
@@ -9972,8 +10018,8 @@ static DEM2DI_INLINE double dem2di_motion_range(const dem2d_world *world, int be
     for (int i = begin; i < end; i++) {
         dem2di_state next = dem2di_next_state(world, i, &damping, heavy, damped, spin, turns);
         if (turns)
-            world->next_travel[i] =
-                dem2di_travel(&next, world->lever[i], world->time_step, world->travel[i]);
+            world->next_travel[i] = dem2di_travel(&next, world->lever[i], world->time_step,
+                                                  world->travel[i] + world->rounding);
         world->before[i] = next;
         most = dem2di_max(most, dem2di_dot(next.v, next.v) * world->wear[i]);
     }
@@ -10012,7 +10058,7 @@ static double dem2di_motion_pass(dem2d_world *world) {
     world->plan.damped = world->local_damping > 0 || world->global_damping > 0;
     dem2di_run(world, DEM2D_PHASE_MOTION, blocks, dem2di_motion_task, world);
     for (int k = 0; k < blocks; k++) most = dem2di_max(most, world->tallies[k].most);
-    return world->worn + sqrt(most) * world->time_step;
+    return world->worn + sqrt(most) * world->time_step + world->creep;
 }
 
 /* A particle that the step would give a state that is not finite, or -1. */
@@ -10092,19 +10138,24 @@ static double dem2di_greatest_stiffness(const dem2d_world *world) {
     return world->faces == DEM2D_CONTACT_AREA ? HUGE_VAL : greatest;
 }
 
-/* No eigenvalue of a particle is above the sum of the traces of its contacts, each of which is at
-   most 2 (kn + kt) (1/m + R^2/I) with one point within its circle, twice that with two. Walls may
-   reach deeper. */
+/* No eigenvalue of a particle is above the sum of the traces of its contacts. Of two circles a
+   contact's is at most 2 (kn + kt) (1/m + R^2/I) with the greater radius, as the contact point may
+   lie outside of the smaller one. */
 static bool dem2di_surely_soft(const dem2d_world *world, int slot, double stiffness,
                                double enough) {
     const dem2di_list *list = &world->list;
-    int begin = list->first[slot], end = list->first[slot + 1], contacts = 0;
     double radius = world->now[slot].radius;
-    for (; begin < end && list->incident[begin] / 2 < list->pairs; begin++) contacts++;
-    if (begin < end && list->incident[begin] / 2 < list->count) return false;
-    double each = 2 * stiffness * (world->plan.faces ? 2 : 1);
-    return contacts * each *
-               (world->inverse[slot].mass + radius * radius * world->inverse[slot].inertia) <=
+    int contacts = 0;
+    for (int k = list->first[slot]; k < list->first[slot + 1]; k++) {
+        int contact = list->incident[k] / 2;
+        if (contact == list->count) break;
+        if (contact >= list->discs) return false;
+        const dem2di_key *key = &list->keys[contact];
+        radius = dem2di_max(radius, world->now[key->a == slot ? key->b : key->a].radius);
+        contacts++;
+    }
+    const dem2di_inverse *inverse = &world->inverse[slot];
+    return contacts * 2 * stiffness * (inverse->mass + radius * radius * inverse->inertia) <=
            enough;
 }
 
@@ -10209,6 +10260,14 @@ static void dem2di_commit(dem2d_world *world) {
     world->steps++;
 }
 
+/* The laws of this force pass, for the queries. */
+static void dem2di_use_laws(dem2d_world *world) {
+    size_t side = (size_t)world->laws_side;
+    if (side > 0) memcpy(world->used_laws, world->laws, side * side * sizeof *world->laws);
+    for (int j = 0; j < world->wall_count; j++)
+        world->walls[j].used_material = (int)world->walls[j].desc.material.index;
+}
+
 /* The straight road: candidate pairs, contacts, walls, sums and motion; then commit. All results go
    to arrays beside the present ones, and what can fail does so before the motion, which comes over
    the states of the last force pass: a failure only has to return. */
@@ -10219,13 +10278,11 @@ static dem2d_result dem2di_step(dem2d_world *world) {
         dem2d_result result = dem2di_build_list(world);
         if (result != DEM2D_OK) return result;
     }
+    world->list_stale = listed; /* should the step fail, the next try begins with a list as well */
     dem2di_contact_pass(world, &count);
     if (listed && world->check_time_step) {
         dem2d_result result = dem2di_check_step(world, &slow);
-        if (result != DEM2D_OK) {
-            world->list_stale = true; /* so that the next try is checked too */
-            return result;
-        }
+        if (result != DEM2D_OK) return result;
     }
     dem2di_wall_sums(world);
     bool worn = dem2di_wall_pass(world);
@@ -10241,11 +10298,10 @@ static dem2d_result dem2di_step(dem2d_world *world) {
     double path = dem2di_motion_pass(world); /* nothing fails from here on */
     worn = worn || path > 1 - DEM2DI_LIST_STEPS * DBL_EPSILON ||
            world->steps - world->listed_at >= DEM2DI_LIST_STEPS;
-    if (listed && world->laws_side > 0)
-        memcpy(world->used_laws, world->laws,
-               (size_t)world->laws_side * (size_t)world->laws_side * sizeof *world->laws);
+    if (listed) dem2di_use_laws(world);
     world->worn = path;
-    world->list_stale = world->list_worn = worn;
+    world->list_worn = worn;
+    world->list_stale = worn || world->plan.again;
     world->rebuilds += listed;
     world->count = count;
     world->slow_time_step += slow;
