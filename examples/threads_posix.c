@@ -17,75 +17,86 @@
 #include <pthread.h>
 #include <sched.h>
 
-/* A step has three phases of maybe 50 us. To wake a thread through the kernel each time would cost
-   as much, so workers look for the next phase for a while before they sleep. C99 has no atomics,
-   and a lock in that loop would hold up the one who hands out the work: hence the __atomic builtins
-   of gcc and clang, where C11 has <stdatomic.h>. */
-enum { LOOK = 200 }; // us
+/* Each thread takes the same share of the items in every phase and step: particles that are near in
+   memory are near in space, and so each finds in its cache what it left there. The shares are even
+   enough. A step has two phases of maybe 50 us: to wake a thread through the kernel each time would
+   cost as much, so workers look for the next phase for a while before they sleep. C99 has no
+   atomics, hence the __atomic builtins of gcc and clang, where C11 has <stdatomic.h>. */
+enum { LOOK = 500 }; // us
 
+typedef struct worker {
+    struct pool *pool;
+    int share; // its place among the threads; the caller has 0
+    pthread_t thread;
+} worker;
+
+/* What all look at and what all write are kept in lines of the cache apart from each other. */
 typedef struct pool {
-    int left;   // items that nobody has taken; atomic
-    int undone; // items that are not finished; atomic
     dem2d_task_fn *task;
     void *context;
-    pthread_mutex_t lock; // for what follows, and to set `left`
-    pthread_cond_t wake;  // there is work, or stop
-    int asleep;           // workers that wait for it
+    int count, threads;
+    pthread_mutex_t lock; // for `asleep` and `stop`, and to set `job`
+    pthread_cond_t wake;
+    int asleep; // workers that wait for it
     bool stop;
-    int workers;
-    pthread_t worker[256];
+    worker workers[255];
+    char apart[64];
+    unsigned job; // number of the phase; atomic
+    char apart_too[64];
+    int undone; // workers that have not finished it; atomic
 } pool;
 
-/* Does one item; false if there is none. Who takes a number from `left` may read `task`: it is
-   not set anew before that item is done. A late worker takes from the next phase, or nothing. */
-static bool do_item(pool *p) {
-    if (__atomic_load_n(&p->left, __ATOMIC_RELAXED) <= 0) return false;
-    const int item = __atomic_sub_fetch(&p->left, 1, __ATOMIC_ACQUIRE);
-    if (item < 0) return false;
-    p->task(p->context, item, item + 1);
-    __atomic_sub_fetch(&p->undone, 1, __ATOMIC_RELEASE);
-    return true;
+static void do_share(const pool *p, int share) {
+    const int begin = (int)((int64_t)p->count * share / p->threads);
+    const int end = (int)((int64_t)p->count * (share + 1) / p->threads);
+    if (begin < end) p->task(p->context, begin, end);
 }
 
-/* Works while there is work; returns when there has been none for LOOK. */
-static void work_and_look(pool *p) {
-    double worked = clock_seconds();
-    do {
-        bool found = false;
-        while (do_item(p)) found = true;
-        if (found) worked = clock_seconds();
+static bool is_new(const pool *p, unsigned last) {
+    return __atomic_load_n(&p->job, __ATOMIC_ACQUIRE) != last;
+}
+
+/* Returns when there is another phase than the last one, or an end of them. */
+static void await_job(pool *p, unsigned last) {
+    const double start = clock_seconds();
+    while (!is_new(p, last) && clock_seconds() - start < 1e-6 * LOOK)
         sched_yield(); // there may be more threads than processors
-    } while (clock_seconds() - worked < 1e-6 * LOOK);
+    if (is_new(p, last)) return;
+    pthread_mutex_lock(&p->lock);
+    p->asleep++;
+    while (!is_new(p, last) && !p->stop) pthread_cond_wait(&p->wake, &p->lock);
+    p->asleep--;
+    pthread_mutex_unlock(&p->lock);
 }
 
 static void *work(void *context) {
-    pool *p = context;
-    for (bool stop = false; !stop;) {
-        work_and_look(p);
-        pthread_mutex_lock(&p->lock);
-        p->asleep++;
-        while (!p->stop && __atomic_load_n(&p->left, __ATOMIC_RELAXED) <= 0)
-            pthread_cond_wait(&p->wake, &p->lock);
-        p->asleep--;
-        stop = p->stop;
-        pthread_mutex_unlock(&p->lock);
+    const worker *w = context;
+    for (unsigned job = 0;; job++) {
+        await_job(w->pool, job);
+        if (!is_new(w->pool, job)) return NULL;
+        do_share(w->pool, w->share);
+        __atomic_sub_fetch(&w->pool->undone, 1, __ATOMIC_RELEASE);
     }
-    return NULL;
 }
 
-/* The dem2d_parallel_fn. The caller works too, and waits for nobody who has not taken an item. */
+/* The dem2d_parallel_fn. The caller works too. */
 static void run_on_pool(void *user, dem2d_phase phase, int count, dem2d_task_fn *task,
                         void *context) {
     pool *p = user;
     (void)phase;
+    if (count == 1 || p->threads == 1) {
+        task(context, 0, count);
+        return;
+    }
     p->task = task;
     p->context = context;
-    __atomic_store_n(&p->undone, count, __ATOMIC_RELAXED);
+    p->count = count;
+    __atomic_store_n(&p->undone, p->threads - 1, __ATOMIC_RELAXED);
     pthread_mutex_lock(&p->lock); // so that nobody falls asleep in between
-    __atomic_store_n(&p->left, count, __ATOMIC_RELEASE);
-    if (p->asleep > 0 && count > 1) pthread_cond_broadcast(&p->wake);
+    __atomic_add_fetch(&p->job, 1, __ATOMIC_RELEASE);
+    if (p->asleep > 0) pthread_cond_broadcast(&p->wake);
     pthread_mutex_unlock(&p->lock);
-    while (do_item(p)) continue;
+    do_share(p, 0);
     while (__atomic_load_n(&p->undone, __ATOMIC_ACQUIRE) > 0) sched_yield();
 }
 
@@ -93,9 +104,14 @@ static void pool_start(pool *p, int threads) {
     memset(p, 0, sizeof *p);
     pthread_mutex_init(&p->lock, NULL);
     pthread_cond_init(&p->wake, NULL);
-    for (; p->workers < threads - 1; p->workers++) // the caller is one more
-        if (pthread_create(&p->worker[p->workers], NULL, work, p) != 0)
-            fail(STATUS_FAILED, "cannot start thread %d", p->workers + 1);
+    p->threads = threads;
+    for (int i = 1; i < threads; i++) {
+        worker *w = &p->workers[i - 1];
+        w->pool = p;
+        w->share = i;
+        if (pthread_create(&w->thread, NULL, work, w) != 0)
+            fail(STATUS_FAILED, "cannot start thread %d", i);
+    }
 }
 
 static void pool_end(pool *p) {
@@ -103,7 +119,7 @@ static void pool_end(pool *p) {
     p->stop = true;
     pthread_cond_broadcast(&p->wake);
     pthread_mutex_unlock(&p->lock);
-    while (p->workers > 0) pthread_join(p->worker[--p->workers], NULL);
+    for (int i = 1; i < p->threads; i++) pthread_join(p->workers[i - 1].thread, NULL);
     pthread_cond_destroy(&p->wake);
     pthread_mutex_destroy(&p->lock);
 }

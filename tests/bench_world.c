@@ -574,13 +574,16 @@ static bed get_bed(int scene, int test, int count) {
    late finds nothing to do, and the caller need not wait for it. */
 enum { IDLE, OPEN, JOINED, HELPED };
 
+/* What the threads write has a line of the cache to itself each. */
 typedef struct pool {
     pthread_t thread;
     pthread_mutex_t mutex;
     pthread_cond_t wake;
     dem2d_task_fn *task;
     void *context;
-    int count, chunk, next;  /* next: the first item nobody has taken */
+    int count, chunk;
+    char apart[64];
+    int next[2][16];         /* in [0]: the first item nobody has taken, of both halves */
     int job, asleep, closed; /* atomic */
 } pool;
 
@@ -590,11 +593,17 @@ static void relax_core(void) {
 #endif
 }
 
-static void work(pool *p) {
-    for (;;) {
-        const int begin = __atomic_fetch_add(&p->next, p->chunk, __ATOMIC_RELAXED);
-        if (begin >= p->count) return;
-        p->task(p->context, begin, p->count - begin < p->chunk ? p->count : begin + p->chunk);
+/* Each thread takes chunks of its own half, which its cache knows from the last step, then helps
+   with the other's. */
+static void work(pool *p, int own) {
+    for (int k = 0; k < 2; k++) {
+        const int half = k == 0 ? own : 1 - own, middle = p->count / 2;
+        const int end = half == 0 ? middle : p->count;
+        for (;;) {
+            const int begin = __atomic_fetch_add(&p->next[half][0], p->chunk, __ATOMIC_RELAXED);
+            if (begin >= end) break;
+            p->task(p->context, begin, end - begin < p->chunk ? end : begin + p->chunk);
+        }
     }
 }
 
@@ -614,11 +623,11 @@ static void sleep_until_open(pool *p) {
 }
 
 static void *help(void *user) {
-    enum { SPINS = 2000 }; /* some tens of microseconds */
+    enum { SPINS = 20000 }; /* some hundred microseconds */
     pool *p = user;
     for (int spins = 0; !__atomic_load_n(&p->closed, __ATOMIC_RELAXED); spins++) {
         if (__atomic_load_n(&p->job, __ATOMIC_RELAXED) == OPEN && change_job(p, OPEN, JOINED)) {
-            work(p);
+            work(p, 1);
             __atomic_store_n(&p->job, HELPED, __ATOMIC_RELEASE);
             spins = 0;
         } else if (spins == SPINS) {
@@ -647,15 +656,16 @@ static void run_on_two(void *user, dem2d_phase phase, int count, dem2d_task_fn *
         if (count == 1) task(context, 0, 1);
         return;
     }
-    p->task = task, p->context = context, p->count = count, p->next = 0;
-    p->chunk = 1 + count / 16; /* several for each: the blocks are not all alike */
+    p->task = task, p->context = context, p->count = count;
+    p->next[0][0] = 0, p->next[1][0] = count / 2;
+    p->chunk = 1 + count / 8; /* several for each: the blocks are not all alike */
     __atomic_store_n(&p->job, OPEN, __ATOMIC_SEQ_CST);
     if (__atomic_load_n(&p->asleep, __ATOMIC_SEQ_CST)) {
         pthread_mutex_lock(&p->mutex);
         pthread_cond_signal(&p->wake);
         pthread_mutex_unlock(&p->mutex);
     }
-    work(p);
+    work(p, 0);
     if (!change_job(p, OPEN, IDLE)) wait_for_helper(p);
 }
 

@@ -1,0 +1,353 @@
+/* The list of pairs and the order of particles in memory: nothing is missed, whatever the sizes,
+   places and speeds; nothing that can be seen depends on them; a refused step changes nothing. */
+#define DEM2D_IMPLEMENTATION
+#include "dem2d.h"
+#include "testing.h"
+
+/* --- building blocks ------------------------------------------------------------------------- */
+
+typedef struct scene {
+    dem2d_world *world;
+    dem2d_material_id material;
+    dem2d_shape_id shapes[3]; /* a circle of radius 1, an ellipse, a triangle */
+} scene;
+
+static dem2d_world_desc quiet_desc(void) {
+    dem2d_world_desc desc = {0};
+    desc.time_step = 1e-4;
+    desc.skip_time_step_check = true;
+    return desc;
+}
+
+static scene open_scene(const dem2d_world_desc *desc, double stiffness, double friction) {
+    static const dem2d_vec corners[3] = {{1, 0}, {-0.5, 0.8}, {-0.5, -0.8}};
+    const dem2d_material_desc stone = {1000, stiffness, stiffness, friction};
+    dem2d_shape *shapes[3];
+    scene s;
+    assert_ok(dem2d_world_create(desc, &s.world));
+    assert_ok(dem2d_world_add_material(s.world, &stone, &s.material));
+    assert_ok(dem2d_shape_create_circle(NULL, 1, &shapes[0]));
+    assert_ok(dem2d_shape_create_ellipse(NULL, 1, 0.6, &shapes[1]));
+    assert_ok(dem2d_shape_create_polygon(NULL, corners, 3, 0, &shapes[2]));
+    for (int i = 0; i < 3; i++) {
+        assert_ok(dem2d_world_add_shape(s.world, shapes[i], &s.shapes[i]));
+        dem2d_shape_destroy(shapes[i]);
+    }
+    return s;
+}
+
+static dem2d_particle_id add(const scene *s, int shape, double scale, double x, double y,
+                             double vx) {
+    dem2d_particle_desc desc = {0};
+    dem2d_particle_id id;
+    desc.scale = scale, desc.shape = s->shapes[shape], desc.material = s->material;
+    desc.position.x = x, desc.position.y = y, desc.velocity.x = vx;
+    assert_ok(dem2d_world_add_particle(s->world, &desc, &id));
+    return id;
+}
+
+static uint64_t state_hash(const dem2d_world *world) {
+    uint64_t hash = 1469598103934665603u; /* FNV-1a */
+    for (int i = 0; i < world->name_count; i++) {
+        if (world->names[i].slot < 0) continue;
+        const unsigned char *byte = (const unsigned char *)&world->now[world->names[i].slot];
+        for (size_t k = 0; k < sizeof(dem2di_state); k++) hash = (hash ^ byte[k]) * 1099511628211u;
+    }
+    return hash;
+}
+
+/* Contacts of the last force pass against all pairs, one by one, at the positions of that pass. */
+static int count_missed(const dem2d_world *world) {
+    int missed = 0;
+    for (int a = 0; a < world->body_count; a++)
+        for (int b = 0; b < a; b++) {
+            const dem2d_shape *sa = dem2di_shape_of(world, &world->bodies[a]);
+            const dem2d_shape *sb = dem2di_shape_of(world, &world->bodies[b]);
+            dem2d_contact contact;
+            assert_ok(dem2d_pair_contact(sa, dem2di_pose_of(world, world->before, a), sb,
+                                         dem2di_pose_of(world, world->before, b), NULL, &contact));
+            if (contact.state != DEM2D_PENETRATING || contact.depth <= 1e-7 * sa->circumscribed)
+                continue;
+            dem2di_key key = {b, a};
+            if (world->bodies[a].index < world->bodies[b].index) key.a = a, key.b = b;
+            const int listed = dem2di_listed(world, &key, false);
+            dem2di_link link;
+            dem2d_vec arm;
+            missed += listed < 0 || !dem2di_link_at(world, listed, false, &link, &arm);
+        }
+    return missed;
+}
+
+/* --- nothing is missed ------------------------------------------------------------------------ */
+
+/* Random clouds of sizes from 1 to 1/ratio, which fly about; far is where their middle is. */
+static void check_cloud(double ratio, double far, double speed, double skin) {
+    dem2d_world_desc desc = quiet_desc();
+    desc.skin = skin;
+    const scene s = open_scene(&desc, 1e5, 0.3);
+    test_random random = {7};
+    for (int i = 0; i < 150; i++) {
+        const double scale = pow(ratio, -test_uniform(&random, 0, 1));
+        add(&s, i % 3, scale, far + test_uniform(&random, -8, 8), test_uniform(&random, -8, 8),
+            test_uniform(&random, -speed, speed));
+    }
+    for (int k = 0; k < 25; k++) {
+        assert_ok(dem2d_world_step(s.world, k < 5 ? 1 : 20, NULL));
+        assert_int_equal(count_missed(s.world), 0);
+    }
+    dem2d_world_destroy(s.world);
+}
+
+static void test_clouds(void **state) {
+    (void)state;
+    check_cloud(1, 0, 1, 0);
+    check_cloud(10, 0, 10, 0);
+    check_cloud(100, 0, 100, 0);
+    check_cloud(1000, 0, 10, 0.05);
+    check_cloud(100, 1e6, 10, 0);
+    check_cloud(100, -1e8, 10, 0);
+}
+
+/* Two circles that approach at 1e8 by less than the last bit of a position in a step: each step
+   moves them by all of it or not at all. */
+static void test_far_crawl(void **state) {
+    (void)state;
+    dem2d_world_desc desc = quiet_desc();
+    const scene s = open_scene(&desc, 1e5, 0);
+    const double ulp = 1.4901161193847656e-8, v = 0.5001 * ulp / desc.time_step;
+    const dem2d_particle_id a = add(&s, 0, 0.001, 1e8, 0, v);
+    const dem2d_particle_id b = add(&s, 0, 0.001, 1e8 + 0.0021, 0, -v);
+    const dem2d_vec va = {v, 0}, vb = {-v, 0};
+    assert_ok(dem2d_world_drive_particle(s.world, a, DEM2D_DRIVEN, va, 0));
+    assert_ok(dem2d_world_drive_particle(s.world, b, DEM2D_DRIVEN, vb, 0));
+    for (int k = 0; k < 400; k++) {
+        assert_ok(dem2d_world_step(s.world, 50, NULL));
+        assert_int_equal(count_missed(s.world), 0);
+    }
+    dem2d_world_destroy(s.world);
+}
+
+/* All in one place, all in one line, one, none. */
+static void test_crowds(void **state) {
+    (void)state;
+    dem2d_world_desc desc = quiet_desc();
+    for (int kind = 0; kind < 4; kind++) {
+        const scene s = open_scene(&desc, 1, 0.1);
+        const int count = kind == 3 ? 0 : kind == 2 ? 1 : 200;
+        for (int i = 0; i < count; i++) add(&s, 0, 1, kind == 1 ? 1.9 * i : 0, 0, 0);
+        assert_ok(dem2d_world_step(s.world, 1, NULL));
+        dem2d_stats stats;
+        assert_ok(dem2d_world_stats(s.world, &stats));
+        assert_int_equal(stats.contacts, kind == 0 ? 200 * 199 / 2 : kind == 1 ? 199 : 0);
+        dem2d_world_destroy(s.world);
+    }
+}
+
+/* A skin below all rounding is taken as the least that means something. */
+static void test_least_skin(void **state) {
+    (void)state;
+    dem2d_world_desc desc = quiet_desc();
+    desc.skin = 1e-300;
+    const scene s = open_scene(&desc, 1e5, 0);
+    add(&s, 0, 1, 0, 0, 1);
+    add(&s, 0, 1, 2.01, 0, 0);
+    assert_ok(dem2d_world_step(s.world, 300, NULL));
+    assert_int_equal(count_missed(s.world), 0);
+    dem2d_stats stats;
+    assert_ok(dem2d_world_stats(s.world, &stats));
+    assert_int_equal(stats.contacts, 1);
+    dem2d_world_destroy(s.world);
+}
+
+/* --- nothing depends on memory or on lists ----------------------------------------------------- */
+
+/* A lattice whose pairs are just at the reach of the first list, and small circles between. */
+static uint64_t run_lattice(double radius, bool sorted, bool renewed, double skin) {
+    dem2d_world_desc desc = quiet_desc();
+    desc.skin = skin;
+    const scene s = open_scene(&desc, 1e5, 0.5);
+    for (int k = 0; k < 400; k++) {
+        const int i = (k * 37 + 211) % 400; /* neighbours are not neighbours in memory */
+        const double x = 0.7 + 2.2 * radius * (i % 20), y = 0.3 + 1.9 * radius * (i / 20);
+        add(&s, 0, radius, x, y, 0);
+        add(&s, 0, 0.1 * radius, x + 0.8 * radius, y + 0.68 * radius, 0);
+        add(&s, 0, 0.1 * radius, x - 0.8 * radius, y + 0.66 * radius, 0);
+    }
+    if (!sorted) s.world->scattered = false;
+    for (int k = 0; k < 20; k++) {
+        if (sorted && k % 3 == 0) s.world->scattered = true;
+        if (renewed) s.world->list_stale = true;
+        assert_ok(dem2d_world_step(s.world, 10, NULL));
+    }
+    const uint64_t hash = state_hash(s.world);
+    dem2d_world_destroy(s.world);
+    return hash;
+}
+
+static void test_same_bits(void **state) {
+    (void)state;
+    for (int i = 0; i < 12; i++) {
+        const double radius = 0.01 + 0.001 * i;
+        const uint64_t hash = run_lattice(radius, false, false, 0);
+        assert_true(run_lattice(radius, true, false, 0) == hash);
+        assert_true(run_lattice(radius, true, true, 0) == hash);
+        assert_true(run_lattice(radius, false, true, 0.01) == hash);
+        assert_true(run_lattice(radius, false, false, 0.5) == hash);
+    }
+}
+
+/* --- refused steps ----------------------------------------------------------------------------- */
+
+typedef struct view {
+    dem2d_particle_info grains[2];
+    dem2d_contact_info contacts[4];
+    dem2d_energy energy;
+    dem2d_stress stress;
+    int count;
+} view;
+
+static view look(const dem2d_world *world, const dem2d_particle_id ids[2]) {
+    view v;
+    memset(&v, 0, sizeof v);
+    for (int i = 0; i < 2; i++) assert_ok(dem2d_world_get_particle(world, ids[i], &v.grains[i]));
+    assert_ok(dem2d_world_contacts(world, v.contacts, 4, &v.count));
+    assert_ok(dem2d_world_energy(world, &v.energy));
+    assert_ok(dem2d_world_stress(world, 1, &v.stress));
+    return v;
+}
+
+/* Two circles that rub; friction is taken away and the stiffness made too great: refused. Then all
+   is as it was, and with the old law goes on as if nothing had been. */
+static void test_refused_law(void **state) {
+    (void)state;
+    dem2d_world_desc desc = quiet_desc();
+    desc.skip_time_step_check = false;
+    view last[2];
+    for (int refused = 0; refused < 2; refused++) {
+        const scene s = open_scene(&desc, 1e5, 0.5);
+        const dem2d_pair_desc stiff = {1e15, 0, 0}, old = {1e5, 1e5, 0.5};
+        dem2d_particle_id ids[2];
+        ids[0] = add(&s, 0, 1, 0, 0, 0);
+        ids[1] = add(&s, 0, 1, 1.5, 1.3, -0.3);
+        assert_ok(dem2d_world_step(s.world, 50, NULL));
+        if (refused) {
+            const view before = look(s.world, ids);
+            assert_int_equal(before.count, 1);
+            assert_true(before.contacts[0].tangential_force != 0);
+            assert_ok(dem2d_world_set_pair(s.world, s.material, s.material, &stiff));
+            for (int tries = 0; tries < 3; tries++) {
+                assert_result(dem2d_world_step(s.world, 1, NULL), DEM2D_TIME_STEP);
+                const view after = look(s.world, ids);
+                assert_memory_equal(&after, &before, sizeof after);
+            }
+        }
+        assert_ok(dem2d_world_set_pair(s.world, s.material, s.material, &old));
+        assert_ok(dem2d_world_step(s.world, 50, NULL));
+        last[refused] = look(s.world, ids);
+        for (int i = 0; i < 2; i++) last[refused].grains[i].shape.generation = 0;
+        dem2d_world_destroy(s.world);
+    }
+    assert_memory_equal(&last[0], &last[1], sizeof last[0]);
+}
+
+/* A step that would not end finite fails after it has renewed the list: the next one still knows
+   the laws of its contacts. */
+static void test_refused_state(void **state) {
+    (void)state;
+    dem2d_world_desc desc = quiet_desc();
+    const scene s = open_scene(&desc, 1e5, 0.5);
+    const dem2d_vec wild = {0, -1.5e308}, none = {0, 0};
+    dem2d_particle_id ids[2];
+    ids[0] = add(&s, 0, 1, 0, 0, 0);
+    ids[1] = add(&s, 0, 1, 1.5, 1.3, 0);
+    assert_ok(dem2d_world_set_gravity(s.world, wild));
+    assert_ok(dem2d_world_set_damping(s.world, 0.9, 0));
+    assert_ok(dem2d_world_drive_particle(s.world, ids[0], DEM2D_FREE, (dem2d_vec){0, 1}, 0));
+    assert_result(dem2d_world_step(s.world, 1, NULL), DEM2D_STATE);
+    assert_ok(dem2d_world_set_gravity(s.world, none));
+    assert_ok(dem2d_world_step(s.world, 1, NULL));
+    const view v = look(s.world, ids);
+    assert_int_equal(v.count, 1);
+    assert_near(v.contacts[0].normal_force, 1e5 * v.contacts[0].depth, 1e-14);
+    dem2d_world_destroy(s.world);
+}
+
+/* Rotations are those the particles were given, whether the world keeps angles or not, and the last
+   ellipse that leaves takes no bit of them along. */
+static void test_rotations(void **state) {
+    (void)state;
+    dem2d_world_desc desc = quiet_desc();
+    const scene s = open_scene(&desc, 1e5, 0.5);
+    dem2d_particle_id ids[2];
+    ids[0] = add(&s, 0, 1, 0, 0, 0);
+    ids[1] = add(&s, 1, 1, 5, 0, 0);
+    const dem2d_vec v = {0, 0};
+    assert_ok(dem2d_world_drive_particle(s.world, ids[0], DEM2D_FREE, v, 3));
+    assert_ok(dem2d_world_move_particle(s.world, ids[0], v, 0.7));
+    dem2d_particle_info info;
+    assert_ok(dem2d_world_get_particle(s.world, ids[0], &info));
+    const dem2d_rot q = dem2d_rot_make(0.7);
+    assert_memory_equal(&info.pose.rotation, &q, sizeof q);
+    assert_ok(dem2d_world_step(s.world, 1000, NULL));
+    assert_ok(dem2d_world_get_particle(s.world, ids[0], &info));
+    assert_within(dem2d_rot_angle(info.pose.rotation), 0.7 + 0.3, 1e-12);
+    const dem2d_rot turned = info.pose.rotation;
+    assert_ok(dem2d_world_remove_particle(s.world, ids[1]));
+    assert_ok(dem2d_world_get_particle(s.world, ids[0], &info));
+    assert_memory_equal(&info.pose.rotation, &turned, sizeof turned);
+    assert_ok(dem2d_world_step(s.world, 1000, NULL));
+    assert_ok(dem2d_world_get_particle(s.world, ids[0], &info));
+    assert_within(dem2d_rot_angle(info.pose.rotation), 0.7 + 0.6, 1e-12);
+    dem2d_world_destroy(s.world);
+}
+
+/* A world of circles alone keeps angles: many turns, and what a query says. */
+static void test_angles(void **state) {
+    (void)state;
+    dem2d_world_desc desc = quiet_desc();
+    const scene s = open_scene(&desc, 1e5, 0.5);
+    const dem2d_particle_id id = add(&s, 0, 1, 0, 0, 0);
+    const dem2d_vec v = {0, 0};
+    assert_ok(dem2d_world_drive_particle(s.world, id, DEM2D_DRIVEN, v, -1e4));
+    assert_ok(dem2d_world_step(s.world, 100000, NULL));
+    dem2d_particle_info info;
+    assert_ok(dem2d_world_get_particle(s.world, id, &info));
+    const long double angle = remainderl(-1e5L, 2 * TEST_PI);
+    assert_within(dem2d_rot_angle(info.pose.rotation), angle, 1e-10);
+    dem2d_world_destroy(s.world);
+}
+
+/* --- the check of the time step ---------------------------------------------------------------- */
+
+/* Deep in a large circle the contact point is far outside of the small one, whose lever is long. */
+static void test_deep_lever(void **state) {
+    (void)state;
+    dem2d_world_desc desc = quiet_desc();
+    desc.skip_time_step_check = false;
+    for (int shape = 0; shape < 2; shape++) {
+        const scene s = open_scene(&desc, 1e6, 0.5);
+        const dem2d_particle_id large = add(&s, shape, 100, 0, 0, 0);
+        const dem2d_vec v = {0, 0};
+        double safe, limit;
+        assert_ok(dem2d_world_drive_particle(s.world, large, DEM2D_FIXED, v, 0));
+        add(&s, shape, 0.5, 50, 0, 0);
+        assert_ok(dem2d_world_step(s.world, 1, NULL));
+        assert_ok(dem2d_world_time_step_bounds(s.world, &safe, &limit, NULL));
+        assert_ok(dem2d_world_set_time_step(s.world, 1.05 * limit));
+        assert_result(dem2d_world_step(s.world, 1, NULL), DEM2D_TIME_STEP);
+        assert_ok(dem2d_world_set_time_step(s.world, 0.9 * limit));
+        assert_ok(dem2d_world_step(s.world, 1, NULL));
+        dem2d_world_destroy(s.world);
+    }
+}
+
+int main(void) {
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(test_clouds),        cmocka_unit_test(test_far_crawl),
+        cmocka_unit_test(test_crowds),        cmocka_unit_test(test_least_skin),
+        cmocka_unit_test(test_same_bits),     cmocka_unit_test(test_refused_law),
+        cmocka_unit_test(test_refused_state), cmocka_unit_test(test_rotations),
+        cmocka_unit_test(test_angles),        cmocka_unit_test(test_deep_lever),
+    };
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}
