@@ -42,6 +42,7 @@ CONTENTS (search for the anchor, ">>" and the word)
                     leapfrog motion                                         >>motion
                     the world: objects with ids                             >>world
                     the list of contacts, particles sorted in space         >>list
+                    the ledger of energies                                  >>ledger
                     contacts, sums, motion; the stable time step            >>step
                     energy, stress, coordination                            >>measures
                     pictures                                                >>writers
@@ -162,9 +163,10 @@ CONCEPTS
                 They come and go without a jump of force or moment.
     Wall        A half-plane: its normal points into the grains. It stands still, moves at a
                 velocity, or is servo-controlled to a stress.
-    Force       On B along the normal at each contact point: kn depth (never attractive). Along
-                the tangent an incremental spring kt, at most friction times the normal force
-                ([F] eq. 8-10).
+    Force       On B along the normal at each contact point: kn depth, and a dashpot if the
+                materials have one; never attractive. Along the tangent an incremental spring kt,
+                at most friction times the normal force ([F] eq. 8-10). Against rolling a spring
+                as well, if they have rolling friction. Or a law of your own.
     Skipping    A pair found apart by a gap is not looked at again before its particles have
                 moved and turned that far together. Of two circles a look costs less than that.
     List        Pairs nearer than their skins are listed; the list is renewed when a particle's path
@@ -255,6 +257,9 @@ OPTIONS (zero means: physical zero for physical fields; "library default" where 
     dem2d_world_desc        particle_capacity     -      grows      >= 0
     dem2d_world_desc        pair_capacity         -      grows      >= 0
     dem2d_world_desc        skip_time_step_check  -      false
+    dem2d_world_desc        ledger                -      false
+    dem2d_world_desc        law                   -      NULL       springs and friction
+    dem2d_world_desc        law_user              -      NULL
     dem2d_world_desc        parallel_for          -      NULL       the caller's thread does all
     dem2d_world_desc        parallel_user         -      NULL
     dem2d_world_desc        env                   -      NULL       copied
@@ -262,9 +267,13 @@ OPTIONS (zero means: physical zero for physical fields; "library default" where 
     dem2d_material_desc     normal_stiffness      N/m    none       > 0
     dem2d_material_desc     tangential_stiffness  N/m    0          >= 0
     dem2d_material_desc     friction              -      0          >= 0
+    dem2d_material_desc     damping_ratio         -      0          >= 0
+    dem2d_material_desc     rolling_friction      -      0          >= 0
     dem2d_pair_desc         normal_stiffness      N/m    none       > 0
     dem2d_pair_desc         tangential_stiffness  N/m    0          >= 0
     dem2d_pair_desc         friction              -      0          >= 0
+    dem2d_pair_desc         damping_ratio         -      0          >= 0
+    dem2d_pair_desc         rolling_friction      -      0          >= 0
     dem2d_particle_desc     scale                 -      none       > 0
     dem2d_particle_desc     shape                 -      none       a shape of this world
     dem2d_particle_desc     material              -      none       a material of this world
@@ -318,6 +327,7 @@ COSTS (instructions per circle and step of a settled bed with 2.2 contacts each,
     fixed particles, walls, parallel_for                 +1    when there are but touch nothing
     polygons for circles                                +530
     energy and stress asked for in every step          +1600   else nothing
+    the ledger of energies                             +1000   else nothing
     a pair of circles listed but apart                   75    as much as one in contact: no branch
     another pair listed but apart, surely so             70    of the 700 to 2000 that a look costs
     a region without particles, a pair of fixed ones      0
@@ -903,6 +913,62 @@ typedef void dem2d_task_fn(void *context, int begin, int end);
 typedef void dem2d_parallel_fn(void *user, dem2d_phase phase, int count, dem2d_task_fn *task,
                                void *context);
 
+/// A material. Two materials meet with the harmonic mean of their stiffnesses (springs in
+/// series, doubled), the smaller frictions and the greater damping ratio, unless
+/// dem2d_world_set_pair says otherwise.
+typedef struct dem2d_material_desc {
+    double density;              ///< kg/m2 (kg/m3 per metre of thickness), > 0
+    double normal_stiffness;     ///< N/m, > 0
+    double tangential_stiffness; ///< N/m, >= 0
+    double friction;             ///< coefficient, >= 0
+    double damping_ratio;        ///< of the normal dashpot, >= 0: see dem2d_damping_ratio
+    double rolling_friction;     ///< coefficient, >= 0
+} dem2d_material_desc;
+
+/// How two materials meet.
+typedef struct dem2d_pair_desc {
+    double normal_stiffness;     ///< N/m, > 0
+    double tangential_stiffness; ///< N/m, >= 0
+    double friction;             ///< coefficient, >= 0
+    /// Of the normal dashpot, >= 0: its force is 2 zeta sqrt(m kn) times the closing speed, with m
+    /// the reduced mass of the two. Spring and dashpot together never pull.
+    double damping_ratio;
+    /// Coefficient mu_r, >= 0: a spring kt R^2 against rolling, its moment at most mu_r R times the
+    /// normal force, with 1/R = 1/R_A + 1/R_B of the equivalent radii (a wall's is infinite).
+    double rolling_friction;
+} dem2d_pair_desc;
+
+/// What a contact is, for a caller's law. Velocities are those half a step before.
+typedef struct dem2d_law_input {
+    dem2d_pair_desc pair; ///< how the materials meet
+    dem2d_particle_id a;  ///< particle A
+    dem2d_particle_id b;  ///< particle B; generation 0 when B is a wall
+    dem2d_wall_id wall;   ///< wall B; generation 0 when B is a particle
+    dem2d_vec normal;     ///< unit, from A to B
+    double time_step;     ///< s
+    double depth;         ///< m, > 0
+    double closing;       ///< m/s, at which A and B approach along the normal
+    double slip;    ///< m/s, of B against A at the contact, along the normal turned by +90 degrees
+    double turning; ///< rad/s, of B against A
+    double mass;    ///< kg/m, reduced; 0 when neither is free
+    double radius;  ///< m, reduced, of the equivalent radii
+    double tangential_force; ///< N/m, in the step before; 0 for a new contact
+    double moment;           ///< N, likewise
+    double state[2];         ///< likewise, whatever the law keeps there
+} dem2d_law_input;
+
+/// What a caller's law answers; all zero at the call but for the state, which is the input's.
+typedef struct dem2d_law_output {
+    double normal_force;     ///< N/m, on B along the normal; may pull
+    double tangential_force; ///< N/m, on B along the normal turned by +90 degrees
+    double moment;           ///< N, on B
+    double energy;           ///< J/m, stored in the contact, for the energies
+    double state[2];         ///< for the next step
+} dem2d_law_output;
+
+/// A contact law: forces of a contact that is closed. Called by the threads of parallel_for.
+typedef void dem2d_law_fn(void *user, const dem2d_law_input *input, dem2d_law_output *output);
+
 /// A world. Only time_step has no default.
 typedef struct dem2d_world_desc {
     double time_step;          ///< s, > 0
@@ -917,26 +983,14 @@ typedef struct dem2d_world_desc {
     int particle_capacity;     ///< reserved at creation; 0 grows
     int pair_capacity;         ///< reserved at creation; 0 grows
     bool skip_time_step_check; ///< no stability check
+    bool ledger;               ///< keep the ledger of energies, see dem2d_world_ledger
+    /// Instead of springs, dashpot and friction; contacts then have one point. NULL: those.
+    dem2d_law_fn *law;
+    void *law_user;                  ///< handed to law
     dem2d_parallel_fn *parallel_for; ///< shares a step's work out; NULL: all is done in the call
     void *parallel_user;             ///< handed to parallel_for
     const dem2d_env *env;            ///< memory and log, copied; NULL for malloc, free, silence
 } dem2d_world_desc;
-
-/// A material. Two materials meet with the harmonic mean of their stiffnesses (springs in
-/// series, doubled) and the smaller friction, unless dem2d_world_set_pair says otherwise.
-typedef struct dem2d_material_desc {
-    double density;              ///< kg/m2 (kg/m3 per metre of thickness), > 0
-    double normal_stiffness;     ///< N/m, > 0
-    double tangential_stiffness; ///< N/m, >= 0
-    double friction;             ///< coefficient, >= 0
-} dem2d_material_desc;
-
-/// How two materials meet.
-typedef struct dem2d_pair_desc {
-    double normal_stiffness;     ///< N/m, > 0
-    double tangential_stiffness; ///< N/m, >= 0
-    double friction;             ///< coefficient, >= 0
-} dem2d_pair_desc;
 
 /// How a particle moves.
 typedef enum dem2d_motion {
@@ -1016,8 +1070,9 @@ typedef struct dem2d_contact_info {
     dem2d_vec branch;        ///< m, centre of A to centre of B (wall: to the contact point)
     int points;              ///< that carry the force: 1, or 2 where two faces meet
     double depth;            ///< m, overlap; by area: area over width
-    double normal_force;     ///< N/m, on B along the normal, >= 0
+    double normal_force;     ///< N/m, on B along the normal; >= 0 but by a caller's law
     double tangential_force; ///< N/m, on B along the normal turned by +90 degrees
+    double moment;           ///< N, on B, against rolling
 } dem2d_contact_info;
 
 /// Counters of a world.
@@ -1053,6 +1108,10 @@ DEM2D_API const dem2d_shape *dem2d_world_shape(const dem2d_world *world, dem2d_s
 /// Add a material. At most 256. Errors: NOT_FINITE, OUT_OF_RANGE, OUT_OF_MEMORY.
 DEM2D_API dem2d_result dem2d_world_add_material(dem2d_world *world, const dem2d_material_desc *desc,
                                                 dem2d_material_id *id);
+/// Damping ratio zeta of the dashpot that gives a restitution coefficient in (0, 1], at any speed
+/// and with no pull: -ln e = 2 zeta acos(zeta)/sqrt(1 - zeta^2), and likewise with acosh beyond
+/// zeta = 1 (Schwager, Poeschel 2007). Errors: NULL_ARGUMENT, OUT_OF_RANGE, NOT_FINITE.
+DEM2D_API dem2d_result dem2d_damping_ratio(double restitution, double *damping_ratio);
 /// Say how two materials (or one with itself) meet from now on.
 DEM2D_API dem2d_result dem2d_world_set_pair(dem2d_world *world, dem2d_material_id a,
                                             dem2d_material_id b, const dem2d_pair_desc *desc);
@@ -1110,8 +1169,29 @@ typedef struct dem2d_energy {
     double rotational;    ///< likewise
     double normal;        ///< in normal springs
     double tangential;    ///< in tangential springs
+    double rolling;       ///< in springs against rolling
     double potential;     ///< -sum m g.x
 } dem2d_energy;
+
+/// Where energy came from and went, J/m: stored at the last force pass, the rest since the first.
+/// The kinetic energy is that for which the leapfrog conserves the energy of a spring exactly: half
+/// the mass times the velocity half a step before times that half a step after.
+typedef struct dem2d_ledger {
+    double kinetic;    ///< of the free particles
+    double normal;     ///< in normal springs
+    double tangential; ///< in tangential springs and those against rolling
+    double gravity;    ///< work of gravity on the free particles
+    double walls;      ///< work of the walls on the particles
+    double driven;     ///< work of the driven particles on the others
+    double friction;   ///< dissipated by sliding and rolling, and by a caller's law
+    double dashpot;    ///< dissipated by dashpots
+    double damping;    ///< dissipated by local and global damping
+    /// Put in by the caller: at the start, and whenever objects, velocities or laws are changed. It
+    /// is what closes the ledger over the first step after that.
+    double given;
+    /// Stored and dissipated energy less what was put in: error of the time stepping.
+    double closure;
+} dem2d_ledger;
 
 /// Stress tensor, compression positive, Pa.
 typedef struct dem2d_stress {
@@ -1142,6 +1222,8 @@ DEM2D_API dem2d_result dem2d_world_contacts(const dem2d_world *world, dem2d_cont
                                             int capacity, int *count);
 /// Energies.
 DEM2D_API dem2d_result dem2d_world_energy(const dem2d_world *world, dem2d_energy *energy);
+/// The ledger, for a world that keeps one (desc.ledger), else OUT_OF_RANGE.
+DEM2D_API dem2d_result dem2d_world_ledger(const dem2d_world *world, dem2d_ledger *ledger);
 /// Love-Weber stress (1/area) sum of f l over the contacts, walls included; area > 0, m2.
 DEM2D_API dem2d_result dem2d_world_stress(const dem2d_world *world, double area,
                                           dem2d_stress *stress);
@@ -1397,6 +1479,17 @@ DEM2D_API double dem2d_rot_angle(dem2d_rot rotation) {
         angle += d + d * d * d / 6;
     }
     return angle > -DEM2DI_PI ? angle : DEM2DI_PI;
+}
+
+/* ln x for x > 0, to a few eps of itself: x = m 2^k with m in [sqrt(1/2), sqrt 2), and
+   ln m = 2 atanh z with z = (m - 1)/(m + 1), |z| < 0.172: the first term left out is z^21/21. */
+static double dem2di_log(double x) {
+    int k;
+    double m = frexp(x, &k);
+    if (m < 0.70710678118654752) m *= 2, k--;
+    double z = (m - 1) / (m + 1), square = z * z, sum = 0;
+    for (int n = 19; n > 1; n -= 2) sum = (sum + 1.0 / n) * square;
+    return k * 0.69314718055994531 + (2 * z + 2 * z * sum);
 }
 
 DEM2D_API dem2d_pose dem2d_pose_make(double x, double y, double angle, double scale) {
@@ -7408,13 +7501,20 @@ typedef struct dem2di_ends {
     double shear[2];
 } dem2di_ends;
 
-/* Velocity of B against A at the contact point, along the tangent; arm_b is the point seen from
-   B's centre. */
-static inline double dem2di_slip(const dem2di_link *link, dem2d_vec arm_b, dem2d_vec va, double wa,
-                                 dem2d_vec vb, double wb) {
+/* What the full law keeps beside a contact's link: dashpot, rolling, the caller's law. All zero for
+   a contact that is apart. */
+typedef struct dem2di_extra {
+    double viscous;          /* part of the normal force that is not the spring's, N/m */
+    double moment;           /* on B, N */
+    double energy, state[2]; /* of the caller's law */
+} dem2di_extra;
+
+/* Velocity of B against A at the contact point; arm_b is the point seen from B's centre. */
+static inline dem2d_vec dem2di_approach(const dem2di_link *link, dem2d_vec arm_b, dem2d_vec va,
+                                        double wa, dem2d_vec vb, double wb) {
     dem2d_vec a = dem2di_along(va, wa, dem2di_perp(link->point));
     dem2d_vec b = dem2di_along(vb, wb, dem2di_perp(arm_b));
-    return dem2di_cross(link->normal, dem2di_sub(b, a));
+    return dem2di_sub(b, a);
 }
 
 /* [F] eq. 8-10 for a given normal force, with the tangential one held within both limits. The
@@ -7438,7 +7538,8 @@ static void dem2di_ends_hand_on(const dem2di_link *last, const dem2di_ends *last
                                 const dem2di_link *link, const dem2di_ends *ends,
                                 const double force[2], double shear[2]) {
     if (!(last_ends->weight[0] > 0)) {
-        shear[1] = last->shear * (force[1] / (force[0] + force[1]));
+        double sum = force[0] + force[1]; /* 0 where dashpots leave nothing */
+        shear[1] = last->shear * (sum > 0 ? force[1] / sum : 0.5);
         shear[0] = last->shear - shear[1];
         return;
     }
@@ -7456,13 +7557,18 @@ static void dem2di_ends_hand_on(const dem2di_link *last, const dem2di_ends *last
     shear[left ? 0 : 1] = 0;
 }
 
-/* The same for two points, both with the link's slip: it depends on the height along the normal
-   alone. */
-static void dem2di_law_apply_ends(const dem2d_pair_desc *law, double slip, double time_step,
-                                  const dem2di_link *last, const dem2di_ends *last_ends,
-                                  dem2di_ends *ends, dem2di_link *link) {
-    double force[2];
+/* Normal forces of two points. */
+static void dem2di_ends_press(const dem2d_pair_desc *law, const dem2di_ends *ends,
+                              double force[2]) {
     for (int i = 0; i < 2; i++) force[i] = law->normal_stiffness * ends->weight[i] * ends->depth[i];
+}
+
+/* The law for two points whose normal forces are known, both with the link's slip: it depends on
+   the height along the normal alone. */
+static void dem2di_law_apply_ends(const dem2d_pair_desc *law, double slip, double time_step,
+                                  const double force[2], const dem2di_link *last,
+                                  const dem2di_ends *last_ends, dem2di_ends *ends,
+                                  dem2di_link *link) {
     link->force = force[0] + force[1];
     link->shear = 0;
     dem2di_ends_hand_on(last, last_ends, link, ends, force, ends->shear);
@@ -7492,6 +7598,82 @@ static void dem2di_ends_set(const dem2d_contact_point points[2], dem2di_ends *en
         ends->offset[i] = dem2di_dot(dem2di_sub(points[i].position, link->point), t);
 }
 
+/* --- dashpot, rolling --------------------------------------------------------------------------
+ */
+
+/* How two that touch move against each other, and what they are together. */
+typedef struct dem2di_meeting {
+    double closing, slip, turning; /* as in dem2d_law_input */
+    double mass, radius;           /* reduced */
+} dem2di_meeting;
+
+/* Coefficient of the dashpot, N s/m. */
+static double dem2di_dashpot(const dem2d_pair_desc *law, double mass) {
+    return 2 * law->damping_ratio * sqrt(mass * law->normal_stiffness);
+}
+
+/* Normal force of a spring and the dashpot, clipped where it would pull. */
+static double dem2di_damped(double spring, double dashpot, double closing) {
+    return dem2di_max(0, spring + dashpot * closing);
+}
+
+/* Normal forces of two points, each with its own closing speed, and their new centre. */
+static void dem2di_ends_damp(const dem2d_pair_desc *law, const dem2di_meeting *meeting,
+                             double force[2], dem2di_ends *ends, dem2di_link *link) {
+    double dashpot = dem2di_dashpot(law, meeting->mass);
+    for (int i = 0; i < 2; i++) {
+        double closing = meeting->closing + meeting->turning * ends->offset[i];
+        force[i] = dem2di_damped(force[i], ends->weight[i] * dashpot, closing);
+    }
+    double sum = force[0] + force[1];
+    if (!(sum > 0)) return;
+    double move = force[0] / sum * ends->offset[0] + force[1] / sum * ends->offset[1];
+    link->point = dem2di_along(link->point, move, dem2di_perp(link->normal));
+    for (int i = 0; i < 2; i++) ends->offset[i] -= move;
+}
+
+/* Stiffness of the spring against rolling. */
+static double dem2di_rolling_stiffness(const dem2d_pair_desc *law, double radius) {
+    return law->tangential_stiffness * radius * radius;
+}
+
+/* Moment of the spring against rolling, held within its limit (Ai et al. 2011, model C without the
+   dashpot). */
+static double dem2di_rolling(const dem2d_pair_desc *law, const dem2di_meeting *meeting,
+                             double time_step, double normal_force, double last) {
+    double limit = law->rolling_friction * meeting->radius * normal_force;
+    double stiffness = dem2di_rolling_stiffness(law, meeting->radius);
+    double moment = last - stiffness * meeting->turning * time_step;
+    return dem2di_max(-limit, dem2di_min(limit, moment));
+}
+
+/* -ln e of a dashpot whose force is clipped: Schwager, Poeschel, Granular Matter 9 (2007) 465. */
+static double dem2di_damping_loss(double zeta) {
+    double away = sqrt(fabs(1 - zeta)) * sqrt(1 + zeta);
+    dem2d_rot rotation = {zeta, away};
+    if (!(away > 0)) return 2 * zeta; /* the limit of both */
+    double angle = zeta < 1 ? dem2d_rot_angle(rotation) : dem2di_log(zeta + away);
+    return 2 * zeta * angle / away;
+}
+
+DEM2D_API dem2d_result dem2d_damping_ratio(double restitution, double *damping_ratio) {
+    if (damping_ratio == NULL) return DEM2D_NULL_ARGUMENT;
+    if (!dem2di_finite(restitution)) return DEM2D_NOT_FINITE;
+    if (!(restitution > 0 && restitution <= 1)) return DEM2D_OUT_OF_RANGE;
+    double loss = -dem2di_log(restitution), low = 0, high = 1;
+    while (dem2di_damping_loss(high) < loss) high *= 2; /* grows as the logarithm */
+    for (double middle = high / 2; low < middle && middle < high; middle = low + (high - low) / 2)
+        if (dem2di_damping_loss(middle) < loss)
+            low = middle;
+        else
+            high = middle;
+    *damping_ratio = loss > 0 ? high : 0;
+    return DEM2D_OK;
+}
+
+/* --- forces on the two -------------------------------------------------------------------------
+ */
+
 /* Force on B. */
 static inline dem2d_vec dem2di_link_force(const dem2di_link *link) {
     return dem2di_along(dem2di_scale(link->normal, link->force), link->shear,
@@ -7504,14 +7686,15 @@ typedef struct dem2di_load {
     double torque;
 } dem2di_load;
 
-/* What a contact does to its partners A (0) and B (1). */
-static inline void dem2di_link_loads(const dem2di_link *link, dem2d_vec arm_b,
-                                     dem2di_load loads[2]) {
+/* What a contact does to its partners A (0) and B (1); extra may be NULL. */
+static inline void dem2di_link_loads(const dem2di_link *link, const dem2di_extra *extra,
+                                     dem2d_vec arm_b, dem2di_load loads[2]) {
+    double moment = extra != NULL ? extra->moment : 0;
     dem2d_vec force = dem2di_link_force(link);
     loads[0].force = dem2di_negate(force);
-    loads[0].torque = -dem2di_cross(link->point, force);
+    loads[0].torque = -dem2di_cross(link->point, force) - moment;
     loads[1].force = force;
-    loads[1].torque = dem2di_cross(arm_b, force);
+    loads[1].torque = dem2di_cross(arm_b, force) + moment;
 }
 
 /* Stiffness of one particle: the upper triangle of a symmetric matrix in x, y, angle. */
@@ -7682,15 +7865,17 @@ typedef struct dem2di_wall_state {
    of the wall, then of the particle's id). Each at the last force pass and in the one being made.
    What the scene has no use for is not there. */
 typedef struct dem2di_list {
-    dem2di_key *keys;                /* count; a < 0 when the contact was forgotten */
-    int discs, pairs, count;         /* where the kinds end */
-    double *shear, *next_shear;      /* circles with friction: the tangential springs */
-    dem2di_link *links, *next_links; /* all but circles: of contact i at i - discs */
-    dem2di_ends *ends, *next_ends;   /* likewise, where contacts may have two points */
+    dem2di_key *keys;                   /* count; a < 0 when the contact was forgotten */
+    int discs, pairs, count;            /* where the kinds end */
+    double *shear, *next_shear;         /* circles with friction: the tangential springs */
+    dem2di_link *links, *next_links;    /* all but circles: of contact i at i - discs */
+    dem2di_ends *ends, *next_ends;      /* likewise, where contacts may have two points */
+    dem2di_extra *extras, *next_extras; /* likewise, with the full law */
     int *incident; /* 2 i for the A of contact i, 2 i + 1 for its B: those of each particle in the
                       order of the partner's id, walls last; then 2 count up to a whole gather */
     int *first;    /* of a slot's in incident; bodies + 1 */
-    int keys_capacity, springs_capacity, links_capacity, ends_capacity, incident_capacity;
+    int keys_capacity, springs_capacity, links_capacity, ends_capacity, extras_capacity;
+    int incident_capacity;
 } dem2di_list;
 
 /* What the contact passes count. */
@@ -7721,6 +7906,8 @@ typedef struct dem2di_plan {
     bool turns; /* some particle is no circle: rotations matter, and pairs are skipped by travel */
     bool one_law; /* all particles are of one material: */
     int material;
+    bool full;          /* some law has a dashpot or rolling friction, or is the caller's: what the
+                           circles' batches do not know, so that all pairs have links and extras */
     bool again;         /* friction is only there for the springs of the last list: look again */
     bool faces;         /* contacts may have two points: by the rule, and some particle has faces */
     bool heavy, damped; /* gravity, damping: as they are set at the step */
@@ -7734,9 +7921,37 @@ typedef struct dem2di_plan {
 #define DEM2DI_LINE \
     64 /* bytes: of a cache line, so that parts of scratch memory do not share one */
 
+/* Accounts of the ledger; the first are work at a velocity, half of a step's before the positions
+   and half behind. */
+enum {
+    DEM2DI_GRAVITY,
+    DEM2DI_BY_WALLS,
+    DEM2DI_DRIVING,
+    DEM2DI_DAMPED,
+    DEM2DI_HALVES,
+    DEM2DI_RUBBED = DEM2DI_HALVES,
+    DEM2DI_DASHED,
+    DEM2DI_ACCOUNTS
+};
+
+/* Energy stored in springs. */
+typedef struct dem2di_stored {
+    double normal, tangential, rolling;
+} dem2di_stored;
+
+typedef struct dem2di_ledger {
+    bool kept;
+    bool edited; /* the caller has changed something since the last step */
+    double sum[DEM2DI_ACCOUNTS], half[DEM2DI_HALVES];
+    double kinetic, given, closure;
+    dem2di_stored stored;
+} dem2di_ledger;
+
 struct dem2d_world {
     dem2d_env user_env, env; /* the caller's, and the one that counts bytes */
     size_t bytes;
+    dem2d_law_fn *law;
+    void *law_user;
     dem2d_parallel_fn *parallel_for;
     void *parallel_user;
     double time_step, local_damping, global_damping, tolerance;
@@ -7760,6 +7975,7 @@ struct dem2d_world {
     int64_t steps, rebuilds, slow_time_step, listed_at;
     dem2di_count count;
     dem2di_plan plan;
+    dem2di_ledger ledger;
 
     dem2di_template *templates;
     dem2d_material_desc *materials;
@@ -7836,6 +8052,7 @@ typedef enum dem2di_group {
     DEM2DI_SPRINGS,
     DEM2DI_LINKS,
     DEM2DI_ENDS,
+    DEM2DI_EXTRAS,
     DEM2DI_GROUPS
 } dem2di_group;
 
@@ -7873,10 +8090,14 @@ static int dem2di_columns_of(dem2d_world *w, dem2di_group group, int **capacity,
         *capacity = &w->list.links_capacity;
         DEM2DI_COLUMN(w->list.links);
         DEM2DI_COLUMN(w->list.next_links);
-    } else {
+    } else if (group == DEM2DI_ENDS) {
         *capacity = &w->list.ends_capacity;
         DEM2DI_COLUMN(w->list.ends);
         DEM2DI_COLUMN(w->list.next_ends);
+    } else {
+        *capacity = &w->list.extras_capacity;
+        DEM2DI_COLUMN(w->list.extras);
+        DEM2DI_COLUMN(w->list.next_extras);
     }
     return count;
 }
@@ -7910,7 +8131,8 @@ static bool dem2di_list_reserve(dem2d_world *world, const dem2di_plan *plan, int
                                 sizeof *list->keys) &&
            dem2di_group_reserve(world, DEM2DI_SPRINGS, plan->friction ? discs : 0, true) &&
            dem2di_group_reserve(world, DEM2DI_LINKS, others, true) &&
-           dem2di_group_reserve(world, DEM2DI_ENDS, plan->faces ? others : 0, true);
+           dem2di_group_reserve(world, DEM2DI_ENDS, plan->faces ? others : 0, true) &&
+           dem2di_group_reserve(world, DEM2DI_EXTRAS, plan->full ? others : 0, true);
 }
 
 static dem2d_result dem2di_out_of_memory(const dem2d_world *world, const char *what) {
@@ -7999,6 +8221,9 @@ DEM2D_API dem2d_result dem2d_world_create(const dem2d_world_desc *desc, dem2d_wo
     made->gravity = desc->gravity;
     made->local_damping = desc->local_damping;
     made->global_damping = desc->global_damping;
+    made->ledger.kept = made->ledger.edited = desc->ledger;
+    made->law = desc->law;
+    made->law_user = desc->law_user;
     made->parallel_for = desc->parallel_for;
     made->parallel_user = desc->parallel_user;
     made->skin_fixed = desc->skin > 0;
@@ -8049,6 +8274,13 @@ static dem2d_particle_id dem2di_particle_id(const dem2d_world *world, int slot) 
     dem2d_particle_id id;
     id.index = (uint32_t)world->bodies[slot].index;
     id.generation = world->names[id.index].generation;
+    return id;
+}
+
+static dem2d_wall_id dem2di_wall_id(const dem2d_world *world, int slot) {
+    dem2d_wall_id id;
+    id.index = (uint32_t)slot;
+    id.generation = world->walls[slot].generation;
     return id;
 }
 
@@ -8129,12 +8361,25 @@ static double dem2di_mean_stiffness(double a, double b) {
     return mean > 0 ? a * (b / mean) : 0;
 }
 
+/* How a material meets itself. */
+static dem2d_pair_desc dem2di_law_among(const dem2d_material_desc *material) {
+    dem2d_pair_desc law;
+    law.normal_stiffness = material->normal_stiffness;
+    law.tangential_stiffness = material->tangential_stiffness;
+    law.friction = material->friction;
+    law.damping_ratio = material->damping_ratio;
+    law.rolling_friction = material->rolling_friction;
+    return law;
+}
+
 static dem2d_pair_desc dem2di_mix(const dem2d_material_desc *a, const dem2d_material_desc *b) {
     dem2d_pair_desc law;
     law.normal_stiffness = dem2di_mean_stiffness(a->normal_stiffness, b->normal_stiffness);
     law.tangential_stiffness =
         dem2di_mean_stiffness(a->tangential_stiffness, b->tangential_stiffness);
     law.friction = dem2di_min(a->friction, b->friction);
+    law.damping_ratio = dem2di_max(a->damping_ratio, b->damping_ratio);
+    law.rolling_friction = dem2di_min(a->rolling_friction, b->rolling_friction);
     return law;
 }
 
@@ -8150,12 +8395,15 @@ static inline const dem2d_pair_desc *dem2di_law_of(const dem2d_world *world, int
     return dem2di_law(world, world->bodies[key->a].material, material);
 }
 
-static dem2d_result dem2di_check_law(const dem2d_env *env, double normal, double tangential,
-                                     double friction) {
-    dem2d_result result = dem2di_check_positive(env, "normal_stiffness", normal);
+static dem2d_result dem2di_check_law(const dem2d_env *env, const dem2d_pair_desc *law) {
+    dem2d_result result = dem2di_check_positive(env, "normal_stiffness", law->normal_stiffness);
     if (result == DEM2D_OK)
-        result = dem2di_check_not_negative(env, "tangential_stiffness", tangential);
-    if (result == DEM2D_OK) result = dem2di_check_not_negative(env, "friction", friction);
+        result = dem2di_check_not_negative(env, "tangential_stiffness", law->tangential_stiffness);
+    if (result == DEM2D_OK) result = dem2di_check_not_negative(env, "friction", law->friction);
+    if (result == DEM2D_OK)
+        result = dem2di_check_not_negative(env, "damping_ratio", law->damping_ratio);
+    if (result == DEM2D_OK)
+        result = dem2di_check_not_negative(env, "rolling_friction", law->rolling_friction);
     return result;
 }
 
@@ -8186,9 +8434,10 @@ DEM2D_API dem2d_result dem2d_world_add_material(dem2d_world *world, const dem2d_
                                                 dem2d_material_id *id) {
     if (world == NULL || desc == NULL || id == NULL) return DEM2D_NULL_ARGUMENT;
     dem2d_result result = dem2di_check_positive(&world->env, "density", desc->density);
-    if (result == DEM2D_OK)
-        result = dem2di_check_law(&world->env, desc->normal_stiffness, desc->tangential_stiffness,
-                                  desc->friction);
+    if (result == DEM2D_OK) {
+        dem2d_pair_desc own = dem2di_law_among(desc);
+        result = dem2di_check_law(&world->env, &own);
+    }
     if (result != DEM2D_OK) return result;
     int slot = world->material_count;
     if (slot == DEM2DI_MATERIALS)
@@ -8212,12 +8461,12 @@ DEM2D_API dem2d_result dem2d_world_set_pair(dem2d_world *world, dem2d_material_i
     if (world == NULL || desc == NULL) return DEM2D_NULL_ARGUMENT;
     if (!dem2di_material_lives(world, a)) return dem2di_stale(world, "material", a.index);
     if (!dem2di_material_lives(world, b)) return dem2di_stale(world, "material", b.index);
-    dem2d_result result = dem2di_check_law(&world->env, desc->normal_stiffness,
-                                           desc->tangential_stiffness, desc->friction);
+    dem2d_result result = dem2di_check_law(&world->env, desc);
     if (result != DEM2D_OK) return result;
     *dem2di_law(world, (int)a.index, (int)b.index) = *desc;
     *dem2di_law(world, (int)b.index, (int)a.index) = *desc;
     world->list_stale = true; /* so that the time step is checked */
+    world->ledger.edited = true;
     return DEM2D_OK;
 }
 
@@ -8341,6 +8590,7 @@ DEM2D_API dem2d_result dem2d_world_add_particle(dem2d_world *world, const dem2d_
     world->list.first[slot + 1] = world->list.first[slot]; /* no contacts yet */
     world->body_count++;
     world->list_stale = true;
+    world->ledger.edited = true;
     id->index = (uint32_t)body.index;
     id->generation = world->names[body.index].generation;
     return DEM2D_OK;
@@ -8352,6 +8602,7 @@ static void dem2di_forget(dem2d_world *world, int slot) {
     for (int k = list->first[slot]; k < list->first[slot + 1]; k++)
         if (list->incident[k] / 2 < list->count) list->keys[list->incident[k] / 2].a = -1;
     world->list_stale = true;
+    world->ledger.edited = true;
 }
 
 /* Contacts of a fixed particle with others that are fixed are forgotten. */
@@ -8372,6 +8623,7 @@ static void dem2di_forget_wall(dem2d_world *world, int wall) {
     for (int i = world->list.pairs; i < world->list.count; i++)
         if (world->list.keys[i].b == wall) world->list.keys[i].a = -1;
     world->list_stale = true;
+    world->ledger.edited = true;
 }
 
 DEM2D_API dem2d_result dem2d_world_remove_particle(dem2d_world *world, dem2d_particle_id id) {
@@ -8430,6 +8682,22 @@ static DEM2DI_INLINE dem2di_round dem2di_round_make(dem2d_vec d, double radius_a
     return round;
 }
 
+/* Of the equivalent radii of the two of a listed contact; a wall is flat. */
+static double dem2di_reduced_radius(const dem2d_world *world, int contact) {
+    const dem2di_key *key = &world->list.keys[contact];
+    double radius = dem2di_equivalent(world, key->a);
+    if (contact >= world->list.pairs) return radius;
+    double other = dem2di_equivalent(world, key->b);
+    return radius * (other / (radius + other));
+}
+
+/* 1/m of the two of a listed contact; 0 when neither is free. */
+static double dem2di_reduced_inverse(const dem2d_world *world, int contact) {
+    const dem2di_key *key = &world->list.keys[contact];
+    double inverse = world->inverse[key->a].mass;
+    return contact >= world->list.pairs ? inverse : inverse + world->inverse[key->b].mass;
+}
+
 /* What holds at the last force pass, or (`next`) in the one that is being made. */
 static const dem2di_state *dem2di_states_at(const dem2d_world *world, bool next) {
     return next ? world->now : world->before;
@@ -8441,6 +8709,14 @@ static const dem2d_pair_desc *dem2di_law_at(const dem2d_world *world, int contac
     int material = contact >= world->list.pairs ? world->walls[key->b].used_material
                                                 : world->bodies[key->b].material;
     return &world->used_laws[world->bodies[key->a].material * world->laws_side + material];
+}
+
+/* The tangential spring of a contact then. */
+static double dem2di_spring_at(const dem2d_world *world, int contact, bool next) {
+    const dem2di_list *list = &world->list;
+    int at = contact - list->discs;
+    if (at >= 0) return (next ? list->next_links : list->links)[at].shear;
+    return world->plan.friction ? (next ? list->next_shear : list->shear)[contact] : 0;
 }
 
 /* A listed contact then, and the contact point from B's centre (with walls 0); false when it is
@@ -8468,7 +8744,7 @@ static bool dem2di_link_at(const dem2d_world *world, int contact, bool next, dem
     link->point = dem2di_scale(round.normal, round.arm_a);
     link->depth = round.depth;
     link->force = round.force;
-    link->shear = world->plan.friction ? (next ? list->next_shear : list->shear)[contact] : 0;
+    link->shear = dem2di_spring_at(world, contact, next);
     link->budget = 0;
     *arm_b = dem2di_scale(round.normal, -round.arm_b);
     return round.depth > 0;
@@ -8482,6 +8758,48 @@ static const dem2di_ends *dem2di_ends_at(const dem2d_world *world, int contact, 
     return ends->weight[0] > 0 ? ends : NULL;
 }
 
+/* What the full law keeps of a contact; NULL without it. */
+static const dem2di_extra *dem2di_extra_at(const dem2d_world *world, int contact, bool next) {
+    const dem2di_list *list = &world->list;
+    if (!world->plan.full) return NULL;
+    return &(next ? list->next_extras : list->extras)[contact - list->discs];
+}
+
+/* Energy in the springs of a contact that is closed. */
+static dem2di_stored dem2di_stored_in(const dem2d_world *world, int contact, bool next,
+                                      const dem2di_link *link) {
+    const dem2d_pair_desc *law = dem2di_law_at(world, contact, next);
+    const dem2di_ends *ends = dem2di_ends_at(world, contact, next);
+    const dem2di_extra *extra = dem2di_extra_at(world, contact, next);
+    double kn = law->normal_stiffness, kt = law->tangential_stiffness, spring = link->force;
+    dem2di_stored stored = {0, 0, 0};
+    if (extra != NULL) {
+        stored.normal = extra->energy;
+        if (world->law != NULL) return stored;
+        double kr = dem2di_rolling_stiffness(law, dem2di_reduced_radius(world, contact));
+        if (kr > 0) stored.rolling = extra->moment * (extra->moment / kr) / 2;
+        spring -= extra->viscous;
+    }
+    if (ends == NULL) {
+        stored.normal = spring * link->depth / 2;
+        if (kt > 0) stored.tangential = link->shear * (link->shear / kt) / 2;
+        return stored;
+    }
+    for (int k = 0; k < 2; k++) {
+        double weight = ends->weight[k], shear = ends->shear[k];
+        if (!(weight > 0)) continue;
+        stored.normal += weight * kn * ends->depth[k] * ends->depth[k] / 2;
+        if (kt > 0) stored.tangential += shear * (shear / (weight * kt)) / 2;
+    }
+    return stored;
+}
+
+static void dem2di_stored_add(dem2di_stored *sum, dem2di_stored part, double factor) {
+    sum->normal += factor * part.normal;
+    sum->tangential += factor * part.tangential;
+    sum->rolling += factor * part.rolling;
+}
+
 /* Sum of the contact forces on a particle at the last force pass, in the order of the step. */
 static dem2di_load dem2di_load_of(const dem2d_world *world, int slot) {
     const dem2di_list *list = &world->list;
@@ -8492,7 +8810,7 @@ static dem2di_load dem2di_load_of(const dem2d_world *world, int slot) {
         dem2d_vec arm_b;
         if (!dem2di_link_at(world, contact, false, &link, &arm_b)) continue;
         dem2di_load loads[2];
-        dem2di_link_loads(&link, arm_b, loads);
+        dem2di_link_loads(&link, dem2di_extra_at(world, contact, false), arm_b, loads);
         load.force = dem2di_add(load.force, loads[side].force);
         load.torque += loads[side].torque;
     }
@@ -8553,6 +8871,7 @@ DEM2D_API dem2d_result dem2d_world_drive_particle(dem2d_world *world, dem2d_part
     if (motion == DEM2D_FIXED) dem2di_forget_fixed(world, slot);
     world->inverse[slot] = dem2di_inverse_of(world, &world->bodies[slot]);
     world->list_stale = true; /* pairs of two fixed ones are not listed */
+    world->ledger.edited = true;
     return DEM2D_OK;
 }
 
@@ -8607,6 +8926,7 @@ static void dem2di_wall_place(dem2d_world *world, int slot, const dem2d_wall_des
     if (desc->mode != DEM2D_WALL_SERVO) now->drift = 0;
     world->wall_before[slot] = *now;
     world->list_stale = true;
+    world->ledger.edited = true;
 }
 
 static void dem2di_wall_unspan(dem2d_world *world, const dem2di_wall *wall) {
@@ -8718,6 +9038,7 @@ DEM2D_API dem2d_result dem2d_world_set_time_step(dem2d_world *world, double time
     if (result != DEM2D_OK) return result;
     world->time_step = time_step;
     world->list_stale = true; /* so that the step is checked */
+    world->ledger.edited = true;
     return DEM2D_OK;
 }
 
@@ -8798,12 +9119,15 @@ static void dem2di_swap_contacts(dem2di_list *list) {
     double *shear = list->shear;
     dem2di_link *links = list->links;
     dem2di_ends *ends = list->ends;
+    dem2di_extra *extras = list->extras;
     list->shear = list->next_shear;
     list->next_shear = shear;
     list->links = list->next_links;
     list->next_links = links;
     list->ends = list->next_ends;
     list->next_ends = ends;
+    list->extras = list->next_extras;
+    list->next_extras = extras;
 }
 
 /* --- the contacts of each particle ------------------------------------------------------------ */
@@ -9039,14 +9363,18 @@ static dem2di_plan dem2di_plan_make(const dem2d_world *world) {
     for (int a = 0; a < world->material_count; a++)
         for (int b = 0; b < world->material_count; b++) {
             const dem2d_pair_desc *law = dem2di_law(world, a, b);
-            bool rubs = law->friction > 0 && law->tangential_stiffness > 0;
-            plan.friction = plan.friction || (rubs && used[a] && (used[b] || met[b]));
+            if (!used[a] || !(used[b] || met[b])) continue;
+            bool rolls = law->rolling_friction > 0 && law->tangential_stiffness > 0;
+            plan.friction = plan.friction || (law->friction > 0 && law->tangential_stiffness > 0);
+            plan.full = plan.full || rolls || law->damping_ratio > 0;
         }
+    plan.full = plan.full || world->law != NULL;
+    plan.faces = plan.faces && world->law == NULL;
     /* springs and rotations of the last force pass must outlast a step that is refused */
     bool outlasted = world->plan.again && world->steps > world->listed_at;
     plan.again = !plan.friction && world->plan.friction && !outlasted;
     plan.friction = plan.friction || plan.again;
-    plan.turns = plan.turns || world->faces == DEM2D_CONTACT_AREA;
+    plan.turns = plan.turns || plan.full || world->faces == DEM2D_CONTACT_AREA;
     plan.turns = plan.turns || (world->plan.turns && world->body_count > 0);
     plan.spin = plan.spin || plan.turns || plan.friction;
     return plan;
@@ -9098,7 +9426,7 @@ static void dem2di_disc_task(void *context, int begin, int end) {
             disc->reach = world->now[i].radius + skin;
             disc->fixed = body->motion == DEM2D_FIXED;
             disc->round = dem2di_shape_of(world, body)->type == DEM2D_CIRCLE &&
-                          world->faces != DEM2D_CONTACT_AREA;
+                          world->faces != DEM2D_CONTACT_AREA && !build->plan.full;
             largest = dem2di_max(largest, disc->reach);
         }
         world->tallies[block].most = largest;
@@ -9169,21 +9497,31 @@ static void dem2di_recall(const dem2di_build *build, int place) {
     const dem2di_list *list = &world->list;
     const dem2di_key *key = &build->keys[place];
     int discs = build->total[DEM2DI_DISCS], pairs = discs + build->total[DEM2DI_OTHERS];
-    int old = dem2di_listed(world, key, place >= pairs);
+    int old = dem2di_listed(world, key, place >= pairs), at = old - list->discs;
     if (place < discs) {
         if (build->plan.friction)
-            list->next_shear[place] = old >= 0 && world->plan.friction ? list->shear[old] : 0;
+            list->next_shear[place] = old >= 0 ? dem2di_spring_at(world, old, false) : 0;
         return;
     }
     dem2di_link *link = &list->next_links[place - discs];
     memset(link, 0, sizeof *link);
-    if (old >= 0) *link = list->links[old - list->discs];
+    if (old >= 0 && at < 0) { /* of circles, which are among the others from now on */
+        dem2d_vec arm_b;
+        (void)dem2di_link_at(world, old, false, link, &arm_b);
+    }
+    bool kept = old >= 0 && at >= 0;
+    if (kept) *link = list->links[at];
+    if (build->plan.full) {
+        dem2di_extra *extra = &list->next_extras[place - discs];
+        memset(extra, 0, sizeof *extra);
+        if (kept && world->plan.full) *extra = list->extras[at];
+    }
     if (place < pairs && world->plan.turns) /* budgets count from here */
         link->budget -= world->travel[key->a] + world->travel[key->b];
     if (!build->plan.faces) return;
     dem2di_ends *ends = &list->next_ends[place - discs];
     memset(ends, 0, sizeof *ends);
-    if (old >= 0 && world->plan.faces) *ends = list->ends[old - list->discs];
+    if (kept && world->plan.faces) *ends = list->ends[at];
 }
 
 static void dem2di_fill_task(void *context, int begin, int end) {
@@ -9279,7 +9617,7 @@ static bool dem2di_bounded(dem2d_world *world) {
     speed += 2 * time * (fabs(world->gravity.x) + fabs(world->gravity.y) + force * light);
     spin += 2 * time * (force * 2 * size * slender);
     return far + time * speed < 1e300 && spin * world->time_step < 1e50 && /* its cube is finite */
-           world->faces != DEM2D_CONTACT_AREA;
+           world->faces != DEM2D_CONTACT_AREA && !world->plan.full;
 }
 
 /* Scratch memory for the search, and then for what it found. */
@@ -9420,8 +9758,110 @@ static dem2d_result dem2di_build_list(dem2d_world *world) {
 }
 
 /* ============================================================================================
+   >>ledger  The ledger of energies: what is stored, and what went where in a step
+   uses: config, math, law, motion, world, list
+   ============================================================================================ */
+
+/* The velocity of B against A at a closed contact of the force pass that is being made, and how
+   fast B turns against A. */
+static dem2d_vec dem2di_contact_motion(const dem2d_world *world, int contact,
+                                       const dem2di_link *link, dem2d_vec arm_b, double *turning) {
+    const dem2di_key *key = &world->list.keys[contact];
+    const dem2di_state *a = &world->now[key->a];
+    bool wall = contact >= world->list.pairs;
+    dem2d_vec v = wall ? world->wall_now[key->b].velocity : world->now[key->b].v;
+    double w = wall ? 0 : world->now[key->b].w;
+    *turning = w - a->w;
+    return dem2di_approach(link, arm_b, a->v, a->w, v, w);
+}
+
+/* One contact between the last force pass and this: forces act half at each, so that the energy
+   they take is their mean times the way. What sliding and rolling take is that less what the
+   springs gained. */
+static void dem2di_book_contact(const dem2d_world *world, int contact, dem2di_ledger *ledger) {
+    dem2di_link last, link;
+    dem2d_vec arm;
+    memset(&last, 0, sizeof last);
+    memset(&link, 0, sizeof link);
+    bool was = dem2di_link_at(world, contact, false, &last, &arm);
+    bool is = dem2di_link_at(world, contact, true, &link, &arm);
+    if (!was && !is) return;
+    const dem2di_extra *extra[2];
+    for (int k = 0; k < 2; k++) extra[k] = dem2di_extra_at(world, contact, k == 1);
+    double way = was ? -last.depth : 0, turn = 0, slide = 0; /* that opened: the spring's way out */
+    if (is) {
+        dem2d_vec approach = dem2di_contact_motion(world, contact, &link, arm, &turn);
+        way = -dem2di_dot(link.normal, approach) * world->time_step;
+        slide = dem2di_cross(link.normal, approach) * world->time_step;
+        turn *= world->time_step;
+    }
+    double shear = (was ? last.shear : 0) + (is ? link.shear : 0), moment = 0, viscous = 0;
+    if (extra[0] != NULL) {
+        moment = extra[0]->moment + extra[1]->moment;
+        viscous = extra[0]->viscous + extra[1]->viscous;
+    }
+    dem2di_stored gained = {0, 0, 0};
+    if (is) gained = dem2di_stored_in(world, contact, true, &link);
+    dem2di_stored_add(&ledger->stored, gained, 1);
+    if (was) dem2di_stored_add(&gained, dem2di_stored_in(world, contact, false, &last), -1);
+    double taken = -(shear * slide + moment * turn) / 2;
+    if (world->law != NULL) taken += (last.force + link.force) / 2 * way - gained.normal;
+    ledger->sum[DEM2DI_RUBBED] += taken - gained.tangential - gained.rolling;
+    ledger->sum[DEM2DI_DASHED] += viscous / 2 * way;
+}
+
+/* All contacts in the order of their ids, before the motion. */
+static void dem2di_book_contacts(dem2d_world *world) {
+    const dem2di_list *list = &world->list;
+    memset(&world->ledger.stored, 0, sizeof world->ledger.stored);
+    for (int index = 0; index < world->name_count; index++) {
+        int slot = world->names[index].slot;
+        if (slot < 0) continue;
+        for (int k = list->first[slot]; k < list->first[slot + 1]; k++)
+            if (list->incident[k] % 2 == 0)
+                dem2di_book_contact(world, list->incident[k] / 2, &world->ledger);
+    }
+}
+
+/* Power on one particle in the first half of the step (0) and in the second, by accounts, and its
+   kinetic energy. The new state is where the one of the last force pass was. */
+static void dem2di_book_particle(const dem2d_world *world, int slot, dem2di_load load,
+                                 double power[2][DEM2DI_HALVES], double *kinetic) {
+    const dem2di_body *body = &world->bodies[slot];
+    const dem2di_state *old = &world->now[slot], *made = &world->before[slot];
+    double mass = dem2di_body_mass(world, body), inertia = dem2di_body_inertia(world, body);
+    bool is_free = body->motion == DEM2D_FREE;
+    dem2d_vec weight = dem2di_scale(world->gravity, mass);
+    dem2d_vec drag = dem2di_scale(dem2di_sub(made->v, old->v), mass / world->time_step);
+    drag = dem2di_sub(dem2di_sub(drag, load.force), weight);
+    double brake = (made->w - old->w) * (inertia / world->time_step) - load.torque;
+    for (int k = 0; k < 2; k++) {
+        const dem2di_state *half = k == 0 ? old : made;
+        double pushed = dem2di_dot(load.force, half->v) + load.torque * half->w;
+        if (is_free) {
+            power[k][DEM2DI_GRAVITY] += dem2di_dot(weight, half->v);
+            power[k][DEM2DI_DAMPED] -= dem2di_dot(drag, half->v) + brake * half->w;
+        } else {
+            power[k][DEM2DI_DRIVING] -= pushed;
+        }
+    }
+    if (is_free)
+        *kinetic += mass * dem2di_dot(old->v, made->v) / 2 + inertia * old->w * made->w / 2;
+}
+
+/* What closes the ledger: stored and dissipated less what was put in. */
+static double dem2di_ledger_error(const dem2di_ledger *ledger) {
+    const double *sum = ledger->sum;
+    const dem2di_stored *stored = &ledger->stored;
+    return ledger->kinetic + stored->normal + stored->tangential + stored->rolling +
+           sum[DEM2DI_RUBBED] + sum[DEM2DI_DASHED] + sum[DEM2DI_DAMPED] - sum[DEM2DI_GRAVITY] -
+           sum[DEM2DI_BY_WALLS] - sum[DEM2DI_DRIVING] - ledger->given;
+}
+
+/* ============================================================================================
    >>step  Contacts, their sums, walls, motion; the stable time step
-   uses: config, math, memory, support, shapes, minimum, faces, contact, law, motion, world, list
+   uses: config, math, memory, support, shapes, minimum, faces, contact, law, motion, world, list,
+         ledger
    ============================================================================================ */
 
 /* Contacts of circles are taken in batches: what they need is fetched, all are computed by a loop
@@ -9620,19 +10060,105 @@ static int dem2di_pair_geometry(const dem2d_world *world, int a, int b, const de
     return 1;
 }
 
-/* Force of a contact whose geometry is known, from its springs before. `at` is its place among
-   those that are not of circles. */
-static void dem2di_link_load(const dem2d_world *world, int at, const dem2d_pair_desc *law,
-                             double slip, bool two) {
+/* Force of a contact whose geometry is known, from its springs before and the velocity of B against
+   A. `at` is its place among those that are not of circles. */
+static inline void dem2di_link_load(const dem2d_world *world, int at, const dem2d_pair_desc *law,
+                                    dem2d_vec approach, bool two) {
     const dem2di_list *list = &world->list;
     dem2di_link *link = &list->next_links[at];
+    double slip = dem2di_cross(link->normal, approach);
     if (two) {
-        dem2di_law_apply_ends(law, slip, world->time_step, &list->links[at], &list->ends[at],
+        double force[2];
+        dem2di_ends_press(law, &list->next_ends[at], force);
+        dem2di_law_apply_ends(law, slip, world->time_step, force, &list->links[at], &list->ends[at],
                               &list->next_ends[at], link);
         return;
     }
     if (world->faces != DEM2D_CONTACT_AREA) link->force = law->normal_stiffness * link->depth;
     dem2di_law_apply(law, slip, world->time_step, list->links[at].shear, link);
+}
+
+/* How the two of contact i meet; wb is 0 for a wall. */
+static dem2di_meeting dem2di_meeting_make(const dem2d_world *world, int i, dem2d_vec approach,
+                                          double wb) {
+    const dem2di_link *link = &world->list.next_links[i - world->list.discs];
+    double inverse = dem2di_reduced_inverse(world, i);
+    dem2di_meeting meeting;
+    meeting.closing = -dem2di_dot(link->normal, approach);
+    meeting.slip = dem2di_cross(link->normal, approach);
+    meeting.turning = wb - world->now[world->list.keys[i].a].w;
+    meeting.mass = inverse > 0 ? 1 / inverse : 0;
+    meeting.radius = dem2di_reduced_radius(world, i);
+    return meeting;
+}
+
+/* The caller's law for contact i. */
+static void dem2di_call_law(const dem2d_world *world, int i, const dem2di_meeting *meeting) {
+    const dem2di_list *list = &world->list;
+    const dem2di_key *key = &list->keys[i];
+    int at = i - list->discs;
+    dem2di_link *link = &list->next_links[at];
+    const dem2di_extra *last = &list->extras[at];
+    dem2d_law_input input;
+    dem2d_law_output output;
+    memset(&input, 0, sizeof input);
+    memset(&output, 0, sizeof output);
+    input.pair = *dem2di_law_of(world, i);
+    input.a = dem2di_particle_id(world, key->a);
+    if (i < list->pairs)
+        input.b = dem2di_particle_id(world, key->b);
+    else
+        input.wall = dem2di_wall_id(world, key->b);
+    input.normal = link->normal;
+    input.time_step = world->time_step;
+    input.depth = link->depth;
+    input.closing = meeting->closing;
+    input.slip = meeting->slip;
+    input.turning = meeting->turning;
+    input.mass = meeting->mass;
+    input.radius = meeting->radius;
+    input.tangential_force = list->links[at].shear;
+    input.moment = last->moment;
+    memcpy(input.state, last->state, sizeof input.state);
+    memcpy(output.state, last->state, sizeof output.state);
+    world->law(world->law_user, &input, &output);
+    link->force = output.normal_force;
+    link->shear = output.tangential_force;
+    dem2di_extra *extra = &list->next_extras[at];
+    extra->moment = output.moment;
+    extra->energy = output.energy;
+    memcpy(extra->state, output.state, sizeof extra->state);
+}
+
+/* The full law: dashpot and rolling as well, or the caller's. Two points may get another centre. */
+static void dem2di_full_load(const dem2d_world *world, int i, const dem2di_meeting *meeting,
+                             bool two) {
+    const dem2di_list *list = &world->list;
+    const dem2d_pair_desc *law = dem2di_law_of(world, i);
+    int at = i - list->discs;
+    dem2di_link *link = &list->next_links[at];
+    dem2di_extra *extra = &list->next_extras[at];
+    const double dt = world->time_step;
+    if (world->law != NULL) {
+        dem2di_call_law(world, i, meeting);
+        return;
+    }
+    if (two) {
+        double force[2];
+        dem2di_ends_press(law, &list->next_ends[at], force);
+        double spring = force[0] + force[1];
+        dem2di_ends_damp(law, meeting, force, &list->next_ends[at], link);
+        dem2di_law_apply_ends(law, meeting->slip, dt, force, &list->links[at], &list->ends[at],
+                              &list->next_ends[at], link);
+        extra->viscous = link->force - spring;
+    } else {
+        double spring =
+            world->faces == DEM2D_CONTACT_AREA ? link->force : law->normal_stiffness * link->depth;
+        link->force = dem2di_damped(spring, dem2di_dashpot(law, meeting->mass), meeting->closing);
+        dem2di_law_apply(law, meeting->slip, dt, list->links[at].shear, link);
+        extra->viscous = link->force - spring;
+    }
+    extra->moment = dem2di_rolling(law, meeting, dt, link->force, list->extras[at].moment);
 }
 
 static dem2d_vec dem2di_outline_corner(const dem2d_world *world, int body, int i) {
@@ -9754,11 +10280,19 @@ static void dem2di_no_loads(const dem2d_world *world, int i) {
 static inline void dem2di_set_loads(const dem2d_world *world, int i, dem2d_vec arm_b,
                                     dem2di_count *count) {
     dem2di_load loads[2];
-    dem2di_link_loads(&world->list.next_links[i - world->list.discs], arm_b, loads);
+    dem2di_link_loads(&world->list.next_links[i - world->list.discs],
+                      dem2di_extra_at(world, i, true), arm_b, loads);
     dem2di_load_set(world, 2 * i, loads[0]);
     dem2di_load_set(world, 2 * i + 1, loads[1]);
     double sum = loads[1].force.x + loads[1].force.y + loads[0].torque + loads[1].torque;
     count->unsound += !dem2di_finite(sum);
+}
+
+/* What a contact has beside its link. */
+static inline void dem2di_clear_beside(const dem2d_world *world, int at) {
+    const dem2di_list *list = &world->list;
+    if (world->plan.faces) memset(&list->next_ends[at], 0, sizeof *list->next_ends);
+    if (world->plan.full) memset(&list->next_extras[at], 0, sizeof *list->next_extras);
 }
 
 /* Geometry and force of one listed pair that is not of two circles. */
@@ -9774,11 +10308,11 @@ static void dem2di_pair_look(const dem2d_world *world, int i, dem2di_overlap *sc
         link->budget = last->budget;
         link->depth = -1;
         link->shear = 0;
-        if (world->plan.faces) memset(&list->next_ends[at], 0, sizeof *list->next_ends);
+        dem2di_clear_beside(world, at);
         return;
     }
     link->force = link->shear = 0;
-    if (world->plan.faces) memset(&list->next_ends[at], 0, sizeof *list->next_ends);
+    dem2di_clear_beside(world, at);
     int found = dem2di_pair_geometry(world, a, b, last, link, points, count);
     if (!(link->depth > 0)) {
         dem2di_no_loads(world, i);
@@ -9794,8 +10328,14 @@ static void dem2di_pair_look(const dem2d_world *world, int i, dem2di_overlap *sc
         if (!(link->depth > 0)) return;
     }
     dem2d_vec arm_b = dem2di_sub(link->point, d);
-    double slip = dem2di_slip(link, arm_b, sa->v, sa->w, sb->v, sb->w);
-    dem2di_link_load(world, at, law, slip, found == 2);
+    dem2d_vec approach = dem2di_approach(link, arm_b, sa->v, sa->w, sb->v, sb->w);
+    if (world->plan.full) {
+        dem2di_meeting meeting = dem2di_meeting_make(world, i, approach, sb->w);
+        dem2di_full_load(world, i, &meeting, found == 2);
+        arm_b = dem2di_sub(link->point, d);
+    } else {
+        dem2di_link_load(world, at, law, approach, found == 2);
+    }
     dem2di_set_loads(world, i, arm_b, count);
 }
 
@@ -9815,7 +10355,7 @@ static void dem2di_touch_look(const dem2d_world *world, int i, dem2di_overlap *s
     link->normal.x = u.x;
     link->normal.y = u.y;
     link->shear = 0;
-    if (world->plan.faces) memset(&list->next_ends[at], 0, sizeof *list->next_ends);
+    dem2di_clear_beside(world, at);
     if (list->links[at].depth > 0) dem2di_no_loads(world, i);
     double surface = dem2di_dot(dem2di_sub(wall->point, state->x), u);
     link->depth = state->radius - surface;
@@ -9838,8 +10378,13 @@ static void dem2di_touch_look(const dem2d_world *world, int i, dem2di_overlap *s
         dem2di_area_apply(world, i, -1, dem2di_sub(wall->point, state->x), law, scratch);
     if (!(link->depth > 0)) return;
     dem2d_vec foot = dem2di_vec(0, 0); /* walls do not turn */
-    double slip = dem2di_slip(link, foot, state->v, state->w, wall->velocity, 0);
-    dem2di_link_load(world, at, law, slip, found == 2);
+    dem2d_vec approach = dem2di_approach(link, foot, state->v, state->w, wall->velocity, 0);
+    if (world->plan.full) {
+        dem2di_meeting meeting = dem2di_meeting_make(world, i, approach, 0);
+        dem2di_full_load(world, i, &meeting, found == 2);
+    } else {
+        dem2di_link_load(world, at, law, approach, found == 2);
+    }
     dem2di_set_loads(world, i, foot, count);
 }
 
@@ -10059,6 +10604,35 @@ static double dem2di_motion_pass(dem2d_world *world) {
     return world->worn + sqrt(most) * world->time_step + world->creep;
 }
 
+/* The rest of the ledger, after the motion: work at the velocities before and behind. */
+static void dem2di_book_motion(dem2d_world *world) {
+    dem2di_ledger *ledger = &world->ledger;
+    double power[2][DEM2DI_HALVES] = {{0}};
+    ledger->kinetic = 0;
+    for (int index = 0; index < world->name_count; index++) {
+        int slot = world->names[index].slot;
+        if (slot < 0) continue;
+        dem2di_load load = dem2di_gather(world, slot, world->plan.spin);
+        dem2di_book_particle(world, slot, load, power, &ledger->kinetic);
+    }
+    for (int j = 0; j < world->wall_count; j++) {
+        const dem2di_wall_state *old = &world->wall_now[j], *made = &world->wall_next[j];
+        if (!world->walls[j].alive) continue;
+        power[0][DEM2DI_BY_WALLS] -= dem2di_dot(made->force, old->velocity);
+        power[1][DEM2DI_BY_WALLS] -= dem2di_dot(made->force, made->velocity);
+    }
+    for (int k = 0; k < DEM2DI_HALVES; k++) {
+        ledger->sum[k] += ledger->half[k] + power[0][k] * world->time_step / 2;
+        ledger->half[k] = power[1][k] * world->time_step / 2;
+    }
+    double error = dem2di_ledger_error(ledger);
+    if (ledger->edited)
+        ledger->given += error - ledger->closure;
+    else
+        ledger->closure = error;
+    ledger->edited = false;
+}
+
 /* A particle that the step would give a state that is not finite, or -1. */
 static int dem2di_unsound(const dem2d_world *world) {
     dem2di_damping damping =
@@ -10081,9 +10655,35 @@ static void dem2di_stiffness_point(double kn, double kt, dem2d_vec normal, dem2d
     dem2di_stiffness_add(sum, kt, dem2di_perp(normal), arm);
 }
 
+/* The greatest c/kn of the dashpots on a particle, s. */
+static double dem2di_dashpot_lag(const dem2d_world *world, int slot, bool next) {
+    const dem2di_list *list = &world->list;
+    double lag = 0;
+    if (!world->plan.full || world->law != NULL) return 0;
+    for (int k = list->first[slot]; k < list->first[slot + 1]; k++) {
+        int i = list->incident[k] / 2;
+        dem2di_link link;
+        dem2d_vec arm_b;
+        if (!dem2di_link_at(world, i, next, &link, &arm_b)) continue;
+        const dem2d_pair_desc *law = dem2di_law_at(world, i, next);
+        double inverse = dem2di_reduced_inverse(world, i);
+        if (!(inverse > 0)) continue;
+        lag = dem2di_max(lag, dem2di_dashpot(law, 1 / inverse) / law->normal_stiffness);
+    }
+    return lag;
+}
+
+/* The eigenvalue without dashpots that bounds the time step as one with them does: velocities lag
+   by half a step, so that x'' = -l (x + lag x') is stable while l dt (dt + 2 lag) <= 4. */
+static double dem2di_lagging(double value, double lag) {
+    if (!(lag > 0 && value > 0)) return value;
+    double time_step = 4 / value / (lag + sqrt(lag * lag + 4 / value));
+    return 4 / (time_step * time_step);
+}
+
 /* Stiffness of the contacts of a particle for the limit (0) and for the safe bound (1), which
-   counts those between two free particles twice. One that slides does not resist: it counts for the
-   safe bound only. */
+   counts those between two free particles twice. One that slides does not resist, and may not that
+   rolls, or by the caller's law: it counts for the safe bound only. */
 static void dem2di_stiffness_sum(const dem2d_world *world, int slot, bool next,
                                  dem2di_stiffness sum[2]) {
     const dem2di_list *list = &world->list;
@@ -10098,12 +10698,15 @@ static void dem2di_stiffness_sum(const dem2d_world *world, int slot, bool next,
         const dem2di_ends *ends = dem2di_ends_at(world, i, next);
         bool shared = i < list->pairs && world->bodies[key->a].motion == DEM2D_FREE &&
                       world->bodies[key->b].motion == DEM2D_FREE;
-        bool sticks = fabs(link.shear) < law->friction * link.force;
+        bool sticks = world->law == NULL && fabs(link.shear) < law->friction * link.force;
+        bool rubs = law->friction > 0 || world->law != NULL;
         double kn = dem2di_stiffness_of(world, law, &link), kt = law->tangential_stiffness;
         dem2d_vec arm = side ? arm_b : link.point, t = dem2di_perp(link.normal);
         for (int bound = 0; bound < 2; bound++) {
             double f = bound == 1 && shared ? 2 : 1;
-            double slide = sticks || (bound == 1 && law->friction > 0) ? f * kt : 0;
+            double slide = sticks || (bound == 1 && rubs) ? f * kt : 0;
+            if (bound == 1 && law->rolling_friction > 0)
+                sum[1].rr += f * dem2di_rolling_stiffness(law, dem2di_reduced_radius(world, i));
             for (int p = 0; p < (ends != NULL ? 2 : 1); p++) {
                 double w = ends != NULL ? ends->weight[p] : 1;
                 dem2d_vec at = ends != NULL ? dem2di_along(arm, ends->offset[p], t) : arm;
@@ -10171,11 +10774,13 @@ static void dem2di_stiffest_range(const dem2d_world *world, int begin, int end, 
         if (enough > 0 && dem2di_surely_soft(world, i, stiffness, enough)) continue;
         dem2di_stiffness_sum(world, i, next, sum);
         double mass = dem2di_body_mass(world, body), inertia = dem2di_body_inertia(world, body);
+        double lag = dem2di_dashpot_lag(world, i, next);
         for (int bound = 0; bound < 2; bound++) {
             const dem2di_stiffness *k = &sum[bound];
             double value = (k->xx + k->yy) / mass + k->rr / inertia;
-            if (k->xx + k->yy > 0 && value > enough)
+            if (k->xx + k->yy > 0 && (value > enough || lag > 0))
                 value = dem2di_largest_eigenvalue(k, mass, inertia);
+            if (bound == 1) value = dem2di_lagging(value, lag);
             dem2di_stiffest_meet(world, stiffest, bound, value, i);
         }
         if (!loose || sum[1].xx + sum[1].yy > 0) continue;
@@ -10293,7 +10898,9 @@ static dem2d_result dem2di_step(dem2d_world *world) {
         if (world->walls[j].alive && !dem2di_vec_finite(world->wall_next[j].point))
             return dem2di_fail(&world->env, DEM2D_STATE, j,
                                "wall %d would get a place that is not finite", j);
-    double path = dem2di_motion_pass(world); /* nothing fails from here on */
+    if (world->ledger.kept) dem2di_book_contacts(world); /* nothing fails from here on */
+    double path = dem2di_motion_pass(world);
+    if (world->ledger.kept) dem2di_book_motion(world);
     worn = worn || path > 1 - DEM2DI_LIST_STEPS * DBL_EPSILON ||
            world->steps - world->listed_at >= DEM2DI_LIST_STEPS;
     if (listed) dem2di_use_laws(world);
@@ -10411,12 +11018,10 @@ static dem2d_contact_info dem2di_contact_of(const dem2d_world *world, const dem2
     dem2d_contact_info info;
     memset(&info, 0, sizeof info);
     info.a = dem2di_particle_id(world, key->a);
-    if (walk->walls) {
-        info.wall.index = (uint32_t)key->b;
-        info.wall.generation = world->walls[key->b].generation;
-    } else {
+    if (walk->walls)
+        info.wall = dem2di_wall_id(world, key->b);
+    else
         info.b = dem2di_particle_id(world, key->b);
-    }
     info.normal = link->normal;
     info.point = dem2di_add(world->before[key->a].x, link->point);
     info.branch = walk->branch;
@@ -10424,6 +11029,8 @@ static dem2d_contact_info dem2di_contact_of(const dem2d_world *world, const dem2
     info.depth = link->depth;
     info.normal_force = link->force;
     info.tangential_force = link->shear;
+    const dem2di_extra *extra = dem2di_extra_at(world, walk->contact, false);
+    info.moment = extra != NULL ? extra->moment : 0;
     return info;
 }
 
@@ -10447,22 +11054,10 @@ DEM2D_API dem2d_result dem2d_world_contacts(const dem2d_world *world, dem2d_cont
 static void dem2di_spring_energy(const dem2d_world *world, bool walls, dem2d_energy *energy) {
     dem2di_tour walk = dem2di_tour_start(walls);
     while (dem2di_tour_next(world, &walk)) {
-        const dem2di_link *link = &walk.link;
-        const dem2d_pair_desc *law = dem2di_law_at(world, walk.contact, false);
-        const dem2di_ends *ends = dem2di_ends_at(world, walk.contact, false);
-        double kn = law->normal_stiffness, kt = law->tangential_stiffness;
-        if (ends == NULL) {
-            energy->normal += link->force * link->depth / 2;
-            if (kt > 0) energy->tangential += link->shear * (link->shear / kt) / 2;
-            continue;
-        }
-        for (int k = 0; k < 2; k++) {
-            if (!(ends->weight[k] > 0)) continue;
-            energy->normal += ends->weight[k] * kn * ends->depth[k] * ends->depth[k] / 2;
-            if (kt > 0)
-                energy->tangential +=
-                    ends->shear[k] * (ends->shear[k] / (ends->weight[k] * kt)) / 2;
-        }
+        dem2di_stored part = dem2di_stored_in(world, walk.contact, false, &walk.link);
+        energy->normal += part.normal;
+        energy->tangential += part.tangential;
+        energy->rolling += part.rolling;
     }
 }
 
@@ -10483,6 +11078,25 @@ DEM2D_API dem2d_result dem2d_world_energy(const dem2d_world *world, dem2d_energy
     }
     dem2di_spring_energy(world, false, energy);
     dem2di_spring_energy(world, true, energy);
+    return DEM2D_OK;
+}
+
+DEM2D_API dem2d_result dem2d_world_ledger(const dem2d_world *world, dem2d_ledger *ledger) {
+    if (world == NULL || ledger == NULL) return DEM2D_NULL_ARGUMENT;
+    const dem2di_ledger *own = &world->ledger;
+    if (!own->kept)
+        return dem2di_fail(&world->env, DEM2D_OUT_OF_RANGE, -1, "ledger: this world keeps none");
+    ledger->kinetic = own->kinetic;
+    ledger->normal = own->stored.normal;
+    ledger->tangential = own->stored.tangential + own->stored.rolling;
+    ledger->gravity = own->sum[DEM2DI_GRAVITY];
+    ledger->walls = own->sum[DEM2DI_BY_WALLS];
+    ledger->driven = own->sum[DEM2DI_DRIVING];
+    ledger->friction = own->sum[DEM2DI_RUBBED];
+    ledger->dashpot = own->sum[DEM2DI_DASHED];
+    ledger->damping = own->sum[DEM2DI_DAMPED];
+    ledger->given = own->given;
+    ledger->closure = own->closure;
     return DEM2D_OK;
 }
 

@@ -920,7 +920,7 @@ static inline void add_falling(dem2d_world *world, dem2d_material_id material, i
 static inline dem2d_world *run_fall(const fall *f, dem2d_parallel_fn *parallel_for, void *user,
                                     double *seconds) {
     dem2d_world_desc scene = {0};
-    dem2d_material_desc stone = {2700, 1e7, 1e7, 0.4}; // kg/m2, N/m, N/m, friction
+    dem2d_material_desc stone = {2700, 1e7, 1e7, 0.4, 0, 0}; // kg/m2, N/m, N/m, friction
     dem2d_material_id material;
     dem2d_world *world;
     const double pitch = 0.05; // m

@@ -63,7 +63,7 @@ static void add_wall(bench *b, int i, dem2d_wall_mode mode) {
 }
 
 static void make_world(bench *b, const dem2d_world_desc *desc) {
-    const dem2d_material_desc smooth = {DENSITY, KN, 0, 0};
+    const dem2d_material_desc smooth = {DENSITY, KN, 0, 0, 0, 0};
     dem2d_shape *disc;
     check(dem2d_world_create(desc, &b->world), "world");
     check(dem2d_world_add_material(b->world, &smooth, &b->material), "material");
@@ -128,7 +128,7 @@ static void serial(void *user, dem2d_phase phase, int count, dem2d_task_fn *task
 }
 
 static void set_friction(bench *b, double friction) {
-    const dem2d_pair_desc pair = {KN, friction > 0 ? KN : 0, friction};
+    const dem2d_pair_desc pair = {KN, friction > 0 ? KN : 0, friction, 0, 0};
     check(dem2d_world_set_pair(b->world, b->material, b->material, &pair), "pair");
 }
 
@@ -201,8 +201,8 @@ static void add_fixed_pair(bench *b) {
 }
 
 static void add_rough_material(bench *b) {
-    const dem2d_material_desc rough = {DENSITY, KN, KN, 0.4};
-    const dem2d_pair_desc pair = {KN, KN, 0.4};
+    const dem2d_material_desc rough = {DENSITY, KN, KN, 0.4, 0, 0};
+    const dem2d_pair_desc pair = {KN, KN, 0.4, 0, 0};
     dem2d_material_id id;
     check(dem2d_world_add_material(b->world, &rough, &id), "material");
     check(dem2d_world_set_pair(b->world, id, id, &pair), "pair");

@@ -75,7 +75,7 @@ static double energy_of(const dem2d_world *world) {
 
 static dem2d_world *make_world(dem2d_face_rule rule, double time_step, double gravity,
                                dem2d_material_id *material) {
-    const dem2d_material_desc stone = {DENSITY, KN, 0, 0};
+    const dem2d_material_desc stone = {DENSITY, KN, 0, 0, 0, 0};
     dem2d_world_desc desc = {0};
     dem2d_world *world;
     desc.time_step = time_step, desc.gravity.y = -gravity, desc.faces = rule;

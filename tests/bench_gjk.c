@@ -225,7 +225,7 @@ static void add_walls(packing *p, dem2d_material_id material) {
    passed: faces, with one contact point each, never come wholly to rest. */
 static void make_packing(packing *p, const library *lib) {
     dem2d_world_desc scene = {0};
-    dem2d_material_desc stone = {2700, 1e7, 1e7, 0.2};
+    dem2d_material_desc stone = {2700, 1e7, 1e7, 0.2, 0, 0};
     dem2d_material_id material;
     dem2d_energy energy;
     int steps = 0;

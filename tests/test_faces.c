@@ -623,7 +623,7 @@ static dem2d_world_desc basic_desc(double time_step) {
 }
 
 static scene make_scene(const dem2d_world_desc *desc, double kt, double friction) {
-    const dem2d_material_desc material = {DENSITY, KN, kt, friction};
+    const dem2d_material_desc material = {DENSITY, KN, kt, friction, 0, 0};
     scene s;
     memset(&s, 0, sizeof s);
     assert_ok(dem2d_world_create(desc, &s.world));

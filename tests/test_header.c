@@ -425,6 +425,11 @@ static int uses_faults(const doc *d, int line, const list *contents, int self) {
         if (place == self) errors += fault(d, line, "uses itself: ", name);
         if (place > self) errors += fault(d, line, "uses a section below: ", name);
         at += length;
+        if (strcmp(at, ",") == 0 && line + 1 < d->count) { // goes on in the next line
+            at = d->line[++line];
+            at += strspn(at, " ");
+            continue;
+        }
         if (!*at) return errors;
         at += strspn(at, ", ");
     }

@@ -16,7 +16,7 @@ typedef struct scene {
 } scene;
 
 static scene make_scene(double kt, double friction, double time_step) {
-    const dem2d_material_desc material = {2700, KN, kt, friction};
+    const dem2d_material_desc material = {2700, KN, kt, friction, 0, 0};
     dem2d_world_desc desc = {0};
     scene s;
     desc.time_step = time_step;

@@ -21,7 +21,7 @@ static dem2d_world_desc quiet_desc(void) {
 
 static scene open_scene(const dem2d_world_desc *desc, double stiffness, double friction) {
     static const dem2d_vec corners[3] = {{1, 0}, {-0.5, 0.8}, {-0.5, -0.8}};
-    const dem2d_material_desc stone = {1000, stiffness, stiffness, friction};
+    const dem2d_material_desc stone = {1000, stiffness, stiffness, friction, 0, 0};
     dem2d_shape *shapes[3];
     scene s;
     assert_ok(dem2d_world_create(desc, &s.world));
@@ -230,7 +230,7 @@ static void test_refused_law(void **state) {
     view last[2];
     for (int refused = 0; refused < 2; refused++) {
         const scene s = open_scene(&desc, 1e5, 0.5);
-        const dem2d_pair_desc stiff = {1e15, 0, 0}, old = {1e5, 1e5, 0.5};
+        const dem2d_pair_desc stiff = {1e15, 0, 0, 0, 0}, old = {1e5, 1e5, 0.5, 0, 0};
         dem2d_particle_id ids[2];
         ids[0] = add(&s, 0, 1, 0, 0, 0);
         ids[1] = add(&s, 0, 1, 1.5, 1.3, -0.3);

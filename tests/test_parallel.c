@@ -272,7 +272,7 @@ static void add_walls(run *r, const scene *s) {
 
 /* Without a runner the library does its work itself. */
 static void make_run(run *r, const scene *s, const runner *runner, calls *calls) {
-    const dem2d_material_desc stone = {2700, 1e6, s->friction > 0 ? 1e6 : 0, s->friction};
+    const dem2d_material_desc stone = {2700, 1e6, s->friction > 0 ? 1e6 : 0, s->friction, 0, 0};
     dem2d_world_desc desc = {0};
     memset(r, 0, sizeof *r);
     r->random.state = 7;

@@ -15,7 +15,7 @@ typedef struct scene {
     dem2d_material_id material;
 } scene;
 
-static const dem2d_material_desc stone = {2700, 1e7, 1e7, 0.4};
+static const dem2d_material_desc stone = {2700, 1e7, 1e7, 0.4, 0, 0};
 
 static dem2d_world_desc basic_desc(void) {
     dem2d_world_desc desc = {0};
@@ -410,7 +410,7 @@ enum { MATERIALS, PAIRS, PARTICLES, WALLS };
 
 static dem2d_result add_bad(int what, const scene *s, dem2d_shape_id shape, const bad_field *bad) {
     dem2d_material_desc material = stone;
-    dem2d_pair_desc meeting = {1e6, 1e6, 0.5};
+    dem2d_pair_desc meeting = {1e6, 1e6, 0.5, 0, 0};
     dem2d_particle_desc grain = grain_desc(s, shape, 0, 0);
     dem2d_wall_desc plane = wall_desc(s, 0, 0, 0, 1);
     dem2d_material_id material_id;
@@ -583,7 +583,7 @@ static void check_stale(dem2d_world *w, dem2d_shape_id shape, dem2d_material_id 
                         dem2d_particle_id grain, dem2d_wall_id plane) {
     dem2d_particle_info particle_info;
     dem2d_wall_info wall_info;
-    const dem2d_pair_desc meeting = {1, 1, 1};
+    const dem2d_pair_desc meeting = {1, 1, 1, 0, 0};
     dem2d_wall_desc desc = {0};
     const dem2d_result results[] = {
         dem2d_world_remove_shape(w, shape),
@@ -664,7 +664,7 @@ static void test_results(void **state) {
 /* A disc of one material driven along a heavy disc of another: stiffnesses and friction are read
    off the contact. */
 static void check_meeting(const dem2d_pair_desc *given, double kn, double kt, double mu) {
-    const dem2d_material_desc first = {2700, 1e6, 4e5, 0.5}, second = {1e9, 3e6, 1.2e6, 0.2};
+    const dem2d_material_desc first = {2700, 1e6, 4e5, 0.5, 0, 0}, second = {1e9, 3e6, 1.2e6, 0.2, 0, 0};
     dem2d_world_desc desc = basic_desc();
     desc.time_step = 1e-5;
     scene s = make_scene(&desc, &first);
@@ -694,7 +694,7 @@ static void check_meeting(const dem2d_pair_desc *given, double kn, double kt, do
 
 static void test_mixing(void **state) {
     (void)state;
-    const dem2d_pair_desc given = {5e6, 2e5, 0.05};
+    const dem2d_pair_desc given = {5e6, 2e5, 0.05, 0, 0};
     check_meeting(NULL, 1.5e6, 6e5, 0.2); /* harmonic means, the smaller friction */
     check_meeting(&given, 5e6, 2e5, 0.05);
 }
@@ -804,7 +804,7 @@ static void test_wall_motion(void **state) {
 /* A servo wall on a column of n grains in a frictionless channel: the stress on the lid and on the
    floor is the target, and the lid's length is the width of the channel. */
 static void check_servo(int n, bool boxes, double stress) {
-    const dem2d_material_desc smooth = {2700, 1e7, 0, 0};
+    const dem2d_material_desc smooth = {2700, 1e7, 0, 0, 0, 0};
     const dem2d_vec square[4] = {{0, 0}, {0.1, 0}, {0.1, 0.1}, {0, 0.1}};
     const double width = 0.1001;
     dem2d_world_desc desc = basic_desc();
@@ -861,7 +861,7 @@ static void test_servo_speed(void **state) {
 
 /* Three discs in a row with known overlaps, the last one smaller. */
 static scene make_row(dem2d_particle_id ids[3]) {
-    const dem2d_material_desc smooth = {2700, 1e6, 0, 0};
+    const dem2d_material_desc smooth = {2700, 1e6, 0, 0, 0, 0};
     const dem2d_world_desc desc = basic_desc();
     const scene s = make_scene(&desc, &smooth);
     const dem2d_shape_id disc = add_disc(s.world, 1);
@@ -996,7 +996,7 @@ static void test_spring_energy(void **state) {
     (void)state;
     dem2d_particle_id ids[3];
     const scene s = make_row(ids);
-    const dem2d_pair_desc sticky = {1e6, 5e5, 100};
+    const dem2d_pair_desc sticky = {1e6, 5e5, 100, 0, 0};
     dem2d_energy e;
     assert_ok(dem2d_world_set_pair(s.world, s.material, s.material, &sticky));
     assert_ok(dem2d_world_move_particle(s.world, ids[2], vec(50, 0), 0));
@@ -1204,7 +1204,7 @@ static void test_time_step_bounds(void **state) {
     (void)state;
     static const double tangential[] = {0, 1e7, 5e7};
     for (int i = 0; i < COUNT_OF(tangential); i++) {
-        const dem2d_material_desc material = {2700, 1e7, tangential[i], 0.5};
+        const dem2d_material_desc material = {2700, 1e7, tangential[i], 0.5, 0, 0};
         const dem2d_world_desc desc = basic_desc();
         const scene s = make_scene(&desc, &material);
         const dem2d_particle_id id = add_grain(&s, add_disc(s.world, 0.1), 0, 0.1 - 1e-7);
@@ -1243,7 +1243,7 @@ static void test_time_step_bounds(void **state) {
 static void test_time_step_too_long(void **state) {
     (void)state;
     static world_state failed, twin_state;
-    const dem2d_material_desc smooth = {2700, 1e7, 0, 0};
+    const dem2d_material_desc smooth = {2700, 1e7, 0, 0, 0, 0};
     scene twins[2];
     test_env env;
     test_env_init(&env);
@@ -1482,7 +1482,7 @@ static void test_svg_changes_nothing(void **state) {
 static void test_changes_are_checked(void **state) {
     (void)state;
     const dem2d_world_desc desc = basic_desc();
-    const dem2d_pair_desc hard = {1e13, 1e13, 0.4};
+    const dem2d_pair_desc hard = {1e13, 1e13, 0.4, 0, 0};
     for (int change = 0; change < 2; change++) {
         const scene s = make_scene(&desc, &stone);
         const dem2d_particle_id id = add_grain(&s, add_disc(s.world, 0.1), 0, 0.1 - 1e-5);
