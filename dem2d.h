@@ -9805,7 +9805,10 @@ static void dem2di_book_contact(const dem2d_world *world, int contact, dem2di_le
     dem2di_stored_add(&ledger->stored, gained, 1);
     if (was) dem2di_stored_add(&gained, dem2di_stored_in(world, contact, false, &last), -1);
     double taken = -(shear * slide + moment * turn) / 2;
-    if (world->law != NULL) taken += (last.force + link.force) / 2 * way - gained.normal;
+    if (world->law != NULL) {
+        double deeper = (is ? link.depth : 0) - (was ? last.depth : 0);
+        taken += ((was ? last.force : 0) + (is ? link.force : 0)) / 2 * deeper - gained.normal;
+    }
     ledger->sum[DEM2DI_RUBBED] += taken - gained.tangential - gained.rolling;
     ledger->sum[DEM2DI_DASHED] += viscous / 2 * way;
 }

@@ -1,0 +1,483 @@
+/* The full law against closed forms: dashpots by restitution, rolling friction, a caller's law; and
+   the ledger of energies, which has to close. */
+#define DEM2D_IMPLEMENTATION
+#include "dem2d.h"
+#include "testing.h"
+
+#include <float.h>
+
+#define KN 1e7
+
+typedef struct scene {
+    dem2d_world *world;
+    dem2d_material_id material;
+} scene;
+
+static scene make_scene(dem2d_world_desc desc, dem2d_material_desc material) {
+    scene s;
+    if (!(desc.contact_tolerance > 0)) desc.contact_tolerance = 1e-13;
+    assert_ok(dem2d_world_create(&desc, &s.world));
+    assert_ok(dem2d_world_add_material(s.world, &material, &s.material));
+    return s;
+}
+
+static dem2d_material_desc stone(double kt, double friction) {
+    dem2d_material_desc material = {0};
+    material.density = 2700, material.normal_stiffness = KN;
+    material.tangential_stiffness = kt, material.friction = friction;
+    return material;
+}
+
+/* Takes the shape. */
+static dem2d_particle_id add(const scene *s, dem2d_shape *shape, dem2d_vec at, double angle,
+                             dem2d_vec velocity, double spin) {
+    dem2d_particle_desc desc = {0};
+    dem2d_particle_id id;
+    assert_ok(dem2d_world_add_shape(s->world, shape, &desc.shape));
+    dem2d_shape_destroy(shape);
+    desc.scale = 1, desc.material = s->material, desc.angle = angle;
+    desc.position = at, desc.velocity = velocity, desc.angular_velocity = spin;
+    assert_ok(dem2d_world_add_particle(s->world, &desc, &id));
+    return id;
+}
+
+static dem2d_wall_id add_wall(const scene *s, double x, double y, double nx, double ny) {
+    dem2d_wall_desc desc = {0};
+    dem2d_wall_id id;
+    desc.material = s->material, desc.point = vec(x, y), desc.normal = vec(nx, ny);
+    assert_ok(dem2d_world_add_wall(s->world, &desc, &id));
+    return id;
+}
+
+static dem2d_particle_info look(const scene *s, dem2d_particle_id id) {
+    dem2d_particle_info info;
+    assert_ok(dem2d_world_get_particle(s->world, id, &info));
+    return info;
+}
+
+static dem2d_ledger book(const scene *s) {
+    dem2d_ledger ledger;
+    assert_ok(dem2d_world_ledger(s->world, &ledger));
+    return ledger;
+}
+
+static dem2d_shape *disc(double radius) {
+    dem2d_shape *shape;
+    assert_ok(dem2d_shape_create_circle(NULL, radius, &shape));
+    return shape;
+}
+
+static dem2d_shape *box(double width, double height) {
+    const dem2d_vec points[4] = {{0, 0}, {width, 0}, {width, height}, {0, height}};
+    dem2d_shape *shape;
+    assert_ok(dem2d_shape_create_polygon(NULL, points, 4, 0, &shape));
+    return shape;
+}
+
+static dem2d_shape *ellipse(double a, double b) {
+    dem2d_shape *shape;
+    assert_ok(dem2d_shape_create_ellipse(NULL, a, b, &shape));
+    return shape;
+}
+
+/* --- dashpot --------------------------------------------------------------------------------- */
+
+/* The motion of a mass with a clipped spring and dashpot, integrated in steps of 1e-5 of its time
+   by Runge and Kutta's method: what comes out over what goes in. */
+static double restitution_by_integration(double zeta) {
+    double x = 0, v = 1, h = 1e-4;
+    for (;;) {
+        double k1v = -x - 2 * zeta * v, xm = x + h / 2 * v, vm = v + h / 2 * k1v;
+        double k2v = -xm - 2 * zeta * vm, xn = x + h / 2 * vm, vn = v + h / 2 * k2v;
+        double k3v = -xn - 2 * zeta * vn, xe = x + h * vn, ve = v + h * k3v;
+        double k4v = -xe - 2 * zeta * ve;
+        if (x + 2 * zeta * v <= 0) return -v; /* no more force: it leaves */
+        x += h / 6 * (v + 2 * vm + 2 * vn + ve);
+        v += h / 6 * (k1v + 2 * k2v + 2 * k3v + k4v);
+    }
+}
+
+static void test_damping_ratio(void **state) {
+    (void)state;
+    const double values[] = {0.02, 0.1, 0.1353352832366127, 0.3, 0.5, 0.7, 0.9, 0.999};
+    for (int i = 0; i < COUNT_OF(values); i++) {
+        double zeta;
+        assert_ok(dem2d_damping_ratio(values[i], &zeta));
+        assert_within(restitution_by_integration(zeta), values[i], 2e-4);
+    }
+    double zeta = -1;
+    assert_ok(dem2d_damping_ratio(1, &zeta));
+    assert_true(zeta == 0);
+    assert_ok(dem2d_damping_ratio(exp(-2), &zeta));
+    assert_near(zeta, 1, 1e-7); /* e^-2 is the limit of both branches */
+    zeta = 7;
+    assert_result(dem2d_damping_ratio(0, &zeta), DEM2D_OUT_OF_RANGE);
+    assert_result(dem2d_damping_ratio(1.5, &zeta), DEM2D_OUT_OF_RANGE);
+    assert_result(dem2d_damping_ratio((double)NAN, &zeta), DEM2D_NOT_FINITE);
+    assert_result(dem2d_damping_ratio(0.5, NULL), DEM2D_NULL_ARGUMENT);
+    assert_true(zeta == 7);
+}
+
+enum { DISCS, DISC_WALL, BOX_WALL, OVALS, IMPACTS };
+
+/* Head on, at 1 m/s; the speed of parting over that of meeting. */
+static double bounce(int kind, double restitution, double steps) {
+    dem2d_world_desc desc = {0};
+    dem2d_material_desc material = stone(KN, 0.3);
+    const double half = 0.05;
+    const bool wall = kind == DISC_WALL || kind == BOX_WALL;
+    const double area = kind == BOX_WALL ? 4 * half * half : (double)TEST_PI * half * half;
+    const double mass = 2700 * area / (wall ? 1 : 2);
+    const double stiffness = kind == BOX_WALL ? 2 * KN : KN; /* at both corners */
+    assert_ok(dem2d_damping_ratio(restitution, &material.damping_ratio));
+    desc.time_step = (double)TEST_PI * sqrt(mass / stiffness) / steps;
+    /* each corner's dashpot is that of the whole mass on one spring: sqrt 2 times too strong */
+    if (kind == BOX_WALL) material.damping_ratio /= sqrt(2);
+    scene s = make_scene(desc, material);
+    dem2d_particle_id b = {0, 0}, a;
+    if (wall)
+        add_wall(&s, 0, 0, 0, 1);
+    else
+        b = add(&s, kind == DISCS ? disc(half) : ellipse(0.08, half), vec(0, -half), 0, vec(0, 0),
+                0);
+    if (kind == OVALS)
+        a = add(&s, ellipse(0.08, half), vec(0, half + 1e-4), 0, vec(0, -1), 0);
+    else
+        a = add(&s, kind == BOX_WALL ? box(2 * half, 2 * half) : disc(half), vec(0, half + 1e-4), 0,
+                vec(0, -1), 0);
+    assert_ok(dem2d_world_step(s.world, (int)(4 * steps), NULL));
+    double parting = look(&s, a).velocity.y;
+    if (!wall) parting -= look(&s, b).velocity.y;
+    if (kind == OVALS) assert_within(look(&s, a).angular_velocity, 0, 1e-9);
+    dem2d_world_destroy(s.world);
+    return parting;
+}
+
+static void test_restitution(void **state) {
+    (void)state;
+    const double values[] = {0.1, 0.3, 0.5, 0.7, 0.9};
+    for (int kind = 0; kind < IMPACTS; kind++)
+        for (int i = 0; i < COUNT_OF(values); i++) {
+            assert_within(bounce(kind, values[i], 100), values[i], 0.012);
+            assert_within(bounce(kind, values[i], 1000), values[i], 0.0012);
+        }
+}
+
+/* --- rolling --------------------------------------------------------------------------------- */
+
+/* A disc on an incline b (by gravity): it stays for tan b < mu_r, else it rolls down with the
+   moment of the limit: a = 2/3 g (sin b - mu_r cos b). */
+static void test_rolling(void **state) {
+    (void)state;
+    const double radius = 0.05, mu_r = 0.1, slopes[] = {0.05, 0.3};
+    for (int i = 0; i < 2; i++) {
+        dem2d_world_desc desc = {0};
+        dem2d_material_desc material = stone(KN, 0.8);
+        material.rolling_friction = mu_r;
+        desc.time_step = 2e-5;
+        desc.gravity = vec(9.81 * sin(slopes[i]), -9.81 * cos(slopes[i]));
+        desc.ledger = true;
+        scene s = make_scene(desc, material);
+        const double mass = 2700 * (double)TEST_PI * radius * radius;
+        add_wall(&s, 0, 0, 0, 1);
+        dem2d_particle_id id = add(
+            &s, disc(radius), vec(0, radius - mass * 9.81 * cos(slopes[i]) / KN), 0, vec(0, 0), 0);
+        const double time = 1.5; /* long against the swing of the tangential spring */
+        assert_ok(dem2d_world_step(s.world, (int)(time / desc.time_step), NULL));
+        const double way = look(&s, id).pose.position.x;
+        if (i == 0)
+            assert_within(way, 0, 1e-4 * radius);
+        else
+            assert_near(way, 9.81 * (sin(slopes[1]) - mu_r * cos(slopes[1])) / 3 * time * time,
+                        2e-3);
+        dem2d_contact_info c;
+        int count;
+        assert_ok(dem2d_world_contacts(s.world, &c, 1, &count));
+        assert_int_equal(count, 1);
+        if (i == 1) assert_near(fabs(c.moment), mu_r * radius * c.normal_force, 1e-9);
+        dem2d_ledger ledger = book(&s);
+        assert_within(ledger.closure, 0, 1e-3 * fmax(ledger.gravity, ledger.tangential));
+        if (i == 1) assert_true(ledger.friction > 0.2 * ledger.gravity);
+        dem2d_world_destroy(s.world);
+    }
+}
+
+/* --- a caller's law -------------------------------------------------------------------------- */
+
+typedef struct law_calls {
+    int calls;
+    double greatest;
+    double dashpot; /* over the mass, 1/s: may pull */
+    double bad;
+} law_calls;
+
+/* The built-in law once more; with a dashpot that is not clipped. */
+static void same_law(void *user, const dem2d_law_input *in, dem2d_law_output *out) {
+    law_calls *seen = user;
+    const double limit = in->pair.friction * in->pair.normal_stiffness * in->depth;
+    seen->calls++;
+    seen->greatest = fmax(seen->greatest, in->depth);
+    if (!(in->depth > 0) || in->state[0] != out->state[0]) seen->bad = 1;
+    out->normal_force =
+        in->pair.normal_stiffness * in->depth + seen->dashpot * in->mass * in->closing;
+    out->tangential_force =
+        in->tangential_force - in->pair.tangential_stiffness * in->slip * in->time_step;
+    out->tangential_force = fmax(-limit, fmin(limit, out->tangential_force));
+    out->energy = in->pair.normal_stiffness * in->depth * in->depth / 2;
+    if (in->pair.tangential_stiffness > 0)
+        out->energy +=
+            out->tangential_force * out->tangential_force / (2 * in->pair.tangential_stiffness);
+    out->state[0] = in->state[0] + 1;
+}
+
+/* Grains of three kinds in a box; the last of them are the last added. */
+static void fill(const scene *s, int count, double speed) {
+    test_random random = {11};
+    for (int i = 0; i < count; i++) {
+        const dem2d_vec at = vec(0.06 + 0.12 * (i % 4), 0.06 + 0.12 * (i / 4));
+        const dem2d_vec v =
+            vec(test_uniform(&random, -speed, speed), test_uniform(&random, -speed, speed));
+        dem2d_shape *shape = i % 3 == 0 ? disc(0.04) : i % 3 == 1 ? ellipse(0.055, 0.03) : NULL;
+        if (shape == NULL) {
+            const double a[4] = {0.09, 0, 0, 0.003}, b[4] = {0, 0, 0, 0};
+            assert_ok(dem2d_shape_create_fourier(NULL, a, b, 3, &shape));
+        }
+        add(s, shape, at, i, v, test_uniform(&random, -speed, speed) / 0.05);
+    }
+    add_wall(s, 0, 0, 0, 1), add_wall(s, 0, 0, 1, 0);
+    add_wall(s, 0.48, 0, -1, 0), add_wall(s, 0, 0.48, 0, -1);
+}
+
+/* The same grains by the built-in law and by the caller's copy of it. */
+static void test_callers_law(void **state) {
+    (void)state;
+    scene s[2];
+    law_calls seen = {0};
+    for (int k = 0; k < 2; k++) {
+        dem2d_world_desc desc = {0};
+        desc.time_step = 2e-5, desc.gravity.y = -9.81, desc.ledger = true;
+        desc.faces = DEM2D_ONE_POINT;
+        if (k == 1) desc.law = same_law, desc.law_user = &seen;
+        s[k] = make_scene(desc, stone(KN / 2, 0.3));
+        fill(&s[k], 16, 1);
+        assert_ok(dem2d_world_step(s[k].world, 2000, NULL));
+    }
+    assert_true(seen.calls > 1000 && seen.greatest > 0 && seen.bad == 0);
+    dem2d_particle_id ids[16];
+    int count;
+    assert_ok(dem2d_world_particles(s[0].world, ids, 16, &count));
+    for (int i = 0; i < count; i++) {
+        const dem2d_particle_info a = look(&s[0], ids[i]), b = look(&s[1], ids[i]);
+        assert_within(a.pose.position.x, b.pose.position.x, 1e-9);
+        assert_within(a.pose.position.y, b.pose.position.y, 1e-9);
+    }
+    const dem2d_ledger a = book(&s[0]), b = book(&s[1]);
+    assert_near(b.friction, a.friction, 1e-6);
+    assert_within(b.closure, 0, 1e-3 * b.given);
+    for (int k = 0; k < 2; k++) dem2d_world_destroy(s[k].world);
+}
+
+/* A dashpot that may pull: e = exp(-pi zeta/s) at any speed. */
+static void test_tension(void **state) {
+    (void)state;
+    const double zeta = 0.2, half = 0.05;
+    const double mass = 2700 * (double)TEST_PI * half * half, w0 = sqrt(KN / mass);
+    law_calls seen = {0};
+    seen.dashpot = 2 * zeta * w0;
+    dem2d_world_desc desc = {0};
+    desc.time_step = (double)TEST_PI / w0 / 1000, desc.law = same_law, desc.law_user = &seen;
+    scene s = make_scene(desc, stone(0, 0));
+    add_wall(&s, 0, 0, 0, 1);
+    dem2d_particle_id id = add(&s, disc(half), vec(0, half + 1e-4), 0, vec(0, -1), 0);
+    assert_ok(dem2d_world_step(s.world, 3000, NULL));
+    const double expected = exp(-(double)TEST_PI * zeta / sqrt(1 - zeta * zeta));
+    assert_within(look(&s, id).velocity.y, expected, 1e-3);
+    dem2d_world_destroy(s.world);
+}
+
+/* --- ledger ---------------------------------------------------------------------------------- */
+
+/* Greatest error of the ledger of a gas without friction, of the energy put in. */
+static double gas_error(double steps) {
+    dem2d_world_desc desc = {0};
+    const double mass = 2700 * (double)TEST_PI * 0.04 * 0.04 / 2;
+    desc.time_step = (double)TEST_PI * sqrt(mass / KN) / steps, desc.ledger = true;
+    scene s = make_scene(desc, stone(0, 0));
+    fill(&s, 16, 1);
+    double worst = 0;
+    for (int i = 0; i < 200; i++) {
+        assert_ok(dem2d_world_step(s.world, (int)steps / 2, NULL));
+        const dem2d_ledger ledger = book(&s);
+        worst = fmax(worst, fabs(ledger.closure) / ledger.given);
+        assert_true(ledger.friction == 0 && ledger.dashpot == 0);
+        assert_within(ledger.damping, 0, 1e-10 * ledger.given); /* rounding of forces */
+    }
+    dem2d_world_destroy(s.world);
+    return worst;
+}
+
+/* Nothing is dissipated: the ledger is the energy of the grains, and its error that of the time
+   step, of second order. */
+static void test_ledger_order(void **state) {
+    (void)state;
+    const double coarse = gas_error(100), fine = gas_error(1000);
+    print_message("t_c/100: %.2g, t_c/1000: %.2g\n", coarse, fine);
+    assert_true(coarse < 1e-3);
+    assert_true(fine < 1e-6 && fine < coarse / 50);
+}
+
+typedef struct account {
+    const char *name;
+    double friction, local, global, ratio, rolling;
+    bool area, gravity;
+} account;
+
+/* All accounts by turns, with walls that push, until the grains are nearly at rest. */
+static void test_ledger_closes(void **state) {
+    (void)state;
+    static const account accounts[] = {
+        {"springs", 0, 0, 0, 0, 0, false, true},     {"friction", 0.4, 0, 0, 0, 0, false, true},
+        {"local", 0.4, 0.5, 0, 0, 0, false, true},   {"global", 0.4, 0, 5, 0, 0, false, true},
+        {"dashpot", 0.4, 0, 0, 0.3, 0, false, true}, {"rolling", 0.4, 0, 0, 0.1, 0.2, false, true},
+        {"area", 0.4, 0.2, 0, 0, 0, true, false},
+    };
+    for (int i = 0; i < COUNT_OF(accounts); i++) {
+        const account *a = &accounts[i];
+        dem2d_world_desc desc = {0};
+        dem2d_material_desc material = stone(KN / 2, a->friction);
+        material.damping_ratio = a->ratio, material.rolling_friction = a->rolling;
+        desc.time_step = 5e-6, desc.ledger = true;
+        desc.gravity.y = a->gravity ? -9.81 : 0;
+        desc.local_damping = a->local, desc.global_damping = a->global;
+        if (a->area) desc.faces = DEM2D_CONTACT_AREA, desc.time_step = 2e-5;
+        scene s = make_scene(desc, material);
+        fill(&s, 16, 1);
+        dem2d_wall_desc moving = {0};
+        moving.material = s.material, moving.mode = DEM2D_WALL_MOVING;
+        moving.normal = vec(0, -1), moving.velocity = vec(0, -0.3), moving.point = vec(0, 0.48);
+        const dem2d_wall_id top = {3, 1};
+        assert_ok(dem2d_world_set_wall(s.world, top, &moving));
+        assert_ok(dem2d_world_step(s.world, (int)(0.2 / desc.time_step), NULL));
+        const dem2d_ledger l = book(&s);
+        const double put = fabs(l.given) + fabs(l.gravity) + fabs(l.walls);
+        print_message("%-9s closure %.2g of %.3g; friction %.3g dashpot %.3g damping %.3g "
+                      "walls %.3g\n",
+                      a->name, l.closure / put, put, l.friction, l.dashpot, l.damping, l.walls);
+        assert_within(l.closure, 0, 1e-3 * put);
+        assert_true((l.friction > 1e-3 * put) == (a->friction > 0));
+        assert_true((l.dashpot > 1e-3 * put) == (a->ratio > 0));
+        assert_true((l.damping > 1e-3 * put) == (a->local > 0 || a->global > 0));
+        assert_true(l.walls > 0 && (l.gravity != 0) == a->gravity);
+        dem2d_world_destroy(s.world);
+    }
+}
+
+/* Speeds, particles and laws changed by hand are booked as given, to the first order of a step. */
+static void test_ledger_edits(void **state) {
+    (void)state;
+    dem2d_world_desc desc = {0};
+    desc.time_step = 1e-5, desc.ledger = true;
+    scene s = make_scene(desc, stone(0, 0));
+    dem2d_particle_id id = add(&s, disc(0.05), vec(0, 0), 0, vec(1, 0), 0);
+    assert_ok(dem2d_world_step(s.world, 10, NULL));
+    const double mass = look(&s, id).mass;
+    assert_near(book(&s).given, mass / 2, 1e-12);
+    assert_ok(dem2d_world_drive_particle(s.world, id, DEM2D_FREE, vec(3, 0), 0));
+    assert_ok(dem2d_world_step(s.world, 2, NULL));
+    assert_near(book(&s).given, 9 * mass / 2, 1e-12);
+    assert_within(book(&s).closure, 0, 1e-12 * mass);
+    dem2d_particle_id other = add(&s, disc(0.05), vec(5, 5), 0, vec(2, 0), 0);
+    assert_ok(dem2d_world_step(s.world, 2, NULL));
+    assert_near(book(&s).given, (9 + 4) * mass / 2, 1e-12);
+    assert_ok(dem2d_world_remove_particle(s.world, other));
+    assert_ok(dem2d_world_step(s.world, 2, NULL));
+    assert_near(book(&s).given, 9 * mass / 2, 1e-12);
+    /* a driven disc pushes another: what it does is work */
+    assert_ok(dem2d_world_drive_particle(s.world, id, DEM2D_DRIVEN, vec(1, 0), 0));
+    const double x = look(&s, id).pose.position.x;
+    add(&s, disc(0.05), vec(x + 0.1001, 0), 0, vec(0, 0), 0);
+    assert_ok(dem2d_world_step(s.world, 2000, NULL));
+    dem2d_ledger l = book(&s);
+    assert_near(l.kinetic, 4 * mass / 2, 1e-3); /* thrown off at twice the speed */
+    assert_near(l.driven, 4 * mass / 2, 1e-3);
+    assert_within(l.closure, 0, 1e-3 * l.driven);
+    assert_result(dem2d_world_ledger(s.world, NULL), DEM2D_NULL_ARGUMENT);
+    dem2d_world_destroy(s.world);
+    desc.ledger = false;
+    s = make_scene(desc, stone(0, 0));
+    l.closure = 7;
+    assert_result(dem2d_world_ledger(s.world, &l), DEM2D_OUT_OF_RANGE);
+    assert_true(l.closure == 7);
+    dem2d_world_destroy(s.world);
+}
+
+/* The full law on and off while contacts are closed: springs stay. */
+static void test_law_changes(void **state) {
+    (void)state;
+    dem2d_world_desc desc = {0};
+    desc.time_step = 2e-5, desc.gravity = vec(1, -9.81), desc.local_damping = 0.5;
+    scene s = make_scene(desc, stone(KN / 2, 0.6));
+    add_wall(&s, 0, 0, 0, 1);
+    dem2d_particle_id low = add(&s, disc(0.05), vec(0, 0.05), 0, vec(0, 0), 0);
+    add(&s, disc(0.05), vec(0.1, 0.05), 0, vec(0, 0), 0);
+    add(&s, disc(0.05), vec(0.05, 0.05 + 0.0866), 0, vec(0, 0), 0);
+    dem2d_wall_desc side = {0};
+    side.material = s.material, side.point = vec(0.15, 0), side.normal = vec(-1, 0);
+    dem2d_wall_id id;
+    assert_ok(dem2d_world_add_wall(s.world, &side, &id));
+    assert_ok(dem2d_world_step(s.world, 40000, NULL));
+    dem2d_pair_desc law = {0};
+    law.normal_stiffness = KN, law.tangential_stiffness = KN / 2, law.friction = 0.6;
+    const dem2d_particle_info rest = look(&s, low);
+    assert_true(fabs(rest.torque) < 1e-6 && fabs(rest.velocity.x) < 1e-9);
+    for (int k = 0; k < 4; k++) {
+        law.damping_ratio = k % 2 == 0 ? 0.1 : 0;
+        assert_ok(dem2d_world_set_pair(s.world, s.material, s.material, &law));
+        assert_ok(dem2d_world_step(s.world, 2000, NULL));
+        assert_within(look(&s, low).pose.position.x, rest.pose.position.x, 1e-9 * 0.05);
+        assert_within(look(&s, low).force.y, rest.force.y, 1e-6 * rest.mass);
+    }
+    dem2d_world_destroy(s.world);
+}
+
+/* A dashpot asks for shorter steps: at the safe bound a stiff one still comes to rest. */
+static void test_damped_time_step(void **state) {
+    (void)state;
+    dem2d_world_desc desc = {0};
+    dem2d_material_desc material = stone(0, 0);
+    material.damping_ratio = 2;
+    desc.time_step = 1e-6, desc.gravity.y = -9.81;
+    for (int k = 0; k < 2; k++) {
+        double safe, limit;
+        scene s = make_scene(desc, material);
+        add_wall(&s, 0, 0, 0, 1);
+        dem2d_particle_id id = add(&s, disc(0.05), vec(0, 0.05 - 1e-6), 0, vec(0, 0), 0);
+        assert_ok(dem2d_world_step(s.world, 1, NULL));
+        assert_ok(dem2d_world_time_step_bounds(s.world, &safe, &limit, NULL));
+        const double w0 = sqrt(KN / look(&s, id).mass);
+        assert_near(limit, 2 / w0, 1e-12);
+        assert_near(safe, 2 / w0 * (sqrt(1 + 4) - 2), 1e-12);
+        assert_ok(dem2d_world_set_time_step(s.world, (k == 0 ? 0.98 : 1.05) * safe));
+        dem2d_stats stats;
+        double fastest = 0;
+        for (int i = 0; i < 4000; i++) {
+            assert_ok(dem2d_world_step(s.world, 1, NULL));
+            if (i > 3000) fastest = fmax(fastest, fabs(look(&s, id).velocity.y));
+        }
+        assert_ok(dem2d_world_stats(s.world, &stats));
+        assert_true((stats.slow_time_step > 0) == (k == 1));
+        assert_true((fastest < 1e-9) == (k == 0));
+        dem2d_world_destroy(s.world);
+    }
+}
+
+int main(void) {
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(test_damping_ratio), cmocka_unit_test(test_restitution),
+        cmocka_unit_test(test_rolling),       cmocka_unit_test(test_callers_law),
+        cmocka_unit_test(test_tension),       cmocka_unit_test(test_ledger_order),
+        cmocka_unit_test(test_ledger_closes), cmocka_unit_test(test_ledger_edits),
+        cmocka_unit_test(test_law_changes),   cmocka_unit_test(test_damped_time_step),
+    };
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}
