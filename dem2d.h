@@ -161,8 +161,9 @@ CONCEPTS
     Face        Where two edges meet (polygons, straight arcs, walls) two points carry the
                 contact, the ends of the common part, each with its own depth and the whole kn.
                 They come and go without a jump of force or moment.
-    Wall        A half-plane: its normal points into the grains. It stands still, moves at a
-                velocity, or is servo-controlled to a stress.
+    Wall        A half-plane: its normal points into the grains. Or a segment, which has two sides;
+                a chain of them counts once at its joints. A wall stands still, moves at a velocity,
+                or is servo-controlled to a stress.
     Force       On B along the normal at each contact point: kn depth, and a dashpot if the
                 materials have one; never attractive. Along the tangent an incremental spring kt,
                 at most friction times the normal force ([F] eq. 8-10). Against rolling a spring
@@ -287,6 +288,8 @@ OPTIONS (zero means: physical zero for physical fields; "library default" where 
     dem2d_wall_desc         material              -      none       a material of this world
     dem2d_wall_desc         point                 m      0          finite
     dem2d_wall_desc         normal                -      none       not zero; normalised
+    dem2d_wall_desc         segment               -      false      not with CONTACT_AREA
+    dem2d_wall_desc         end                   m      0          not the point, for a segment
     dem2d_wall_desc         velocity              m/s    0          finite; MOVING only
     dem2d_wall_desc         stress                Pa     0          finite; SERVO only
     dem2d_wall_desc         max_speed             m/s    none       > 0 for SERVO
@@ -1034,13 +1037,16 @@ typedef enum dem2d_wall_mode {
     DEM2D_WALL_SERVO   ///< along its normal, so that force = stress * length
 } dem2d_wall_mode;
 
-/// A half-plane.
+/// A half-plane, or a segment. Segments push to both sides and at their ends. Ends of two that are
+/// nearer than a millionth of the shorter one are a joint: a particle there has one contact.
 typedef struct dem2d_wall_desc {
-    double length;              ///< m, for stress; ignored when spans are given
+    double length;              ///< m, for stress; ignored when spans are given, and by segments
     dem2d_wall_mode mode;       ///< still, moving, servo
     dem2d_material_id material; ///< friction and stiffness (its density is not used)
-    dem2d_vec point;            ///< m, on the surface
+    dem2d_vec point;            ///< m, on the surface; of a segment the start
     dem2d_vec normal;           ///< out of the wall, towards the grains; any length but 0
+    bool segment;               ///< from point to end; normal is ignored, it is left of that
+    dem2d_vec end;              ///< m, of a segment
     dem2d_vec velocity;         ///< m/s, for MOVING
     double stress;              ///< Pa, for SERVO, compression positive
     double max_speed;           ///< m/s, for SERVO, > 0
@@ -1052,7 +1058,9 @@ typedef struct dem2d_wall_info {
     dem2d_wall_mode mode;       ///< still, moving, servo
     dem2d_material_id material; ///< as given
     dem2d_vec point;            ///< m, on the surface, now
-    dem2d_vec normal;           ///< unit, towards the grains
+    dem2d_vec normal;           ///< unit, towards the grains; of a segment to its left
+    bool segment;               ///< from point to end
+    dem2d_vec end;              ///< m, now; of a half-plane the point
     dem2d_vec velocity;         ///< m/s, half a step before the point
     dem2d_vec force;            ///< N/m, of the particles on the wall in the last force pass
     double length;              ///< m, at the last force pass; 0 when neither length nor spans
@@ -7848,6 +7856,8 @@ typedef struct dem2di_wall {
     int span[2];          /* indices, or -1 */
     dem2d_vec listed;     /* point when the list was built */
     double skin;          /* how far it may move before the next time */
+    dem2d_rot along;      /* of a segment: direction from point to end, */
+    double extent;        /* and length */
     int used_material;    /* at the last force pass */
     uint32_t generation;
     int users; /* walls that span to it */
@@ -7906,6 +7916,7 @@ typedef struct dem2di_plan {
     bool turns; /* some particle is no circle: rotations matter, and pairs are skipped by travel */
     bool one_law; /* all particles are of one material: */
     int material;
+    bool joints;        /* two segments meet */
     bool full;          /* some law has a dashpot or rolling friction, or is the caller's: what the
                            circles' batches do not know, so that all pairs have links and extras */
     bool again;         /* friction is only there for the springs of the last list: look again */
@@ -7993,6 +8004,7 @@ struct dem2d_world {
     double *lever; /* a support value changes by at most this times the angle of a turn */
     int body_capacity, travel_capacity;
 
+    dem2d_shape *line; /* a polygon of two corners, half a metre from 0: what segments are */
     dem2di_wall *walls;
     dem2di_wall_state *wall_before, *wall_now, *wall_next;
     int wall_count, wall_capacity;
@@ -8154,6 +8166,7 @@ DEM2D_API void dem2d_world_destroy(dem2d_world *world) {
     const dem2d_env *env = &w->env;
     for (int i = 0; i < w->template_count; i++) dem2di_template_clear(env, &w->templates[i]);
     size_t side = (size_t)w->laws_side;
+    dem2d_shape_destroy(w->line);
     dem2di_release(env, w->templates, (size_t)w->template_capacity, sizeof *w->templates);
     dem2di_release(env, w->materials, (size_t)w->material_capacity, sizeof *w->materials);
     dem2di_release(env, w->laws, side * side, sizeof *w->laws);
@@ -8885,9 +8898,20 @@ static dem2d_result dem2di_check_spans(const dem2d_world *world, const dem2d_wal
     }
     if (given == 1)
         return dem2di_fail(&world->env, DEM2D_OUT_OF_RANGE, -1, "spans: one wall of two given");
-    if (desc->mode == DEM2D_WALL_SERVO && given == 0)
+    if (desc->mode == DEM2D_WALL_SERVO && given == 0 && !desc->segment)
         return dem2di_check_positive(&world->env, "length", desc->length);
     return dem2di_check_not_negative(&world->env, "length", desc->length);
+}
+
+static dem2d_result dem2di_check_segment(const dem2d_world *world, const dem2d_wall_desc *desc) {
+    const dem2d_env *env = &world->env;
+    dem2d_result result = dem2di_check_vec(env, "end", desc->end);
+    if (result != DEM2D_OK) return result;
+    if (world->faces == DEM2D_CONTACT_AREA)
+        return dem2di_fail(env, DEM2D_OUT_OF_RANGE, -1, "segment: not with the contact-area rule");
+    double length = dem2di_length(dem2di_sub(desc->end, desc->point));
+    if (length > 0 && dem2di_finite(length)) return DEM2D_OK;
+    return dem2di_fail(env, DEM2D_OUT_OF_RANGE, -1, "end: segment of length %g", length);
 }
 
 static dem2d_result dem2di_check_wall(const dem2d_world *world, const dem2d_wall_desc *desc) {
@@ -8903,7 +8927,9 @@ static dem2d_result dem2di_check_wall(const dem2d_world *world, const dem2d_wall
     if (result == DEM2D_OK && desc->mode == DEM2D_WALL_SERVO)
         result = dem2di_check_positive(env, "max_speed", desc->max_speed);
     if (result != DEM2D_OK) return result;
-    if (!dem2di_unit(desc->normal, &unit))
+    if (desc->segment) result = dem2di_check_segment(world, desc);
+    if (result != DEM2D_OK) return result;
+    if (!desc->segment && !dem2di_unit(desc->normal, &unit))
         return dem2di_fail(env, DEM2D_OUT_OF_RANGE, -1, "normal is 0");
     if (desc->mode != DEM2D_WALL_STILL && desc->mode != DEM2D_WALL_MOVING &&
         desc->mode != DEM2D_WALL_SERVO)
@@ -8915,7 +8941,16 @@ static dem2d_result dem2di_check_wall(const dem2d_world *world, const dem2d_wall
 static void dem2di_wall_place(dem2d_world *world, int slot, const dem2d_wall_desc *desc) {
     dem2di_wall *wall = &world->walls[slot];
     wall->desc = *desc;
-    (void)dem2di_unit(desc->normal, &wall->desc.normal);
+    if (desc->segment) {
+        dem2d_vec chord = dem2di_sub(desc->end, desc->point), along;
+        (void)dem2di_unit(chord, &along);
+        wall->along.c = along.x;
+        wall->along.s = along.y;
+        wall->extent = dem2di_length(chord);
+        wall->desc.normal = dem2di_perp(along);
+    } else {
+        (void)dem2di_unit(desc->normal, &wall->desc.normal);
+    }
     for (int i = 0; i < 2; i++) {
         wall->span[i] = desc->spans[i].generation != 0 ? (int)desc->spans[i].index : -1;
         if (wall->span[i] >= 0) world->walls[wall->span[i]].users++;
@@ -8927,6 +8962,21 @@ static void dem2di_wall_place(dem2d_world *world, int slot, const dem2d_wall_des
     world->wall_before[slot] = *now;
     world->list_stale = true;
     world->ledger.edited = true;
+}
+
+/* The line that segments are made of, when the first comes. */
+static bool dem2di_line_make(dem2d_world *world, const dem2d_wall_desc *desc) {
+    if (!desc->segment || world->line != NULL) return true;
+    dem2d_shape *line = dem2di_shape_allocate(&world->env, DEM2D_POLYGON, 2, 0);
+    if (line == NULL) return false;
+    for (int k = 0; k < 2; k++) {
+        line->corners[k] = dem2di_vec(k - 0.5, 0);
+        line->ends[k] = dem2di_vec(1 - 2 * k, 0);
+    }
+    line->flat = true;
+    line->circumscribed = 0.5;
+    world->line = line;
+    return true;
 }
 
 static void dem2di_wall_unspan(dem2d_world *world, const dem2di_wall *wall) {
@@ -8941,7 +8991,8 @@ DEM2D_API dem2d_result dem2d_world_add_wall(dem2d_world *world, const dem2d_wall
     if (result != DEM2D_OK) return result;
     int slot = 0;
     while (slot < world->wall_count && world->walls[slot].alive) slot++;
-    if (!dem2di_group_reserve(world, DEM2DI_WALLS, slot + 1, false))
+    if (!dem2di_group_reserve(world, DEM2DI_WALLS, slot + 1, false) ||
+        !dem2di_line_make(world, desc))
         return dem2di_out_of_memory(world, "a wall");
     dem2di_wall *wall = &world->walls[slot];
     wall->alive = true;
@@ -8956,19 +9007,42 @@ DEM2D_API dem2d_result dem2d_world_add_wall(dem2d_world *world, const dem2d_wall
     return DEM2D_OK;
 }
 
+/* How far a wall has moved, as far as contacts can tell. */
+static double dem2di_wall_way(const dem2di_wall *wall, dem2d_vec moved) {
+    return wall->desc.segment ? dem2di_length(moved) : fabs(dem2di_dot(moved, wall->desc.normal));
+}
+
+/* The end of a segment now. */
+static dem2d_vec dem2di_segment_end(const dem2di_wall *wall, dem2d_vec point) {
+    return dem2di_along(point, wall->extent, dem2di_vec(wall->along.c, wall->along.s));
+}
+
+/* Distance of a point from a wall; behind a half-plane negative. */
+static double dem2di_wall_distance(const dem2d_world *world, int wall, dem2d_vec x) {
+    const dem2di_wall *w = &world->walls[wall];
+    dem2d_vec from = dem2di_sub(x, world->wall_now[wall].point);
+    if (!w->desc.segment) return dem2di_dot(from, w->desc.normal);
+    dem2d_vec along = dem2di_vec(w->along.c, w->along.s);
+    double place = dem2di_max(0, dem2di_min(w->extent, dem2di_dot(from, along)));
+    return dem2di_length(dem2di_along(from, -place, along));
+}
+
 DEM2D_API dem2d_result dem2d_world_set_wall(dem2d_world *world, dem2d_wall_id id,
                                             const dem2d_wall_desc *desc) {
     if (world == NULL || desc == NULL) return DEM2D_NULL_ARGUMENT;
     if (!dem2di_wall_lives(world, id)) return dem2di_stale(world, "wall", id.index);
     dem2d_result result = dem2di_check_wall(world, desc);
     if (result != DEM2D_OK) return result;
+    if (!dem2di_line_make(world, desc)) return dem2di_out_of_memory(world, "a segment");
     dem2di_wall *wall = &world->walls[id.index];
-    dem2d_vec normal = wall->desc.normal;
+    dem2di_wall old = *wall;
     dem2d_vec moved = dem2di_sub(desc->point, world->wall_now[id.index].point);
     dem2di_wall_unspan(world, wall);
     dem2di_wall_place(world, (int)id.index, desc);
-    bool turned = normal.x != wall->desc.normal.x || normal.y != wall->desc.normal.y;
-    if (turned || fabs(dem2di_dot(moved, normal)) > wall->skin)
+    bool turned = old.desc.normal.x != wall->desc.normal.x ||
+                  old.desc.normal.y != wall->desc.normal.y || old.desc.segment != desc->segment ||
+                  old.extent != wall->extent;
+    if (turned || dem2di_wall_way(&old, moved) > wall->skin)
         dem2di_forget_wall(world, (int)id.index);
     return DEM2D_OK;
 }
@@ -8990,7 +9064,7 @@ DEM2D_API dem2d_result dem2d_world_remove_wall(dem2d_world *world, dem2d_wall_id
 /* Length that carries a wall's stress: between its spans, or as given. */
 static double dem2di_wall_length(const dem2d_world *world, const dem2di_wall_state *states, int i) {
     const dem2di_wall *wall = &world->walls[i];
-    if (wall->span[0] < 0) return wall->desc.length;
+    if (wall->span[0] < 0) return wall->desc.segment ? wall->extent : wall->desc.length;
     dem2d_vec across = dem2di_sub(states[wall->span[1]].point, states[wall->span[0]].point);
     return fabs(dem2di_dot(across, world->walls[wall->span[0]].desc.normal));
 }
@@ -9005,6 +9079,8 @@ DEM2D_API dem2d_result dem2d_world_get_wall(const dem2d_world *world, dem2d_wall
     info->material = wall->desc.material;
     info->point = now->point;
     info->normal = wall->desc.normal;
+    info->segment = wall->desc.segment;
+    info->end = info->segment ? dem2di_segment_end(wall, now->point) : now->point;
     info->velocity = now->velocity;
     info->force = now->force;
     info->length = dem2di_wall_length(world, world->wall_before, (int)id.index);
@@ -9342,6 +9418,36 @@ typedef struct dem2di_build {
     int incident;                  /* entries that the particles have together */
 } dem2di_build;
 
+/* The ends of two segments that are a joint: numbers of 0 (start) and 1 (end) in `which`; false
+   when there is none. */
+static bool dem2di_segments_meet(const dem2d_world *world, int a, int b, int which[2],
+                                 dem2d_vec *at) {
+    const dem2di_wall *w[2] = {&world->walls[a], &world->walls[b]};
+    int slot[2] = {a, b};
+    dem2d_vec end[2][2];
+    for (int k = 0; k < 2; k++) {
+        if (!w[k]->alive || !w[k]->desc.segment) return false;
+        end[k][0] = world->wall_now[slot[k]].point;
+        end[k][1] = dem2di_segment_end(w[k], end[k][0]);
+    }
+    double near = 1e-6 * dem2di_min(w[0]->extent, w[1]->extent);
+    for (which[0] = 0; which[0] < 2; which[0]++)
+        for (which[1] = 0; which[1] < 2; which[1]++) {
+            *at = end[0][which[0]];
+            if (dem2di_length(dem2di_sub(*at, end[1][which[1]])) <= near) return true;
+        }
+    return false;
+}
+
+static bool dem2di_has_joints(const dem2d_world *world) {
+    int which[2];
+    dem2d_vec at;
+    for (int a = 0; a < world->wall_count; a++)
+        for (int b = 0; b < a && world->walls[a].desc.segment; b++)
+            if (dem2di_segments_meet(world, a, b, which, &at)) return true;
+    return false;
+}
+
 /* What the scene makes use of. */
 static dem2di_plan dem2di_plan_make(const dem2d_world *world) {
     dem2di_plan plan;
@@ -9368,6 +9474,7 @@ static dem2di_plan dem2di_plan_make(const dem2d_world *world) {
             plan.friction = plan.friction || (law->friction > 0 && law->tangential_stiffness > 0);
             plan.full = plan.full || rolls || law->damping_ratio > 0;
         }
+    plan.joints = dem2di_has_joints(world);
     plan.full = plan.full || world->law != NULL;
     plan.faces = plan.faces && world->law == NULL;
     /* springs and rotations of the last force pass must outlast a step that is refused */
@@ -9384,10 +9491,7 @@ static dem2di_plan dem2di_plan_make(const dem2d_world *world) {
 static double dem2di_gap_now(const dem2d_world *world, int contact) {
     const dem2di_key *key = &world->list.keys[contact];
     const dem2di_state *a = &world->now[key->a];
-    if (contact >= world->list.pairs) {
-        dem2d_vec from = dem2di_sub(a->x, world->wall_now[key->b].point);
-        return dem2di_dot(from, world->walls[key->b].desc.normal) - a->radius;
-    }
+    if (contact >= world->list.pairs) return dem2di_wall_distance(world, key->b, a->x) - a->radius;
     const dem2di_state *b = &world->now[key->b];
     return dem2di_length(dem2di_centre_line(a->x, b->x)) - (a->radius + b->radius);
 }
@@ -9453,8 +9557,8 @@ static int dem2di_find_walls(const dem2d_world *world, const dem2di_disc *disc, 
     if (disc->fixed) return 0;
     for (int j = 0; j < world->wall_count; j++) {
         const dem2di_wall *wall = &world->walls[j];
-        dem2d_vec from = dem2di_sub(world->now[slot].x, world->wall_now[j].point);
-        if (!wall->alive || !(dem2di_dot(from, wall->desc.normal) < disc->reach + wall->skin))
+        if (!wall->alive ||
+            !(dem2di_wall_distance(world, j, disc->centre) < disc->reach + wall->skin))
             continue;
         if (to != NULL) {
             to[count].key = (uint64_t)j << 32 | (uint64_t)world->bodies[slot].index;
@@ -10015,6 +10119,34 @@ static void dem2di_link_apart(const dem2d_world *world, int a, int b, double gap
     link->budget = world->travel[a] + world->travel[b] + (gap - DEM2DI_ROUNDING * size);
 }
 
+/* A look at two shapes: the contact's normal, depth and points, or their gap. Returns the number of
+   points that carry the contact. */
+static int dem2di_shapes_look(const dem2d_world *world, dem2di_pair *pair, const dem2di_link *last,
+                              dem2di_link *link, dem2d_contact_point points[2], double *gap,
+                              dem2di_count *count) {
+    dem2di_search search;
+    count->looks++;
+    pair->calls = 0;
+    bool warm = last->normal.x != 0 || last->normal.y != 0;
+    dem2di_contact_again(pair, world->solver, &last->feature,
+                         warm ? last->normal : dem2di_centres(pair), world->tolerance,
+                         world->max_iterations, true, &search);
+    count->calls += pair->calls;
+    link->normal.x = search.normal.x; /* not as one: it has just been stored in two */
+    link->normal.y = search.normal.y;
+    link->feature = search.feature;
+    if (!(search.upper > 0)) {
+        count->gaps++;
+        *gap = -search.upper;
+        return 0;
+    }
+    count->proofs[search.proof]++;
+    link->depth = search.upper;
+    if (world->plan.faces) return dem2di_pair_points(pair, &search, points);
+    points[0].position = dem2di_scale(dem2di_add(search.a, dem2di_add(search.b, pair->d)), 0.5);
+    return 1;
+}
+
 /* Geometry of one pair at the present positions; depth <= 0 when apart. Returns the number of
    points that carry the contact. */
 static int dem2di_pair_geometry(const dem2d_world *world, int a, int b, const dem2di_link *last,
@@ -10030,9 +10162,7 @@ static int dem2di_pair_geometry(const dem2d_world *world, int a, int b, const de
         dem2di_link_apart(world, a, b, distance - reach, distance + reach, link);
         return 0;
     }
-    count->looks++;
     dem2di_pair pair;
-    dem2di_search search;
     pair.a = dem2di_shape_of(world, body_a);
     pair.b = dem2di_shape_of(world, body_b);
     pair.ra = state_a->q;
@@ -10042,43 +10172,29 @@ static int dem2di_pair_geometry(const dem2d_world *world, int a, int b, const de
     pair.d = d;
     pair.distance = distance;
     pair.size = reach + distance;
-    pair.calls = 0;
-    bool warm = last->normal.x != 0 || last->normal.y != 0;
-    dem2di_contact_again(&pair, world->solver, &last->feature,
-                         warm ? last->normal : dem2di_centres(&pair), world->tolerance,
-                         world->max_iterations, true, &search);
-    count->calls += pair.calls;
-    link->normal.x = search.normal.x; /* not as one: it has just been stored in two */
-    link->normal.y = search.normal.y;
-    link->feature = search.feature;
-    if (!(search.upper > 0)) {
-        count->gaps++;
-        dem2di_link_apart(world, a, b, -search.upper, pair.size, link);
-        return 0;
-    }
-    count->proofs[search.proof]++;
-    link->depth = search.upper;
-    if (world->plan.faces) return dem2di_pair_points(&pair, &search, points);
-    points[0].position = dem2di_scale(dem2di_add(search.a, dem2di_add(search.b, d)), 0.5);
-    return 1;
+    double gap;
+    int found = dem2di_shapes_look(world, &pair, last, link, points, &gap, count);
+    if (found == 0) dem2di_link_apart(world, a, b, gap, pair.size, link);
+    return found;
 }
 
 /* Force of a contact whose geometry is known, from its springs before and the velocity of B against
-   A. `at` is its place among those that are not of circles. */
-static inline void dem2di_link_load(const dem2d_world *world, int at, const dem2d_pair_desc *law,
-                                    dem2d_vec approach, bool two) {
+   A. `at` is its place among those that are not of circles, `from` where its springs are: there,
+   but for one that has come across a joint. */
+static inline void dem2di_link_load(const dem2d_world *world, int at, int from,
+                                    const dem2d_pair_desc *law, dem2d_vec approach, bool two) {
     const dem2di_list *list = &world->list;
     dem2di_link *link = &list->next_links[at];
     double slip = dem2di_cross(link->normal, approach);
     if (two) {
         double force[2];
         dem2di_ends_press(law, &list->next_ends[at], force);
-        dem2di_law_apply_ends(law, slip, world->time_step, force, &list->links[at], &list->ends[at],
-                              &list->next_ends[at], link);
+        dem2di_law_apply_ends(law, slip, world->time_step, force, &list->links[from],
+                              &list->ends[from], &list->next_ends[at], link);
         return;
     }
     if (world->faces != DEM2D_CONTACT_AREA) link->force = law->normal_stiffness * link->depth;
-    dem2di_law_apply(law, slip, world->time_step, list->links[at].shear, link);
+    dem2di_law_apply(law, slip, world->time_step, list->links[from].shear, link);
 }
 
 /* How the two of contact i meet; wb is 0 for a wall. */
@@ -10096,12 +10212,13 @@ static dem2di_meeting dem2di_meeting_make(const dem2d_world *world, int i, dem2d
 }
 
 /* The caller's law for contact i. */
-static void dem2di_call_law(const dem2d_world *world, int i, const dem2di_meeting *meeting) {
+static void dem2di_call_law(const dem2d_world *world, int i, int from,
+                            const dem2di_meeting *meeting) {
     const dem2di_list *list = &world->list;
     const dem2di_key *key = &list->keys[i];
     int at = i - list->discs;
     dem2di_link *link = &list->next_links[at];
-    const dem2di_extra *last = &list->extras[at];
+    const dem2di_extra *last = &list->extras[from];
     dem2d_law_input input;
     dem2d_law_output output;
     memset(&input, 0, sizeof input);
@@ -10120,7 +10237,7 @@ static void dem2di_call_law(const dem2d_world *world, int i, const dem2di_meetin
     input.turning = meeting->turning;
     input.mass = meeting->mass;
     input.radius = meeting->radius;
-    input.tangential_force = list->links[at].shear;
+    input.tangential_force = list->links[from].shear;
     input.moment = last->moment;
     memcpy(input.state, last->state, sizeof input.state);
     memcpy(output.state, last->state, sizeof output.state);
@@ -10134,8 +10251,8 @@ static void dem2di_call_law(const dem2d_world *world, int i, const dem2di_meetin
 }
 
 /* The full law: dashpot and rolling as well, or the caller's. Two points may get another centre. */
-static void dem2di_full_load(const dem2d_world *world, int i, const dem2di_meeting *meeting,
-                             bool two) {
+static void dem2di_full_load(const dem2d_world *world, int i, int from,
+                             const dem2di_meeting *meeting, bool two) {
     const dem2di_list *list = &world->list;
     const dem2d_pair_desc *law = dem2di_law_of(world, i);
     int at = i - list->discs;
@@ -10143,7 +10260,7 @@ static void dem2di_full_load(const dem2d_world *world, int i, const dem2di_meeti
     dem2di_extra *extra = &list->next_extras[at];
     const double dt = world->time_step;
     if (world->law != NULL) {
-        dem2di_call_law(world, i, meeting);
+        dem2di_call_law(world, i, from, meeting);
         return;
     }
     if (two) {
@@ -10151,17 +10268,17 @@ static void dem2di_full_load(const dem2d_world *world, int i, const dem2di_meeti
         dem2di_ends_press(law, &list->next_ends[at], force);
         double spring = force[0] + force[1];
         dem2di_ends_damp(law, meeting, force, &list->next_ends[at], link);
-        dem2di_law_apply_ends(law, meeting->slip, dt, force, &list->links[at], &list->ends[at],
+        dem2di_law_apply_ends(law, meeting->slip, dt, force, &list->links[from], &list->ends[from],
                               &list->next_ends[at], link);
         extra->viscous = link->force - spring;
     } else {
         double spring =
             world->faces == DEM2D_CONTACT_AREA ? link->force : law->normal_stiffness * link->depth;
         link->force = dem2di_damped(spring, dem2di_dashpot(law, meeting->mass), meeting->closing);
-        dem2di_law_apply(law, meeting->slip, dt, list->links[at].shear, link);
+        dem2di_law_apply(law, meeting->slip, dt, list->links[from].shear, link);
         extra->viscous = link->force - spring;
     }
-    extra->moment = dem2di_rolling(law, meeting, dt, link->force, list->extras[at].moment);
+    extra->moment = dem2di_rolling(law, meeting, dt, link->force, list->extras[from].moment);
 }
 
 static dem2d_vec dem2di_outline_corner(const dem2d_world *world, int body, int i) {
@@ -10334,49 +10451,86 @@ static void dem2di_pair_look(const dem2d_world *world, int i, dem2di_overlap *sc
     dem2d_vec approach = dem2di_approach(link, arm_b, sa->v, sa->w, sb->v, sb->w);
     if (world->plan.full) {
         dem2di_meeting meeting = dem2di_meeting_make(world, i, approach, sb->w);
-        dem2di_full_load(world, i, &meeting, found == 2);
+        dem2di_full_load(world, i, at, &meeting, found == 2);
         arm_b = dem2di_sub(link->point, d);
     } else {
-        dem2di_link_load(world, at, law, approach, found == 2);
+        dem2di_link_load(world, at, at, law, approach, found == 2);
     }
     dem2di_set_loads(world, i, arm_b, count);
 }
 
-/* The same for a particle and a wall: one support call, none for a circle. */
-static void dem2di_touch_look(const dem2d_world *world, int i, dem2di_overlap *scratch,
-                              dem2di_count *count) {
-    const dem2di_list *list = &world->list;
-    int a = list->keys[i].a, j = list->keys[i].b, at = i - list->discs, found = 1;
+/* A particle at a half-plane: one support call, none for a circle. Returns the number of points. */
+static int dem2di_plane_geometry(const dem2d_world *world, int a, int wall, dem2di_link *link,
+                                 dem2d_contact_point points[2], dem2di_count *count) {
     const dem2di_body *body = &world->bodies[a];
     const dem2d_shape *shape = dem2di_shape_of(world, body);
     const dem2di_state *state = &world->now[a];
-    const dem2di_wall_state *wall = &world->wall_now[j];
-    dem2di_link *link = &list->next_links[at];
-    dem2d_contact_point points[2];
-    dem2d_vec u = dem2di_negate(world->walls[j].desc.normal);
+    dem2d_vec point = world->wall_now[wall].point;
+    dem2d_vec u = dem2di_negate(world->walls[wall].desc.normal);
     dem2d_vec support = dem2di_scale(u, state->radius);
     link->normal.x = u.x;
     link->normal.y = u.y;
-    link->shear = 0;
-    dem2di_clear_beside(world, at);
-    if (list->links[at].depth > 0) dem2di_no_loads(world, i);
-    double surface = dem2di_dot(dem2di_sub(wall->point, state->x), u);
+    double surface = dem2di_dot(dem2di_sub(point, state->x), u);
     link->depth = state->radius - surface;
-    if (!(link->depth > 0)) return;
+    if (!(link->depth > 0)) return 0;
     if (shape->type != DEM2D_CIRCLE) {
         dem2d_pose pose = dem2di_pose_of(world, world->now, a);
-        link->depth = dem2di_wall_depth(shape, &pose, wall->point, u, &support);
+        link->depth = dem2di_wall_depth(shape, &pose, point, u, &support);
         count->calls++;
-        if (!(link->depth > 0)) return;
+        if (!(link->depth > 0)) return 0;
     }
-    link->point.x = support.x - link->depth * u.x;
-    link->point.y = support.y - link->depth * u.y;
-    if (world->plan.faces && shape->flat) {
-        found = dem2di_wall_points(shape, state->q, body->scale, u, surface, support, link->depth,
-                                   points);
-        dem2di_link_place(list, at, found, points);
+    if (world->plan.faces && shape->flat)
+        return dem2di_wall_points(shape, state->q, body->scale, u, surface, support, link->depth,
+                                  points);
+    points[0].position.x = support.x - link->depth * u.x;
+    points[0].position.y = support.y - link->depth * u.y;
+    return 1;
+}
+
+/* A particle at a segment: a pair, of which only what is near the particle counts, so that the
+   search is as exact as for its neighbours. Points are on the segment. */
+static int dem2di_segment_geometry(const dem2d_world *world, int a, int wall,
+                                   const dem2di_link *last, dem2di_link *link,
+                                   dem2d_contact_point points[2], dem2di_count *count) {
+    const dem2di_wall *w = &world->walls[wall];
+    const dem2di_body *body = &world->bodies[a];
+    const dem2di_state *state = &world->now[a];
+    const dem2d_rot none = {1, 0};
+    dem2di_link_keep(last, link);
+    link->depth = -1;
+    if (!(dem2di_wall_distance(world, wall, state->x) < state->radius)) return 0;
+    dem2d_vec along = dem2di_vec(w->along.c, w->along.s);
+    dem2d_vec start = dem2di_sub(world->wall_now[wall].point, state->x);
+    double foot = -dem2di_dot(start, along), reach = 2 * state->radius, gap;
+    double from = dem2di_max(0, foot - reach), to = dem2di_min(w->extent, foot + reach);
+    dem2di_pair pair;
+    pair.a = dem2di_shape_of(world, body);
+    pair.b = world->line;
+    pair.ra = pair.a->type == DEM2D_CIRCLE ? none : state->q;
+    pair.rb = w->along;
+    pair.scale_a = body->scale;
+    pair.scale_b = to - from;
+    pair.d = dem2di_along(start, from + (to - from) / 2, along);
+    pair.distance = dem2di_length(pair.d);
+    pair.size = state->radius + pair.scale_b / 2 + pair.distance;
+    int found = dem2di_shapes_look(world, &pair, last, link, points, &gap, count);
+    for (int k = 0; k < found; k++) {
+        double depth = found == 2 ? points[k].depth : link->depth;
+        points[k].position = dem2di_along(points[k].position, -depth / 2, link->normal);
     }
+    return found;
+}
+
+/* Force of a contact with a wall whose geometry is known. */
+static void dem2di_touch_force(const dem2d_world *world, int i, int from, dem2di_overlap *scratch,
+                               dem2di_count *count) {
+    const dem2di_list *list = &world->list;
+    int a = list->keys[i].a, j = list->keys[i].b, at = i - list->discs;
+    const dem2di_state *state = &world->now[a];
+    const dem2di_wall_state *wall = &world->wall_now[j];
+    dem2di_link *link = &list->next_links[at];
     const dem2d_pair_desc *law = dem2di_law_of(world, i);
+    bool two = dem2di_ends_at(world, i, true) != NULL;
     if (world->faces == DEM2D_CONTACT_AREA)
         dem2di_area_apply(world, i, -1, dem2di_sub(wall->point, state->x), law, scratch);
     if (!(link->depth > 0)) return;
@@ -10384,11 +10538,140 @@ static void dem2di_touch_look(const dem2d_world *world, int i, dem2di_overlap *s
     dem2d_vec approach = dem2di_approach(link, foot, state->v, state->w, wall->velocity, 0);
     if (world->plan.full) {
         dem2di_meeting meeting = dem2di_meeting_make(world, i, approach, 0);
-        dem2di_full_load(world, i, &meeting, found == 2);
+        dem2di_full_load(world, i, from, &meeting, two);
     } else {
-        dem2di_link_load(world, at, law, approach, found == 2);
+        dem2di_link_load(world, at, from, law, approach, two);
     }
     dem2di_set_loads(world, i, foot, count);
+}
+
+/* The same as for a pair, for a particle and a wall. Where segments are joined, forces come after
+   all of the geometry. */
+static void dem2di_touch_look(const dem2d_world *world, int i, dem2di_overlap *scratch,
+                              dem2di_count *count) {
+    const dem2di_list *list = &world->list;
+    int a = list->keys[i].a, j = list->keys[i].b, at = i - list->discs;
+    const dem2di_link *last = &list->links[at];
+    dem2di_link *link = &list->next_links[at];
+    bool segment = world->walls[j].desc.segment;
+    dem2d_contact_point points[2];
+    link->shear = 0;
+    dem2di_clear_beside(world, at);
+    if (last->depth > 0) dem2di_no_loads(world, i);
+    int found = segment ? dem2di_segment_geometry(world, a, j, last, link, points, count)
+                        : dem2di_plane_geometry(world, a, j, link, points, count);
+    if (found == 0) return;
+    dem2di_link_place(list, at, found, points);
+    if (!segment || !world->plan.joints) dem2di_touch_force(world, i, at, scratch, count);
+}
+
+/* --- joints of segments: of two contacts at the same place one is left -------------------------
+ */
+
+/* A corner (sine) this small is rounding: the contact is along the segment's side. */
+#define DEM2DI_CORNER 1e-8
+
+/* Which end of its segment a contact is at, or -1: along the side. */
+static int dem2di_segment_corner(const dem2d_world *world, int contact) {
+    dem2d_rot along = world->walls[world->list.keys[contact].b].along;
+    dem2d_vec u = world->list.next_links[contact - world->list.discs].normal;
+    double sine = u.x * along.c + u.y * along.s;
+    return fabs(sine) <= DEM2DI_CORNER ? -1 : sine < 0;
+}
+
+/* Which point of a contact is at a place, or -1. */
+static int dem2di_point_near(const dem2d_world *world, int contact, dem2d_vec place) {
+    const dem2di_link *link = &world->list.next_links[contact - world->list.discs];
+    const dem2di_ends *ends = dem2di_ends_at(world, contact, true);
+    const dem2di_state *a = &world->now[world->list.keys[contact].a];
+    dem2d_vec from = dem2di_sub(place, dem2di_add(a->x, link->point));
+    for (int k = 0; k < (ends != NULL ? 2 : 1); k++) {
+        double offset = ends != NULL ? ends->offset[k] : 0;
+        dem2d_vec left = dem2di_along(from, -offset, dem2di_perp(link->normal));
+        if (dem2di_length(left) <= 1e-6 * a->radius) return k; /* as near as ends of a joint */
+    }
+    return -1;
+}
+
+static bool dem2di_segment_touched(const dem2d_world *world, int contact, bool next) {
+    const dem2di_list *list = &world->list;
+    return contact >= list->pairs && contact < list->count &&
+           world->walls[list->keys[contact].b].desc.segment &&
+           (next ? list->next_links : list->links)[contact - list->discs].depth > 0;
+}
+
+/* A contact of two points keeps the other one. */
+static void dem2di_drop_point(const dem2d_world *world, int contact, int point) {
+    const dem2di_list *list = &world->list;
+    dem2di_link *link = &list->next_links[contact - list->discs];
+    dem2di_ends *ends = &list->next_ends[contact - list->discs];
+    link->depth = ends->depth[1 - point];
+    link->point = dem2di_along(link->point, ends->offset[1 - point], dem2di_perp(link->normal));
+    memset(ends, 0, sizeof *ends);
+}
+
+/* Two contacts of a particle with segments a < b: the one at the end of its segment yields to one
+   along the side of the other, of two at the ends the second, of two points where faces meet on
+   both sides of the joint both. */
+static void dem2di_joint_yield(const dem2d_world *world, int a, int b) {
+    const dem2di_list *list = &world->list;
+    dem2di_link *link[2] = {&list->next_links[a - list->discs], &list->next_links[b - list->discs]};
+    int which[2];
+    dem2d_vec at;
+    if (!dem2di_segments_meet(world, list->keys[a].b, list->keys[b].b, which, &at)) return;
+    int corner[2] = {dem2di_segment_corner(world, a), dem2di_segment_corner(world, b)};
+    bool ends[2] = {corner[0] == which[0], corner[1] == which[1]};
+    if (ends[0] || ends[1]) {
+        link[ends[1] ? 1 : 0]->depth = -1;
+        return;
+    }
+    if (corner[0] >= 0 || corner[1] >= 0) return;
+    int near[2] = {dem2di_point_near(world, a, at), dem2di_point_near(world, b, at)};
+    bool two[2] = {dem2di_ends_at(world, a, true) != NULL, dem2di_ends_at(world, b, true) != NULL};
+    bool flat = fabs(dem2di_cross(link[0]->normal, link[1]->normal)) <= DEM2DI_CORNER;
+    bool both = near[0] >= 0 && near[1] >= 0;
+    if (both && !two[0] && !two[1]) link[1]->depth = -1;
+    if (near[0] >= 0 && two[0] && flat) dem2di_drop_point(world, a, near[0]);
+    if (near[1] >= 0 && two[1] && (flat || both)) dem2di_drop_point(world, b, near[1]);
+}
+
+/* Where the springs of a contact are: of a new one, those of a contact that it took over from. */
+static int dem2di_joint_source(const dem2d_world *world, int contact) {
+    const dem2di_list *list = &world->list;
+    const dem2di_key *key = &list->keys[contact];
+    int own = contact - list->discs, which[2];
+    dem2d_vec at;
+    if (list->links[own].depth > 0) return own;
+    for (int k = list->first[key->a]; k < list->first[key->a + 1]; k++) {
+        int other = list->incident[k] / 2;
+        if (dem2di_segment_touched(world, other, false) &&
+            !dem2di_segment_touched(world, other, true) &&
+            dem2di_segments_meet(world, key->b, list->keys[other].b, which, &at))
+            return other - list->discs;
+    }
+    return own;
+}
+
+/* All contacts with segments, one after the other: few of any scene's. */
+static void dem2di_settle_joints(const dem2d_world *world, dem2di_count *count) {
+    const dem2di_list *list = &world->list;
+    for (int i = list->pairs; i < list->count; i++) {
+        int a = list->keys[i].a;
+        for (int k = list->first[a]; k < list->first[a + 1]; k++) {
+            int other = list->incident[k] / 2;
+            if (other > i && dem2di_segment_touched(world, i, true) &&
+                dem2di_segment_touched(world, other, true))
+                dem2di_joint_yield(world, i, other);
+        }
+    }
+    for (int i = list->pairs; i < list->count; i++) {
+        if (!dem2di_segment_touched(world, i, true)) {
+            if (world->walls[list->keys[i].b].desc.segment)
+                dem2di_clear_beside(world, i - list->discs);
+            continue;
+        }
+        dem2di_touch_force(world, i, dem2di_joint_source(world, i), NULL, count);
+    }
 }
 
 /* Blocks of the three kinds of contacts, one kind after the other. */
@@ -10430,6 +10713,7 @@ static void dem2di_contact_pass(dem2d_world *world, dem2di_count *count) {
     int blocks = dem2di_contact_blocks(list->discs, list->count);
     dem2di_run(world, DEM2D_PHASE_CONTACTS, blocks, dem2di_contact_task, world);
     for (int k = 0; k < blocks; k++) dem2di_count_add(count, &world->tallies[k].count);
+    if (world->plan.joints) dem2di_settle_joints(world, count);
 }
 
 /* Of a contact of one point. By area the force kn A w/L^2 rises as kn w^2/L^2 and with the width w
@@ -10501,8 +10785,8 @@ static bool dem2di_wall_pass(dem2d_world *world) {
         if (!wall->alive) continue;
         if (wall->desc.mode == DEM2D_WALL_SERVO) next->velocity = dem2di_servo_velocity(world, j);
         next->point = dem2di_along(next->point, world->time_step, next->velocity);
-        dem2d_vec moved = dem2di_sub(next->point, wall->listed);
-        stale = stale || !(fabs(dem2di_dot(moved, wall->desc.normal)) <= wall->skin);
+        double way = dem2di_wall_way(wall, dem2di_sub(next->point, wall->listed));
+        stale = stale || !(way <= wall->skin);
     }
     return stale;
 }
@@ -11283,8 +11567,12 @@ static void dem2di_draw_wall(const dem2d_world *world, const dem2di_view *view, 
     dem2d_vec point = world->wall_before[j].point;
     point = dem2di_along(point, dem2di_dot(dem2di_sub(centre, point), along), along);
     double reach = (view->width + view->height) / view->factor; /* beyond every border */
-    dem2d_vec p = dem2di_pixel(view, dem2di_along(point, -reach, along));
-    dem2d_vec q = dem2di_pixel(view, dem2di_along(point, reach, along));
+    dem2d_vec from = dem2di_along(point, -reach, along), to = dem2di_along(point, reach, along);
+    if (world->walls[j].desc.segment) {
+        from = world->wall_before[j].point;
+        to = dem2di_segment_end(&world->walls[j], from);
+    }
+    dem2d_vec p = dem2di_pixel(view, from), q = dem2di_pixel(view, to);
     dem2di_print(writer,
                  "<line x1=\"%.2f\" y1=\"%.2f\" x2=\"%.2f\" y2=\"%.2f\" stroke=\"#444\" "
                  "stroke-width=\"2\"/>\n",

@@ -1,0 +1,298 @@
+/* Segment walls: depth and normal against a scan of their points, joints that count once, sliding
+   over them, boxes across them, hoppers. */
+#define DEM2D_IMPLEMENTATION
+#include "dem2d.h"
+#include "testing.h"
+
+#define KN 1e7
+
+static dem2d_world *make_world(double friction, dem2d_vec gravity, bool ledger,
+                               dem2d_material_id *material) {
+    dem2d_world_desc desc = {0};
+    dem2d_material_desc stone = {0};
+    dem2d_world *world;
+    desc.time_step = 1e-5, desc.gravity = gravity, desc.ledger = ledger;
+    stone.density = 2700, stone.normal_stiffness = KN, stone.tangential_stiffness = KN / 2;
+    stone.friction = friction;
+    assert_ok(dem2d_world_create(&desc, &world));
+    assert_ok(dem2d_world_add_material(world, &stone, material));
+    return world;
+}
+
+static dem2d_wall_id add_segment(dem2d_world *world, dem2d_material_id material, dem2d_vec from,
+                                 dem2d_vec to) {
+    dem2d_wall_desc desc = {0};
+    dem2d_wall_id id;
+    desc.material = material, desc.segment = true, desc.point = from, desc.end = to;
+    assert_ok(dem2d_world_add_wall(world, &desc, &id));
+    return id;
+}
+
+/* Takes the shape. */
+static dem2d_particle_id add(dem2d_world *world, dem2d_material_id material, dem2d_shape *shape,
+                             dem2d_vec at, double angle, dem2d_vec velocity) {
+    dem2d_particle_desc desc = {0};
+    dem2d_particle_id id;
+    assert_ok(dem2d_world_add_shape(world, shape, &desc.shape));
+    dem2d_shape_destroy(shape);
+    desc.scale = 1, desc.material = material, desc.position = at, desc.angle = angle;
+    desc.velocity = velocity;
+    assert_ok(dem2d_world_add_particle(world, &desc, &id));
+    return id;
+}
+
+enum { DISC, ELLIPSE, BOX, ROUNDED, LOBES, SHAPES };
+
+static dem2d_shape *make_shape(int kind) {
+    const dem2d_vec corners[4] = {{0, 0}, {0.1, 0}, {0.1, 0.06}, {0, 0.06}};
+    const double a[4] = {0.09, 0, 0, 0.003}, b[4] = {0, 0, 0, 0};
+    dem2d_shape *shape = NULL;
+    if (kind == DISC) assert_ok(dem2d_shape_create_circle(NULL, 0.05, &shape));
+    if (kind == ELLIPSE) assert_ok(dem2d_shape_create_ellipse(NULL, 0.06, 0.03, &shape));
+    if (kind == BOX) assert_ok(dem2d_shape_create_polygon(NULL, corners, 4, 0, &shape));
+    if (kind == ROUNDED) assert_ok(dem2d_shape_create_polygon(NULL, corners, 4, 0.01, &shape));
+    if (kind == LOBES) assert_ok(dem2d_shape_create_fourier(NULL, a, b, 3, &shape));
+    return shape;
+}
+
+/* Least over all directions of the support value of shape minus segment, by a scan. */
+static long double scan_depth(const dem2d_shape *shape, dem2d_pose pose, dem2d_vec from,
+                              dem2d_vec to) {
+    long double least = 1e9L, best = 0, step = 2 * TEST_PI / 7200;
+    for (int round = 0; round < 4; round++) {
+        const long double middle = best, width = step;
+        const int count = round == 0 ? 7200 : 200;
+        if (round > 0) step = 2 * width / count;
+        for (int i = 0; i <= count; i++) {
+            const long double angle = round == 0 ? i * step : middle - width + i * step;
+            const dem2d_vec u = {(double)cosl(angle), (double)sinl(angle)};
+            dem2d_support support;
+            assert_ok(dem2d_shape_support(shape, pose, u, &support));
+            const long double a =
+                (from.x - pose.position.x) * cosl(angle) + (from.y - pose.position.y) * sinl(angle);
+            const long double b =
+                (to.x - pose.position.x) * cosl(angle) + (to.y - pose.position.y) * sinl(angle);
+            const long double h = support.value - (a < b ? a : b);
+            if (h < least) least = h, best = angle;
+        }
+    }
+    return least;
+}
+
+/* One particle near one segment, beside its side or its ends. */
+static void test_depth(void **state) {
+    (void)state;
+    test_random random = {5};
+    int found = 0;
+    for (int i = 0; i < 400; i++) {
+        dem2d_material_id material;
+        dem2d_world *world = make_world(0.3, vec(0, 0), false, &material);
+        const double angle = test_uniform(&random, 0, 6.28), length = i % 2 ? 0.03 : 0.4;
+        const dem2d_vec from = vec(1, 2);
+        const dem2d_vec to = vec(from.x + length * cos(angle), from.y + length * sin(angle));
+        const double place = test_uniform(&random, -0.05, length + 0.05);
+        const double away = test_uniform(&random, 0.02, 0.06) * (i % 3 ? 1 : -1);
+        const dem2d_vec at = vec(from.x + place * cos(angle) - away * sin(angle),
+                                 from.y + place * sin(angle) + away * cos(angle));
+        const double turn = test_uniform(&random, 0, 6.28);
+        add_segment(world, material, from, to);
+        dem2d_shape *shape = make_shape(i % SHAPES);
+        const dem2d_pose pose = dem2d_pose_make(at.x, at.y, turn, 1);
+        const long double depth = scan_depth(shape, pose, from, to);
+        add(world, material, shape, at, turn, vec(0, 0));
+        assert_ok(dem2d_world_step(world, 1, NULL));
+        dem2d_contact_info contact;
+        int count;
+        assert_ok(dem2d_world_contacts(world, &contact, 1, &count));
+        assert_int_equal(count, depth > 0);
+        if (depth > 0 && contact.points == 1) assert_within(contact.depth, depth, 1e-9);
+        if (depth > 0) {
+            assert_within(contact.depth, depth, 1e-4);
+            assert_true(contact.wall.generation > 0 && contact.normal_force > 0);
+            found++;
+        }
+        dem2d_world_destroy(world);
+    }
+    assert_true(found > 100);
+}
+
+/* A shape slides without friction along a floor of pieces, and along one piece: the same. With
+   friction, a disc rolls on alike. The ledger closes as well. */
+static void test_flat_joints(void **state) {
+    (void)state;
+    for (int kind = 0; kind < SHAPES; kind++)
+        for (int rough = 0; rough < 2; rough++) {
+            /* the springs of two points are not shared out over both sides of a joint: a sliding
+               box's start anew on one side, each time */
+            const bool two = kind == BOX || kind == ROUNDED;
+            dem2d_particle_info info[2];
+            for (int pieces = 0; pieces < 2; pieces++) {
+                dem2d_material_id material;
+                dem2d_world *world = make_world(rough ? 0.5 : 0, vec(0, -9.81), true, &material);
+                const int count = pieces ? 7 : 1;
+                for (int k = 0; k < count; k++) /* some to the left, some to the right */
+                    if (k % 2)
+                        add_segment(world, material, vec(2.0 * k / count - 0.5, 0),
+                                    vec(2.0 * (k + 1) / count - 0.5, 0));
+                    else
+                        add_segment(world, material, vec(2.0 * (k + 1) / count - 0.5, 0),
+                                    vec(2.0 * k / count - 0.5, 0));
+                dem2d_shape *shape = make_shape(kind);
+                dem2d_support low;
+                assert_ok(dem2d_shape_support(shape, still(), vec(0, -1), &low));
+                const double y = low.value - 2e-5;
+                dem2d_particle_id id = add(world, material, shape, vec(0, y), 0, vec(1, 0));
+                for (int i = 0; i < 400; i++) {
+                    int open;
+                    dem2d_contact_info contacts[4];
+                    assert_ok(dem2d_world_step(world, 100, NULL));
+                    assert_ok(dem2d_world_contacts(world, contacts, 4, &open));
+                    int points = 0;
+                    for (int c = 0; c < open; c++) points += contacts[c].points;
+                    assert_true(points <= (two ? 2 : 1));
+                }
+                dem2d_ledger ledger;
+                assert_ok(dem2d_world_ledger(world, &ledger));
+                assert_within(ledger.closure, 0, (rough && two ? 1e-2 : 1e-4) * ledger.given);
+                assert_ok(dem2d_world_get_particle(world, id, &info[pieces]));
+                dem2d_world_destroy(world);
+            }
+            const double far = rough && two ? 1e-3 : 2e-5;
+            assert_within(info[1].pose.position.x, info[0].pose.position.x, far);
+            assert_within(info[1].velocity.x, info[0].velocity.x, 10 * far);
+            if (!rough) assert_within(info[0].pose.position.x, 0.4, 1e-6);
+            assert_within(info[1].pose.position.y, info[0].pose.position.y, 2e-5);
+            if (kind == DISC || (two && !rough)) /* the others rock for long */
+                assert_within(info[1].velocity.y, info[0].velocity.y, 1e-3);
+        }
+}
+
+static double total_force(const dem2d_world *world, dem2d_vec *sum) {
+    dem2d_contact_info contacts[16];
+    int count;
+    *sum = vec(0, 0);
+    assert_ok(dem2d_world_contacts(world, contacts, 16, &count));
+    for (int i = 0; i < count; i++)
+        if (contacts[i].wall.generation > 0) {
+            sum->x += contacts[i].normal_force * contacts[i].normal.x;
+            sum->y += contacts[i].normal_force * contacts[i].normal.y;
+        }
+    return count;
+}
+
+/* A disc on the common end of three segments: one contact, along the line to its centre. In a
+   trough: two. */
+static void test_joint_kinds(void **state) {
+    (void)state;
+    dem2d_material_id material;
+    dem2d_vec force;
+    dem2d_world *world = make_world(0, vec(0, 0), false, &material);
+    add_segment(world, material, vec(0, 0), vec(-1, -1));
+    add_segment(world, material, vec(1, -1), vec(0, 0));
+    add_segment(world, material, vec(0, 0), vec(0, -1));
+    add(world, material, make_shape(DISC), vec(0.01, 0.048), 0, vec(0, 0));
+    assert_ok(dem2d_world_step(world, 1, NULL));
+    assert_int_equal(total_force(world, &force), 1);
+    const double distance = hypot(0.01, 0.048);
+    assert_near(-force.y, KN * (0.05 - distance) * 0.048 / distance, 1e-9);
+    dem2d_world_destroy(world);
+    world = make_world(0, vec(0, 0), false, &material);
+    add_segment(world, material, vec(-1, 1), vec(0, 0));
+    add_segment(world, material, vec(0, 0), vec(1, 1));
+    add(world, material, make_shape(DISC), vec(0, 0.07), 0, vec(0, 0));
+    assert_ok(dem2d_world_step(world, 1, NULL));
+    assert_int_equal(total_force(world, &force), 2);
+    assert_near(-force.y, 2 * KN * (0.05 - 0.07 / sqrt(2)) / sqrt(2), 1e-9);
+    dem2d_world_destroy(world);
+    /* a box on a flat joint: four corners of two common parts, two points */
+    world = make_world(0, vec(0, 0), false, &material);
+    add_segment(world, material, vec(-1, 0), vec(0, 0));
+    add_segment(world, material, vec(0, 0), vec(1, 0));
+    add(world, material, make_shape(BOX), vec(0.01, 0.03 - 1e-5), 0, vec(0, 0));
+    assert_ok(dem2d_world_step(world, 1, NULL));
+    assert_int_equal(total_force(world, &force), 2);
+    assert_near(-force.y, 2 * KN * 1e-5, 1e-9);
+    dem2d_world_destroy(world);
+}
+
+/* Discs fall through a hopper and out: none is lost in the walls, all arrive below. A segment may
+   move, be servo-controlled, replaced and removed. */
+static void test_hopper(void **state) {
+    (void)state;
+    dem2d_material_id material;
+    dem2d_world *world = make_world(0.1, vec(0, -9.81), false, &material);
+    assert_ok(dem2d_world_set_damping(world, 0.1, 0));
+    assert_ok(dem2d_world_set_time_step(world, 4e-5));
+    const dem2d_vec left[3] = {{-0.4, 1.2}, {-0.4, 0.5}, {-0.15, 0}};
+    for (int k = 0; k < 2; k++) {
+        add_segment(world, material, left[k], left[k + 1]);
+        add_segment(world, material, vec(-left[k].x, left[k].y),
+                    vec(-left[k + 1].x, left[k + 1].y));
+    }
+    dem2d_particle_id ids[40];
+    for (int i = 0; i < 40; i++)
+        ids[i] = add(world, material, make_shape(i % SHAPES),
+                     vec(-0.26 + 0.13 * (i % 5), 0.55 + 0.13 * (i / 5)), i, vec(0, 0));
+    assert_ok(dem2d_world_step(world, 40000, NULL));
+    for (int i = 0; i < 40; i++) {
+        dem2d_particle_info info;
+        assert_ok(dem2d_world_get_particle(world, ids[i], &info));
+        assert_true(info.pose.position.y < 0);
+        assert_true(isfinite(info.pose.position.x));
+    }
+    dem2d_world_destroy(world);
+}
+
+static void test_moves(void **state) {
+    (void)state;
+    dem2d_material_id material;
+    dem2d_world *world = make_world(0.3, vec(0, 0), false, &material);
+    dem2d_wall_id floor_id = add_segment(world, material, vec(-0.2, 0), vec(0.2, 0));
+    dem2d_particle_id id = add(world, material, make_shape(DISC), vec(0, 0.05), 0, vec(0, 0));
+    dem2d_wall_desc lid = {0};
+    dem2d_wall_id lid_id;
+    dem2d_wall_info info;
+    lid.material = material, lid.segment = true, lid.mode = DEM2D_WALL_SERVO;
+    lid.point = vec(0.1, 0.11), lid.end = vec(-0.1, 0.11); /* its left is below */
+    lid.stress = 1e4, lid.max_speed = 0.1;
+    assert_ok(dem2d_world_add_wall(world, &lid, &lid_id));
+    assert_ok(dem2d_world_set_damping(world, 0.5, 0));
+    assert_ok(dem2d_world_step(world, 30000, NULL));
+    assert_ok(dem2d_world_get_wall(world, lid_id, &info));
+    assert_near(info.length, 0.2, 1e-14);
+    assert_near(info.stress, 1e4, 1e-3);
+    assert_near(info.end.y, info.point.y, 1e-12);
+    assert_near(info.normal.y, -1, 1e-12);
+    dem2d_wall_desc moving = {0};
+    moving.material = material, moving.segment = true, moving.mode = DEM2D_WALL_MOVING;
+    moving.point = vec(-0.2, 0), moving.end = vec(0.2, 0), moving.velocity = vec(0.5, 0);
+    assert_ok(dem2d_world_set_wall(world, floor_id, &moving));
+    assert_ok(dem2d_world_step(world, 1000, NULL));
+    dem2d_particle_info disc;
+    assert_ok(dem2d_world_get_particle(world, id, &disc));
+    assert_true(disc.velocity.x > 0); /* dragged along */
+    moving.end = moving.point;
+    assert_result(dem2d_world_set_wall(world, floor_id, &moving), DEM2D_OUT_OF_RANGE);
+    moving.end.x = (double)NAN;
+    assert_result(dem2d_world_set_wall(world, floor_id, &moving), DEM2D_NOT_FINITE);
+    assert_ok(dem2d_world_remove_wall(world, lid_id));
+    assert_ok(dem2d_world_step(world, 10, NULL));
+    dem2d_world_destroy(world);
+    dem2d_world_desc desc = {0};
+    desc.time_step = 1e-5, desc.faces = DEM2D_CONTACT_AREA;
+    const dem2d_material_desc stone = {2700, KN, KN, 0.3, 0, 0};
+    assert_ok(dem2d_world_create(&desc, &world));
+    assert_ok(dem2d_world_add_material(world, &stone, &material));
+    moving.material = material, moving.end = vec(0, 0);
+    assert_result(dem2d_world_add_wall(world, &moving, &lid_id), DEM2D_OUT_OF_RANGE);
+    dem2d_world_destroy(world);
+}
+
+int main(void) {
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(test_depth),       cmocka_unit_test(test_flat_joints),
+        cmocka_unit_test(test_joint_kinds), cmocka_unit_test(test_hopper),
+        cmocka_unit_test(test_moves),
+    };
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}
