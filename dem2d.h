@@ -44,8 +44,8 @@ CONTENTS (search for the anchor, ">>" and the word)
                     the list of contacts, particles sorted in space         >>list
                     the ledger of energies                                  >>ledger
                     contacts, sums, motion; the stable time step            >>step
-                    energy, stress, coordination                            >>measures
-                    pictures                                                >>writers
+                    energy, stress, fabric, packing, distance from rest     >>measures
+                    pictures, files for ParaView, histories                 >>writers
     Changes, licence                                                        >>licence
 
 ================================================================================================
@@ -200,6 +200,16 @@ HOW TO
     hold a stress        a wall with mode DEM2D_WALL_SERVO, stress, and a length: constant or the
                          distance between two other walls.
     draw                 dem2d_world_write_svg, or dem2d_shape_outline for your own pictures.
+    measure a sample     dem2d_world_stress with the sample's area (of one grain:
+                         dem2d_world_particle_stress), then dem2d_stress_principal for p and q;
+                         dem2d_strain of its sides; dem2d_world_porosity of a box inside it.
+    tell it is at rest   dem2d_world_equilibrium: unbalanced below 1e-3, a small kinetic_ratio.
+    load it slowly       dem2d_world_inertial_number below 1e-3.
+    see why it is strong dem2d_world_fabric: anisotropies of contacts and forces, and the q/p that
+                         follows; dem2d_world_histogram for polar diagrams.
+    look in ParaView     dem2d_world_write_vtp, a file for each part and time; dem2d_pvd_write
+                         makes a series of them. Colour grains by any of their arrays.
+    keep a history       dem2d_world_write_csv after every so many steps, append but the first.
 
 OPTIONS (zero means: physical zero for physical fields; "library default" where one is given)
     struct                  field                 unit   default    range
@@ -299,6 +309,21 @@ OPTIONS (zero means: physical zero for physical fields; "library default" where 
     dem2d_svg_desc          force_chains          -      false
     dem2d_svg_desc          write                 -      none       or a path, not both
     dem2d_svg_desc          user                  -      NULL
+    dem2d_vtp_desc          outline_points        -      64         0 or >= 3
+    dem2d_vtp_desc          part                  -      PARTICLES
+    dem2d_vtp_desc          write                 -      none       or a path, not both
+    dem2d_vtp_desc          user                  -      NULL
+    dem2d_pvd_desc          count                 -      0          >= 0
+    dem2d_pvd_desc          times                 s      none       count values, finite
+    dem2d_pvd_desc          files                 -      none       count names, no control bytes
+    dem2d_pvd_desc          write                 -      none       or a path, not both
+    dem2d_pvd_desc          user                  -      NULL
+    dem2d_csv_desc          count                 -      0          >= 0
+    dem2d_csv_desc          names                 -      none       count; no comma, quote, line end
+    dem2d_csv_desc          values                -      none       count values, finite
+    dem2d_csv_desc          append                -      false
+    dem2d_csv_desc          write                 -      none       or a path, not both
+    dem2d_csv_desc          user                  -      NULL
 
 ERRORS
     Functions that can fail return a dem2d_result; dem2d_result_text gives its text. Outputs are
@@ -561,6 +586,10 @@ DEM2D_API dem2d_result dem2d_shape_aabb(const dem2d_shape *shape, dem2d_pose pos
 /// edges (rounded ones of the rounding). Errors: TOO_FEW_POINTS, NOT_FINITE, OUT_OF_RANGE.
 DEM2D_API dem2d_result dem2d_shape_outline(const dem2d_shape *shape, dem2d_pose pose, int count,
                                            dem2d_vec *points);
+/// Direction of the long axis of a template (rad, in (-pi/2, pi/2], from x) and the ratio >= 1 of
+/// its greater to its smaller radius of gyration; 0 and 1 when it has no axis (circles, regular
+/// polygons). By the outline polygon: exact for sharp polygons, else to 1e-4.
+DEM2D_API dem2d_result dem2d_shape_axis(const dem2d_shape *shape, double *angle, double *ratio);
 
 /* ============================================================================================
    >>api-mass  Area, centroid, polar moment
@@ -1168,7 +1197,7 @@ DEM2D_API dem2d_result dem2d_world_time_step_bounds(const dem2d_world *world, do
 DEM2D_API dem2d_result dem2d_world_step(dem2d_world *world, int count, int *done);
 
 /* ============================================================================================
-   >>api-measures  Queries: lists, energy, stress, coordination
+   >>api-measures  Queries: lists, energy, stress, fabric, packing, distance from rest
    ============================================================================================ */
 
 /// Energies of the last force pass, J/m.
@@ -1209,6 +1238,13 @@ typedef struct dem2d_stress {
     double yy; ///< normal, y
 } dem2d_stress;
 
+/// Mean and deviator of a stress in the plane.
+typedef struct dem2d_principal {
+    double p;     ///< Pa, (s1 + s2)/2
+    double q;     ///< Pa, (s1 - s2)/2, >= 0
+    double angle; ///< rad in (-pi/2, pi/2], direction of s1, the greater one, from x; 0 if q is 0
+} dem2d_principal;
+
 /// Numbers of a packing at the last force pass.
 typedef struct dem2d_packing {
     double coordination;        ///< contacting neighbours per particle, walls not counted
@@ -1216,7 +1252,52 @@ typedef struct dem2d_packing {
     double mean_overlap;        ///< overlap / equivalent radius of the smaller particle, mean
     double max_overlap;         ///< the same, greatest (with walls: of the particle)
     double solid_area;          ///< m2, sum of the particles' areas
+    int rattlers;               ///< particles with fewer than two contacts, walls not counted
 } dem2d_packing;
+
+/// Anisotropy of second order: 1 + coefficient cos 2 (angle - direction).
+typedef struct dem2d_anisotropy {
+    double coefficient; ///< >= 0
+    double direction;   ///< rad in (-pi/2, pi/2]; 0 if the coefficient is 0
+} dem2d_anisotropy;
+
+/// Fabric of the contacts between particles at the last force pass; all 0 without any. Means of
+/// lengths and forces by direction are corrected for the number of contacts there (Rothenburg,
+/// Bathurst 1989; Guo, Zhao 2013), taken as 1 + a_c cos, but not below 0.1.
+typedef struct dem2d_fabric {
+    int contacts;                       ///< number of them
+    double xx;                          ///< (1/N) sum of n n, with n the unit normals
+    double xy;                          ///< likewise
+    double yy;                          ///< likewise
+    double deviator;                    ///< difference of the principal values of this tensor
+    double mean_branch;                 ///< m, from centre to centre, along the normal
+    double mean_force;                  ///< N/m, normal
+    dem2d_anisotropy normals;           ///< a_c: where the contacts are
+    dem2d_anisotropy branches;          ///< a_b: of the branches along the normal
+    dem2d_anisotropy normal_forces;     ///< a_n
+    dem2d_anisotropy tangential_forces; ///< a_t: f_t = -f0 a_t sin 2 (angle - direction)
+    double stress_ratio; ///< q/p foretold: (a_c + a_b + a_n + a_t)/2, parts along a_c's direction
+} dem2d_fabric;
+
+/// What a histogram counts or averages. Directions of normals fill [0, 2 pi), and each contact
+/// between particles counts for both, with opposite normals.
+typedef enum dem2d_histogram {
+    DEM2D_HISTOGRAM_COORDINATION, ///< particles with 0, 1, .. bins - 1 or more contacts, no walls
+    DEM2D_HISTOGRAM_ORIENTATION,  ///< particles by their long axis, in [0, pi); without one: none
+    DEM2D_HISTOGRAM_NORMAL,       ///< contacts by the direction of their normal
+    DEM2D_HISTOGRAM_BRANCH,       ///< m, mean branch along the normal, by its direction
+    DEM2D_HISTOGRAM_NORMAL_FORCE, ///< N/m, mean by the direction of the normal
+    DEM2D_HISTOGRAM_TANGENTIAL_FORCE, ///< N/m, signed (see dem2d_contact_info), likewise
+    DEM2D_HISTOGRAM_COUNT
+} dem2d_histogram;
+
+/// How far a world is from rest, at the last force pass.
+typedef struct dem2d_equilibrium {
+    double mean_speed;    ///< m/s, of the centroids of particles that are not fixed
+    double max_speed;     ///< m/s
+    double kinetic_ratio; ///< kinetic over spring energy; 0 at rest, HUGE_VAL without contacts
+    double unbalanced;    ///< mean |contact forces + weight| of the free over mean contact force
+} dem2d_equilibrium;
 
 /// Counters.
 DEM2D_API dem2d_result dem2d_world_stats(const dem2d_world *world, dem2d_stats *stats);
@@ -1235,14 +1316,40 @@ DEM2D_API dem2d_result dem2d_world_ledger(const dem2d_world *world, dem2d_ledger
 /// Love-Weber stress (1/area) sum of f l over the contacts, walls included; area > 0, m2.
 DEM2D_API dem2d_result dem2d_world_stress(const dem2d_world *world, double area,
                                           dem2d_stress *stress);
-/// Coordination number, overlaps, solid area.
+/// Stress in a particle: (1/its area) sum of arm and force over its contacts, walls included.
+/// Times the areas, those of all particles add up to dem2d_world_stress times its area.
+DEM2D_API dem2d_result dem2d_world_particle_stress(const dem2d_world *world, dem2d_particle_id id,
+                                                   dem2d_stress *stress);
+/// Mean, deviator and direction of the symmetric part of a stress. Errors: NOT_FINITE.
+DEM2D_API dem2d_result dem2d_stress_principal(const dem2d_stress *stress,
+                                              dem2d_principal *principal);
+/// Logarithmic strain -ln(now/before) of a length, compression positive; NaN unless both are above
+/// 0 and finite. The same bits everywhere, right to 2 ulp, of small strains too.
+DEM2D_API double dem2d_strain(double now, double before);
+/// Coordination number, overlaps, solid area, rattlers.
 DEM2D_API dem2d_result dem2d_world_packing(const dem2d_world *world, dem2d_packing *packing);
-/// 1 - area of the particles / area (> 0, m2) of the region that holds them all.
-DEM2D_API dem2d_result dem2d_world_porosity(const dem2d_world *world, double area,
+/// 1 - (area of the parts of particles inside a region)/(its area). Each particle's part is right
+/// to 1e-4 of its area, exact if it is a sharp polygon or wholly inside; what overlaps counts
+/// twice. Errors: NOT_FINITE, OUT_OF_RANGE (upper not above lower).
+DEM2D_API dem2d_result dem2d_world_porosity(const dem2d_world *world, const dem2d_box *region,
                                             double *porosity);
+/// Fabric: where contacts are, and how lengths and forces depend on their direction.
+DEM2D_API dem2d_result dem2d_world_fabric(const dem2d_world *world, dem2d_fabric *fabric);
+/// A histogram of bins >= 1 equal parts into values; means over empty bins are 0. Errors:
+/// OUT_OF_RANGE, OUT_OF_MEMORY (it counts in memory of the environment).
+DEM2D_API dem2d_result dem2d_world_histogram(const dem2d_world *world, dem2d_histogram kind,
+                                             int bins, double *values);
+/// Speeds, kinetic energy and resultants against what the contacts carry.
+DEM2D_API dem2d_result dem2d_world_equilibrium(const dem2d_world *world,
+                                               dem2d_equilibrium *equilibrium);
+/// Inertial number |strain_rate| d sqrt(density/pressure) (1/s; Pa, > 0): d is the mean diameter of
+/// the circles of equal area, the density that of the solid. Quasi-static below 1e-3; 0 without
+/// particles.
+DEM2D_API dem2d_result dem2d_world_inertial_number(const dem2d_world *world, double strain_rate,
+                                                   double pressure, double *number);
 
 /* ============================================================================================
-   >>api-writers  Pictures
+   >>api-writers  Pictures, files for ParaView, histories
    ============================================================================================ */
 
 /// Takes bytes; returns false when they could not be written.
@@ -1257,9 +1364,63 @@ typedef struct dem2d_svg_desc {
     void *user;            ///< handed to write
 } dem2d_svg_desc;
 
-/// Draw shapes (a colour per model), walls and force chains to desc->write, or to a file when path
-/// is not NULL. Errors: NULL_ARGUMENT, OUT_OF_RANGE, IO, OUT_OF_MEMORY. Does not change the world.
+/// What a .vtp file holds.
+typedef enum dem2d_vtp_part {
+    DEM2D_VTP_PARTICLES, ///< outlines
+    DEM2D_VTP_CONTACTS,  ///< lines along the branches
+    DEM2D_VTP_WALLS,     ///< lines, cut off at the scene's box
+    DEM2D_VTP_PART_COUNT
+} dem2d_vtp_part;
+
+/// A file of VTK's XML PolyData.
+typedef struct dem2d_vtp_desc {
+    int outline_points;    ///< per curved particle, 0 for 64
+    dem2d_vtp_part part;   ///< what is written
+    dem2d_write_fn *write; ///< where the bytes go, or NULL when a path is given
+    void *user;            ///< handed to write
+} dem2d_vtp_desc;
+
+/// A ParaView collection: files by time.
+typedef struct dem2d_pvd_desc {
+    int count;                ///< of files, >= 0
+    const double *times;      ///< s, one for each
+    const char *const *files; ///< names as seen from the .pvd, in UTF-8, without control characters
+    dem2d_write_fn *write;    ///< where the bytes go, or NULL when a path is given
+    void *user;               ///< handed to write
+} dem2d_pvd_desc;
+
+/// A row of a history, as comma-separated values.
+typedef struct dem2d_csv_desc {
+    int count;                ///< of the caller's columns, >= 0
+    const char *const *names; ///< of them, without commas, quotes and line ends
+    const double *values;     ///< of them, finite
+    bool append;              ///< one more row; else a header line and the first row, a new file
+    dem2d_write_fn *write;    ///< where the bytes go, or NULL when a path is given
+    void *user;               ///< handed to write
+} dem2d_csv_desc;
+
+/* Each writes to desc->write, or to a file when path is not NULL: one of the two. None changes the
+   world. Errors: NULL_ARGUMENT, OUT_OF_RANGE, NOT_FINITE, IO (the file can't be opened, written or
+   closed, or write returns false). */
+
+/// Draw shapes (a colour per model), walls, force chains and, below, a scale bar.
 DEM2D_API dem2d_result dem2d_world_write_svg(const dem2d_world *world, const dem2d_svg_desc *desc,
+                                             const char *path);
+/// Write one part of a world for VTK and ParaView. Cell data of particles: id (index), type,
+/// material, motion, contacts (walls not counted), velocity (mean of the half steps),
+/// angular_velocity, angle, mass, radius (equivalent), stress (3 x 3); of contacts: a, b, wall
+/// (indices, or -1), points, normal, force (on B), position, normal_force, tangential_force, depth;
+/// of walls: id, mode, velocity (mean of the half steps), force, stress.
+DEM2D_API dem2d_result dem2d_world_write_vtp(const dem2d_world *world, const dem2d_vtp_desc *desc,
+                                             const char *path);
+/// Write a collection of files that make a series in time. env (may be NULL) gets the messages.
+DEM2D_API dem2d_result dem2d_pvd_write(const dem2d_env *env, const dem2d_pvd_desc *desc,
+                                       const char *path);
+/// Write a row: step, time (steps done times the present time step), translational, rotational,
+/// normal, tangential, potential (dem2d_energy), kinetic_ratio, mean_speed, max_speed, unbalanced
+/// (dem2d_equilibrium), coordination, coordination_loaded, rattlers (dem2d_packing), contacts,
+/// wall_contacts, max_overlap, then the caller's columns.
+DEM2D_API dem2d_result dem2d_world_write_csv(const dem2d_world *world, const dem2d_csv_desc *desc,
                                              const char *path);
 
 #ifdef __cplusplus
@@ -1489,15 +1650,22 @@ DEM2D_API double dem2d_rot_angle(dem2d_rot rotation) {
     return angle > -DEM2DI_PI ? angle : DEM2DI_PI;
 }
 
-/* ln x for x > 0, to a few eps of itself: x = m 2^k with m in [sqrt(1/2), sqrt 2), and
-   ln m = 2 atanh z with z = (m - 1)/(m + 1), |z| < 0.172: the first term left out is z^21/21. */
-static double dem2di_log(double x) {
-    int k;
-    double m = frexp(x, &k);
-    if (m < 0.70710678118654752) m *= 2, k--;
-    double z = (m - 1) / (m + 1), square = z * z, sum = 0;
-    for (int n = 19; n > 1; n -= 2) sum = (sum + 1.0 / n) * square;
-    return k * 0.69314718055994531 + (2 * z + 2 * z * sum);
+/* ln(a/b) for a >= b > 0 = k ln 2 + 2 artanh z, z = (a - b)/(a + b): b is brought to within a
+   factor of 2 of a by exact halving and doubling, nearest in the sense of z^2 <= 1/34. Then a - b
+   is exact, and the first term left out, z^24/25, is 1e-38. */
+static double dem2di_log_ratio(double a, double b) {
+    /* ln 2 in two parts, the first of 32 bits: k times it is exact */
+    const double high = 6.93147180369123816490e-01, low = 1.90821492927058770002e-10;
+    int k = 0;
+    for (; b < a * 0.70710678118654752; k++)
+        if (a > 1)
+            a /= 2;
+        else
+            b *= 2;
+    if (a > 1) a /= 2, b /= 2; /* for the sum of two great ones */
+    double z = (a - b) / (a + b), square = z * z, sum = 0;
+    for (int n = 23; n > 1; n -= 2) sum = square * (sum + 1.0 / n);
+    return k * high + (2 * z + (2 * z * sum + k * low));
 }
 
 DEM2D_API dem2d_pose dem2d_pose_make(double x, double y, double angle, double scale) {
@@ -1506,6 +1674,32 @@ DEM2D_API dem2d_pose dem2d_pose_make(double x, double y, double angle, double sc
     pose.rotation = dem2d_rot_make(angle);
     pose.scale = scale;
     return pose;
+}
+
+/* A symmetric tensor in the plane. */
+typedef struct dem2di_tensor {
+    double xx, xy, yy;
+} dem2di_tensor;
+
+/* t += f (a b + b a)/2 */
+static void dem2di_tensor_add(dem2di_tensor *t, double f, dem2d_vec a, dem2d_vec b) {
+    t->xx += f * (a.x * b.x);
+    t->xy += f * ((a.x * b.y + a.y * b.x) / 2);
+    t->yy += f * (a.y * b.y);
+}
+
+/* Mohr's circle. */
+static dem2d_principal dem2di_tensor_principal(dem2di_tensor t) {
+    dem2d_vec across = dem2di_vec(t.xx / 2 - t.yy / 2, t.xy), u = {0, 0};
+    dem2d_rot twice;
+    (void)dem2di_unit(across, &u);
+    twice.c = u.x;
+    twice.s = u.y;
+    dem2d_principal principal;
+    principal.p = t.xx / 2 + t.yy / 2;
+    principal.q = dem2di_dot(across, u);
+    principal.angle = dem2d_rot_angle(twice) / 2;
+    return principal;
 }
 
 /* ============================================================================================
@@ -3093,6 +3287,58 @@ DEM2D_API dem2d_result dem2d_shape_outline(const dem2d_shape *shape, dem2d_pose 
     if (result != DEM2D_OK) return result;
     for (int i = 0; i < count; i++)
         points[i] = dem2di_place(&pose, dem2di_outline_point(shape, i, count));
+    return DEM2D_OK;
+}
+
+/* Part of a shape's area that its outline polygon may leave out, where it stands for the shape: no
+   part of it is then wrong by more. Points are doubled until that holds; their cap is for custom
+   shapes, whose area is what the caller says. */
+#define DEM2DI_OUTLINE_DEFECT 1e-4
+#define DEM2DI_OUTLINE_CAP 65536
+
+/* As many points for each corner or arc, so that regular shapes have regular polygons. */
+static int dem2di_fine_count(const dem2d_shape *shape) {
+    int parts = shape->count > 0 ? shape->count : 1;
+    if (shape->type == DEM2D_POLYGON && shape->rounding == 0) return parts;
+    int points = parts > 128 ? 2 * parts : (255 / parts + 1) * parts;
+    double least = (1 - DEM2DI_OUTLINE_DEFECT) * shape->mass.area;
+    while (points < DEM2DI_OUTLINE_CAP && dem2di_mass_interpolated(shape, points).area < least)
+        points *= 2;
+    return points;
+}
+
+/* Second moments of area of an outline polygon about the centroid, along axes turned by q. */
+static dem2di_tensor dem2di_second_moments(const dem2d_shape *shape, int points, dem2d_rot q) {
+    dem2di_tensor sum = {0, 0, 0};
+    dem2d_vec a = dem2di_turn_back(q, dem2di_outline_point(shape, 0, points));
+    for (int i = 1; i <= points; i++) {
+        dem2d_vec b = dem2di_turn_back(q, dem2di_outline_point(shape, i % points, points));
+        double sixth = dem2di_cross(a, b) / 12; /* of the triangle's area */
+        dem2di_tensor_add(&sum, sixth, a, a);
+        dem2di_tensor_add(&sum, sixth, a, b);
+        dem2di_tensor_add(&sum, sixth, b, b);
+        a = b;
+    }
+    return sum;
+}
+
+/* The long axis, in (-pi/2, pi/2], and the ratio of the radii of gyration; 0 and 1 if the moments
+   differ by no more than their rounding. The second sum along the axis keeps a needle's width. */
+static double dem2di_axis(const dem2d_shape *shape, double *ratio) {
+    int points = dem2di_fine_count(shape);
+    double rounding = (points + 256) * DBL_EPSILON;
+    dem2di_tensor sum = dem2di_second_moments(shape, points, dem2d_rot_make(0));
+    dem2d_principal principal = dem2di_tensor_principal(sum);
+    *ratio = 1;
+    if (!(principal.q > rounding * principal.p)) return 0;
+    sum = dem2di_second_moments(shape, points, dem2d_rot_make(principal.angle));
+    *ratio = sqrt(sum.xx / sum.yy);
+    return principal.angle;
+}
+
+DEM2D_API dem2d_result dem2d_shape_axis(const dem2d_shape *shape, double *angle, double *ratio) {
+    if (shape == NULL || angle == NULL || ratio == NULL) return DEM2D_NULL_ARGUMENT;
+    *angle = dem2di_axis(shape, ratio);
     return DEM2D_OK;
 }
 
@@ -7660,7 +7906,7 @@ static double dem2di_damping_loss(double zeta) {
     double away = sqrt(fabs(1 - zeta)) * sqrt(1 + zeta);
     dem2d_rot rotation = {zeta, away};
     if (!(away > 0)) return 2 * zeta; /* the limit of both */
-    double angle = zeta < 1 ? dem2d_rot_angle(rotation) : dem2di_log(zeta + away);
+    double angle = zeta < 1 ? dem2d_rot_angle(rotation) : dem2di_log_ratio(zeta + away, 1);
     return 2 * zeta * angle / away;
 }
 
@@ -7668,7 +7914,7 @@ DEM2D_API dem2d_result dem2d_damping_ratio(double restitution, double *damping_r
     if (damping_ratio == NULL) return DEM2D_NULL_ARGUMENT;
     if (!dem2di_finite(restitution)) return DEM2D_NOT_FINITE;
     if (!(restitution > 0 && restitution <= 1)) return DEM2D_OUT_OF_RANGE;
-    double loss = -dem2di_log(restitution), low = 0, high = 1;
+    double loss = dem2di_log_ratio(1, restitution), low = 0, high = 1;
     while (dem2di_damping_loss(high) < loss) high *= 2; /* grows as the logarithm */
     for (double middle = high / 2; low < middle && middle < high; middle = low + (high - low) / 2)
         if (dem2di_damping_loss(middle) < loss)
@@ -11214,8 +11460,8 @@ DEM2D_API dem2d_result dem2d_world_step(dem2d_world *world, int count, int *done
 }
 
 /* ============================================================================================
-   >>measures  Lists of what is there, energy, stress, coordination
-   uses: config, math, memory, law, motion, world
+   >>measures  Lists of what is there, energy, stress, fabric, packing, distance from rest
+   uses: config, math, memory, mass, shapes, law, motion, world
    ============================================================================================ */
 
 /* A walk over the contacts of the last force pass in the order of their ids: those of particles, or
@@ -11387,6 +11633,22 @@ DEM2D_API dem2d_result dem2d_world_ledger(const dem2d_world *world, dem2d_ledger
     return DEM2D_OK;
 }
 
+static void dem2di_stress_add(dem2d_stress *sum, dem2d_vec arm, dem2d_vec force) {
+    sum->xx += arm.x * force.x;
+    sum->xy += arm.x * force.y;
+    sum->yx += arm.y * force.x;
+    sum->yy += arm.y * force.y;
+}
+
+static dem2d_stress dem2di_stress_over(const dem2d_stress *sum, double area) {
+    dem2d_stress stress;
+    stress.xx = sum->xx / area;
+    stress.xy = sum->xy / area;
+    stress.yx = sum->yx / area;
+    stress.yy = sum->yy / area;
+    return stress;
+}
+
 DEM2D_API dem2d_result dem2d_world_stress(const dem2d_world *world, double area,
                                           dem2d_stress *stress) {
     if (world == NULL || stress == NULL) return DEM2D_NULL_ARGUMENT;
@@ -11395,19 +11657,62 @@ DEM2D_API dem2d_result dem2d_world_stress(const dem2d_world *world, double area,
     dem2d_stress sum = {0, 0, 0, 0};
     for (int wall = 0; wall < 2; wall++) {
         dem2di_tour walk = dem2di_tour_start(wall == 1);
-        while (dem2di_tour_next(world, &walk)) {
-            dem2d_vec force = dem2di_link_force(&walk.link);
-            sum.xx += walk.branch.x * force.x;
-            sum.xy += walk.branch.x * force.y;
-            sum.yx += walk.branch.y * force.x;
-            sum.yy += walk.branch.y * force.y;
-        }
+        while (dem2di_tour_next(world, &walk))
+            dem2di_stress_add(&sum, walk.branch, dem2di_link_force(&walk.link));
     }
-    stress->xx = sum.xx / area;
-    stress->xy = sum.xy / area;
-    stress->yx = sum.yx / area;
-    stress->yy = sum.yy / area;
+    *stress = dem2di_stress_over(&sum, area);
     return DEM2D_OK;
+}
+
+static double dem2di_body_area(const dem2d_world *world, const dem2di_body *body) {
+    return dem2di_shape_of(world, body)->mass.area * body->scale * body->scale;
+}
+
+/* The arm points from the centre to the contact; what pushes there pushes against the arm. */
+static dem2d_stress dem2di_particle_stress(const dem2d_world *world, int slot) {
+    const dem2di_list *list = &world->list;
+    dem2d_stress sum = {0, 0, 0, 0};
+    for (int k = list->first[slot]; k < list->first[slot + 1]; k++) {
+        int contact = list->incident[k] / 2, side = list->incident[k] & 1;
+        dem2di_link link;
+        dem2d_vec arm_b;
+        if (!dem2di_link_at(world, contact, false, &link, &arm_b)) continue;
+        dem2d_vec force = dem2di_link_force(&link);
+        if (side == 0)
+            dem2di_stress_add(&sum, link.point, force);
+        else
+            dem2di_stress_add(&sum, dem2di_negate(arm_b), force);
+    }
+    return dem2di_stress_over(&sum, dem2di_body_area(world, &world->bodies[slot]));
+}
+
+DEM2D_API dem2d_result dem2d_world_particle_stress(const dem2d_world *world, dem2d_particle_id id,
+                                                   dem2d_stress *stress) {
+    if (world == NULL || stress == NULL) return DEM2D_NULL_ARGUMENT;
+    int slot = dem2di_slot(world, id);
+    if (slot < 0) return dem2di_stale(world, "particle", id.index);
+    *stress = dem2di_particle_stress(world, slot);
+    return DEM2D_OK;
+}
+
+DEM2D_API dem2d_result dem2d_stress_principal(const dem2d_stress *stress,
+                                              dem2d_principal *principal) {
+    if (stress == NULL || principal == NULL) return DEM2D_NULL_ARGUMENT;
+    if (!dem2di_finite(stress->xx) || !dem2di_finite(stress->xy) || !dem2di_finite(stress->yx) ||
+        !dem2di_finite(stress->yy))
+        return DEM2D_NOT_FINITE;
+    dem2di_tensor symmetric;
+    symmetric.xx = stress->xx;
+    symmetric.xy = stress->xy / 2 + stress->yx / 2;
+    symmetric.yy = stress->yy;
+    *principal = dem2di_tensor_principal(symmetric);
+    return DEM2D_OK;
+}
+
+DEM2D_API double dem2d_strain(double now, double before) {
+    if (!dem2di_finite(now) || !dem2di_finite(before) || !(now > 0 && before > 0))
+        return (double)NAN;
+    return now > before ? -dem2di_log_ratio(now, before) : dem2di_log_ratio(before, now);
 }
 
 /* Contacts of a particle with others. */
@@ -11434,7 +11739,7 @@ DEM2D_API dem2d_result dem2d_world_packing(const dem2d_world *world, dem2d_packi
         ends += contacts;
         loaded += contacts >= 2;
         if (contacts >= 2) loaded_ends += contacts;
-        area += dem2di_shape_of(world, body)->mass.area * body->scale * body->scale;
+        area += dem2di_body_area(world, body);
     }
     for (int wall = 0; wall < 2; wall++) {
         dem2di_tour walk = dem2di_tour_start(wall == 1);
@@ -11454,22 +11759,357 @@ DEM2D_API dem2d_result dem2d_world_packing(const dem2d_world *world, dem2d_packi
     packing->mean_overlap = open > 0 ? overlap / open : 0;
     packing->max_overlap = greatest;
     packing->solid_area = area;
+    packing->rattlers = alive - loaded;
     return DEM2D_OK;
 }
 
-DEM2D_API dem2d_result dem2d_world_porosity(const dem2d_world *world, double area,
+static double dem2di_clamp(double a, double low, double high) {
+    return dem2di_max(low, dem2di_min(a, high));
+}
+
+/* Mean of y held between low and high while it goes evenly from a to b. */
+static double dem2di_mean_held(double a, double b, double low, double high) {
+    double p = dem2di_clamp(a, low, high), q = dem2di_clamp(b, low, high);
+    if (p == q || (p == a && q == b)) return (p + q) / 2;
+    return (p * (p - a) + (p + q) / 2 * (q - p) + q * (b - q)) / (b - a);
+}
+
+/* Integral of y dx, held within a box, along the edge from p to q. Summed around a polygon against
+   the clock it is the area of its part inside; no polygon is stored for that. */
+static double dem2di_edge_held(dem2d_vec p, dem2d_vec q, const dem2d_box *box) {
+    double left = dem2di_clamp(p.x, box->lower.x, box->upper.x);
+    double right = dem2di_clamp(q.x, box->lower.x, box->upper.x);
+    if (left == right) return 0;
+    double rise = (q.y - p.y) / (q.x - p.x);
+    double a = left == p.x ? p.y : p.y + (left - p.x) * rise;
+    double b = right == q.x ? q.y : q.y + (right - q.x) * rise;
+    return (right - left) * dem2di_mean_held(a, b, box->lower.y, box->upper.y);
+}
+
+/* Part of a shape's outline polygon inside a box about its centre. */
+static double dem2di_part_inside(const dem2d_shape *shape, const dem2d_pose *pose,
+                                 const dem2d_box *box) {
+    int points = dem2di_fine_count(shape);
+    dem2d_pose centred = *pose;
+    centred.position = dem2di_vec(0, 0);
+    double inside = 0;
+    dem2d_vec p = dem2di_place(&centred, dem2di_outline_point(shape, 0, points));
+    for (int i = 1; i <= points; i++) {
+        dem2d_vec q = dem2di_place(&centred, dem2di_outline_point(shape, i % points, points));
+        inside -= dem2di_edge_held(p, q, box);
+        p = q;
+    }
+    double all = dem2di_mass_interpolated(shape, points).area * pose->scale * pose->scale;
+    return dem2di_clamp(inside / all, 0, 1);
+}
+
+/* Area of a particle inside a region. The region is taken about the particle's centre, and no
+   larger than its box, so that neither its size nor its distance costs digits. */
+static double dem2di_area_inside(const dem2d_world *world, int slot, const dem2d_box *region) {
+    const dem2di_body *body = &world->bodies[slot];
+    const dem2d_shape *shape = dem2di_shape_of(world, body);
+    dem2d_pose pose = dem2di_pose_of(world, world->before, slot), centred = pose;
+    double area = dem2di_body_area(world, body);
+    dem2d_box box, part;
+    centred.position = dem2di_vec(0, 0);
+    (void)dem2d_shape_aabb(shape, centred, &box);
+    part.lower.x = dem2di_max(box.lower.x, region->lower.x - pose.position.x);
+    part.lower.y = dem2di_max(box.lower.y, region->lower.y - pose.position.y);
+    part.upper.x = dem2di_min(box.upper.x, region->upper.x - pose.position.x);
+    part.upper.y = dem2di_min(box.upper.y, region->upper.y - pose.position.y);
+    if (!(part.lower.x < part.upper.x && part.lower.y < part.upper.y)) return 0;
+    if (part.lower.x == box.lower.x && part.lower.y == box.lower.y && part.upper.x == box.upper.x &&
+        part.upper.y == box.upper.y)
+        return area;
+    return area * dem2di_part_inside(shape, &pose, &part);
+}
+
+static dem2d_result dem2di_check_region(const dem2d_env *env, const dem2d_box *region) {
+    dem2d_result result = dem2di_check_vec(env, "region.lower", region->lower);
+    if (result == DEM2D_OK) result = dem2di_check_vec(env, "region.upper", region->upper);
+    if (result != DEM2D_OK) return result;
+    double width = region->upper.x - region->lower.x, height = region->upper.y - region->lower.y;
+    if (width > 0 && height > 0 && width * height > 0 && dem2di_finite(width * height))
+        return DEM2D_OK;
+    return dem2di_fail(env, DEM2D_OUT_OF_RANGE, -1, "region of %g by %g", width, height);
+}
+
+DEM2D_API dem2d_result dem2d_world_porosity(const dem2d_world *world, const dem2d_box *region,
                                             double *porosity) {
-    if (world == NULL || porosity == NULL) return DEM2D_NULL_ARGUMENT;
-    dem2d_packing packing;
-    dem2d_result result = dem2di_check_positive(&world->env, "area", area);
-    if (result == DEM2D_OK) result = dem2d_world_packing(world, &packing);
-    if (result == DEM2D_OK) *porosity = 1 - packing.solid_area / area;
-    return result;
+    if (world == NULL || region == NULL || porosity == NULL) return DEM2D_NULL_ARGUMENT;
+    dem2d_result result = dem2di_check_region(&world->env, region);
+    if (result != DEM2D_OK) return result;
+    double solid = 0;
+    for (int index = 0; index < world->name_count; index++)
+        if (world->names[index].slot >= 0)
+            solid += dem2di_area_inside(world, world->names[index].slot, region);
+    double width = region->upper.x - region->lower.x, height = region->upper.y - region->lower.y;
+    *porosity = 1 - solid / (width * height);
+    return DEM2D_OK;
+}
+
+/* --- fabric -------------------------------------------------------------------------------------
+ */
+
+/* A quantity f0 (1 + a cos 2 (t - t0)) has the mean of f n n over all directions t of
+   f0/2 (1 +- a/2) along its axes: the deviator q is f0 a/4. The number of contacts is one with
+   f0 = 1. A tangential f = -f0 a sin 2 (t - t0), along n turned by +90 degrees, t, has the
+   symmetric mean of f (t n + n t)/2 with
+       xx = -mean of f sin 2t/2 = f0 a/4 cos 2 t0 = -yy,   xy = mean of f cos 2t/2 = f0 a/4 sin 2 t0
+   which is q = f0 a/4 along t0 once more. */
+static dem2d_anisotropy dem2di_anisotropy(dem2di_tensor mean, double f0) {
+    dem2d_principal principal = dem2di_tensor_principal(mean);
+    dem2d_anisotropy none = {0, 0}, found;
+    found.coefficient = 4 * principal.q / f0;
+    found.direction = principal.angle;
+    return f0 > 0 && principal.q > 0 ? found : none;
+}
+
+/* cos 2 (t - t0) of a unit vector to an axis. */
+static double dem2di_cos_twice(dem2d_vec n, dem2d_rot axis) {
+    double along = n.x * axis.c + n.y * axis.s, across = n.y * axis.c - n.x * axis.s;
+    return (along - across) * (along + across);
+}
+
+/* Least relative number of contacts in a direction that means are corrected by: above a_c = 0.9
+   the second order foretells none or less somewhere, and the few contacts there would outweigh all
+   others. */
+#define DEM2DI_DENSITY_LEAST 0.1
+
+/* Means over contacts, with and without the correction for their number by direction. */
+typedef struct dem2di_fabric_sums {
+    int count;
+    double branch, force;
+    dem2di_tensor normals, branches, normal_forces, tangential_forces;
+} dem2di_fabric_sums;
+
+/* Sums with the density of contacts 1 + coefficient cos 2 (t - t0). */
+static dem2di_fabric_sums dem2di_fabric_sum(const dem2d_world *world, dem2d_anisotropy density) {
+    dem2di_fabric_sums sums;
+    dem2d_rot axis = dem2d_rot_make(density.direction);
+    dem2di_tour walk = dem2di_tour_start(false);
+    memset(&sums, 0, sizeof sums);
+    for (; dem2di_tour_next(world, &walk); sums.count++) {
+        const dem2di_link *link = &walk.link;
+        dem2d_vec n = link->normal;
+        double weight = 1 + density.coefficient * dem2di_cos_twice(n, axis);
+        double length = dem2di_dot(walk.branch, n);
+        weight = dem2di_max(weight, DEM2DI_DENSITY_LEAST);
+        sums.branch += length;
+        sums.force += link->force;
+        dem2di_tensor_add(&sums.normals, 1, n, n);
+        dem2di_tensor_add(&sums.branches, length / weight, n, n);
+        dem2di_tensor_add(&sums.normal_forces, link->force / weight, n, n);
+        dem2di_tensor_add(&sums.tangential_forces, link->shear / weight, n, dem2di_perp(n));
+    }
+    return sums;
+}
+
+/* Part of an anisotropy along an axis. */
+static double dem2di_anisotropy_along(dem2d_anisotropy a, dem2d_rot axis) {
+    dem2d_rot own = dem2d_rot_make(a.direction);
+    return a.coefficient * dem2di_cos_twice(dem2di_vec(own.c, own.s), axis);
+}
+
+DEM2D_API dem2d_result dem2d_world_fabric(const dem2d_world *world, dem2d_fabric *fabric) {
+    if (world == NULL || fabric == NULL) return DEM2D_NULL_ARGUMENT;
+    memset(fabric, 0, sizeof *fabric);
+    dem2di_fabric_sums sums = dem2di_fabric_sum(world, fabric->normals);
+    int count = fabric->contacts = sums.count;
+    if (count == 0) return DEM2D_OK;
+    fabric->xx = sums.normals.xx / count;
+    fabric->xy = sums.normals.xy / count;
+    fabric->yy = sums.normals.yy / count;
+    fabric->mean_branch = sums.branch / count;
+    fabric->mean_force = sums.force / count;
+    fabric->normals = dem2di_anisotropy(sums.normals, count);
+    fabric->deviator = fabric->normals.coefficient / 2;
+    sums = dem2di_fabric_sum(world, fabric->normals);
+    double force = sums.normal_forces.xx + sums.normal_forces.yy;
+    fabric->branches = dem2di_anisotropy(sums.branches, sums.branches.xx + sums.branches.yy);
+    fabric->normal_forces = dem2di_anisotropy(sums.normal_forces, force);
+    fabric->tangential_forces = dem2di_anisotropy(sums.tangential_forces, force);
+    dem2d_rot axis = dem2d_rot_make(fabric->normals.direction);
+    const dem2d_anisotropy parts[4] = {fabric->normals, fabric->branches, fabric->normal_forces,
+                                       fabric->tangential_forces};
+    for (int i = 0; i < 4; i++) fabric->stress_ratio += dem2di_anisotropy_along(parts[i], axis) / 2;
+    return DEM2D_OK;
+}
+
+/* --- histograms ---------------------------------------------------------------------------------
+ */
+
+/* The bin of a direction among those that share out a turn (or half a turn, and then of an axis).
+ */
+static int dem2di_bin(dem2d_vec direction, double turn, int bins) {
+    dem2d_rot q;
+    q.c = direction.x;
+    q.s = direction.y;
+    double angle = dem2d_rot_angle(q);
+    if (angle < 0) angle += turn;
+    if (angle >= turn) angle -= turn;
+    int bin = (int)(angle / turn * bins);
+    return bin < bins ? bin : bins - 1; /* -1e-20 plus a turn is a turn */
+}
+
+static void dem2di_bin_coordination(const dem2d_world *world, int bins, int *counts) {
+    for (int index = 0; index < world->name_count; index++) {
+        int slot = world->names[index].slot;
+        if (slot < 0) continue;
+        int contacts = dem2di_contacts_of(world, slot);
+        counts[contacts < bins ? contacts : bins - 1]++;
+    }
+}
+
+/* The axes of the templates come first: many particles share one. Zero for none. */
+static void dem2di_bin_orientation(const dem2d_world *world, int bins, dem2d_rot *axes,
+                                   int *counts) {
+    for (int t = 0; t < world->template_count; t++) {
+        double ratio = 1, angle = 0;
+        if (world->templates[t].shape != NULL)
+            angle = dem2di_axis(world->templates[t].shape, &ratio);
+        axes[t] = dem2d_rot_make(angle);
+        if (ratio == 1) axes[t].c = axes[t].s = 0;
+    }
+    for (int index = 0; index < world->name_count; index++) {
+        int slot = world->names[index].slot;
+        if (slot < 0) continue;
+        dem2d_rot axis = axes[world->bodies[slot].shape_index];
+        dem2d_pose pose = dem2di_pose_of(world, world->before, slot);
+        if (axis.c == 0 && axis.s == 0) continue;
+        dem2d_vec along = dem2di_turn(pose.rotation, dem2di_vec(axis.c, axis.s));
+        counts[dem2di_bin(along, DEM2DI_PI, bins)]++;
+    }
+}
+
+/* What a contact adds to its two bins. */
+static double dem2di_binned(const dem2di_tour *walk, dem2d_histogram kind) {
+    if (kind == DEM2D_HISTOGRAM_BRANCH) return dem2di_dot(walk->branch, walk->link.normal);
+    if (kind == DEM2D_HISTOGRAM_NORMAL_FORCE) return walk->link.force;
+    return walk->link.shear;
+}
+
+static void dem2di_bin_contacts(const dem2d_world *world, dem2d_histogram kind, int bins,
+                                int *counts, double *sums) {
+    dem2di_tour walk = dem2di_tour_start(false);
+    while (dem2di_tour_next(world, &walk)) {
+        const dem2d_vec normals[2] = {walk.link.normal, dem2di_negate(walk.link.normal)};
+        for (int i = 0; i < 2; i++) {
+            int bin = dem2di_bin(normals[i], 2 * DEM2DI_PI, bins);
+            counts[bin]++;
+            if (kind != DEM2D_HISTOGRAM_NORMAL) sums[bin] += dem2di_binned(&walk, kind);
+        }
+    }
+}
+
+DEM2D_API dem2d_result dem2d_world_histogram(const dem2d_world *world, dem2d_histogram kind,
+                                             int bins, double *values) {
+    if (world == NULL || values == NULL) return DEM2D_NULL_ARGUMENT;
+    const dem2d_env *env = &world->env;
+    if (!((int)kind >= 0 && kind < DEM2D_HISTOGRAM_COUNT))
+        return dem2di_fail(env, DEM2D_OUT_OF_RANGE, -1, "kind = %d", (int)kind);
+    if (bins < 1) return dem2di_fail(env, DEM2D_OUT_OF_RANGE, -1, "bins = %d", bins);
+    size_t room = (size_t)bins, templates = (size_t)world->template_count + 1;
+    int *counts = (int *)dem2di_allocate(env, room, sizeof *counts);
+    dem2d_rot *axes = (dem2d_rot *)dem2di_allocate(env, templates, sizeof *axes);
+    bool there = counts != NULL && axes != NULL;
+    if (there) {
+        memset(counts, 0, room * sizeof *counts);
+        for (int i = 0; i < bins; i++) values[i] = 0;
+        if (kind == DEM2D_HISTOGRAM_COORDINATION)
+            dem2di_bin_coordination(world, bins, counts);
+        else if (kind == DEM2D_HISTOGRAM_ORIENTATION)
+            dem2di_bin_orientation(world, bins, axes, counts);
+        else
+            dem2di_bin_contacts(world, kind, bins, counts, values);
+        for (int i = 0; i < bins; i++)
+            values[i] = kind <= DEM2D_HISTOGRAM_NORMAL ? counts[i]
+                        : counts[i] > 0                ? values[i] / counts[i]
+                                                       : 0;
+    }
+    dem2di_release(env, axes, templates, sizeof *axes);
+    dem2di_release(env, counts, room, sizeof *counts);
+    return there ? DEM2D_OK : dem2di_out_of_memory(world, "a histogram");
+}
+
+/* --- distance from rest -------------------------------------------------------------------------
+ */
+
+/* Mean of the half steps before and after the last force pass. */
+static dem2d_vec dem2di_velocity(const dem2d_world *world, int slot) {
+    return dem2di_scale(dem2di_add(world->before[slot].v, world->now[slot].v), 0.5);
+}
+
+/* Mean force of a contact, walls included; 0 without contacts. */
+static double dem2di_mean_contact_force(const dem2d_world *world) {
+    double sum = 0;
+    int count = 0;
+    for (int wall = 0; wall < 2; wall++) {
+        dem2di_tour walk = dem2di_tour_start(wall == 1);
+        for (; dem2di_tour_next(world, &walk); count++)
+            sum += dem2di_length(dem2di_link_force(&walk.link));
+    }
+    return count > 0 ? sum / count : 0;
+}
+
+static double dem2di_kinetic_ratio(const dem2d_world *world) {
+    dem2d_energy energy;
+    (void)dem2d_world_energy(world, &energy);
+    double kinetic = energy.translational + energy.rotational;
+    double springs = energy.normal + energy.tangential;
+    if (!(kinetic > 0)) return 0;
+    return springs > 0 ? kinetic / springs : HUGE_VAL;
+}
+
+DEM2D_API dem2d_result dem2d_world_equilibrium(const dem2d_world *world,
+                                               dem2d_equilibrium *equilibrium) {
+    if (world == NULL || equilibrium == NULL) return DEM2D_NULL_ARGUMENT;
+    double speeds = 0, most = 0, resultants = 0, force = dem2di_mean_contact_force(world);
+    int moving = 0, unbound = 0;
+    for (int index = 0; index < world->name_count; index++) {
+        int slot = world->names[index].slot;
+        if (slot < 0 || world->bodies[slot].motion == DEM2D_FIXED) continue;
+        double speed = dem2di_length(dem2di_velocity(world, slot));
+        speeds += speed;
+        most = dem2di_max(most, speed);
+        moving++;
+        if (world->bodies[slot].motion != DEM2D_FREE) continue;
+        double mass = dem2di_body_mass(world, &world->bodies[slot]);
+        dem2d_vec contacts = dem2di_load_of(world, slot).force;
+        resultants += dem2di_length(dem2di_along(contacts, mass, world->gravity));
+        unbound++;
+    }
+    equilibrium->mean_speed = moving > 0 ? speeds / moving : 0;
+    equilibrium->max_speed = most;
+    equilibrium->kinetic_ratio = dem2di_kinetic_ratio(world);
+    equilibrium->unbalanced = unbound > 0 && force > 0 ? resultants / unbound / force : 0;
+    return DEM2D_OK;
+}
+
+DEM2D_API dem2d_result dem2d_world_inertial_number(const dem2d_world *world, double strain_rate,
+                                                   double pressure, double *number) {
+    if (world == NULL || number == NULL) return DEM2D_NULL_ARGUMENT;
+    dem2d_result result = dem2di_check_finite(&world->env, "strain_rate", strain_rate);
+    if (result == DEM2D_OK) result = dem2di_check_positive(&world->env, "pressure", pressure);
+    if (result != DEM2D_OK) return result;
+    double diameters = 0, mass = 0, area = 0;
+    int count = 0;
+    for (int index = 0; index < world->name_count; index++) {
+        int slot = world->names[index].slot;
+        if (slot < 0) continue;
+        diameters += 2 * dem2di_equivalent(world, slot);
+        mass += dem2di_body_mass(world, &world->bodies[slot]);
+        area += dem2di_body_area(world, &world->bodies[slot]);
+        count++;
+    }
+    *number = 0;
+    if (count > 0) *number = fabs(strain_rate) * (diameters / count) * sqrt(mass / area / pressure);
+    return DEM2D_OK;
 }
 
 /* ============================================================================================
-   >>writers  Pictures
-   uses: config, math, memory, mass, shapes, world, measures
+   >>writers  Pictures, files for ParaView, histories
+   uses: config, math, memory, mass, shapes, law, motion, world, measures
    ============================================================================================ */
 
 /* Bytes on their way to a callback or a file, and whether all went well. */
@@ -11480,58 +12120,177 @@ typedef struct dem2di_writer {
     bool good;
 } dem2di_writer;
 
+static void dem2di_put_bytes(dem2di_writer *writer, const char *bytes, size_t count) {
+    if (!writer->good || count == 0) return;
+    if (writer->file != NULL)
+        writer->good = fwrite(bytes, 1, count, writer->file) == count;
+    else
+        writer->good = writer->write(writer->user, bytes, count);
+}
+
+/* Text as it is, of any length. */
+static void dem2di_put(dem2di_writer *writer, const char *text) {
+    dem2di_put_bytes(writer, text, strlen(text));
+}
+
+/* Short text with numbers in it. A locale may write them with a decimal comma, which becomes a
+   point: a comma that is meant goes through dem2di_put. */
 DEM2DI_PRINTF(2, 3)
 static void dem2di_print(dem2di_writer *writer, const char *format, ...) {
     char text[512];
-    if (!writer->good) return;
     va_list arguments;
     va_start(arguments, format);
     int length = vsnprintf(text, sizeof text, format, arguments);
     va_end(arguments);
-    for (int i = 0; i < length && i < (int)sizeof text; i++)
-        if (text[i] == ',') text[i] = '.'; /* a locale's decimal comma; no other is printed */
-    if (length < 0 || length >= (int)sizeof text)
+    if (length < 0 || length >= (int)sizeof text) {
         writer->good = false;
-    else if (writer->file != NULL)
-        writer->good = fwrite(text, 1, (size_t)length, writer->file) == (size_t)length;
-    else
-        writer->good = writer->write(writer->user, text, (size_t)length);
+        return;
+    }
+    for (int i = 0; i < length; i++)
+        if (text[i] == ',') text[i] = '.';
+    dem2di_put_bytes(writer, text, (size_t)length);
 }
+
+/* All digits of a number: it reads back as the same bits. */
+static void dem2di_put_number(dem2di_writer *writer, double value) {
+    dem2di_print(writer, "%.17g", value);
+}
+
+/* Ready to write to a callback or a file, of which one must be given. */
+static dem2d_result dem2di_writer_open(const dem2d_env *env, dem2d_write_fn *write, void *user,
+                                       const char *path, bool append, dem2di_writer *writer) {
+    if (path == NULL && write == NULL) return dem2di_fail_null(env, "path and write");
+    if (path != NULL && write != NULL)
+        return dem2di_fail(env, DEM2D_OUT_OF_RANGE, -1, "both path and write are given");
+    writer->write = write;
+    writer->user = user;
+    writer->file = path != NULL ? fopen(path, append ? "ab" : "wb") : NULL;
+    writer->good = path == NULL || writer->file != NULL;
+    return writer->good ? DEM2D_OK : dem2di_fail(env, DEM2D_IO, -1, "could not open %s", path);
+}
+
+static dem2d_result dem2di_writer_close(const dem2d_env *env, const char *path,
+                                        dem2di_writer *writer) {
+    if (writer->file != NULL && fclose(writer->file) != 0) writer->good = false;
+    if (writer->good) return DEM2D_OK;
+    if (path == NULL) return dem2di_fail(env, DEM2D_IO, -1, "the write callback failed");
+    return dem2di_fail(env, DEM2D_IO, -1, "could not write %s", path);
+}
+
+/* Points of an outline: 3 at least, 0 for the default. */
+static dem2d_result dem2di_check_outline_points(const dem2d_env *env, int points) {
+    if (points == 0 || points >= 3) return DEM2D_OK;
+    return dem2di_fail(env, DEM2D_OUT_OF_RANGE, -1, "outline_points = %d", points);
+}
+
+/* Points to draw a shape with: the corners of sharp polygons, `points` of all else. */
+static int dem2di_drawn_points(const dem2d_shape *shape, int points) {
+    if (shape->type == DEM2D_POLYGON && shape->rounding == 0) return shape->count;
+    return points == 0 ? 64 : points;
+}
+
+/* Slot of the next particle in the order of ids, or -1; `index` starts at 0. */
+static int dem2di_next_particle(const dem2d_world *world, int *index) {
+    while (*index < world->name_count) {
+        int slot = world->names[(*index)++].slot;
+        if (slot >= 0) return slot;
+    }
+    return -1;
+}
+
+static void dem2di_box_grow(dem2d_box *all, bool first, dem2d_vec lower, dem2d_vec upper) {
+    all->lower.x = first ? lower.x : dem2di_min(all->lower.x, lower.x);
+    all->lower.y = first ? lower.y : dem2di_min(all->lower.y, lower.y);
+    all->upper.x = first ? upper.x : dem2di_max(all->upper.x, upper.x);
+    all->upper.y = first ? upper.y : dem2di_max(all->upper.y, upper.y);
+}
+
+/* The box of all particles and segments with a margin of a twentieth of the larger side; a unit
+   square without any. */
+static dem2d_box dem2di_scene_box(const dem2d_world *world) {
+    dem2d_box all = {{0, 0}, {1, 1}};
+    bool first = true;
+    int index = 0;
+    for (int slot; (slot = dem2di_next_particle(world, &index)) >= 0; first = false) {
+        dem2d_box box;
+        dem2d_pose pose = dem2di_pose_of(world, world->before, slot);
+        (void)dem2d_shape_aabb(dem2di_shape_of(world, &world->bodies[slot]), pose, &box);
+        dem2di_box_grow(&all, first, box.lower, box.upper);
+    }
+    for (int j = 0; j < world->wall_count; j++) {
+        if (!world->walls[j].alive || !world->walls[j].desc.segment) continue;
+        dem2d_vec point = world->wall_before[j].point;
+        dem2d_vec end = dem2di_segment_end(&world->walls[j], point);
+        dem2di_box_grow(&all, first, point, point);
+        dem2di_box_grow(&all, false, end, end);
+        first = false;
+    }
+    dem2d_vec size = dem2di_sub(all.upper, all.lower);
+    double margin = dem2di_max(size.x, size.y) / 20;
+    all.lower = dem2di_sub(all.lower, dem2di_vec(margin, margin));
+    all.upper = dem2di_add(all.upper, dem2di_vec(margin, margin));
+    return all;
+}
+
+/* Narrow the part of a line from t[0] to t[1] to where start + t rate is within low and high. */
+static void dem2di_line_cut(double start, double rate, double low, double high, double t[2]) {
+    if (rate == 0) {
+        if (start < low || start > high) t[1] = t[0] - 1;
+        return;
+    }
+    double a = (low - start) / rate, b = (high - start) / rate;
+    t[0] = dem2di_max(t[0], dem2di_min(a, b));
+    t[1] = dem2di_min(t[1], dem2di_max(a, b));
+}
+
+/* The part of a wall's line inside a box. One that misses the box gets the part beside it, and
+   false. */
+static bool dem2di_wall_line(const dem2d_world *world, int j, const dem2d_box *box,
+                             dem2d_vec ends[2]) {
+    if (world->walls[j].desc.segment) {
+        ends[0] = world->wall_before[j].point;
+        ends[1] = dem2di_segment_end(&world->walls[j], ends[0]);
+        return true;
+    }
+    dem2d_vec along = dem2di_perp(world->walls[j].desc.normal);
+    dem2d_vec size = dem2di_sub(box->upper, box->lower);
+    dem2d_vec centre = dem2di_along(box->lower, 0.5, size);
+    dem2d_vec foot = world->wall_before[j].point; /* of the centre */
+    foot = dem2di_along(foot, dem2di_dot(dem2di_sub(centre, foot), along), along);
+    double reach = (size.x * fabs(along.x) + size.y * fabs(along.y)) / 2;
+    double cut[2] = {-reach, reach};
+    dem2di_line_cut(foot.x, along.x, box->lower.x, box->upper.x, cut);
+    dem2di_line_cut(foot.y, along.y, box->lower.y, box->upper.y, cut);
+    bool inside = cut[0] <= cut[1];
+    ends[0] = dem2di_along(foot, inside ? cut[0] : -reach, along);
+    ends[1] = dem2di_along(foot, inside ? cut[1] : reach, along);
+    return inside;
+}
+
+/* --- pictures -----------------------------------------------------------------------------------
+ */
 
 /* From world to picture coordinates: y down, pixels. */
 typedef struct dem2di_view {
-    dem2d_vec lower; /* world corner at the left of the picture's bottom */
-    double factor;   /* pixels per metre */
-    double width, height;
+    dem2d_box box;
+    double factor;        /* pixels per metre */
+    double width, height; /* of the box */
+    double strip;         /* height of what is below it, for the scale bar */
 } dem2di_view;
 
 static dem2d_vec dem2di_pixel(const dem2di_view *view, dem2d_vec p) {
-    return dem2di_vec((p.x - view->lower.x) * view->factor,
-                      view->height - (p.y - view->lower.y) * view->factor);
+    return dem2di_vec((p.x - view->box.lower.x) * view->factor,
+                      view->height - (p.y - view->box.lower.y) * view->factor);
 }
 
-/* The box of all particles, a tenth of the larger side as margin. */
 static dem2di_view dem2di_view_make(const dem2d_world *world, double width) {
-    dem2d_vec lower = dem2di_vec(0, 0), upper = dem2di_vec(1, 1);
-    bool first = true;
-    for (int index = 0; index < world->name_count; index++) {
-        int i = world->names[index].slot;
-        if (i < 0) continue;
-        dem2d_box box;
-        dem2d_pose pose = dem2di_pose_of(world, world->before, i);
-        (void)dem2d_shape_aabb(dem2di_shape_of(world, &world->bodies[i]), pose, &box);
-        lower.x = first ? box.lower.x : dem2di_min(lower.x, box.lower.x);
-        lower.y = first ? box.lower.y : dem2di_min(lower.y, box.lower.y);
-        upper.x = first ? box.upper.x : dem2di_max(upper.x, box.upper.x);
-        upper.y = first ? box.upper.y : dem2di_max(upper.y, box.upper.y);
-        first = false;
-    }
-    double margin = dem2di_max(upper.x - lower.x, upper.y - lower.y) / 20;
     dem2di_view view;
-    view.lower = dem2di_vec(lower.x - margin, lower.y - margin);
-    view.factor = width / (upper.x - lower.x + 2 * margin);
+    view.box = dem2di_scene_box(world);
+    dem2d_vec size = dem2di_sub(view.box.upper, view.box.lower);
+    view.factor = width / size.x;
     view.width = width;
-    view.height = view.factor * (upper.y - lower.y + 2 * margin);
+    view.height = view.factor * size.y;
+    view.strip = width / 16;
     return view;
 }
 
@@ -11548,7 +12307,7 @@ static void dem2di_draw_particle(const dem2d_world *world, const dem2di_view *vi
                      shape->a * pose.scale * view->factor, colour[shape->type]);
         return;
     }
-    if (shape->type == DEM2D_POLYGON && shape->rounding == 0) points = shape->count;
+    points = dem2di_drawn_points(shape, points);
     dem2di_print(writer, "<path d=\"");
     for (int k = 0; k < points; k++) {
         dem2d_vec p = dem2di_outline_point(shape, k, points);
@@ -11558,25 +12317,23 @@ static void dem2di_draw_particle(const dem2d_world *world, const dem2di_view *vi
     dem2di_print(writer, "Z\" fill=\"%s\"/>\n", colour[shape->type]);
 }
 
-/* The part of a wall's line that crosses the picture. */
-static void dem2di_draw_wall(const dem2d_world *world, const dem2di_view *view, int j,
-                             dem2di_writer *writer) {
-    dem2d_vec along = dem2di_perp(world->walls[j].desc.normal);
-    dem2d_vec centre =
-        dem2di_along(view->lower, 0.5 / view->factor, dem2di_vec(view->width, view->height));
-    dem2d_vec point = world->wall_before[j].point;
-    point = dem2di_along(point, dem2di_dot(dem2di_sub(centre, point), along), along);
-    double reach = (view->width + view->height) / view->factor; /* beyond every border */
-    dem2d_vec from = dem2di_along(point, -reach, along), to = dem2di_along(point, reach, along);
-    if (world->walls[j].desc.segment) {
-        from = world->wall_before[j].point;
-        to = dem2di_segment_end(&world->walls[j], from);
-    }
-    dem2d_vec p = dem2di_pixel(view, from), q = dem2di_pixel(view, to);
+static void dem2di_draw_line(dem2d_vec p, dem2d_vec q, double width, dem2di_writer *writer) {
     dem2di_print(writer,
-                 "<line x1=\"%.2f\" y1=\"%.2f\" x2=\"%.2f\" y2=\"%.2f\" stroke=\"#444\" "
-                 "stroke-width=\"2\"/>\n",
-                 p.x, p.y, q.x, q.y);
+                 "<line x1=\"%.2f\" y1=\"%.2f\" x2=\"%.2f\" y2=\"%.2f\" "
+                 "stroke-width=\"%.3f\"/>\n",
+                 p.x, p.y, q.x, q.y, width);
+}
+
+static void dem2di_draw_walls(const dem2d_world *world, const dem2di_view *view,
+                              dem2di_writer *writer) {
+    dem2di_print(writer, "<g stroke=\"#444\">\n");
+    for (int j = 0; j < world->wall_count; j++) {
+        dem2d_vec ends[2];
+        if (world->walls[j].alive && dem2di_wall_line(world, j, &view->box, ends))
+            dem2di_draw_line(dem2di_pixel(view, ends[0]), dem2di_pixel(view, ends[1]),
+                             view->width / 400, writer);
+    }
+    dem2di_print(writer, "</g>\n");
 }
 
 /* Force chains: from centre to centre (or wall contact point); the mean force is 1/400 of the
@@ -11594,34 +12351,56 @@ static void dem2di_draw_chains(const dem2d_world *world, const dem2di_view *view
         walk = dem2di_tour_start(wall == 1);
         while (dem2di_tour_next(world, &walk)) {
             dem2d_vec start = world->before[world->list.keys[walk.contact].a].x;
-            dem2d_vec p = dem2di_pixel(view, start);
-            dem2d_vec q = dem2di_pixel(view, dem2di_add(start, walk.branch));
-            dem2di_print(writer,
-                         "<line x1=\"%.2f\" y1=\"%.2f\" x2=\"%.2f\" y2=\"%.2f\" "
-                         "stroke-width=\"%.3f\"/>\n",
-                         p.x, p.y, q.x, q.y, walk.link.force * unit);
+            dem2d_vec end = dem2di_add(start, walk.branch);
+            dem2di_draw_line(dem2di_pixel(view, start), dem2di_pixel(view, end),
+                             walk.link.force * unit, writer);
         }
     }
     dem2di_print(writer, "</g>\n");
 }
 
+/* The greatest of 1, 2, 5, 10, .. times a power of ten that is not above a length; 0 if that is no
+   normal number. */
+static double dem2di_round_length(double length) {
+    double unit = 1;
+    if (!(length >= DBL_MIN && length <= DBL_MAX)) return 0;
+    while (unit > length) unit /= 10;
+    while (unit * 10 <= length) unit *= 10;
+    return unit * 5 <= length ? unit * 5 : unit * 2 <= length ? unit * 2 : unit;
+}
+
+/* Below the scene, where it hides nothing: a line between two ticks, and its length. */
+static void dem2di_draw_scale(const dem2di_view *view, dem2di_writer *writer) {
+    double metres = dem2di_round_length(0.3 * view->width / view->factor);
+    double tick = view->strip / 8, y = view->height + view->strip / 2, line = view->width / 400;
+    dem2d_vec left = dem2di_vec(view->width / 20, y);
+    dem2d_vec right = dem2di_vec(left.x + metres * view->factor, y), up = dem2di_vec(0, tick);
+    dem2di_print(writer, "<g stroke=\"#222\">\n");
+    dem2di_draw_line(left, right, line, writer);
+    dem2di_draw_line(dem2di_sub(left, up), dem2di_add(left, up), line, writer);
+    dem2di_draw_line(dem2di_sub(right, up), dem2di_add(right, up), line, writer);
+    dem2di_print(writer,
+                 "</g>\n<text x=\"%.2f\" y=\"%.2f\" font-family=\"sans-serif\" "
+                 "font-size=\"%.2f\" fill=\"#222\">%g m</text>\n",
+                 right.x + 2 * tick, y + view->strip / 8, view->strip / 2.5, metres);
+}
+
 static void dem2di_draw(const dem2d_world *world, const dem2d_svg_desc *desc,
                         dem2di_writer *writer) {
-    double width = desc->width == 0 ? 800 : desc->width;
-    int points = desc->outline_points == 0 ? 64 : desc->outline_points;
-    dem2di_view view = dem2di_view_make(world, width);
+    dem2di_view view = dem2di_view_make(world, desc->width == 0 ? 800 : desc->width);
+    double height = view.height + view.strip;
     dem2di_print(writer,
                  "<svg xmlns=\"http://www.w3.org/2000/svg\" width=\"%.0f\" height=\"%.0f\" "
                  "viewBox=\"0 0 %.2f %.2f\">\n<rect width=\"100%%\" height=\"100%%\" "
                  "fill=\"white\"/>\n<g stroke=\"#333\" stroke-width=\"%.3f\">\n",
-                 view.width, view.height, view.width, view.height, view.width / 1600);
-    for (int i = 0; i < world->name_count && writer->good; i++)
-        if (world->names[i].slot >= 0)
-            dem2di_draw_particle(world, &view, points, world->names[i].slot, writer);
+                 view.width, height, view.width, height, view.width / 1600);
+    int index = 0, slot;
+    while ((slot = dem2di_next_particle(world, &index)) >= 0 && writer->good)
+        dem2di_draw_particle(world, &view, desc->outline_points, slot, writer);
     dem2di_print(writer, "</g>\n");
-    for (int j = 0; j < world->wall_count; j++)
-        if (world->walls[j].alive) dem2di_draw_wall(world, &view, j, writer);
+    dem2di_draw_walls(world, &view, writer);
     if (desc->force_chains) dem2di_draw_chains(world, &view, writer);
+    dem2di_draw_scale(&view, writer);
     dem2di_print(writer, "</svg>\n");
 }
 
@@ -11629,23 +12408,431 @@ DEM2D_API dem2d_result dem2d_world_write_svg(const dem2d_world *world, const dem
                                              const char *path) {
     if (world == NULL || desc == NULL) return DEM2D_NULL_ARGUMENT;
     const dem2d_env *env = &world->env;
-    dem2d_result result = dem2di_check_not_negative(env, "width", desc->width);
-    if (result != DEM2D_OK) return result;
-    if (desc->outline_points < 0 || (desc->outline_points > 0 && desc->outline_points < 3))
-        return dem2di_fail(env, DEM2D_OUT_OF_RANGE, -1, "outline_points = %d",
-                           desc->outline_points);
-    if (path == NULL && desc->write == NULL) return dem2di_fail_null(env, "path and write");
-    if (path != NULL && desc->write != NULL)
-        return dem2di_fail(env, DEM2D_OUT_OF_RANGE, -1, "both path and write are given");
     dem2di_writer writer;
-    writer.write = desc->write;
-    writer.user = desc->user;
-    writer.file = path != NULL ? fopen(path, "w") : NULL;
-    writer.good = path == NULL || writer.file != NULL;
-    if (writer.good) dem2di_draw(world, desc, &writer);
-    if (writer.file != NULL && fclose(writer.file) != 0) writer.good = false;
-    if (writer.good) return DEM2D_OK;
-    return dem2di_fail(env, DEM2D_IO, -1, "could not write %s", path != NULL ? path : "picture");
+    dem2d_result result = dem2di_check_not_negative(env, "width", desc->width);
+    if (result == DEM2D_OK) result = dem2di_check_outline_points(env, desc->outline_points);
+    if (result == DEM2D_OK)
+        result = dem2di_writer_open(env, desc->write, desc->user, path, false, &writer);
+    if (result != DEM2D_OK) return result;
+    dem2di_draw(world, desc, &writer);
+    return dem2di_writer_close(env, path, &writer);
+}
+
+/* --- files for VTK ------------------------------------------------------------------------------
+ */
+
+/* An item of a .vtp file (VTK's cells): a particle, a contact or a wall, one after the other. */
+typedef struct dem2di_item {
+    dem2d_vtp_part part;
+    int outline_points;
+    dem2d_box box;    /* of the scene, for walls */
+    int index;        /* where it goes on, of particles and walls */
+    int slot;         /* of the particle, or number of the wall */
+    dem2di_tour walk; /* contacts of particles, then with walls */
+} dem2di_item;
+
+static dem2di_item dem2di_item_start(const dem2d_world *world, const dem2d_vtp_desc *desc) {
+    dem2di_item item;
+    memset(&item, 0, sizeof item);
+    item.part = desc->part;
+    item.outline_points = desc->outline_points;
+    if (desc->part == DEM2D_VTP_WALLS) item.box = dem2di_scene_box(world);
+    item.walk = dem2di_tour_start(false);
+    return item;
+}
+
+static bool dem2di_item_next(const dem2d_world *world, dem2di_item *item) {
+    if (item->part == DEM2D_VTP_PARTICLES) {
+        item->slot = dem2di_next_particle(world, &item->index);
+        return item->slot >= 0;
+    }
+    if (item->part == DEM2D_VTP_CONTACTS) {
+        if (dem2di_tour_next(world, &item->walk)) return true;
+        if (item->walk.walls) return false;
+        item->walk = dem2di_tour_start(true);
+        return dem2di_tour_next(world, &item->walk);
+    }
+    for (; item->index < world->wall_count; item->index++) {
+        if (!world->walls[item->index].alive) continue;
+        item->slot = item->index++;
+        return true;
+    }
+    return false;
+}
+
+static int dem2di_item_points(const dem2d_world *world, const dem2di_item *item) {
+    if (item->part != DEM2D_VTP_PARTICLES) return 2;
+    return dem2di_drawn_points(dem2di_shape_of(world, &world->bodies[item->slot]),
+                               item->outline_points);
+}
+
+/* An array of what cells have: whole numbers of 32 bits, or doubles. */
+typedef struct dem2di_array {
+    const char *name; /* NULL after the last */
+    int components;
+    bool whole;
+} dem2di_array;
+
+/* Of all arrays of a part together, in their order. */
+#define DEM2DI_ITEM_NUMBERS 21
+
+static const dem2di_array *dem2di_arrays_of(dem2d_vtp_part part) {
+    static const dem2di_array particles[] = {{"id", 1, true},
+                                             {"type", 1, true},
+                                             {"material", 1, true},
+                                             {"motion", 1, true},
+                                             {"contacts", 1, true},
+                                             {"velocity", 3, false},
+                                             {"angular_velocity", 1, false},
+                                             {"angle", 1, false},
+                                             {"mass", 1, false},
+                                             {"radius", 1, false},
+                                             {"stress", 9, false},
+                                             {NULL, 0, false}};
+    static const dem2di_array contacts[] = {{"a", 1, true},
+                                            {"b", 1, true},
+                                            {"wall", 1, true},
+                                            {"points", 1, true},
+                                            {"normal", 3, false},
+                                            {"force", 3, false},
+                                            {"position", 3, false},
+                                            {"normal_force", 1, false},
+                                            {"tangential_force", 1, false},
+                                            {"depth", 1, false},
+                                            {NULL, 0, false}};
+    static const dem2di_array walls[] = {{"id", 1, true},        {"mode", 1, true},
+                                         {"velocity", 3, false}, {"force", 3, false},
+                                         {"stress", 1, false},   {NULL, 0, false}};
+    return part == DEM2D_VTP_PARTICLES ? particles : part == DEM2D_VTP_CONTACTS ? contacts : walls;
+}
+
+static void dem2di_particle_numbers(const dem2d_world *world, int slot, double *numbers) {
+    const dem2di_body *body = &world->bodies[slot];
+    const dem2di_state *before = &world->before[slot], *now = &world->now[slot];
+    dem2d_vec v = dem2di_velocity(world, slot);
+    dem2d_stress stress = dem2di_particle_stress(world, slot);
+    const double all[] = {(double)body->index,
+                          (double)dem2di_shape_of(world, body)->type,
+                          (double)body->material,
+                          (double)body->motion,
+                          (double)dem2di_contacts_of(world, slot),
+                          v.x,
+                          v.y,
+                          0,
+                          (before->w + now->w) / 2,
+                          dem2d_rot_angle(dem2di_pose_of(world, world->before, slot).rotation),
+                          dem2di_body_mass(world, body),
+                          dem2di_equivalent(world, slot),
+                          stress.xx,
+                          stress.xy,
+                          0,
+                          stress.yx,
+                          stress.yy,
+                          0,
+                          0,
+                          0,
+                          0};
+    memcpy(numbers, all, sizeof all);
+}
+
+static void dem2di_contact_numbers(const dem2d_world *world, const dem2di_tour *walk,
+                                   double *numbers) {
+    dem2d_contact_info info = dem2di_contact_of(world, walk);
+    dem2d_vec force = dem2di_link_force(&walk->link);
+    const double all[] = {(double)info.a.index,
+                          walk->walls ? -1 : (double)info.b.index,
+                          walk->walls ? (double)info.wall.index : -1,
+                          (double)info.points,
+                          info.normal.x,
+                          info.normal.y,
+                          0,
+                          force.x,
+                          force.y,
+                          0,
+                          info.point.x,
+                          info.point.y,
+                          0,
+                          info.normal_force,
+                          info.tangential_force,
+                          info.depth};
+    memcpy(numbers, all, sizeof all);
+}
+
+static void dem2di_wall_numbers(const dem2d_world *world, int j, double *numbers) {
+    dem2d_wall_id id;
+    dem2d_wall_info info;
+    id.index = (uint32_t)j;
+    id.generation = world->walls[j].generation;
+    (void)dem2d_world_get_wall(world, id, &info);
+    dem2d_vec v = dem2di_add(world->wall_before[j].velocity, world->wall_now[j].velocity);
+    const double all[] = {(double)j,    (double)info.mode, v.x / 2, v.y / 2,    0,
+                          info.force.x, info.force.y,      0,       info.stress};
+    memcpy(numbers, all, sizeof all);
+}
+
+static void dem2di_item_numbers(const dem2d_world *world, const dem2di_item *item,
+                                double numbers[DEM2DI_ITEM_NUMBERS]) {
+    if (item->part == DEM2D_VTP_PARTICLES)
+        dem2di_particle_numbers(world, item->slot, numbers);
+    else if (item->part == DEM2D_VTP_CONTACTS)
+        dem2di_contact_numbers(world, &item->walk, numbers);
+    else
+        dem2di_wall_numbers(world, item->slot, numbers);
+}
+
+/* Doubles of one item or point. Those too small to be normal become 0: some readers stop there. */
+static void dem2di_vtp_doubles(dem2di_writer *writer, const double *numbers, int count) {
+    for (int k = 0; k < count; k++) {
+        if (k > 0) dem2di_put(writer, " ");
+        dem2di_put_number(writer, fabs(numbers[k]) >= DBL_MIN ? numbers[k] : 0);
+    }
+    dem2di_put(writer, "\n");
+}
+
+static void dem2di_vtp_point(dem2di_writer *writer, dem2d_vec p) {
+    const double numbers[3] = {p.x, p.y, 0};
+    dem2di_vtp_doubles(writer, numbers, 3);
+}
+
+static void dem2di_item_put_points(const dem2d_world *world, const dem2di_item *item,
+                                   dem2di_writer *writer) {
+    dem2d_vec ends[2];
+    if (item->part == DEM2D_VTP_PARTICLES) {
+        const dem2d_shape *shape = dem2di_shape_of(world, &world->bodies[item->slot]);
+        dem2d_pose pose = dem2di_pose_of(world, world->before, item->slot);
+        int points = dem2di_item_points(world, item);
+        for (int i = 0; i < points; i++)
+            dem2di_vtp_point(writer, dem2di_place(&pose, dem2di_outline_point(shape, i, points)));
+        return;
+    }
+    if (item->part == DEM2D_VTP_CONTACTS) {
+        ends[0] = world->before[world->list.keys[item->walk.contact].a].x;
+        ends[1] = dem2di_add(ends[0], item->walk.branch);
+    } else {
+        (void)dem2di_wall_line(world, item->slot, &item->box, ends);
+    }
+    for (int i = 0; i < 2; i++) dem2di_vtp_point(writer, ends[i]);
+}
+
+static void dem2di_vtp_tag(dem2di_writer *writer, const char *type, const char *name,
+                           int components) {
+    dem2di_print(writer,
+                 "<DataArray type=\"%s\" Name=\"%s\" NumberOfComponents=\"%d\" "
+                 "format=\"ascii\">\n",
+                 type, name, components);
+}
+
+static void dem2di_vtp_cell_data(const dem2d_world *world, const dem2d_vtp_desc *desc,
+                                 dem2di_writer *writer) {
+    double numbers[DEM2DI_ITEM_NUMBERS];
+    int first = 0; /* of the array's among the numbers of an item */
+    dem2di_put(writer, "<CellData>\n");
+    for (const dem2di_array *array = dem2di_arrays_of(desc->part); array->name != NULL; array++) {
+        dem2di_item item = dem2di_item_start(world, desc);
+        dem2di_vtp_tag(writer, array->whole ? "Int32" : "Float64", array->name, array->components);
+        while (dem2di_item_next(world, &item)) {
+            dem2di_item_numbers(world, &item, numbers);
+            if (array->whole)
+                dem2di_print(writer, "%d\n", (int)numbers[first]);
+            else
+                dem2di_vtp_doubles(writer, numbers + first, array->components);
+        }
+        dem2di_put(writer, "</DataArray>\n");
+        first += array->components;
+    }
+    dem2di_put(writer, "</CellData>\n");
+}
+
+/* Points of all items, one after the other, and the cells that join those of each. */
+static void dem2di_vtp_cells(const dem2d_world *world, const dem2d_vtp_desc *desc, int64_t points,
+                             dem2di_writer *writer) {
+    const char *kind = desc->part == DEM2D_VTP_PARTICLES ? "Polys" : "Lines";
+    dem2di_item item = dem2di_item_start(world, desc);
+    int64_t end = 0;
+    dem2di_put(writer, "<Points>\n");
+    dem2di_vtp_tag(writer, "Float64", "Points", 3);
+    while (dem2di_item_next(world, &item)) dem2di_item_put_points(world, &item, writer);
+    dem2di_print(writer, "</DataArray>\n</Points>\n<%s>\n", kind);
+    dem2di_vtp_tag(writer, "Int64", "connectivity", 1);
+    for (int64_t i = 0; i < points; i++) dem2di_print(writer, "%lld\n", (long long)i);
+    dem2di_put(writer, "</DataArray>\n");
+    dem2di_vtp_tag(writer, "Int64", "offsets", 1);
+    for (item = dem2di_item_start(world, desc); dem2di_item_next(world, &item);) {
+        end += dem2di_item_points(world, &item);
+        dem2di_print(writer, "%lld\n", (long long)end);
+    }
+    dem2di_print(writer, "</DataArray>\n</%s>\n", kind);
+}
+
+static void dem2di_vtp(const dem2d_world *world, const dem2d_vtp_desc *desc,
+                       dem2di_writer *writer) {
+    dem2di_item item = dem2di_item_start(world, desc);
+    int cells = 0;
+    int64_t points = 0;
+    for (; dem2di_item_next(world, &item); cells++) points += dem2di_item_points(world, &item);
+    bool lines = desc->part != DEM2D_VTP_PARTICLES;
+    dem2di_put(writer, "<?xml version=\"1.0\"?>\n<VTKFile type=\"PolyData\" version=\"1.0\" "
+                       "byte_order=\"LittleEndian\">\n<PolyData>\n");
+    dem2di_print(writer,
+                 "<Piece NumberOfPoints=\"%lld\" NumberOfVerts=\"0\" NumberOfLines=\"%d\" "
+                 "NumberOfStrips=\"0\" NumberOfPolys=\"%d\">\n",
+                 (long long)points, lines ? cells : 0, lines ? 0 : cells);
+    dem2di_vtp_cell_data(world, desc, writer);
+    dem2di_vtp_cells(world, desc, points, writer);
+    dem2di_put(writer, "</Piece>\n</PolyData>\n</VTKFile>\n");
+}
+
+DEM2D_API dem2d_result dem2d_world_write_vtp(const dem2d_world *world, const dem2d_vtp_desc *desc,
+                                             const char *path) {
+    if (world == NULL || desc == NULL) return DEM2D_NULL_ARGUMENT;
+    const dem2d_env *env = &world->env;
+    dem2di_writer writer;
+    if (!((int)desc->part >= 0 && desc->part < DEM2D_VTP_PART_COUNT))
+        return dem2di_fail(env, DEM2D_OUT_OF_RANGE, -1, "part = %d", (int)desc->part);
+    dem2d_result result = dem2di_check_outline_points(env, desc->outline_points);
+    if (result == DEM2D_OK)
+        result = dem2di_writer_open(env, desc->write, desc->user, path, false, &writer);
+    if (result != DEM2D_OK) return result;
+    dem2di_vtp(world, desc, &writer);
+    return dem2di_writer_close(env, path, &writer);
+}
+
+/* Text as the value of an attribute. */
+static void dem2di_put_escaped(dem2di_writer *writer, const char *text) {
+    while (*text != '\0') {
+        size_t plain = strcspn(text, "&<>\"'");
+        dem2di_put_bytes(writer, text, plain);
+        text += plain;
+        if (*text == '\0') return;
+        dem2di_put(writer, *text == '&'   ? "&amp;"
+                           : *text == '<' ? "&lt;"
+                           : *text == '>' ? "&gt;"
+                           : *text == '"' ? "&quot;"
+                                          : "&apos;");
+        text++;
+    }
+}
+
+/* Values of a caller that belong to names: there, finite; names there, without unwanted bytes. */
+static dem2d_result dem2di_check_named(const dem2d_env *env, const char *const *names,
+                                       const char *what, const double *values, const char *of,
+                                       int count, const char *unwanted) {
+    dem2d_result result = dem2di_check_count(env, "count", count);
+    if (result != DEM2D_OK || count == 0) return result;
+    if (names == NULL) return dem2di_fail_null(env, what);
+    if (values == NULL) return dem2di_fail_null(env, of);
+    for (int i = 0; i < count; i++) {
+        if (names[i] == NULL)
+            return dem2di_fail(env, DEM2D_NULL_ARGUMENT, i, "%s[%d] is NULL", what, i);
+        if (names[i][strcspn(names[i], unwanted)] != '\0')
+            return dem2di_fail(env, DEM2D_OUT_OF_RANGE, i, "%s[%d] = %s", what, i, names[i]);
+        if (!dem2di_finite(values[i]))
+            return dem2di_fail(env, DEM2D_NOT_FINITE, i, "%s[%d] = %g is not finite", of, i,
+                               values[i]);
+    }
+    return DEM2D_OK;
+}
+
+/* Bytes that XML has no place for. */
+#define DEM2DI_CONTROL                                                 \
+    "\001\002\003\004\005\006\007\010\011\012\013\014\015\016\017\020" \
+    "\021\022\023\024\025\026\027\030\031\032\033\034\035\036\037"
+
+DEM2D_API dem2d_result dem2d_pvd_write(const dem2d_env *env, const dem2d_pvd_desc *desc,
+                                       const char *path) {
+    dem2di_writer writer;
+    if (desc == NULL) return dem2di_fail_null(env, "desc");
+    dem2d_result result = dem2di_check_named(env, desc->files, "files", desc->times, "times",
+                                             desc->count, DEM2DI_CONTROL);
+    if (result == DEM2D_OK)
+        result = dem2di_writer_open(env, desc->write, desc->user, path, false, &writer);
+    if (result != DEM2D_OK) return result;
+    dem2di_put(&writer, "<?xml version=\"1.0\"?>\n<VTKFile type=\"Collection\" version=\"0.1\" "
+                        "byte_order=\"LittleEndian\">\n<Collection>\n");
+    for (int i = 0; i < desc->count; i++) {
+        dem2di_put(&writer, "<DataSet timestep=\"");
+        dem2di_put_number(&writer, desc->times[i]);
+        dem2di_put(&writer, "\" group=\"\" part=\"0\" file=\"");
+        dem2di_put_escaped(&writer, desc->files[i]);
+        dem2di_put(&writer, "\"/>\n");
+    }
+    dem2di_put(&writer, "</Collection>\n</VTKFile>\n");
+    return dem2di_writer_close(env, path, &writer);
+}
+
+/* --- histories ----------------------------------------------------------------------------------
+ */
+
+#define DEM2DI_CSV_COLUMNS 17
+
+static void dem2di_csv_values(const dem2d_world *world, double values[DEM2DI_CSV_COLUMNS]) {
+    dem2d_energy energy;
+    dem2d_equilibrium rest;
+    dem2d_packing packing;
+    dem2d_stats stats;
+    (void)dem2d_world_energy(world, &energy);
+    (void)dem2d_world_equilibrium(world, &rest);
+    (void)dem2d_world_packing(world, &packing);
+    (void)dem2d_world_stats(world, &stats);
+    const double all[DEM2DI_CSV_COLUMNS] = {(double)stats.steps,
+                                            (double)stats.steps * world->time_step,
+                                            energy.translational,
+                                            energy.rotational,
+                                            energy.normal,
+                                            energy.tangential,
+                                            energy.potential,
+                                            rest.kinetic_ratio,
+                                            rest.mean_speed,
+                                            rest.max_speed,
+                                            rest.unbalanced,
+                                            packing.coordination,
+                                            packing.coordination_loaded,
+                                            (double)packing.rattlers,
+                                            (double)stats.contacts,
+                                            (double)stats.wall_contacts,
+                                            packing.max_overlap};
+    memcpy(values, all, sizeof all);
+}
+
+static void dem2di_csv_header(const dem2d_csv_desc *desc, dem2di_writer *writer) {
+    dem2di_put(writer, "step,time,translational,rotational,normal,tangential,potential,"
+                       "kinetic_ratio,mean_speed,max_speed,unbalanced,coordination,"
+                       "coordination_loaded,rattlers,contacts,wall_contacts,max_overlap");
+    for (int i = 0; i < desc->count; i++) {
+        dem2di_put(writer, ",");
+        dem2di_put(writer, desc->names[i]);
+    }
+    dem2di_put(writer, "\n");
+}
+
+static void dem2di_csv_row(const dem2d_world *world, const dem2d_csv_desc *desc,
+                           dem2di_writer *writer) {
+    double values[DEM2DI_CSV_COLUMNS];
+    dem2di_csv_values(world, values);
+    for (int i = 0; i < DEM2DI_CSV_COLUMNS; i++) {
+        if (i > 0) dem2di_put(writer, ",");
+        dem2di_put_number(writer, values[i]);
+    }
+    for (int i = 0; i < desc->count; i++) {
+        dem2di_put(writer, ",");
+        dem2di_put_number(writer, desc->values[i]);
+    }
+    dem2di_put(writer, "\n");
+}
+
+DEM2D_API dem2d_result dem2d_world_write_csv(const dem2d_world *world, const dem2d_csv_desc *desc,
+                                             const char *path) {
+    if (world == NULL || desc == NULL) return DEM2D_NULL_ARGUMENT;
+    const dem2d_env *env = &world->env;
+    dem2di_writer writer;
+    dem2d_result result = dem2di_check_named(env, desc->names, "names", desc->values, "values",
+                                             desc->count, ",\"\r\n");
+    if (result == DEM2D_OK)
+        result = dem2di_writer_open(env, desc->write, desc->user, path, desc->append, &writer);
+    if (result != DEM2D_OK) return result;
+    if (!desc->append) dem2di_csv_header(desc, &writer);
+    dem2di_csv_row(world, desc, &writer);
+    return dem2di_writer_close(env, path, &writer);
 }
 
 #ifdef __cplusplus

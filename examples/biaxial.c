@@ -205,8 +205,8 @@ static reading read_walls(const job *j) {
     r.lateral = 0.5 * (r.stress[LEFT] + r.stress[RIGHT]);
     if (r.axial + r.lateral > 0) r.ratio = (r.axial - r.lateral) / (r.axial + r.lateral);
     if (j->height0 > 0) {
-        r.strain = -log_near_one(r.height / j->height0);
-        r.volume_strain = r.strain - log_near_one(r.width / j->width0);
+        r.strain = dem2d_strain(r.height, j->height0);
+        r.volume_strain = r.strain + dem2d_strain(r.width, j->width0);
     }
     return r;
 }

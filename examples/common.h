@@ -154,7 +154,7 @@ static inline int parse_name(const char *option, const char *text, const char *c
     fail(STATUS_BAD_INPUT, "%s %s: expected one of %s", option, text, all);
 }
 
-/* ---- clock, random numbers, logarithm ---- */
+/* ---- clock, random numbers ---- */
 
 /* Seconds on a clock that never jumps; for progress and speed only. */
 static inline double clock_seconds(void) {
@@ -180,18 +180,6 @@ static inline double random_between(uint64_t *state, double low, double high) {
 /* Uniform in 0 .. count - 1. */
 static inline int random_below(uint64_t *state, int count) {
     return (int)(random_bits(state) % (uint64_t)count);
-}
-
-/* Natural logarithm of x > 0 near 1: ln x = 2 (z + z^3/3 + z^5/5 + ...), z = (x - 1)/(x + 1).
-   Not libm's, whose last bit depends on the system. */
-static inline double log_near_one(double x) {
-    const double z = (x - 1) / (x + 1);
-    double power = z, sum = z;
-    for (int n = 3; n < 400 && fabs(power) > 1e-18 * fabs(sum); n += 2) {
-        power *= z * z;
-        sum += power / n;
-    }
-    return 2 * sum;
 }
 
 /* ---- files: names, directories, writing aside ---- */

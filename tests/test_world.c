@@ -1529,14 +1529,18 @@ static void test_porosity(void **state) {
     (void)state;
     const dem2d_world_desc desc = basic_desc();
     const scene s = make_scene(&desc, &stone);
+    const dem2d_box region = {{-0.1, -0.2}, {0.15, 0.2}}, flat = {{0, 0}, {1, 0}};
+    const dem2d_box endless = {{0, 0}, {1, NAN}};
     double porosity = -7;
     add_grain(&s, add_disc(s.world, 0.1), 0, 0);
-    assert_ok(dem2d_world_porosity(s.world, 0.1, &porosity));
+    assert_result(dem2d_world_porosity(s.world, &flat, &porosity), DEM2D_OUT_OF_RANGE);
+    assert_result(dem2d_world_porosity(s.world, &endless, &porosity), DEM2D_NOT_FINITE);
+    assert_result(dem2d_world_porosity(NULL, &region, &porosity), DEM2D_NULL_ARGUMENT);
+    assert_result(dem2d_world_porosity(s.world, NULL, &porosity), DEM2D_NULL_ARGUMENT);
+    assert_result(dem2d_world_porosity(s.world, &region, NULL), DEM2D_NULL_ARGUMENT);
+    assert_true(porosity == -7);
+    assert_ok(dem2d_world_porosity(s.world, &region, &porosity));
     assert_near(porosity, 1 - 0.1 * acosl(-1), 1e-14);
-    assert_result(dem2d_world_porosity(s.world, 0, &porosity), DEM2D_OUT_OF_RANGE);
-    assert_result(dem2d_world_porosity(s.world, NAN, &porosity), DEM2D_NOT_FINITE);
-    assert_result(dem2d_world_porosity(NULL, 1, &porosity), DEM2D_NULL_ARGUMENT);
-    assert_result(dem2d_world_porosity(s.world, 1, NULL), DEM2D_NULL_ARGUMENT);
     dem2d_world_destroy(s.world);
 }
 
