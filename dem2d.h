@@ -5048,7 +5048,8 @@ DEM2D_API dem2d_result dem2d_bezier_fit(const dem2d_env *env, const dem2d_vec *p
     dem2d_result result = dem2di_outline_make(env, points, count, &outline);
     if (result != DEM2D_OK) return result;
     result = dem2di_bezier_fit(env, &outline, arcs, NULL, control, &iterations);
-    for (int i = 0; i < 3 * arcs; i++) control[i] = dem2di_add(control[i], outline.centre);
+    for (int i = 0; i < 3 * arcs && result == DEM2D_OK; i++)
+        control[i] = dem2di_add(control[i], outline.centre);
     dem2di_outline_release(env, &outline);
     return result;
 }
