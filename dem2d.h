@@ -5674,7 +5674,7 @@ DEM2D_API dem2d_result dem2d_radial_compare(const dem2d_env *env, const dem2d_ve
     dem2d_result result = dem2di_check_points(env, "points", points, count, 3);
     if (result == DEM2D_OK) result = dem2d_polygon_mass(points, count, &mass);
     if (result != DEM2D_OK) return result;
-    if (order < 0 || 2 * order >= rays)
+    if (order < 0 || order > (rays - 1) / 2)
         return dem2di_fail(env, DEM2D_OUT_OF_RANGE, order, "order = %d", order);
     dem2d_vec *fitted = (dem2d_vec *)dem2di_allocate(env, 2 * (size_t)rays, sizeof *fitted);
     if (fitted == NULL) return dem2di_fail(env, DEM2D_OUT_OF_MEMORY, -1, "radial series");

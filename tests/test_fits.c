@@ -1010,6 +1010,7 @@ static void radial_series_compares(void **state) {
     assert_result(dem2d_radial_compare(NULL, NULL, 4, 4, &d), DEM2D_NULL_ARGUMENT);
     assert_result(dem2d_radial_compare(NULL, o->p, 4, 4, NULL), DEM2D_NULL_ARGUMENT);
     assert_result(dem2d_radial_compare(NULL, o->p, 4, -1, &d), DEM2D_OUT_OF_RANGE);
+    assert_result(dem2d_radial_compare(NULL, o->p, 4, 0x7fffffff, &d), DEM2D_OUT_OF_RANGE);
 }
 
 /* --- virtual grains --------------------------------------------------------------------------- */
