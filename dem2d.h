@@ -4478,14 +4478,15 @@ DEM2D_API dem2d_result dem2d_fourier_reduce(double *a, double *b, int order,
     if (result != DEM2D_OK) return result;
     if (desc == NULL) return DEM2D_NULL_ARGUMENT;
     double factor = desc->factor == 0 ? 0.9 : desc->factor;
-    double tolerance = (desc->tolerance == 0 ? 1e-6 : desc->tolerance) * a[0];
+    double tolerance = desc->tolerance == 0 ? 1e-6 : desc->tolerance;
     if (!dem2di_finite(factor) || !dem2di_finite(tolerance)) return DEM2D_NOT_FINITE;
     if (!(factor > 0 && factor < 1) || tolerance < 0 || (int)desc->test < 0 ||
         desc->test > DEM2D_NO_TEST)
         return DEM2D_OUT_OF_RANGE;
     int done = 0, n = order;
+    double least = tolerance * a[0];
     while (!dem2di_passes(a, b, n, desc->test)) {
-        while (n > 1 && dem2di_length(dem2di_vec(a[n], b[n])) <= tolerance) {
+        while (n > 1 && dem2di_length(dem2di_vec(a[n], b[n])) <= least) {
             a[n] = b[n] = 0;
             n--;
         }

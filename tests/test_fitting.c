@@ -318,6 +318,11 @@ static void reduction_options(void **state) {
     for (int i = 0; i < COUNT_OF(bad); i++)
         assert_result(dem2d_fourier_reduce(c, d, 8, &bad[i], &count),
                       i < 5 ? DEM2D_OUT_OF_RANGE : DEM2D_NOT_FINITE);
+    static const dem2d_reduction_desc wide = {DEM2D_NO_TEST, 0, 1.7e308}; /* of a0, above 1 */
+    const double wider[3] = {2, 0, 0};
+    memcpy(c, wider, sizeof wider);
+    assert_ok(dem2d_fourier_reduce(c, d, 2, &wide, NULL));
+    memcpy(c, a, sizeof a);
     assert_result(dem2d_fourier_reduce(c, d, -1, &zero, NULL), DEM2D_OUT_OF_RANGE);
     assert_result(dem2d_fourier_reduce(NULL, d, 8, &zero, NULL), DEM2D_NULL_ARGUMENT);
     assert_result(dem2d_fourier_reduce(c, NULL, 8, &zero, NULL), DEM2D_NULL_ARGUMENT);
