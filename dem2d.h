@@ -9614,7 +9614,7 @@ static bool dem2di_arrange(dem2d_world *world) {
     if (world->plan.turns && !dem2di_group_reserve(world, DEM2DI_TRAVELS, world->body_count, false))
         return false;
     dem2di_run(world, DEM2D_PHASE_LIST, 1, dem2di_arrange_task, world);
-    dem2di_incident_make(world);
+    if (world->list.incident != NULL) dem2di_incident_make(world); /* there is no list at first */
     return true;
 }
 
