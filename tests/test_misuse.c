@@ -1,0 +1,674 @@
+/* Wrong use of the whole public API: every pointer NULL, every number not finite or out of its
+   range, every id stale, calls in the wrong order. Each is answered by the result that the table of
+   api_calls.h names; outputs, inputs and the world stay as they were, to the bit. */
+#define DEM2D_IMPLEMENTATION
+#include "dem2d.h"
+#include "testing.h"
+#include "fingerprint.h"
+#include "api_calls.h"
+
+#include <float.h>
+
+/* --- wrong values ---------------------------------------------------------------------------- */
+
+/* What stands in the place of a good value, and what must come of it. */
+typedef struct wrong {
+    unsigned char bytes[sizeof(dem2d_pose)];
+    size_t size;
+    dem2d_result result; /* OK: nothing is wrong with it */
+    bool logged;         /* the name of the field is in the log, if there is one */
+} wrong;
+
+enum { WRONG_MOST = 32 };
+
+typedef struct wrongs {
+    wrong list[WRONG_MOST];
+    int count;
+} wrongs;
+
+static void add(wrongs *w, const void *value, size_t size, dem2d_result result, bool logged) {
+    assert_true(w->count < WRONG_MOST);
+    wrong *one = &w->list[w->count++];
+    memset(one, 0, sizeof *one);
+    memcpy(one->bytes, value, size);
+    one->size = size, one->result = result, one->logged = logged;
+}
+
+static void add_number(wrongs *w, double value, dem2d_result result) {
+    add(w, &value, sizeof value, result, true);
+}
+
+static void add_vec(wrongs *w, double x, double y, dem2d_result result) {
+    const dem2d_vec value = {x, y};
+    add(w, &value, sizeof value, result, true);
+}
+
+static void add_pose(wrongs *w, double x, double c, double s, double scale, dem2d_result result) {
+    dem2d_pose value = {{x, 0.2}, {c, s}, scale};
+    add(w, &value, sizeof value, result, false);
+}
+
+static void add_int(wrongs *w, int value, dem2d_result result) {
+    add(w, &value, sizeof value, result, true);
+}
+
+static void not_finite(wrongs *w) {
+    add_number(w, NAN, DEM2D_NOT_FINITE);
+    add_number(w, INFINITY, DEM2D_NOT_FINITE);
+    add_number(w, -INFINITY, DEM2D_NOT_FINITE);
+}
+
+static void wrong_number(wrongs *w, kind kind) {
+    const double least = 0x1p-1074;
+    if (kind == UNREAD) {
+        add_number(w, NAN, DEM2D_OK);
+        return;
+    }
+    not_finite(w);
+    if (kind == FINITE) return;
+    if (kind == ANGLE) {
+        add_number(w, 1073741824.0 * (1 + DBL_EPSILON), DEM2D_OUT_OF_RANGE);
+        add_number(w, -DBL_MAX, DEM2D_OUT_OF_RANGE);
+        return;
+    }
+    const dem2d_result negative = kind == LEADING ? DEM2D_ZERO_AREA : DEM2D_OUT_OF_RANGE;
+    add_number(w, -1, negative);
+    add_number(w, -least, negative);
+    add_number(w, -DBL_MAX, negative);
+    if (kind == POSITIVE)
+        add_number(w, 0, DEM2D_OUT_OF_RANGE), add_number(w, -0.0, DEM2D_OUT_OF_RANGE);
+    if (kind == LEADING || kind == SIZE) add_number(w, 0, DEM2D_ZERO_AREA);
+    if (kind == SIZE) {
+        const double size[] = {1e200, 1e-200};
+        for (int i = 0; i < 2; i++) add(w, &size[i], sizeof size[i], DEM2D_OUT_OF_RANGE, false);
+    }
+    if (kind == FRACTION || kind == INSIDE) {
+        add_number(w, 1, DEM2D_OUT_OF_RANGE);
+        add_number(w, DBL_MAX, DEM2D_OUT_OF_RANGE);
+    }
+}
+
+static void wrong_vector(wrongs *w, kind kind) {
+    const double bad[] = {NAN, INFINITY, -INFINITY};
+    for (int i = 0; i < COUNT_OF(bad); i++) {
+        add_vec(w, bad[i], 1, DEM2D_NOT_FINITE);
+        add_vec(w, 1, bad[i], DEM2D_NOT_FINITE);
+    }
+    if (kind == DIRECTION) add_vec(w, 0, -0.0, DEM2D_OUT_OF_RANGE);
+}
+
+static void wrong_pose(wrongs *w) {
+    const double bad[] = {NAN, INFINITY, -INFINITY};
+    for (int i = 0; i < COUNT_OF(bad); i++) {
+        add_pose(w, bad[i], 1, 0, 1, DEM2D_NOT_FINITE);
+        add_pose(w, 1, bad[i], 0, 1, DEM2D_NOT_FINITE);
+        add_pose(w, 1, 1, bad[i], 1, DEM2D_NOT_FINITE);
+        add_pose(w, 1, 1, 0, bad[i], DEM2D_NOT_FINITE);
+    }
+    add_pose(w, 1, 0, 0, 1, DEM2D_OUT_OF_RANGE);
+    add_pose(w, 1, 1, 0, 0, DEM2D_OUT_OF_RANGE);
+    add_pose(w, 1, 1, 0, -1, DEM2D_OUT_OF_RANGE);
+}
+
+static void wrong_int(wrongs *w, const row *r) {
+    const bool zero = r->kind == INTEGER_OR_0;
+    const dem2d_result result = r->result;
+    add_int(w, INT_MIN, result);
+    add_int(w, -1, result);
+    if (r->low > 0) add_int(w, r->low - 1, zero && r->low == 1 ? DEM2D_OK : result);
+    if (zero && r->low > 1) add_int(w, 1, result);
+    if (!zero && r->low > 0) add_int(w, 0, result);
+    if (r->high == INT_MAX) return;
+    add_int(w, r->high + 1, result);
+    add_int(w, INT_MAX, result);
+}
+
+static void wrong_id(wrongs *w, const fixture *f, const row *r) {
+    const dem2d_wall_id alive = f->walls[0];
+    for (int i = r->kind == SPAN_ID ? 1 : 0; i < STALE; i++) {
+        if (r->kind == SHAPE_ID)
+            add(w, &f->stale_shapes[i], sizeof *f->stale_shapes, DEM2D_STALE_ID, true);
+        else if (r->kind == MATERIAL_ID)
+            add(w, &f->stale_materials[i], sizeof *f->stale_materials, DEM2D_STALE_ID, true);
+        else if (r->kind == PARTICLE_ID)
+            add(w, &f->stale_particles[i], sizeof *f->stale_particles, DEM2D_STALE_ID, true);
+        else
+            add(w, &f->stale_walls[i], sizeof *f->stale_walls, DEM2D_STALE_ID, r->kind == WALL_ID);
+    }
+    if (r->kind == SPAN_ID)
+        add(w, &alive, sizeof alive, DEM2D_OUT_OF_RANGE, false); /* one of two */
+}
+
+static void wrong_values(wrongs *w, const fixture *f, const row *r) {
+    const void *none = NULL;
+    w->count = 0;
+    switch (r->kind) {
+    case POINTER:
+    case OPTIONAL:
+        add(w, &none, sizeof none, r->kind == POINTER ? DEM2D_NULL_ARGUMENT : DEM2D_OK, false);
+        break;
+    case FINITE:
+    case POSITIVE:
+    case NOT_NEGATIVE:
+    case FRACTION:
+    case INSIDE:
+    case ANGLE:
+    case SIZE:
+    case LEADING:
+    case UNREAD:
+        wrong_number(w, r->kind);
+        break;
+    case VECTOR:
+    case DIRECTION:
+        wrong_vector(w, r->kind);
+        break;
+    case POSE:
+        wrong_pose(w);
+        break;
+    case INTEGER:
+    case INTEGER_OR_0:
+    case ENUM:
+        wrong_int(w, r);
+        break;
+    case SHAPE_ID:
+    case MATERIAL_ID:
+    case PARTICLE_ID:
+    case WALL_ID:
+    case SPAN_ID:
+        wrong_id(w, f, r);
+        break;
+    case ANY_POINTER:
+    case ANY_BOOL:
+    case ANY_SEED:
+        break;
+    }
+}
+
+/* --- the walk -------------------------------------------------------------------------------- */
+
+/* With good arguments but for the one that `w` replaces, on a world of its own: it must go well. */
+static void check_fine(const function *of, const row *r, const wrong *w, bool in_desc) {
+    fixture f;
+    static args v;
+    fixture_make(&f, 10);
+    args_make(&v, &f);
+    of->prepare(&v, &f);
+    if (w) memcpy((char *)(in_desc ? (void *)&v.d : &v) + r->offset, w->bytes, w->size);
+    const dem2d_result result = of->call(&v);
+    if (result != DEM2D_OK)
+        print_error("dem2d_%s, %s: log \"%s\"\n", of->name, r ? r->name : "all good",
+                    f.env.log.text);
+    assert_result(result, DEM2D_OK);
+    if (of->release) of->release(&v);
+    fixture_end(&f);
+}
+
+/* Whether the log names the field: its last part, without a component. */
+static bool log_names(const fixture *f, const char *name) {
+    const char *dot = strrchr(name, '.');
+    char word[64];
+    snprintf(word, sizeof word, "%.*s", (int)strcspn(dot ? dot + 1 : name, "["),
+             dot ? dot + 1 : name);
+    return f->env.log.count > 0 && strstr(f->env.log.text, word);
+}
+
+/* Only `done` of a step is written whatever comes of it: 0 steps. */
+static void check_done(const function *of, args *v, const args *before) {
+    if (of->call != call_world_step || !v->third) return;
+    assert_int_equal(*(int *)v->third, 0);
+    memcpy(v->third, &before->outputs[2], sizeof(int));
+}
+
+static bool check_refused(const function *of, const row *r, const wrong *w, bool in_desc,
+                          fixture *f, args *v) {
+    static args before;
+    char *place = (char *)(in_desc ? (void *)&v->d : v) + r->offset, good[sizeof w->bytes];
+    memcpy(good, place, w->size);
+    memcpy(place, w->bytes, w->size);
+    memcpy(&before, v, sizeof before);
+    test_log_clear(&f->env);
+    const dem2d_result result = of->call(v);
+    check_done(of, v, &before);
+    bool right = result == w->result;
+    if (!right)
+        print_error("\"%s\", expected \"%s\"\n", dem2d_result_text(result),
+                    dem2d_result_text(w->result));
+    if (right && of->logs && w->logged) {
+        right = f->env.log.result == w->result && log_names(f, r->name);
+        if (!right) print_error("%d in the log: \"%s\"\n", f->env.log.count, f->env.log.text);
+    }
+    if (memcmp(&before, v, sizeof before) != 0) {
+        print_error("an argument or output was changed\n");
+        right = false;
+    }
+    memcpy(place, good, w->size);
+    return right;
+}
+
+/* All that is wrong for one argument or field. */
+static void walk_row(const function *of, const row *r, bool in_desc, fixture *f, args *v) {
+    static wrongs w;
+    wrong_values(&w, f, r);
+    for (int i = 0; i < w.count; i++) {
+        if (w.list[i].result == DEM2D_OK) {
+            check_fine(of, r, &w.list[i], in_desc);
+            continue;
+        }
+        fingerprint before = fixture_print(f);
+        bool right = check_refused(of, r, &w.list[i], in_desc, f, v);
+        fingerprint after = fixture_print(f);
+        right = fingerprint_same(&before, &after) && right;
+        fingerprint_free(&before), fingerprint_free(&after);
+        if (right) continue;
+        print_error("dem2d_%s with the wrong %s, value %d of its list\n", of->name, r->name, i);
+        fail();
+    }
+}
+
+/* After all its refusals the world goes on as one that was never asked. */
+static void check_goes_on(fixture *f, fixture *twin) {
+    assert_ok(dem2d_world_step(f->world, 40, NULL));
+    assert_ok(dem2d_world_step(twin->world, 40, NULL));
+    fingerprint one = fixture_print(twin), other = fixture_print(f);
+    assert_true(fingerprint_same(&one, &other));
+    fingerprint_free(&one), fingerprint_free(&other);
+}
+
+static void test_function(void **state) {
+    const function *of = *state;
+    fixture f, twin;
+    static args v;
+    check_fine(of, NULL, NULL, false);
+    fixture_make(&f, 30);
+    fixture_make(&twin, 30);
+    args_make(&v, &f);
+    of->prepare(&v, &f);
+    for (int i = 0; i < of->count; i++) walk_row(of, &of->rows[i], false, &f, &v);
+    for (int i = 0; of->desc >= 0 && i < descs[of->desc].count; i++)
+        walk_row(of, &descs[of->desc].rows[i], true, &f, &v);
+    check_goes_on(&f, &twin);
+    fixture_end(&f);
+    fixture_end(&twin);
+}
+
+/* --- numbers at the ends of their range ------------------------------------------------------ */
+
+/* Where the doubles of an argument or field are; how many. */
+static int doubles_of(kind kind) {
+    switch (kind) {
+    case FINITE:
+    case POSITIVE:
+    case NOT_NEGATIVE:
+    case FRACTION:
+    case INSIDE:
+    case ANGLE:
+    case SIZE:
+    case LEADING:
+    case UNREAD:
+        return 1;
+    case VECTOR:
+    case DIRECTION:
+        return 2;
+    default:
+        return 0;
+    }
+}
+
+/* A finite number of any size is taken or refused. Refused, nothing changes; taken, the world can
+   be stepped, or says why it can't, and asked. */
+static void check_extreme(const function *of, const row *r, bool in_desc, int part, double value) {
+    fixture f;
+    static args v, before;
+    fixture_make(&f, 10);
+    args_make(&v, &f);
+    of->prepare(&v, &f);
+    char *place = (char *)(in_desc ? (void *)&v.d : &v) + r->offset;
+    memcpy(place + (size_t)part * sizeof value, &value, sizeof value);
+    memcpy(&before, &v, sizeof v);
+    fingerprint was = fixture_print(&f);
+    const dem2d_result result = of->call(&v);
+    if (result == DEM2D_OK) {
+        if (of->release) of->release(&v);
+        const dem2d_result stepped = dem2d_world_step(f.world, 3, NULL);
+        assert_true(stepped == DEM2D_OK || stepped == DEM2D_STATE || stepped == DEM2D_TIME_STEP);
+        fingerprint now = fixture_print(&f);
+        fingerprint_free(&now);
+    } else {
+        fingerprint now = fixture_print(&f);
+        const bool same = fingerprint_same(&was, &now) && memcmp(&before, &v, sizeof v) == 0;
+        if (!same || result == DEM2D_OUT_OF_MEMORY || result == DEM2D_NULL_ARGUMENT) {
+            print_error("dem2d_%s with %s = %g: \"%s\"\n", of->name, r->name, value,
+                        dem2d_result_text(result));
+            fail();
+        }
+        fingerprint_free(&now);
+    }
+    fingerprint_free(&was);
+    fixture_end(&f);
+}
+
+static void check_extremes(const function *of, const row *rows, int count, bool in_desc) {
+    static const double values[] = {DBL_MAX, 1e160, 1e60, 1e-160, DBL_MIN, 0x1p-1074};
+    for (int i = 0; i < count; i++)
+        for (int part = 0; part < doubles_of(rows[i].kind); part++)
+            for (int k = 0; k < 2 * COUNT_OF(values); k++)
+                check_extreme(of, &rows[i], in_desc, part, k % 2 ? -values[k / 2] : values[k / 2]);
+}
+
+static void test_extremes(void **state) {
+    (void)state;
+    for (int i = 0; i < COUNT_OF(functions); i++) {
+        const function *of = &functions[i];
+        check_extremes(of, of->rows, of->count, false);
+        if (of->desc >= 0) check_extremes(of, descs[of->desc].rows, descs[of->desc].count, true);
+    }
+}
+
+/* --- the table holds all of the API ---------------------------------------------------------- */
+
+typedef struct extent {
+    size_t size, align;
+} extent;
+
+#define EXTENT(type)                       \
+    (extent) {                             \
+        sizeof(type), offsetof(            \
+                          struct {         \
+                              char before; \
+                              type value;  \
+                          },               \
+                          value)           \
+    }
+
+static extent extent_of(kind kind) {
+    switch (kind) {
+    case POINTER:
+    case OPTIONAL:
+    case ANY_POINTER:
+        return EXTENT(void *);
+    case VECTOR:
+    case DIRECTION:
+        return EXTENT(dem2d_vec);
+    case POSE:
+        return EXTENT(dem2d_pose);
+    case INTEGER:
+    case INTEGER_OR_0:
+    case ENUM:
+        return EXTENT(int);
+    case SHAPE_ID:
+    case MATERIAL_ID:
+    case PARTICLE_ID:
+    case WALL_ID:
+    case SPAN_ID:
+        return EXTENT(dem2d_shape_id);
+    case ANY_BOOL:
+        return EXTENT(bool);
+    case ANY_SEED:
+        return EXTENT(uint64_t);
+    default:
+        return EXTENT(double);
+    }
+}
+
+static size_t aligned(size_t at, size_t to) {
+    return (at + to - 1) / to * to;
+}
+
+/* Each field begins where the one before it ends, and the last one ends the desc. */
+static void test_all_fields(void **state) {
+    (void)state;
+    for (int d = 0; d < DESCS; d++) {
+        size_t at = 0, most = 1;
+        for (int i = 0; i < descs[d].count; i++) {
+            const row *r = &descs[d].rows[i];
+            const extent e = extent_of(r->kind);
+            if (aligned(at, e.align) != r->offset)
+                fail_msg("%s: a field before %s has no row in api_calls.h", descs[d].name, r->name);
+            at = r->offset + e.size;
+            most = e.align > most ? e.align : most;
+        }
+        if (aligned(at, most) != descs[d].size)
+            fail_msg("%s: its last field has no row in api_calls.h", descs[d].name);
+    }
+}
+
+/* Every declaration of a function that returns a result names one of the table. */
+static void test_all_functions(void **state) {
+    static const char start[] = "DEM2D_API dem2d_result dem2d_";
+    char line[256];
+    int found = 0, missing = 0;
+    (void)state;
+    FILE *file = fopen("../dem2d.h", "r");
+    if (!file) fail_msg("../dem2d.h can't be opened (tests run inside tests/)");
+    while (fgets(line, sizeof line, file) && !strstr(line, "#ifdef DEM2D_IMPLEMENTATION")) {
+        if (strncmp(line, start, sizeof start - 1) != 0) continue;
+        char *name = line + sizeof start - 1;
+        name[strcspn(name, "(")] = 0;
+        int i = 0;
+        while (i < COUNT_OF(functions) && strcmp(functions[i].name, name) != 0) i++;
+        if (i == COUNT_OF(functions)) {
+            print_error("dem2d_%s has no row in api_calls.h\n", name);
+            missing++;
+        }
+        found++;
+    }
+    fclose(file);
+    assert_int_equal(missing, 0);
+    assert_true(found > 50);
+}
+
+/* --- what returns no result ------------------------------------------------------------------ */
+
+static void test_others(void **state) {
+    (void)state;
+    fixture f;
+    static const int results[] = {-1, DEM2D_RESULT_COUNT, INT_MAX, INT_MIN};
+    static const double angles[] = {NAN, INFINITY, -INFINITY, 1073741825.0, -1e300};
+    fixture_make(&f, 10);
+    dem2d_world_destroy(NULL);
+    dem2d_shape_destroy(NULL);
+    dem2d_outline_set_destroy(NULL);
+    assert_int_equal(dem2d_outline_set_count(NULL), 0);
+    for (int i = 0; i < COUNT_OF(results); i++)
+        assert_string_equal(dem2d_result_text((dem2d_result)results[i]), "unknown result");
+    for (int i = 0; i < COUNT_OF(angles); i++) {
+        assert_true(isnan(dem2d_rot_make(angles[i]).c) && isnan(dem2d_rot_make(angles[i]).s));
+        assert_true(isnan(dem2d_pose_make(0, 0, angles[i], 1).rotation.c));
+    }
+    assert_null(dem2d_world_shape(NULL, f.shape));
+    for (int i = 0; i < STALE; i++) assert_null(dem2d_world_shape(f.world, f.stale_shapes[i]));
+    fixture_end(&f);
+}
+
+/* --- the wrong order ------------------------------------------------------------------------- */
+
+/* What can be asked of a world without contacts: 0, and the bounds of nothing. */
+static void check_quiet(const dem2d_world *world, int particles) {
+    dem2d_energy e;
+    dem2d_stress s;
+    dem2d_packing p;
+    dem2d_stats n;
+    dem2d_particle_id worst = {7, 7};
+    dem2d_svg_desc svg = {0};
+    uint64_t hash = 0;
+    double safe, limit;
+    int count = -1;
+    svg.write = fingerprint_hash, svg.user = &hash, svg.force_chains = true;
+    assert_ok(dem2d_world_energy(world, &e));
+    assert_true(e.normal == 0 && e.tangential == 0);
+    assert_ok(dem2d_world_stress(world, 1, &s));
+    assert_true(s.xx == 0 && s.xy == 0 && s.yx == 0 && s.yy == 0);
+    assert_ok(dem2d_world_packing(world, &p));
+    assert_true(p.coordination == 0 && p.mean_overlap == 0 && p.max_overlap == 0);
+    assert_ok(dem2d_world_contacts(world, NULL, 0, &count));
+    assert_int_equal(count, 0);
+    assert_ok(dem2d_world_particles(world, NULL, 0, &count));
+    assert_int_equal(count, particles);
+    assert_ok(dem2d_world_time_step_bounds(world, &safe, &limit, &worst));
+    assert_true(limit == HUGE_VAL && (particles > 0 ? safe > 0 && safe < 1 : safe == HUGE_VAL));
+    assert_int_equal(worst.generation, 0);
+    assert_ok(dem2d_world_stats(world, &n));
+    assert_int_equal(n.particles, particles);
+    assert_int_equal(n.contacts + n.wall_contacts, 0);
+    assert_ok(dem2d_world_write_svg(world, &svg, NULL));
+}
+
+/* A world is stepped and asked at every stage of its making. */
+static void test_unfinished_worlds(void **state) {
+    (void)state;
+    test_env env;
+    test_env_init(&env);
+    const dem2d_world_desc d = good_world(&env.env);
+    fixture f;
+    int done = -1, steps = 0;
+    fixture_make(&f, 0);
+    for (int stage = 0; stage < 5; stage++) { /* nothing, material, wall, shape, particle */
+        dem2d_world *world;
+        dem2d_material_id material;
+        dem2d_wall_id wall;
+        dem2d_shape_id shape;
+        dem2d_particle_id particle;
+        dem2d_wall_desc w = good_wall(&f);
+        dem2d_particle_desc p = good_particle(&f);
+        assert_ok(dem2d_world_create(&d, &world));
+        if (stage >= 1) assert_ok(dem2d_world_add_material(world, &good_material, &material));
+        if (stage >= 2) w.material = material, assert_ok(dem2d_world_add_wall(world, &w, &wall));
+        if (stage >= 3) assert_ok(dem2d_world_add_shape(world, f.ellipse, &shape));
+        if (stage >= 4) {
+            p.material = material, p.shape = shape;
+            assert_ok(dem2d_world_add_particle(world, &p, &particle));
+        }
+        check_quiet(world, stage >= 4);
+        assert_ok(dem2d_world_step(world, 0, &done));
+        assert_int_equal(done, 0);
+        for (steps = 0; steps < 3; steps++) {
+            assert_ok(dem2d_world_step(world, 1, &done));
+            assert_int_equal(done, 1);
+            check_quiet(world, stage >= 4);
+        }
+        dem2d_world_destroy(world);
+    }
+    fixture_end(&f);
+    assert_clean(&env);
+}
+
+/* What is used by another can't be removed; with the user gone it can, step or no step between. */
+static void test_in_use(void **state) {
+    (void)state;
+    for (int between = 0; between < 2; between++) {
+        fixture f;
+        dem2d_particle_info info;
+        dem2d_particle_id ids[32], id;
+        dem2d_shape_id shape;
+        int count;
+        fixture_make(&f, 30);
+        assert_ok(dem2d_world_get_particle(f.world, f.particle, &info));
+        fingerprint before = fixture_print(&f);
+        assert_result(dem2d_world_remove_shape(f.world, info.shape), DEM2D_IN_USE);
+        assert_logged(&f.env, DEM2D_IN_USE, (int)info.shape.index, "shape");
+        for (int i = 1; i < 3; i++) {
+            assert_result(dem2d_world_remove_wall(f.world, f.walls[i]), DEM2D_IN_USE);
+            assert_logged(&f.env, DEM2D_IN_USE, (int)f.walls[i].index, "wall");
+        }
+        fingerprint after = fixture_print(&f);
+        assert_true(fingerprint_same(&before, &after));
+        fingerprint_free(&before), fingerprint_free(&after);
+
+        assert_ok(dem2d_world_particles(f.world, ids, 32, &count));
+        for (int i = 0; i < count; i++) {
+            dem2d_particle_info one;
+            assert_ok(dem2d_world_get_particle(f.world, ids[i], &one));
+            if (one.shape.index != info.shape.index) continue;
+            assert_ok(dem2d_world_remove_particle(f.world, ids[i]));
+            assert_result(dem2d_world_remove_particle(f.world, ids[i]), DEM2D_STALE_ID);
+        }
+        if (between) assert_ok(dem2d_world_step(f.world, 1, NULL));
+        assert_ok(dem2d_world_remove_shape(f.world, info.shape));
+        assert_result(dem2d_world_remove_shape(f.world, info.shape), DEM2D_STALE_ID);
+        assert_ok(dem2d_world_remove_wall(f.world, f.walls[3]));
+        for (int i = 0; i < 3; i++) assert_ok(dem2d_world_remove_wall(f.world, f.walls[i]));
+        fingerprint none = fingerprint_take(f.world, NULL, 0); /* every query still answers */
+        fingerprint_free(&none);
+        if (between) assert_ok(dem2d_world_step(f.world, 1, NULL));
+        assert_ok(dem2d_world_add_shape(f.world, f.polygon, &shape)); /* in the free slot */
+        assert_int_equal(shape.index < 5, 1);
+        dem2d_particle_desc p = good_particle(&f);
+        p.shape = shape, p.position = vec(0.2, 0.2);
+        assert_ok(dem2d_world_add_particle(f.world, &p, &id));
+        assert_ok(dem2d_world_step(f.world, 20, NULL));
+        fixture_end(&f);
+    }
+}
+
+/* Everything is removed from a world with contacts; then it is empty and can be filled again. */
+static void test_emptied(void **state) {
+    (void)state;
+    fixture f;
+    dem2d_particle_id ids[32], id;
+    int count;
+    fixture_make(&f, 30);
+    assert_ok(dem2d_world_particles(f.world, ids, 32, &count));
+    for (int i = 0; i < count; i++) assert_ok(dem2d_world_remove_particle(f.world, ids[i]));
+    check_quiet(f.world, 0);
+    assert_ok(dem2d_world_step(f.world, 2, NULL));
+    check_quiet(f.world, 0);
+    dem2d_particle_desc p = good_particle(&f);
+    for (int i = 0; i < count; i++) {
+        p.position = vec(0.06 + 0.05 * (i % 6), 0.06 + 0.05 * (i / 6));
+        assert_ok(dem2d_world_add_particle(f.world, &p, &id));
+    }
+    assert_ok(dem2d_world_step(f.world, 20, NULL));
+    dem2d_stats n;
+    assert_ok(dem2d_world_stats(f.world, &n));
+    assert_true(n.particles == count && n.contacts > 0);
+    fixture_end(&f);
+}
+
+/* Particles whose mass or moment would be no number, and the 257th material. */
+static void test_limits(void **state) {
+    (void)state;
+    static const double scales[] = {1e200, 1e-200, 1e-100, 1e90};
+    fixture f, twin;
+    dem2d_particle_id id = {77, 77};
+    dem2d_material_id material = {77, 77};
+    fixture_make(&f, 30);
+    fixture_make(&twin, 30);
+    for (int i = 0; i < COUNT_OF(scales); i++) {
+        dem2d_particle_desc p = good_particle(&f);
+        p.scale = scales[i];
+        assert_result(dem2d_world_add_particle(f.world, &p, &id), DEM2D_OUT_OF_RANGE);
+        assert_logged(&f.env, DEM2D_OUT_OF_RANGE, -1, "scale");
+        assert_int_equal(id.index, 77);
+    }
+    check_goes_on(&f, &twin);
+    for (int i = 2; i < 256; i++)
+        assert_ok(dem2d_world_add_material(f.world, &good_material, &material));
+    assert_int_equal(material.index, 255);
+    assert_result(dem2d_world_add_material(f.world, &good_material, &material), DEM2D_OUT_OF_RANGE);
+    assert_int_equal(material.index, 255);
+    check_goes_on(&f, &twin);
+    fixture_end(&f);
+    fixture_end(&twin);
+}
+
+int main(void) {
+    static struct CMUnitTest tests[COUNT_OF(functions) + 9];
+    const struct CMUnitTest others[] = {
+        cmocka_unit_test(test_all_fields), cmocka_unit_test(test_all_functions),
+        cmocka_unit_test(test_others),     cmocka_unit_test(test_unfinished_worlds),
+        cmocka_unit_test(test_in_use),     cmocka_unit_test(test_emptied),
+        cmocka_unit_test(test_limits),     cmocka_unit_test(test_extremes),
+    };
+    size_t count = 0;
+    for (int i = 0; i < COUNT_OF(functions); i++) {
+        tests[count].name = functions[i].name;
+        tests[count].test_func = test_function;
+        union {
+            const function *in;
+            void *out;
+        } row = {&functions[i]};
+        tests[count++].initial_state = row.out;
+    }
+    for (int i = 0; i < COUNT_OF(others); i++) tests[count++] = others[i];
+    return _cmocka_run_group_tests("misuse", tests, count, NULL, NULL);
+}
