@@ -1329,7 +1329,7 @@ DEM2D_API double dem2d_strain(double now, double before);
 /// Coordination number, overlaps, solid area, rattlers.
 DEM2D_API dem2d_result dem2d_world_packing(const dem2d_world *world, dem2d_packing *packing);
 /// 1 - (area of the parts of particles inside a region)/(its area). Each particle's part is right
-/// to 1e-4 of its area, exact if it is a sharp polygon or wholly inside; what overlaps counts
+/// to 1e-5 of its area, exact if it is a sharp polygon or wholly inside; what overlaps counts
 /// twice. Errors: NOT_FINITE, OUT_OF_RANGE (upper not above lower).
 DEM2D_API dem2d_result dem2d_world_porosity(const dem2d_world *world, const dem2d_box *region,
                                             double *porosity);
@@ -3293,7 +3293,7 @@ DEM2D_API dem2d_result dem2d_shape_outline(const dem2d_shape *shape, dem2d_pose 
 /* Part of a shape's area that its outline polygon may leave out, where it stands for the shape: no
    part of it is then wrong by more. Points are doubled until that holds; their cap is for custom
    shapes, whose area is what the caller says. */
-#define DEM2DI_OUTLINE_DEFECT 1e-4
+#define DEM2DI_OUTLINE_DEFECT 1e-5
 #define DEM2DI_OUTLINE_CAP 65536
 
 /* As many points for each corner or arc, so that regular shapes have regular polygons. */
