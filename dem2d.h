@@ -20,6 +20,7 @@ CONTENTS (search for the anchor, ">>" and the word)
                     contact of two shapes                                   >>api-contact
                     world                                                   >>api-world
                     measures                                                >>api-measures
+                    state hash, snapshots                                   >>api-snapshot
                     writers                                                 >>api-writers
     Implementation  compiler, constants, floating point                     >>config
                     vectors, rotations, sine and cosine                     >>math
@@ -45,6 +46,7 @@ CONTENTS (search for the anchor, ">>" and the word)
                     the ledger of energies                                  >>ledger
                     contacts, sums, motion; the stable time step            >>step
                     energy, stress, fabric, packing, distance from rest     >>measures
+                    state hash, snapshots                                   >>snapshot
                     pictures, files for ParaView, histories                 >>writers
     Changes, licence                                                        >>licence
 
@@ -199,6 +201,8 @@ HOW TO
     stop friction        dem2d_world_set_pair for the two materials.
     hold a stress        a wall with mode DEM2D_WALL_SERVO, stress, and a length: constant or the
                          distance between two other walls.
+    stop and go on       dem2d_world_save, dem2d_world_load: to the same bits as without a stop.
+    compare two runs     dem2d_world_hash after as many steps.
     draw                 dem2d_world_write_svg, or dem2d_shape_outline for your own pictures.
     measure a sample     dem2d_world_stress with the sample's area (of one grain:
                          dem2d_world_particle_stress), then dem2d_stress_principal for p and q;
@@ -223,6 +227,7 @@ OPTIONS (zero means: physical zero for physical fields; "library default" where 
     dem2d_custom_desc       inscribed             m      0          >= 0
     dem2d_custom_desc       mass                  m2,m4  computed   area 0: from outline_points
     dem2d_custom_desc       outline_points        -      1000       0 or >= 3
+    dem2d_custom_desc       tag                   -      0
     dem2d_reduction_desc    test                  -      SUFFICIENT
     dem2d_reduction_desc    factor                -      0.9        0 or inside (0, 1)
     dem2d_reduction_desc    tolerance             -      1e-6       >= 0, relative to a0
@@ -271,6 +276,7 @@ OPTIONS (zero means: physical zero for physical fields; "library default" where 
     dem2d_world_desc        ledger                -      false
     dem2d_world_desc        law                   -      NULL       springs and friction
     dem2d_world_desc        law_user              -      NULL
+    dem2d_world_desc        law_tag               -      0
     dem2d_world_desc        parallel_for          -      NULL       the caller's thread does all
     dem2d_world_desc        parallel_user         -      NULL
     dem2d_world_desc        env                   -      NULL       copied
@@ -304,6 +310,18 @@ OPTIONS (zero means: physical zero for physical fields; "library default" where 
     dem2d_wall_desc         stress                Pa     0          finite; SERVO only
     dem2d_wall_desc         max_speed             m/s    none       > 0 for SERVO
     dem2d_wall_desc         spans                 -      none       two walls, or both zero
+    dem2d_save_desc         write                 -      none       or a path, not both
+    dem2d_save_desc         user                  -      NULL
+    dem2d_load_desc         read                  -      none       or a path, not both
+    dem2d_load_desc         user                  -      NULL
+    dem2d_load_desc         parallel_for          -      NULL       the caller's thread does all
+    dem2d_load_desc         parallel_user         -      NULL
+    dem2d_load_desc         custom                -      NULL       required for custom shapes
+    dem2d_load_desc         law                   -      NULL       required for its worlds
+    dem2d_load_desc         law_user              -      NULL
+    dem2d_load_desc         law_tag               -      0          as it was saved
+    dem2d_load_desc         custom_user           -      NULL
+    dem2d_load_desc         env                   -      NULL       copied
     dem2d_svg_desc          width                 px     800        >= 0
     dem2d_svg_desc          outline_points        -      64         0 or >= 3
     dem2d_svg_desc          force_chains          -      false
@@ -427,7 +445,9 @@ extern "C" {
     X(TIME_STEP, "the time step is above the stable limit")                \
     X(STATE, "the step would give a state that is not finite")             \
     X(NOT_REACHED, "the coverage asked for was not reached")               \
-    X(IO, "writing failed")
+    X(IO, "reading or writing failed")                                     \
+    X(FORMAT, "not a snapshot, or damaged")                                \
+    X(FORMAT_VERSION, "a snapshot of another version")
 
 /// Result of a function that can fail: DEM2D_OK (0) or the reason.
 typedef enum dem2d_result {
@@ -514,6 +534,7 @@ typedef struct dem2d_custom_desc {
     double inscribed;          ///< m, radius of a disc about the centroid inside; 0 if unknown
     dem2d_mass mass;           ///< if area > 0, taken as given; otherwise from outline points
     int outline_points;        ///< for the mass, 0 for 1000
+    int tag;                   ///< stands for the function in snapshots: see dem2d_load_desc
 } dem2d_custom_desc;
 
 /// What a shape is, as a template (scale 1, about its centroid).
@@ -1019,6 +1040,7 @@ typedef struct dem2d_world_desc {
     /// Instead of springs, dashpot and friction; contacts then have one point. NULL: those.
     dem2d_law_fn *law;
     void *law_user;                  ///< handed to law
+    int law_tag;                     ///< names law in snapshots
     dem2d_parallel_fn *parallel_for; ///< shares a step's work out; NULL: all is done in the call
     void *parallel_user;             ///< handed to parallel_for
     const dem2d_env *env;            ///< memory and log, copied; NULL for malloc, free, silence
@@ -1349,11 +1371,57 @@ DEM2D_API dem2d_result dem2d_world_inertial_number(const dem2d_world *world, dou
                                                    double pressure, double *number);
 
 /* ============================================================================================
-   >>api-writers  Pictures, files for ParaView, histories
+   >>api-snapshot  State hash, snapshots
    ============================================================================================ */
 
 /// Takes bytes; returns false when they could not be written.
 typedef bool dem2d_write_fn(void *user, const char *bytes, size_t count);
+/// Gives the next count bytes; returns false when there are not as many.
+typedef bool dem2d_read_fn(void *user, char *bytes, size_t count);
+/// The custom shape of a tag, or NULL: its support and user are taken, all else was saved.
+typedef const dem2d_custom_desc *dem2d_custom_fn(void *user, int tag);
+
+/// Where a snapshot goes.
+typedef struct dem2d_save_desc {
+    dem2d_write_fn *write; ///< where the bytes go, or NULL when a path is given
+    void *user;            ///< handed to write
+} dem2d_save_desc;
+
+/// Where a snapshot comes from, and what can't be stored.
+typedef struct dem2d_load_desc {
+    dem2d_read_fn *read;             ///< where the bytes come from, or NULL when a path is given
+    void *user;                      ///< handed to read
+    dem2d_parallel_fn *parallel_for; ///< of the world, as in dem2d_world_desc
+    void *parallel_user;             ///< handed to parallel_for
+    dem2d_custom_fn *custom;         ///< finds custom shapes; required when there are any
+    void *custom_user;               ///< handed to custom
+    dem2d_law_fn *law;               ///< of the world; required when it had one
+    void *law_user;                  ///< handed to law
+    int law_tag;                     ///< must be that of the world
+    const dem2d_env *env;            ///< memory and log, copied; NULL for malloc, free, silence
+} dem2d_load_desc;
+
+/// Hash of what the next step depends on and can be seen: settings, steps, materials, how they
+/// meet, templates, particles, walls, contacts and their springs. In the order of ids, doubles by
+/// their bits (0 and -0 differ): the same for any threads, memory, skins, compiler and machine.
+/// Not in it: counters, the list of pairs, callbacks, ids that are free. 0 for NULL.
+DEM2D_API uint64_t dem2d_world_hash(const dem2d_world *world);
+/// Write all of a world to desc->write, or to a file when path is not NULL; the file is written as
+/// path + ".part", then renamed, so that an old one stays until all is well. The same bytes on any
+/// machine. Takes no memory but for the name. Errors: NULL_ARGUMENT, OUT_OF_RANGE (path and write),
+/// OUT_OF_MEMORY, IO.
+DEM2D_API dem2d_result dem2d_world_save(const dem2d_world *world, const dem2d_save_desc *desc,
+                                        const char *path);
+/// The world of a snapshot: all ids hold, and its steps are those of the world that was saved, to
+/// the bit, with all statistics but bytes. read must have no byte after the snapshot. Memory beside
+/// the world's: the snapshot's size. Errors: NULL_ARGUMENT (also a tag that custom does not know, a
+/// law that is not given), OUT_OF_RANGE (path and read), OUT_OF_MEMORY, IO, FORMAT, FORMAT_VERSION.
+DEM2D_API dem2d_result dem2d_world_load(const dem2d_load_desc *desc, const char *path,
+                                        dem2d_world **world);
+
+/* ============================================================================================
+   >>api-writers  Pictures, files for ParaView, histories
+   ============================================================================================ */
 
 /// An SVG picture of a world.
 typedef struct dem2d_svg_desc {
@@ -2148,6 +2216,7 @@ struct dem2d_shape {
     dem2d_vec offset;
     dem2d_support_fn *function;
     void *function_user;
+    int function_tag;
     dem2d_env env;
     size_t bytes;
     /* What follows the struct in one block of memory: */
@@ -2250,7 +2319,9 @@ static inline int dem2di_sector_find(const dem2d_shape *shape, dem2d_vec u) {
         int place = (int)(dem2di_pseudo_angle(u) * (shape->sectors / 4));
         k = shape->sector[place & (shape->sectors - 1)];
     }
-    while (dem2di_dot(shape->ends[k], u) > 0) k = k + 1 < shape->count ? k + 1 : 0;
+    /* once around at most: by rounding all ends of two half turns may gain */
+    for (int left = shape->count; dem2di_dot(shape->ends[k], u) > 0 && left > 0; left--)
+        k = k + 1 < shape->count ? k + 1 : 0;
     return k;
 }
 
@@ -2369,6 +2440,13 @@ static bool dem2di_arc_straight(const dem2d_shape *shape, const dem2di_arc *arc)
     double turn = fabs(dem2di_cross(arc->d0, arc->d1)) + fabs(dem2di_cross(arc->d1, arc->d2)) +
                   fabs(dem2di_cross(arc->d0, arc->d2));
     return turn <= rounding * lengths;
+}
+
+static bool dem2di_has_faces(const dem2d_shape *shape) {
+    bool straight = shape->type == DEM2D_POLYGON;
+    for (int k = 0; shape->type == DEM2D_BEZIER && k < shape->count; k++)
+        straight = straight || dem2di_arc_straight(shape, &shape->arcs[k]);
+    return straight;
 }
 
 /* Support point of a template in a unit direction; rho, if asked for, is the radius of curvature
@@ -2740,7 +2818,8 @@ static void dem2di_fill_sectors(dem2d_shape *shape) {
                    k + 1 < shape->count)
                 k++;
         }
-        while (dem2di_dot(shape->ends[k], u) > 0) k = (k + 1) % shape->count;
+        for (int left = shape->count; dem2di_dot(shape->ends[k], u) > 0 && left > 0; left--)
+            k = (k + 1) % shape->count;
         shape->sector[s] = k;
     }
 }
@@ -2751,6 +2830,12 @@ static int dem2di_sector_count(int count) {
     int sectors = 16;
     while (sectors / 4 < count && sectors < (1 << 28)) sectors *= 2;
     return sectors;
+}
+
+/* What a model has: for a few corners the table is not worth it. */
+static int dem2di_sectors_of(dem2d_shape_type type, int count) {
+    bool table = type == DEM2D_BEZIER || (type == DEM2D_POLYGON && count > DEM2DI_FEW_CORNERS);
+    return table ? dem2di_sector_count(count) : 0;
 }
 
 /* Radii of a polygon about its centroid, the origin. */
@@ -2778,13 +2863,13 @@ DEM2D_API dem2d_result dem2d_shape_create_polygon(const dem2d_env *env, const de
     result = dem2di_clean_polygon(env, corners, (int *)(void *)(corners + count), &count);
     dem2d_shape *made = NULL;
     if (result == DEM2D_OK) {
-        int sectors = count > DEM2DI_FEW_CORNERS ? dem2di_sector_count(count) : 0;
-        made = dem2di_shape_allocate(env, DEM2D_POLYGON, count, sectors);
+        made = dem2di_shape_allocate(env, DEM2D_POLYGON, count,
+                                     dem2di_sectors_of(DEM2D_POLYGON, count));
         if (made == NULL) result = DEM2D_OUT_OF_MEMORY;
     }
     if (made != NULL) {
         made->rounding = rounding;
-        made->flat = true;
+        made->flat = dem2di_has_faces(made);
         made->mass = dem2di_rounded_polygon_mass(corners, count, rounding);
         made->offset = made->mass.centroid;
         made->mass.centroid = dem2di_vec(0, 0);
@@ -3015,9 +3100,8 @@ static void dem2di_finish_bezier(dem2d_shape *shape, double size) {
     for (int k = 0; k < DEM2DI_FLOORS; k++) /* a sector no arc has come to has no bound */
         if (!dem2di_finite(shape->floors[k])) shape->floors[k] = shape->rho_min;
     dem2di_join_floors(shape);
-    for (int k = 0; k < shape->count; k++)
-        shape->flat = shape->flat || dem2di_arc_straight(shape, &shape->arcs[k]);
     dem2di_fill_sectors(shape);
+    shape->flat = dem2di_has_faces(shape);
 }
 
 DEM2D_API dem2d_result dem2d_shape_create_bezier(const dem2d_env *env, const dem2d_vec *control,
@@ -3033,7 +3117,8 @@ DEM2D_API dem2d_result dem2d_shape_create_bezier(const dem2d_env *env, const dem
     area = dem2di_twice_area(control, 3 * arcs);
     if (fabs(area) <= 8 * DBL_EPSILON * size * extent)
         return dem2di_fail(env, DEM2D_ZERO_AREA, -1, "control polygon's area %g", area / 2);
-    dem2d_shape *made = dem2di_shape_allocate(env, DEM2D_BEZIER, arcs, dem2di_sector_count(arcs));
+    dem2d_shape *made =
+        dem2di_shape_allocate(env, DEM2D_BEZIER, arcs, dem2di_sectors_of(DEM2D_BEZIER, arcs));
     if (made == NULL) return DEM2D_OUT_OF_MEMORY;
     dem2di_arcs_from_control(control, arcs, area < 0, made->arcs);
     result = dem2di_check_arcs(env, made->arcs, arcs, area < 0, size);
@@ -3101,20 +3186,23 @@ static void dem2di_fourier_floors(dem2d_shape *shape, const double *a, const dou
     dem2di_join_floors(shape);
 }
 
+/* The terms of order n. */
+static void dem2di_fourier_term(dem2d_shape *shape, int n, double a, double b) {
+    dem2di_block *block = &shape->blocks[(n - 1) / 4];
+    int j = (n - 1) % 4;
+    block->a[j] = a;
+    block->b[j] = b;
+    block->na[j] = n * a;
+    block->nb[j] = n * b;
+    block->square[j] = (double)n * n;
+}
+
 /* Everything about an FS shape but its coefficients a, b (already about the centroid). */
 static void dem2di_finish_fourier(dem2d_shape *shape, const double *a, const double *b,
                                   double rho_min) {
     int order = shape->count;
     shape->a = a[0] / 2;
-    for (int n = 1; n <= order; n++) {
-        dem2di_block *block = &shape->blocks[(n - 1) / 4];
-        int j = (n - 1) % 4;
-        block->a[j] = a[n];
-        block->b[j] = b[n];
-        block->na[j] = n * a[n];
-        block->nb[j] = n * b[n];
-        block->square[j] = (double)n * n;
-    }
+    for (int n = 1; n <= order; n++) dem2di_fourier_term(shape, n, a[n], b[n]);
     /* the greatest support value is the circumscribed radius, the least the inscribed one */
     dem2di_series p = dem2di_series_make(a, b, order, false, 1);
     dem2di_series minus = dem2di_series_make(a, b, order, false, -1);
@@ -3180,6 +3268,7 @@ DEM2D_API dem2d_result dem2d_shape_create_custom(const dem2d_env *env,
     if (made == NULL) return DEM2D_OUT_OF_MEMORY;
     made->function = desc->support;
     made->function_user = desc->user;
+    made->function_tag = desc->tag;
     made->mass = desc->mass.area > 0 ? desc->mass : dem2di_mass_interpolated(made, points);
     made->offset = made->mass.centroid;
     made->mass.centroid = dem2di_vec(0, 0);
@@ -6356,7 +6445,7 @@ static void dem2di_cores_apart(const dem2di_pair *pair, const dem2di_core core[2
     bool moved = false;
     for (int side = 1; side >= -1 && !moved; side -= 2) {
         dem2di_walk_set(pair, core, ka, kb, side, &walk);
-        for (;;) {
+        for (int left = core[0].count + core[1].count; left > 0; left--) { /* once around */
             dem2di_beside edge;
             dem2di_walk next = walk;
             dem2di_walk_on(pair, core, side, &next, &edge);
@@ -7233,11 +7322,12 @@ typedef struct dem2di_overlap {
 } dem2di_overlap;
 
 /* Keep what is left of the line through p along `along` (Sutherland and Hodgman); the new edge is
-   not A's. Returns the number of corners in `kept`, at most one more than before. */
+   not A's. Returns the number of corners in `kept`: at most one more than before, or where a custom
+   shape is not convex what there is room for. */
 static int dem2di_overlap_cut(const dem2di_overlap *corners, int count, dem2d_vec p,
-                              dem2d_vec along, dem2di_overlap *kept) {
+                              dem2d_vec along, dem2di_overlap *kept, int room) {
     int left = 0;
-    for (int i = 0; i < count; i++) {
+    for (int i = 0; i < count && left + 2 <= room; i++) {
         const dem2di_overlap *a = &corners[i], *b = &corners[i + 1 < count ? i + 1 : 0];
         double ha = dem2di_cross(along, dem2di_sub(a->point, p));
         double hb = dem2di_cross(along, dem2di_sub(b->point, p));
@@ -8211,6 +8301,7 @@ struct dem2d_world {
     size_t bytes;
     dem2d_law_fn *law;
     void *law_user;
+    int law_tag;
     dem2d_parallel_fn *parallel_for;
     void *parallel_user;
     double time_step, local_damping, global_damping, tolerance;
@@ -8485,6 +8576,7 @@ DEM2D_API dem2d_result dem2d_world_create(const dem2d_world_desc *desc, dem2d_wo
     made->ledger.kept = made->ledger.edited = desc->ledger;
     made->law = desc->law;
     made->law_user = desc->law_user;
+    made->law_tag = desc->law_tag;
     made->parallel_for = desc->parallel_for;
     made->parallel_user = desc->parallel_user;
     made->skin_fixed = desc->skin > 0;
@@ -9185,20 +9277,24 @@ static dem2d_result dem2di_check_wall(const dem2d_world *world, const dem2d_wall
     return dem2di_check_spans(world, desc);
 }
 
+/* What follows of a segment's description. */
+static void dem2di_segment_set(dem2di_wall *wall) {
+    dem2d_vec chord = dem2di_sub(wall->desc.end, wall->desc.point), along;
+    (void)dem2di_unit(chord, &along);
+    wall->along.c = along.x;
+    wall->along.s = along.y;
+    wall->extent = dem2di_length(chord);
+    wall->desc.normal = dem2di_perp(along);
+}
+
 /* A checked description into a slot; users of its spans are counted. */
 static void dem2di_wall_place(dem2d_world *world, int slot, const dem2d_wall_desc *desc) {
     dem2di_wall *wall = &world->walls[slot];
     wall->desc = *desc;
-    if (desc->segment) {
-        dem2d_vec chord = dem2di_sub(desc->end, desc->point), along;
-        (void)dem2di_unit(chord, &along);
-        wall->along.c = along.x;
-        wall->along.s = along.y;
-        wall->extent = dem2di_length(chord);
-        wall->desc.normal = dem2di_perp(along);
-    } else {
+    if (desc->segment)
+        dem2di_segment_set(wall);
+    else
         (void)dem2di_unit(desc->normal, &wall->desc.normal);
-    }
     for (int i = 0; i < 2; i++) {
         wall->span[i] = desc->spans[i].generation != 0 ? (int)desc->spans[i].index : -1;
         if (wall->span[i] >= 0) world->walls[wall->span[i]].users++;
@@ -9923,17 +10019,20 @@ static void dem2di_touches_task(void *context, int begin, int end) {
                                             build->grid.count); /* the grid is done with */
 }
 
+/* |p'| <= sqrt(R^2 - p^2) and p is at least the inscribed radius; of a circle p' is 0. */
+static double dem2di_lever_of(const dem2d_world *world, int slot) {
+    const dem2d_shape *shape = dem2di_shape_of(world, &world->bodies[slot]);
+    double radius = world->now[slot].radius, inner = shape->inscribed * world->bodies[slot].scale;
+    return shape->type == DEM2D_CIRCLE ? 0 : sqrt(radius * radius - inner * inner);
+}
+
 /* Travels count from here. */
 static void dem2di_travel_task(void *context, int begin, int end) {
     dem2d_world *world = (dem2d_world *)context;
     int last = dem2di_block_end((end - 1) * DEM2DI_BLOCK, DEM2DI_BLOCK, world->body_count);
     for (int i = begin * DEM2DI_BLOCK; i < last; i++) {
-        /* |p'| <= sqrt(R^2 - p^2) and p is at least the inscribed radius; of a circle p' is 0 */
-        const dem2d_shape *shape = dem2di_shape_of(world, &world->bodies[i]);
-        double radius = world->now[i].radius, inner = shape->inscribed * world->bodies[i].scale;
-        bool round = shape->type == DEM2D_CIRCLE;
         world->travel[i] = 0;
-        world->lever[i] = round ? 0 : sqrt(radius * radius - inner * inner);
+        world->lever[i] = dem2di_lever_of(world, i);
     }
 }
 
@@ -9972,6 +10071,20 @@ static bool dem2di_bounded(dem2d_world *world) {
            world->faces != DEM2D_CONTACT_AREA && !world->plan.full;
 }
 
+/* Of the loads on the partners of so many contacts, x, y and torque, and a 0 behind. */
+static size_t dem2di_loads_bytes(const dem2d_world *world, size_t count) {
+    return 3 * (2 * count + 1) * sizeof *world->load_x;
+}
+
+/* No loads yet on the partners of the listed contacts, in scratch memory that has room. */
+static void dem2di_loads_clear(dem2d_world *world) {
+    size_t loads = 2 * (size_t)world->list.count + 1;
+    world->load_x = (double *)(void *)world->scratch;
+    world->load_y = world->load_x + loads;
+    world->load_turn = world->load_y + loads;
+    memset(world->load_x, 0, dem2di_loads_bytes(world, (size_t)world->list.count));
+}
+
 /* Scratch memory for the search, and then for what it found. */
 static bool dem2di_build_cut(dem2di_build *build) {
     dem2d_world *world = build->world;
@@ -9990,7 +10103,7 @@ static bool dem2di_build_cut(dem2di_build *build) {
         build->keys = (dem2di_key *)dem2di_cut(&cutter, total, sizeof *build->keys);
         build->touches = (dem2di_order *)dem2di_cut(&cutter, walls, sizeof *build->touches);
         build->spare = (dem2di_order *)dem2di_cut(&cutter, walls, sizeof *build->spare);
-        size_t step = 3 * (2 * total + 1) * sizeof *world->load_x;
+        size_t step = dem2di_loads_bytes(world, total);
         if (pass == 0 && !dem2di_scratch_reserve(world, cutter.used > step ? cutter.used : step))
             return false;
     }
@@ -10043,11 +10156,7 @@ static void dem2di_build_finish(dem2di_build *build) {
     list->pairs = list->discs + build->total[DEM2DI_OTHERS];
     list->count = list->pairs + build->total[DEM2DI_TOUCHES];
     if (list->count > 0) memcpy(list->keys, build->keys, (size_t)list->count * sizeof *list->keys);
-    size_t loads = 2 * (size_t)list->count + 1;
-    world->load_x = (double *)(void *)world->scratch;
-    world->load_y = world->load_x + loads;
-    world->load_turn = world->load_y + loads;
-    memset(world->load_x, 0, 3 * loads * sizeof *world->load_x);
+    dem2di_loads_clear(world);
     if (world->plan.turns != build->plan.turns) dem2di_reorient(world, build->plan.turns);
     world->plan = build->plan;
     dem2di_swap_contacts(list);
@@ -10587,7 +10696,7 @@ static int dem2di_overlap_of(const dem2d_world *world, int a, int b, const dem2d
             along = dem2di_sub(dem2di_outline_corner(world, b, (start + i + 1) % n), p);
             p = dem2di_add(p, d);
         }
-        count = dem2di_overlap_cut(from, count, p, along, to);
+        count = dem2di_overlap_cut(from, count, p, along, to, world->overlap_size / 2);
         dem2di_overlap *swap = from;
         from = to;
         to = swap;
@@ -12107,6 +12216,980 @@ DEM2D_API dem2d_result dem2d_world_inertial_number(const dem2d_world *world, dou
     *number = 0;
     if (count > 0) *number = fabs(strain_rate) * (diameters / count) * sqrt(mass / area / pressure);
     return DEM2D_OK;
+}
+
+/* ============================================================================================
+   >>snapshot  State hash, snapshots: one list of fields for all that is done with them
+   uses: config, math, memory, support, shapes, law, motion, world, list, measures
+   ============================================================================================ */
+
+/* A snapshot is a mark, a version, its size in bytes, what dem2di_archive_world lists, and a
+   checksum of all before it: little-endian words, doubles by their bits. The mark ends as lines end
+   on different systems, so that a copy as text is noticed. Whoever changes the list of fields
+   changes the version. */
+#define DEM2DI_SNAPSHOT_MARK 0x0A0D64326D65648Du /* 8D "dem2d" 0D 0A */
+#define DEM2DI_SNAPSHOT_VERSION 1u
+#define DEM2DI_SNAPSHOT_HEAD 24 /* bytes: mark, version, size */
+#define DEM2DI_SNAPSHOT_TAIL 8  /* the checksum */
+
+typedef enum dem2di_aim {
+    DEM2DI_HASHING,
+    DEM2DI_SIZING, /* counts bytes */
+    DEM2DI_SAVING,
+    DEM2DI_LOADING
+} dem2di_aim;
+
+#define DEM2DI_CHUNK                                                             \
+    4096 /* bytes written at once: a multiple of the 8 of a word of the checksum \
+          */
+
+/* What is done with fields. After a failure nothing is, and nothing that was loaded may be used. */
+typedef struct dem2di_archive {
+    dem2di_aim aim;
+    dem2d_result result; /* the first failure */
+    const dem2d_env *env;
+    uint64_t hash;
+    uint64_t size;                   /* bytes so far */
+    const unsigned char *next, *end; /* loading: what is left */
+    const dem2d_load_desc *load;
+    unsigned char chunk[DEM2DI_CHUNK]; /* saving: on their way */
+    size_t used;
+    dem2d_write_fn *write;
+    void *user;
+    FILE *file; /* or NULL: to write */
+} dem2di_archive;
+
+/* One to one in either argument, so that no change of a single word can be lost. */
+static uint64_t dem2di_hash_word(uint64_t hash, uint64_t word) {
+    hash = (hash ^ word) * 0x9E3779B97F4A7C15u; /* 2^64 / golden ratio */
+    return hash ^ hash >> 32;
+}
+
+static uint64_t dem2di_word_of(const unsigned char *bytes, size_t count) {
+    uint64_t word = 0;
+    for (size_t k = 0; k < count; k++) word |= (uint64_t)bytes[k] << 8 * k;
+    return word;
+}
+
+static uint64_t dem2di_hash_bytes(uint64_t hash, const unsigned char *bytes, size_t count) {
+    for (size_t i = 0; i < count; i += 8)
+        hash = dem2di_hash_word(hash, dem2di_word_of(bytes + i, count - i < 8 ? count - i : 8));
+    return hash;
+}
+
+static void dem2di_archive_start(const dem2d_env *env, dem2di_aim aim, dem2di_archive *ar) {
+    memset(ar, 0, sizeof *ar);
+    ar->aim = aim;
+    ar->env = env;
+    ar->hash = 0x243F6A8885A308D3u; /* pi - 3: not 0, of which zeros would make 0 */
+}
+
+static bool dem2di_archive_good(const dem2di_archive *ar) {
+    return ar->result == DEM2D_OK;
+}
+
+/* Has something just been loaded? */
+static bool dem2di_archive_loaded(const dem2di_archive *ar) {
+    return ar->aim == DEM2DI_LOADING && ar->result == DEM2D_OK;
+}
+
+/* What has been loaded can't be. The log knows, or is told here. */
+static void dem2di_archive_check(dem2di_archive *ar, dem2d_result result) {
+    if (dem2di_archive_loaded(ar) && result != DEM2D_OK) ar->result = DEM2D_FORMAT;
+}
+
+static void dem2di_archive_expect(dem2di_archive *ar, bool holds, const char *else_what) {
+    if (dem2di_archive_loaded(ar) && !holds)
+        ar->result = dem2di_fail(ar->env, DEM2D_FORMAT, -1, "snapshot: %s", else_what);
+}
+
+/* Is there room for what is to be loaded? */
+static bool dem2di_archive_room(dem2di_archive *ar, bool reserved) {
+    if (dem2di_archive_good(ar) && !reserved)
+        ar->result = dem2di_fail(ar->env, DEM2D_OUT_OF_MEMORY, -1, "no memory for a snapshot");
+    return dem2di_archive_good(ar);
+}
+
+static void dem2di_archive_flush(dem2di_archive *ar) {
+    if (!dem2di_archive_good(ar) || ar->used == 0) return;
+    bool good = ar->file != NULL ? fwrite(ar->chunk, 1, ar->used, ar->file) == ar->used
+                                 : ar->write(ar->user, (const char *)ar->chunk, ar->used);
+    ar->hash = dem2di_hash_bytes(ar->hash, ar->chunk, ar->used);
+    ar->used = 0;
+    if (!good) ar->result = dem2di_fail(ar->env, DEM2D_IO, -1, "could not write the snapshot");
+}
+
+/* --- numbers -----------------------------------------------------------------------------------
+ */
+
+/* The lowest `bytes` of a word. */
+static void dem2di_archive_word(dem2di_archive *ar, uint64_t *word, int bytes) {
+    if (!dem2di_archive_good(ar)) return;
+    ar->size += (uint64_t)bytes;
+    switch (ar->aim) {
+    case DEM2DI_SIZING:
+        break;
+    case DEM2DI_HASHING:
+        ar->hash = dem2di_hash_word(ar->hash, *word);
+        break;
+    case DEM2DI_SAVING:
+        for (int k = 0; k < bytes; k++) {
+            ar->chunk[ar->used++] = (unsigned char)(*word >> 8 * k & 255);
+            if (ar->used == DEM2DI_CHUNK) dem2di_archive_flush(ar);
+        }
+        break;
+    case DEM2DI_LOADING:
+        dem2di_archive_expect(ar, ar->end - ar->next >= bytes, "fields are missing");
+        if (!dem2di_archive_good(ar)) return;
+        *word = dem2di_word_of(ar->next, (size_t)bytes);
+        ar->next += bytes;
+        break;
+    }
+}
+
+/* A whole number of 1 (not below 0), 4 or 8 bytes; what is loaded is from low to high. */
+static int64_t dem2di_archive_whole(dem2di_archive *ar, const char *name, int64_t value, int bytes,
+                                    int64_t low, int64_t high) {
+    uint64_t word = (uint64_t)value;
+    int64_t got;
+    dem2di_archive_word(ar, &word, bytes);
+    if (!dem2di_archive_loaded(ar)) return value;
+    if (bytes == 4 && word > INT32_MAX) word |= (uint64_t)UINT32_MAX << 32;
+    memcpy(&got, &word, sizeof got);
+    if (got >= low && got <= high) return got;
+    ar->result = dem2di_fail(ar->env, DEM2D_FORMAT, -1, "snapshot: %s = %lld is out of range", name,
+                             (long long)got);
+    return value;
+}
+
+static void dem2di_archive_int(dem2di_archive *ar, const char *name, int *value, int low,
+                               int high) {
+    int got = (int)dem2di_archive_whole(ar, name, *value, 4, low, high);
+    if (dem2di_archive_loaded(ar)) *value = got;
+}
+
+static void dem2di_archive_bool(dem2di_archive *ar, const char *name, bool *value) {
+    bool got = dem2di_archive_whole(ar, name, *value, 1, 0, 1) != 0;
+    if (dem2di_archive_loaded(ar)) *value = got;
+}
+
+/* A counter of steps or of what they did: too low to overflow. */
+static void dem2di_archive_tally(dem2di_archive *ar, const char *name, int64_t *value) {
+    int64_t got = dem2di_archive_whole(ar, name, *value, 8, 0, (int64_t)1 << 62);
+    if (dem2di_archive_loaded(ar)) *value = got;
+}
+
+/* Length of an array whose elements take at least so many bytes each: never more than there are. */
+static void dem2di_archive_count(dem2di_archive *ar, const char *name, int *value, int least) {
+    int64_t most = 1 << 30;
+    if (ar->aim == DEM2DI_LOADING && (ar->end - ar->next) / least < most)
+        most = (ar->end - ar->next) / least;
+    int got = (int)dem2di_archive_whole(ar, name, *value, 4, 0, most);
+    if (dem2di_archive_loaded(ar)) *value = got;
+}
+
+static void dem2di_archive_generation(dem2di_archive *ar, uint32_t *value) {
+    uint64_t word = *value;
+    dem2di_archive_word(ar, &word, 4);
+    if (dem2di_archive_loaded(ar)) *value = (uint32_t)word;
+}
+
+/* Any double. */
+static void dem2di_archive_bits(dem2di_archive *ar, double *value) {
+    uint64_t word;
+    memcpy(&word, value, sizeof word);
+    dem2di_archive_word(ar, &word, 8);
+    if (dem2di_archive_loaded(ar)) memcpy(value, &word, sizeof word);
+}
+
+static void dem2di_archive_finite(dem2di_archive *ar, const char *name, double *value) {
+    dem2di_archive_bits(ar, value);
+    dem2di_archive_check(ar, dem2di_check_finite(ar->env, name, *value));
+}
+
+static void dem2di_archive_positive(dem2di_archive *ar, const char *name, double *value) {
+    dem2di_archive_bits(ar, value);
+    dem2di_archive_check(ar, dem2di_check_positive(ar->env, name, *value));
+}
+
+static void dem2di_archive_not_negative(dem2di_archive *ar, const char *name, double *value) {
+    dem2di_archive_bits(ar, value);
+    dem2di_archive_check(ar, dem2di_check_not_negative(ar->env, name, *value));
+}
+
+static void dem2di_archive_vec(dem2di_archive *ar, const char *name, dem2d_vec *value) {
+    dem2di_archive_finite(ar, name, &value->x);
+    dem2di_archive_finite(ar, name, &value->y);
+}
+
+/* --- what there is ------------------------------------------------------------------------------
+   The same functions hash, save and load; results of `whole` are assigned to copies. */
+
+static void dem2di_archive_settings(dem2di_archive *ar, dem2d_world *w) {
+    dem2di_archive_positive(ar, "time_step", &w->time_step);
+    dem2di_archive_vec(ar, "gravity", &w->gravity);
+    dem2di_archive_not_negative(ar, "local_damping", &w->local_damping);
+    dem2di_archive_not_negative(ar, "global_damping", &w->global_damping);
+    dem2di_archive_expect(ar, w->local_damping < 1, "local_damping is 1 or more");
+    dem2di_archive_positive(ar, "contact_tolerance", &w->tolerance);
+    dem2di_archive_int(ar, "max_iterations", &w->max_iterations, 1, 1 << 30);
+    w->solver =
+        (dem2d_solver)dem2di_archive_whole(ar, "solver", w->solver, 4, 0, DEM2D_SOLVER_COUNT - 1);
+    w->faces = (dem2d_face_rule)dem2di_archive_whole(ar, "faces", w->faces, 4, 0,
+                                                     DEM2D_FACE_RULE_COUNT - 1);
+    dem2di_archive_bool(ar, "check_time_step", &w->check_time_step);
+    dem2di_archive_tally(ar, "steps", &w->steps);
+}
+
+static void dem2di_archive_material(dem2di_archive *ar, dem2d_material_desc *material) {
+    dem2di_archive_positive(ar, "density", &material->density);
+    dem2di_archive_positive(ar, "normal_stiffness", &material->normal_stiffness);
+    dem2di_archive_not_negative(ar, "tangential_stiffness", &material->tangential_stiffness);
+    dem2di_archive_not_negative(ar, "friction", &material->friction);
+    dem2di_archive_not_negative(ar, "damping_ratio", &material->damping_ratio);
+    dem2di_archive_not_negative(ar, "rolling_friction", &material->rolling_friction);
+}
+
+/* All 0 where a material has come after the last force pass. */
+static void dem2di_archive_law(dem2di_archive *ar, dem2d_pair_desc *law) {
+    dem2di_archive_not_negative(ar, "normal_stiffness", &law->normal_stiffness);
+    dem2di_archive_not_negative(ar, "tangential_stiffness", &law->tangential_stiffness);
+    dem2di_archive_not_negative(ar, "friction", &law->friction);
+    dem2di_archive_not_negative(ar, "damping_ratio", &law->damping_ratio);
+    dem2di_archive_not_negative(ar, "rolling_friction", &law->rolling_friction);
+}
+
+/* A symmetric table. */
+static void dem2di_archive_laws(dem2di_archive *ar, const dem2d_world *w, dem2d_pair_desc *laws) {
+    for (int a = 0; a < w->material_count; a++)
+        for (int b = 0; b <= a; b++) {
+            dem2d_pair_desc *law = &laws[a * w->laws_side + b];
+            dem2di_archive_law(ar, law);
+            if (dem2di_archive_loaded(ar)) laws[b * w->laws_side + a] = *law;
+        }
+}
+
+static void dem2di_archive_materials(dem2di_archive *ar, dem2d_world *w) {
+    dem2di_archive_count(ar, "materials", &w->material_count, (int)sizeof *w->materials);
+    dem2di_archive_expect(ar, w->material_count <= DEM2DI_MATERIALS, "too many materials");
+    if (!dem2di_archive_good(ar)) return;
+    int n = w->material_count;
+    bool fits =
+        ar->aim != DEM2DI_LOADING ||
+        (dem2di_grow(w, (void **)&w->materials, &w->material_capacity, n, sizeof *w->materials) &&
+         dem2di_widen_laws(w, n));
+    if (!dem2di_archive_room(ar, fits)) return;
+    for (int i = 0; i < n; i++) dem2di_archive_material(ar, &w->materials[i]);
+    dem2di_archive_laws(ar, w, w->laws);
+}
+
+static void dem2di_archive_custom(dem2di_archive *ar, dem2d_shape *shape) {
+    dem2di_archive_int(ar, "tag", &shape->function_tag, INT_MIN, INT_MAX);
+    if (!dem2di_archive_loaded(ar)) return;
+    const dem2d_custom_desc *found = NULL;
+    if (ar->load->custom != NULL)
+        found = ar->load->custom(ar->load->custom_user, shape->function_tag);
+    if (found == NULL || found->support == NULL) {
+        ar->result = dem2di_fail(ar->env, DEM2D_NULL_ARGUMENT, -1,
+                                 "custom: no support function for tag %d", shape->function_tag);
+        return;
+    }
+    shape->function = found->support;
+    shape->function_user = found->user;
+}
+
+/* What a shape's support points come from. The table of sectors and the multiples of a Fourier
+   series follow from it with the same bits. */
+static void dem2di_archive_kernel(dem2di_archive *ar, dem2d_shape *shape) {
+    for (int k = 0; shape->corners != NULL && k < shape->count; k++)
+        dem2di_archive_vec(ar, "corner", &shape->corners[k]);
+    for (int k = 0; shape->arcs != NULL && k < shape->count; k++) {
+        dem2di_archive_vec(ar, "arc", &shape->arcs[k].start);
+        dem2di_archive_vec(ar, "arc", &shape->arcs[k].d0);
+        dem2di_archive_vec(ar, "arc", &shape->arcs[k].d1);
+        dem2di_archive_vec(ar, "arc", &shape->arcs[k].d2);
+    }
+    for (int k = 0; shape->ends != NULL && k < shape->count; k++)
+        dem2di_archive_vec(ar, "tangent", &shape->ends[k]);
+    for (int n = 1; shape->blocks != NULL && n <= shape->count; n++) {
+        double *a = &shape->blocks[(n - 1) / 4].a[(n - 1) % 4];
+        double *b = &shape->blocks[(n - 1) / 4].b[(n - 1) % 4];
+        dem2di_archive_finite(ar, "a", a);
+        dem2di_archive_finite(ar, "b", b);
+        if (dem2di_archive_loaded(ar)) dem2di_fourier_term(shape, n, *a, *b);
+    }
+    for (int k = 0; shape->floors != NULL && k < DEM2DI_FLOORS; k++)
+        dem2di_archive_finite(ar, "floor", &shape->floors[k]);
+    if (!dem2di_archive_loaded(ar)) return;
+    if (shape->sectors > 0) dem2di_fill_sectors(shape);
+    shape->flat = dem2di_has_faces(shape);
+}
+
+/* A shape, which is made when it is loaded. */
+static void dem2di_archive_shape(dem2di_archive *ar, const dem2d_env *env, dem2d_shape **shape) {
+    int type = *shape != NULL ? (int)(*shape)->type : 0,
+        count = *shape != NULL ? (*shape)->count : 0;
+    dem2di_archive_int(ar, "type", &type, 0, DEM2D_SHAPE_TYPE_COUNT - 1);
+    dem2di_archive_count(ar, "count", &count, 2 * (int)sizeof(double));
+    if (dem2di_archive_loaded(ar)) {
+        int least = type == DEM2D_POLYGON ? 3 : type == DEM2D_BEZIER ? 2 : 0;
+        bool counts = least > 0 || type == DEM2D_FOURIER;
+        dem2di_archive_expect(ar, count >= least && (counts || count == 0), "count of a shape");
+        if (!dem2di_archive_good(ar)) return;
+        *shape = dem2di_shape_allocate(env, (dem2d_shape_type)type, count,
+                                       dem2di_sectors_of((dem2d_shape_type)type, count));
+        if (!dem2di_archive_room(ar, *shape != NULL)) return;
+    }
+    if (!dem2di_archive_good(ar)) return;
+    dem2d_shape *s = *shape;
+    dem2di_archive_not_negative(ar, "a", &s->a);
+    dem2di_archive_not_negative(ar, "b", &s->b);
+    dem2di_archive_not_negative(ar, "rounding", &s->rounding);
+    dem2di_archive_positive(ar, "circumscribed", &s->circumscribed);
+    dem2di_archive_not_negative(ar, "inscribed", &s->inscribed);
+    dem2di_archive_not_negative(ar, "rho_min", &s->rho_min);
+    dem2di_archive_positive(ar, "area", &s->mass.area);
+    dem2di_archive_positive(ar, "polar_moment", &s->mass.polar_moment);
+    dem2di_archive_vec(ar, "offset", &s->offset);
+    if (s->type == DEM2D_CUSTOM) dem2di_archive_custom(ar, s);
+    dem2di_archive_kernel(ar, s);
+}
+
+/* The slots of templates, free ones too. */
+static void dem2di_archive_templates(dem2di_archive *ar, dem2d_world *w) {
+    dem2di_archive_count(ar, "templates", &w->template_count, 5);
+    bool fits =
+        ar->aim != DEM2DI_LOADING || dem2di_grow(w, (void **)&w->templates, &w->template_capacity,
+                                                 w->template_count, sizeof *w->templates);
+    if (!dem2di_archive_room(ar, fits)) w->template_count = 0;
+    for (int i = 0; i < w->template_count && dem2di_archive_good(ar); i++) {
+        dem2di_template *place = &w->templates[i];
+        bool there = place->shape != NULL;
+        dem2di_archive_generation(ar, &place->generation);
+        dem2di_archive_bool(ar, "there", &there);
+        if (!there || !dem2di_archive_good(ar)) continue;
+        dem2di_archive_shape(ar, &w->env, &place->shape);
+        if (dem2di_archive_loaded(ar) && w->faces == DEM2D_CONTACT_AREA)
+            (void)dem2di_archive_room(ar, dem2di_template_outline(w, place->shape, place));
+    }
+}
+
+static void dem2di_archive_body(dem2di_archive *ar, const dem2d_world *w, dem2di_body *body) {
+    dem2di_archive_positive(ar, "scale", &body->scale);
+    dem2di_archive_int(ar, "shape", &body->shape_index, -1, w->template_count - 1);
+    dem2di_archive_int(ar, "index", &body->index, 0, INT_MAX);
+    body->material =
+        (uint16_t)dem2di_archive_whole(ar, "material", body->material, 4, 0, w->material_count - 1);
+    body->motion = (uint8_t)dem2di_archive_whole(ar, "motion", body->motion, 4, 0, DEM2D_DRIVEN);
+}
+
+/* The radius follows from the shape. */
+static void dem2di_archive_state(dem2di_archive *ar, dem2di_state *state) {
+    dem2di_archive_vec(ar, "position", &state->x);
+    dem2di_archive_finite(ar, "rotation", &state->q.c);
+    dem2di_archive_finite(ar, "rotation", &state->q.s);
+    dem2di_archive_vec(ar, "velocity", &state->v);
+    dem2di_archive_finite(ar, "angular_velocity", &state->w);
+}
+
+static void dem2di_archive_wall(dem2di_archive *ar, const dem2d_world *w, dem2d_wall_desc *wall) {
+    dem2di_archive_not_negative(ar, "length", &wall->length);
+    wall->mode =
+        (dem2d_wall_mode)dem2di_archive_whole(ar, "mode", wall->mode, 4, 0, DEM2D_WALL_SERVO);
+    wall->material.index = (uint32_t)dem2di_archive_whole(ar, "material", wall->material.index, 4,
+                                                          0, w->material_count - 1);
+    dem2di_archive_generation(ar, &wall->material.generation);
+    dem2di_archive_vec(ar, "point", &wall->point);
+    dem2di_archive_vec(ar, "normal", &wall->normal);
+    dem2di_archive_bool(ar, "segment", &wall->segment);
+    dem2di_archive_vec(ar, "end", &wall->end);
+    dem2di_archive_vec(ar, "velocity", &wall->velocity);
+    dem2di_archive_finite(ar, "stress", &wall->stress);
+    dem2di_archive_not_negative(ar, "max_speed", &wall->max_speed);
+    for (int i = 0; i < 2; i++) {
+        dem2di_archive_generation(ar, &wall->spans[i].index);
+        dem2di_archive_generation(ar, &wall->spans[i].generation);
+    }
+}
+
+static void dem2di_archive_wall_state(dem2di_archive *ar, dem2di_wall_state *state) {
+    dem2di_archive_vec(ar, "point", &state->point);
+    dem2di_archive_vec(ar, "velocity", &state->velocity);
+    dem2di_archive_vec(ar, "force", &state->force);
+    dem2di_archive_finite(ar, "stiffness", &state->stiffness);
+    dem2di_archive_finite(ar, "drift", &state->drift);
+}
+
+/* Of an open contact, beside its normal and depth. */
+static void dem2di_archive_hold(dem2di_archive *ar, dem2di_link *link) {
+    dem2di_archive_vec(ar, "contact point", &link->point);
+    dem2di_archive_finite(ar, "normal force", &link->force);
+    dem2di_archive_finite(ar, "shear", &link->shear);
+}
+
+static void dem2di_archive_ends(dem2di_archive *ar, dem2di_ends *ends) {
+    for (int k = 0; k < 2; k++) {
+        dem2di_archive_finite(ar, "weight", &ends->weight[k]);
+        dem2di_archive_finite(ar, "depth", &ends->depth[k]);
+        dem2di_archive_finite(ar, "offset", &ends->offset[k]);
+        dem2di_archive_finite(ar, "shear", &ends->shear[k]);
+    }
+}
+
+/* What the full law keeps beside it. */
+static void dem2di_archive_extra(dem2di_archive *ar, dem2di_extra *extra) {
+    dem2di_archive_finite(ar, "viscous force", &extra->viscous);
+    dem2di_archive_finite(ar, "moment", &extra->moment);
+    dem2di_archive_finite(ar, "energy", &extra->energy);
+    for (int k = 0; k < 2; k++) dem2di_archive_bits(ar, &extra->state[k]);
+}
+
+/* --- the hash -----------------------------------------------------------------------------------
+ */
+
+/* Poses as a caller sees them: a refused step may have changed how rotations are held. */
+static void dem2di_hash_particles(dem2di_archive *ar, const dem2d_world *w) {
+    for (int index = 0; index < w->name_count; index++) {
+        int slot = w->names[index].slot;
+        if (slot < 0) continue;
+        dem2di_body body = w->bodies[slot];
+        uint32_t generation = w->names[index].generation;
+        dem2di_archive_generation(ar, &generation);
+        dem2di_archive_body(ar, w, &body);
+        for (int next = 0; next < 2; next++) {
+            const dem2di_state *states = dem2di_states_at(w, next == 1);
+            dem2di_state state = states[slot];
+            state.q = dem2di_pose_of(w, states, slot).rotation;
+            dem2di_archive_state(ar, &state);
+        }
+    }
+}
+
+static void dem2di_hash_walls(dem2di_archive *ar, const dem2d_world *w) {
+    for (int j = 0; j < w->wall_count; j++) {
+        dem2di_wall wall = w->walls[j];
+        dem2di_wall_state states[2] = {w->wall_before[j], w->wall_now[j]};
+        if (!wall.alive) continue;
+        dem2di_archive_int(ar, "wall", &j, 0, INT_MAX);
+        dem2di_archive_generation(ar, &wall.generation);
+        dem2di_archive_wall(ar, w, &wall.desc);
+        for (int k = 0; k < 2; k++) dem2di_archive_wall_state(ar, &states[k]);
+    }
+}
+
+/* Open contacts at the last force pass; those that are apart may be listed or not. */
+static void dem2di_hash_contacts(dem2di_archive *ar, const dem2d_world *w, bool walls) {
+    dem2di_tour walk = dem2di_tour_start(walls);
+    while (dem2di_tour_next(w, &walk)) {
+        const dem2di_key *key = &w->list.keys[walk.contact];
+        const dem2di_ends *two = dem2di_ends_at(w, walk.contact, false);
+        dem2d_pair_desc law = *dem2di_law_at(w, walk.contact, false);
+        int a = w->bodies[key->a].index, b = walls ? key->b : w->bodies[key->b].index;
+        dem2di_archive_int(ar, "a", &a, 0, INT_MAX);
+        dem2di_archive_int(ar, "b", &b, 0, INT_MAX);
+        dem2di_archive_vec(ar, "normal", &walk.link.normal);
+        dem2di_archive_finite(ar, "depth", &walk.link.depth);
+        dem2di_archive_hold(ar, &walk.link);
+        dem2di_archive_law(ar, &law);
+        const dem2di_extra *beside = dem2di_extra_at(w, walk.contact, false);
+        if (beside != NULL) {
+            dem2di_extra extra = *beside;
+            dem2di_archive_extra(ar, &extra);
+        }
+        if (two == NULL) continue;
+        dem2di_ends ends = *two;
+        dem2di_archive_ends(ar, &ends);
+    }
+}
+
+DEM2D_API uint64_t dem2d_world_hash(const dem2d_world *world) {
+    if (world == NULL) return 0;
+    dem2di_archive ar;
+    dem2d_world own = *world; /* its arrays are only read: nothing is loaded */
+    dem2di_archive_start(&world->env, DEM2DI_HASHING, &ar);
+    dem2di_archive_settings(&ar, &own);
+    dem2di_archive_materials(&ar, &own);
+    for (int i = 0; i < own.template_count; i++) {
+        if (own.templates[i].shape == NULL) continue;
+        dem2di_archive_int(&ar, "template", &i, 0, INT_MAX);
+        dem2di_archive_generation(&ar, &own.templates[i].generation);
+        dem2di_archive_shape(&ar, &own.env, &own.templates[i].shape);
+    }
+    dem2di_hash_particles(&ar, &own);
+    dem2di_hash_walls(&ar, &own);
+    dem2di_hash_contacts(&ar, &own, false);
+    dem2di_hash_contacts(&ar, &own, true);
+    ar.hash = dem2di_hash_word(dem2di_hash_word(ar.hash, ar.size),
+                               0); /* low bits come from high ones too */
+    return ar.hash != 0 ? ar.hash : 1;
+}
+
+/* --- snapshots ----------------------------------------------------------------------------------
+ */
+
+/* What of the list outlives it. */
+static void dem2di_archive_progress(dem2di_archive *ar, dem2d_world *w) {
+    dem2di_archive_bool(ar, "list_stale", &w->list_stale);
+    dem2di_archive_bool(ar, "list_worn", &w->list_worn);
+    dem2di_archive_bool(ar, "skin_fixed", &w->skin_fixed);
+    dem2di_archive_bool(ar, "scattered", &w->scattered);
+    dem2di_archive_bool(ar, "bounded", &w->bounded);
+    dem2di_archive_positive(ar, "skin", &w->skin);
+    dem2di_archive_not_negative(ar, "interval", &w->interval);
+    dem2di_archive_not_negative(ar, "spread", &w->spread);
+    dem2di_archive_bits(ar, &w->worn);
+    dem2di_archive_bits(ar, &w->creep);
+    dem2di_archive_bits(ar, &w->rounding);
+    dem2di_archive_tally(ar, "listed_at", &w->listed_at);
+    dem2di_archive_expect(ar, w->listed_at <= w->steps, "listed_at is to come");
+    dem2di_archive_tally(ar, "list_rebuilds", &w->rebuilds);
+    dem2di_archive_tally(ar, "slow_time_step", &w->slow_time_step);
+    dem2di_archive_tally(ar, "support_calls", &w->count.calls);
+    dem2di_archive_tally(ar, "looks", &w->count.looks);
+    dem2di_archive_tally(ar, "gaps", &w->count.gaps);
+    dem2di_archive_tally(ar, "unsound", &w->count.unsound);
+    for (int k = 0; k < DEM2D_PROOF_COUNT; k++)
+        dem2di_archive_tally(ar, "proofs", &w->count.proofs[k]);
+}
+
+static void dem2di_archive_ledger(dem2di_archive *ar, dem2di_ledger *ledger) {
+    dem2di_archive_bool(ar, "ledger", &ledger->kept);
+    dem2di_archive_bool(ar, "ledger", &ledger->edited);
+    for (int k = 0; k < DEM2DI_ACCOUNTS; k++) dem2di_archive_bits(ar, &ledger->sum[k]);
+    for (int k = 0; k < DEM2DI_HALVES; k++) dem2di_archive_bits(ar, &ledger->half[k]);
+    dem2di_archive_bits(ar, &ledger->kinetic);
+    dem2di_archive_bits(ar, &ledger->given);
+    dem2di_archive_bits(ar, &ledger->closure);
+    dem2di_archive_bits(ar, &ledger->stored.normal);
+    dem2di_archive_bits(ar, &ledger->stored.tangential);
+    dem2di_archive_bits(ar, &ledger->stored.rolling);
+}
+
+/* Whether there is a caller's law, and which: it is given once more. */
+static void dem2di_archive_callers_law(dem2di_archive *ar, dem2d_world *w) {
+    bool has = w->law != NULL;
+    dem2di_archive_bool(ar, "law", &has);
+    dem2di_archive_int(ar, "law_tag", &w->law_tag, INT_MIN, INT_MAX);
+    if (!dem2di_archive_loaded(ar) || !has) return;
+    const dem2d_load_desc *load = ar->load;
+    if (load->law == NULL || load->law_tag != w->law_tag) {
+        ar->result =
+            dem2di_fail(ar->env, DEM2D_NULL_ARGUMENT, -1, "law: none given for tag %d", w->law_tag);
+        return;
+    }
+    w->law = load->law;
+    w->law_user = load->law_user;
+}
+
+/* Gravity and damping are looked at in each step. */
+static void dem2di_archive_plan(dem2di_archive *ar, const dem2d_world *w, dem2di_plan *plan) {
+    int materials = w->material_count;
+    dem2di_archive_bool(ar, "friction", &plan->friction);
+    dem2di_archive_bool(ar, "spin", &plan->spin);
+    dem2di_archive_bool(ar, "turns", &plan->turns);
+    dem2di_archive_bool(ar, "one_law", &plan->one_law);
+    dem2di_archive_int(ar, "material", &plan->material, 0, materials > 0 ? materials - 1 : 0);
+    dem2di_archive_bool(ar, "again", &plan->again);
+    dem2di_archive_bool(ar, "faces", &plan->faces);
+    dem2di_archive_bool(ar, "joints", &plan->joints);
+    dem2di_archive_bool(ar, "full", &plan->full);
+}
+
+/* What follows of a particle that has been loaded. */
+static void dem2di_archive_revive(dem2di_archive *ar, dem2d_world *w, int slot) {
+    const dem2di_body *body = &w->bodies[slot];
+    if (!dem2di_archive_loaded(ar)) return;
+    for (int next = 0; next < 2; next++) {
+        dem2d_rot q = dem2di_states_at(w, next == 1)[slot].q;
+        double off = w->plan.turns ? q.c * q.c + q.s * q.s - 1 : q.c / 2147483648.0;
+        dem2di_archive_expect(ar, fabs(off) < (w->plan.turns ? 1e-9 : 1), "no rotation");
+    }
+    w->holes += body->shape_index < 0;
+    if (body->shape_index < 0 || !dem2di_archive_good(ar)) return;
+    dem2di_template *place = &w->templates[body->shape_index];
+    dem2di_archive_expect(ar, place->shape != NULL, "a particle without a shape");
+    if (!dem2di_archive_good(ar)) return;
+    double mass = dem2di_body_mass(w, body), inertia = dem2di_body_inertia(w, body);
+    dem2di_archive_check(ar, dem2di_check_positive(ar->env, "mass", mass));
+    dem2di_archive_check(ar, dem2di_check_positive(ar->env, "inertia", inertia));
+    place->users++;
+    w->inverse[slot] = dem2di_inverse_of(w, body);
+    w->now[slot].radius = w->before[slot].radius = place->shape->circumscribed * body->scale;
+    if (w->plan.turns) w->lever[slot] = dem2di_lever_of(w, slot);
+}
+
+/* Particles in the order of memory, removed ones too until the list is renewed. One that has come
+   since has no travel yet. */
+static void dem2di_archive_bodies(dem2di_archive *ar, dem2d_world *w) {
+    dem2di_archive_count(ar, "particles", &w->body_count, 100);
+    dem2di_archive_count(ar, "names", &w->name_count, 8);
+    dem2di_archive_int(ar, "free_name", &w->free_name, -1, w->name_count - 1);
+    int n = w->body_count, most = n > w->name_count ? n : w->name_count;
+    bool fits = ar->aim != DEM2DI_LOADING ||
+                (dem2di_reserve_bodies(w, most) &&
+                 (!w->plan.turns || dem2di_group_reserve(w, DEM2DI_TRAVELS, n, false)));
+    if (!dem2di_archive_room(ar, fits)) return;
+    for (int i = 0; i < n && dem2di_archive_good(ar); i++) {
+        dem2di_body body = w->bodies[i];
+        double none = 0;
+        dem2di_archive_body(ar, w, &body);
+        if (dem2di_archive_loaded(ar)) w->bodies[i] = body;
+        dem2di_archive_state(ar, &w->before[i]);
+        dem2di_archive_state(ar, &w->now[i]);
+        dem2di_archive_bits(ar, &w->wear[i]);
+        dem2di_archive_revive(ar, w, i);
+        if (w->plan.turns)
+            dem2di_archive_not_negative(ar, "travel",
+                                        i < w->travel_capacity ? &w->travel[i] : &none);
+    }
+}
+
+/* Living names and particles know each other, and the free ones are in one list. */
+static bool dem2di_names_agree(const dem2d_world *w) {
+    int unused = 0, index = w->free_name;
+    for (int i = 0; i < w->name_count; i++) {
+        int slot = w->names[i].slot;
+        unused += slot < 0;
+        if (slot < 0) continue;
+        if (slot >= w->body_count || w->bodies[slot].index != i || w->bodies[slot].shape_index < 0)
+            return false;
+    }
+    for (int slot = 0; slot < w->body_count; slot++) {
+        const dem2di_body *body = &w->bodies[slot];
+        if (body->index >= w->name_count) return false;
+        if (body->shape_index >= 0 && w->names[body->index].slot != slot) return false;
+    }
+    for (; unused > 0 && index >= 0; unused--) {
+        if (w->names[index].slot >= 0) return false;
+        index = -2 - w->names[index].slot;
+    }
+    return unused == 0 && index == -1;
+}
+
+static void dem2di_archive_names(dem2di_archive *ar, dem2d_world *w) {
+    for (int i = 0; i < w->name_count && dem2di_archive_good(ar); i++) {
+        dem2di_archive_int(ar, "slot", &w->names[i].slot, -1 - w->name_count, w->body_count - 1);
+        dem2di_archive_generation(ar, &w->names[i].generation);
+    }
+    if (dem2di_archive_loaded(ar)) dem2di_archive_expect(ar, dem2di_names_agree(w), "ids differ");
+}
+
+/* What follows of the walls that have been loaded. */
+static void dem2di_archive_erect(dem2di_archive *ar, dem2d_world *w) {
+    for (int j = 0; j < w->wall_count && dem2di_archive_loaded(ar); j++) {
+        dem2di_wall *wall = &w->walls[j];
+        wall->span[0] = wall->span[1] = -1;
+        if (!wall->alive) continue;
+        dem2d_vec n = wall->desc.normal;
+        dem2di_archive_check(ar, dem2di_check_wall(w, &wall->desc));
+        dem2di_archive_expect(ar, dem2di_is_unit(n.x, n.y), "a normal is not of unit length");
+        if (!dem2di_archive_room(ar, dem2di_line_make(w, &wall->desc))) return;
+        if (wall->desc.segment) dem2di_segment_set(wall);
+        for (int i = 0; i < 2 && dem2di_archive_good(ar); i++) {
+            if (wall->desc.spans[i].generation == 0) continue;
+            wall->span[i] = (int)wall->desc.spans[i].index;
+            w->walls[wall->span[i]].users++;
+        }
+    }
+}
+
+/* The slots of walls, free ones too. */
+static void dem2di_archive_walls(dem2di_archive *ar, dem2d_world *w) {
+    dem2di_archive_count(ar, "walls", &w->wall_count, 100);
+    bool fits =
+        ar->aim != DEM2DI_LOADING || dem2di_group_reserve(w, DEM2DI_WALLS, w->wall_count, false);
+    if (!dem2di_archive_room(ar, fits)) return;
+    int materials = w->material_count;
+    for (int j = 0; j < w->wall_count && dem2di_archive_good(ar); j++) {
+        dem2di_wall wall = w->walls[j];
+        dem2di_archive_bool(ar, "alive", &wall.alive);
+        dem2di_archive_generation(ar, &wall.generation);
+        dem2di_archive_wall(ar, w, &wall.desc);
+        dem2di_archive_vec(ar, "listed", &wall.listed);
+        dem2di_archive_not_negative(ar, "skin", &wall.skin);
+        dem2di_archive_int(ar, "used_material", &wall.used_material, 0, materials - 1);
+        if (dem2di_archive_loaded(ar)) w->walls[j] = wall;
+        dem2di_archive_wall_state(ar, &w->wall_before[j]);
+        dem2di_archive_wall_state(ar, &w->wall_now[j]);
+    }
+    dem2di_archive_erect(ar, w);
+}
+
+/* A contact is of two that live, in the kind it is listed in; a forgotten one may be anything. */
+static bool dem2di_key_sound(const dem2d_world *w, int contact) {
+    const dem2di_key *key = &w->list.keys[contact];
+    if (key->a < 0) return w->list_stale;
+    const dem2di_body *a = &w->bodies[key->a];
+    if (a->shape_index < 0) return false;
+    if (contact >= w->list.pairs) return w->walls[key->b].alive;
+    const dem2di_body *b = &w->bodies[key->b];
+    if (b->shape_index < 0 || key->a == key->b) return false;
+    bool round = dem2di_shape_of(w, a)->type == DEM2D_CIRCLE &&
+                 dem2di_shape_of(w, b)->type == DEM2D_CIRCLE && w->faces != DEM2D_CONTACT_AREA;
+    return contact < w->list.discs ? round && !w->plan.full : w->plan.turns;
+}
+
+static void dem2di_archive_keys(dem2di_archive *ar, dem2d_world *w) {
+    dem2di_list *list = &w->list;
+    dem2di_archive_count(ar, "contacts", &list->count, 4);
+    dem2di_archive_int(ar, "pairs", &list->pairs, 0, list->count);
+    dem2di_archive_int(ar, "discs", &list->discs, 0, list->pairs);
+    bool fits = ar->aim != DEM2DI_LOADING ||
+                (dem2di_list_reserve(w, &w->plan, list->discs, list->count) &&
+                 dem2di_tallies_reserve(w, list->discs, list->count) &&
+                 dem2di_scratch_reserve(w, dem2di_loads_bytes(w, (size_t)list->count)));
+    if (!dem2di_archive_room(ar, fits)) return;
+    for (int i = 0; i < list->count && dem2di_archive_good(ar); i++) {
+        int others = i < list->pairs ? w->body_count : w->wall_count;
+        dem2di_archive_int(ar, "a", &list->keys[i].a, -1, w->body_count - 1);
+        if (list->keys[i].a < 0) continue;
+        dem2di_archive_int(ar, "b", &list->keys[i].b, 0, others - 1);
+        if (dem2di_archive_loaded(ar))
+            dem2di_archive_expect(ar, dem2di_key_sound(w, i), "no such contact");
+    }
+}
+
+/* What a contact remembers: of one that is apart only what the next look starts from. */
+static void dem2di_archive_memory(dem2di_archive *ar, const dem2d_world *w, int contact) {
+    const dem2di_list *list = &w->list;
+    if (list->keys[contact].a < 0) return;
+    if (contact < list->discs) {
+        if (w->plan.friction) dem2di_archive_finite(ar, "shear", &list->shear[contact]);
+        return;
+    }
+    dem2di_link *link = &list->links[contact - list->discs];
+    dem2di_archive_vec(ar, "normal", &link->normal);
+    dem2di_archive_finite(ar, "depth", &link->depth);
+    if (link->depth > 0) dem2di_archive_hold(ar, link);
+    if (link->depth > 0 && w->plan.faces)
+        dem2di_archive_ends(ar, &list->ends[contact - list->discs]);
+    if (link->depth > 0 && w->plan.full)
+        dem2di_archive_extra(ar, &list->extras[contact - list->discs]);
+    if (contact >= list->pairs && !w->walls[list->keys[contact].b].desc.segment) return;
+    dem2di_archive_finite(ar, "budget", &link->budget);
+    dem2di_archive_int(ar, "feature", &link->feature.own, INT_MIN, INT_MAX);
+    for (int k = 0; k < 2; k++)
+        dem2di_archive_int(ar, "corner", &link->feature.corner[k], INT_MIN, INT_MAX);
+}
+
+/* May the next step go by the plan without a look at the scene? */
+static bool dem2di_plan_holds(const dem2d_world *w) {
+    const dem2di_plan *plan = &w->plan;
+    if (w->list_stale) return true;
+    if (w->holes > 0 || plan->again) return false;
+    dem2di_plan need = dem2di_plan_make(w);
+    return plan->friction >= need.friction && plan->spin >= need.spin &&
+           plan->turns >= need.turns && plan->faces >= need.faces && plan->full == need.full &&
+           plan->joints == need.joints &&
+           (!plan->one_law || (need.one_law && plan->material == need.material));
+}
+
+/* The contacts of each particle, and what a step expects of the list. */
+static void dem2di_archive_relist(dem2di_archive *ar, dem2d_world *w) {
+    dem2di_list *list = &w->list;
+    if (!dem2di_archive_loaded(ar)) return;
+    dem2di_archive_expect(ar, dem2di_plan_holds(w), "the plan is of another scene");
+    if (!dem2di_archive_good(ar)) return;
+    int entries =
+        dem2di_incident_count(list->keys, list->pairs, list->count, list->first + 1, w->body_count);
+    bool fits = entries < INT_MAX &&
+                dem2di_array_reserve(w, (void **)&list->incident, &list->incident_capacity,
+                                     entries + 1, sizeof *list->incident);
+    if (!dem2di_archive_room(ar, fits)) return;
+    dem2di_incident_make(w);
+    dem2di_loads_clear(w);
+}
+
+/* All of a world. Not here: capacities, and scratch memory that each step or list fills anew. */
+static void dem2di_archive_world(dem2di_archive *ar, dem2d_world *w) {
+    dem2di_archive_settings(ar, w);
+    dem2di_archive_progress(ar, w);
+    dem2di_archive_ledger(ar, &w->ledger);
+    dem2di_archive_callers_law(ar, w);
+    dem2di_archive_materials(ar, w);
+    if (dem2di_archive_good(ar)) dem2di_archive_laws(ar, w, w->used_laws);
+    dem2di_archive_templates(ar, w);
+    dem2di_archive_plan(ar, w, &w->plan);
+    if (dem2di_archive_good(ar)) dem2di_archive_bodies(ar, w);
+    if (dem2di_archive_good(ar)) dem2di_archive_names(ar, w);
+    if (dem2di_archive_good(ar)) dem2di_archive_walls(ar, w);
+    if (dem2di_archive_good(ar)) dem2di_archive_keys(ar, w);
+    for (int i = 0; dem2di_archive_good(ar) && i < w->list.count; i++)
+        dem2di_archive_memory(ar, w, i);
+    dem2di_archive_relist(ar, w);
+}
+
+/* To where the archive writes. */
+static dem2d_result dem2di_save(const dem2d_world *world, dem2di_archive *ar) {
+    dem2di_archive sizing;
+    dem2d_world own = *world; /* its arrays are only read: nothing is loaded */
+    dem2di_archive_start(&world->env, DEM2DI_SIZING, &sizing);
+    dem2di_archive_world(&sizing, &own);
+    uint64_t head[3] = {DEM2DI_SNAPSHOT_MARK, DEM2DI_SNAPSHOT_VERSION,
+                        DEM2DI_SNAPSHOT_HEAD + sizing.size + DEM2DI_SNAPSHOT_TAIL};
+    for (int k = 0; k < 3; k++) dem2di_archive_word(ar, &head[k], 8);
+    dem2di_archive_world(ar, &own);
+    dem2di_archive_flush(ar);
+    uint64_t checksum = ar->hash;
+    dem2di_archive_word(ar, &checksum, 8);
+    dem2di_archive_flush(ar);
+    return ar->result;
+}
+
+/* Aside first: whatever happens, the path holds the old file or all of the new one. */
+static dem2d_result dem2di_save_aside(const dem2d_world *world, const char *path, const char *aside,
+                                      dem2di_archive *ar) {
+    const dem2d_env *env = &world->env;
+    ar->file = fopen(aside, "wb");
+    if (ar->file == NULL) return dem2di_fail(env, DEM2D_IO, -1, "could not open %s", aside);
+    dem2d_result result = dem2di_save(world, ar);
+    if (fclose(ar->file) != 0 && result == DEM2D_OK)
+        result = dem2di_fail(env, DEM2D_IO, -1, "could not write %s", aside);
+#if defined(_WIN32)
+    if (result == DEM2D_OK) (void)remove(path); /* rename does not replace there */
+#endif
+    if (result == DEM2D_OK && rename(aside, path) != 0)
+        result = dem2di_fail(env, DEM2D_IO, -1, "could not rename %s to %s", aside, path);
+    if (result != DEM2D_OK) (void)remove(aside);
+    return result;
+}
+
+DEM2D_API dem2d_result dem2d_world_save(const dem2d_world *world, const dem2d_save_desc *desc,
+                                        const char *path) {
+    if (world == NULL || desc == NULL) return DEM2D_NULL_ARGUMENT;
+    const dem2d_env *env = &world->env;
+    if (path == NULL && desc->write == NULL) return dem2di_fail_null(env, "path and write");
+    if (path != NULL && desc->write != NULL)
+        return dem2di_fail(env, DEM2D_OUT_OF_RANGE, -1, "both path and write are given");
+    dem2di_archive ar;
+    dem2di_archive_start(env, DEM2DI_SAVING, &ar);
+    ar.write = desc->write;
+    ar.user = desc->user;
+    if (path == NULL) return dem2di_save(world, &ar);
+    static const char part[] = ".part";
+    size_t length = strlen(path), room = length + sizeof part;
+    char *aside = (char *)dem2di_allocate(&world->user_env, room, 1);
+    if (aside == NULL) return dem2di_out_of_memory(world, "a file name");
+    memcpy(aside, path, length);
+    memcpy(aside + length, part, sizeof part);
+    dem2d_result result = dem2di_save_aside(world, path, aside, &ar);
+    dem2di_release(&world->user_env, aside, room, 1);
+    return result;
+}
+
+/* Bytes of a snapshot, and where they come from. */
+typedef struct dem2di_source {
+    const dem2d_load_desc *desc;
+    FILE *file; /* or NULL: desc->read */
+    unsigned char *bytes;
+    size_t size; /* so far */
+} dem2di_source;
+
+static dem2d_result dem2di_source_take(dem2di_source *source, unsigned char *bytes, size_t count) {
+    const dem2d_load_desc *desc = source->desc;
+    if (source->file == NULL) {
+        if (desc->read(desc->user, (char *)bytes, count)) return DEM2D_OK;
+        return dem2di_fail(desc->env, DEM2D_IO, -1, "could not read the snapshot");
+    }
+    if (fread(bytes, 1, count, source->file) == count) return DEM2D_OK;
+    if (ferror(source->file)) return dem2di_fail(desc->env, DEM2D_IO, -1, "could not read");
+    return dem2di_fail(desc->env, DEM2D_FORMAT, -1, "snapshot: cut short");
+}
+
+/* Memory grows with what has really come, whatever size the snapshot says it has. */
+static dem2d_result dem2di_source_grow(dem2di_source *source, size_t size) {
+    const dem2d_env *env = source->desc->env;
+    size_t more = source->size < DEM2DI_CHUNK ? DEM2DI_CHUNK : source->size;
+    if (more > size - source->size) more = size - source->size;
+    size_t longer = source->size + more;
+    unsigned char *bytes = (unsigned char *)dem2di_allocate(env, longer, 1);
+    if (bytes == NULL)
+        return dem2di_fail(env, DEM2D_OUT_OF_MEMORY, -1, "snapshot of %zu bytes", size);
+    if (source->size > 0) memcpy(bytes, source->bytes, source->size);
+    dem2d_result result = dem2di_source_take(source, bytes + source->size, more);
+    dem2di_release(env, source->bytes, source->size, 1);
+    source->bytes = bytes;
+    source->size = longer;
+    return result;
+}
+
+/* All bytes, found to be those that were written. */
+static dem2d_result dem2di_source_read(dem2di_source *source) {
+    const dem2d_load_desc *desc = source->desc;
+    const dem2d_env *env = desc->env;
+    unsigned char head[DEM2DI_SNAPSHOT_HEAD], beyond;
+    dem2d_result result = dem2di_source_take(source, head, sizeof head);
+    if (result != DEM2D_OK) return result;
+    uint64_t version = dem2di_word_of(head + 8, 8), size = dem2di_word_of(head + 16, 8);
+    if (dem2di_word_of(head, 8) != DEM2DI_SNAPSHOT_MARK)
+        return dem2di_fail(env, DEM2D_FORMAT, -1, "snapshot: does not begin as one");
+    if (version != DEM2DI_SNAPSHOT_VERSION)
+        return dem2di_fail(env, DEM2D_FORMAT_VERSION, -1, "snapshot of version %llu, not %u",
+                           (unsigned long long)version, DEM2DI_SNAPSHOT_VERSION);
+    size_t most = SIZE_MAX / 2, rest = (size_t)(size - DEM2DI_SNAPSHOT_HEAD);
+    if (size < DEM2DI_SNAPSHOT_HEAD + DEM2DI_SNAPSHOT_TAIL || size > most)
+        return dem2di_fail(env, DEM2D_FORMAT, -1, "snapshot: size of %llu bytes",
+                           (unsigned long long)size);
+    while (source->size < rest && result == DEM2D_OK) result = dem2di_source_grow(source, rest);
+    if (result != DEM2D_OK) return result;
+    bool more = source->file != NULL ? fread(&beyond, 1, 1, source->file) == 1
+                                     : desc->read(desc->user, (char *)&beyond, 1);
+    if (more) return dem2di_fail(env, DEM2D_FORMAT, -1, "snapshot: bytes after its end");
+    dem2di_archive ar;
+    dem2di_archive_start(env, DEM2DI_HASHING, &ar);
+    source->size -= DEM2DI_SNAPSHOT_TAIL;
+    uint64_t checksum = dem2di_hash_bytes(ar.hash, head, sizeof head);
+    checksum = dem2di_hash_bytes(checksum, source->bytes, source->size);
+    source->size += DEM2DI_SNAPSHOT_TAIL;
+    if (checksum == dem2di_word_of(source->bytes + rest - DEM2DI_SNAPSHOT_TAIL, 8)) return DEM2D_OK;
+    return dem2di_fail(env, DEM2D_FORMAT, -1, "snapshot: the checksum is another");
+}
+
+/* A world from bytes that have been read. */
+static dem2d_result dem2di_source_load(const dem2di_source *source, dem2d_world **world) {
+    const dem2d_load_desc *desc = source->desc;
+    dem2di_archive ar;
+    dem2d_world_desc empty;
+    dem2d_world *made;
+    memset(&empty, 0, sizeof empty);
+    empty.time_step = 1; /* until it is loaded */
+    empty.env = desc->env;
+    empty.parallel_for = desc->parallel_for;
+    empty.parallel_user = desc->parallel_user;
+    dem2d_result result = dem2d_world_create(&empty, &made);
+    if (result != DEM2D_OK) return result;
+    dem2di_archive_start(&made->env, DEM2DI_LOADING, &ar);
+    ar.load = desc;
+    ar.next = source->bytes;
+    ar.end = source->bytes + source->size - DEM2DI_SNAPSHOT_TAIL;
+    dem2di_archive_world(&ar, made);
+    dem2di_archive_expect(&ar, ar.next == ar.end, "more fields than there are");
+    if (ar.result == DEM2D_OK)
+        *world = made;
+    else
+        dem2d_world_destroy(made);
+    return ar.result;
+}
+
+DEM2D_API dem2d_result dem2d_world_load(const dem2d_load_desc *desc, const char *path,
+                                        dem2d_world **world) {
+    if (desc == NULL) return DEM2D_NULL_ARGUMENT;
+    const dem2d_env *env = desc->env;
+    if (world == NULL) return dem2di_fail_null(env, "world");
+    if (path == NULL && desc->read == NULL) return dem2di_fail_null(env, "path and read");
+    if (path != NULL && desc->read != NULL)
+        return dem2di_fail(env, DEM2D_OUT_OF_RANGE, -1, "both path and read are given");
+    dem2di_source source;
+    memset(&source, 0, sizeof source);
+    source.desc = desc;
+    source.file = path != NULL ? fopen(path, "rb") : NULL;
+    if (path != NULL && source.file == NULL)
+        return dem2di_fail(env, DEM2D_IO, -1, "could not open %s", path);
+    dem2d_result result = dem2di_source_read(&source);
+    if (source.file != NULL) (void)fclose(source.file);
+    if (result == DEM2D_OK) result = dem2di_source_load(&source, world);
+    dem2di_release(env, source.bytes, source.size, 1);
+    return result;
 }
 
 /* ============================================================================================

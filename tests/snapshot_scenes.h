@@ -1,0 +1,256 @@
+/* snapshot_scenes.h - small scenes for the tests, the fuzzing and the golden hashes of snapshots:
+   the same numbers from any compiler, in C and C++. Include it after dem2d.h. */
+#ifndef SNAPSHOT_SCENES_H
+#define SNAPSHOT_SCENES_H
+
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+enum {
+    SCENE_CIRCLES,  /* no friction: nothing turns */
+    SCENE_RUBBING,  /* circles of two materials with friction, local damping */
+    SCENE_POLYGONS, /* sharp and rounded, two points where faces meet */
+    SCENE_MIXED, /* all models, a custom one too; servo and moving walls, one driven, one fixed */
+    SCENE_AREA,  /* the contact-area rule */
+    SCENE_GJK,   /* all models by GJK and EPA, one point */
+    SCENE_COUNT
+};
+
+static const char *const scene_names[SCENE_COUNT] = {"circles", "rubbing", "polygons",
+                                                     "mixed",   "area",    "gjk"};
+
+enum { SCENE_SHAPES = 8, SCENE_WALLS = 4, SCENE_TAG = -7 };
+
+typedef struct snapshot_scene {
+    int kind;
+    dem2d_world *world;
+    dem2d_material_id stone, rubber;
+    dem2d_shape_id shapes[SCENE_SHAPES];
+    int shape_count;
+    dem2d_wall_id walls[SCENE_WALLS];
+    uint64_t random;
+} snapshot_scene;
+
+static void scene_check(dem2d_result result) {
+    if (result == DEM2D_OK) return;
+    fprintf(stderr, "scene: %s\n", dem2d_result_text(result));
+    exit(1);
+}
+
+/* In [low, high): exact steps of 2^-30, no library. */
+static double scene_random(snapshot_scene *s, double low, double high) {
+    s->random = s->random * 6364136223846793005u + 1442695040888963407u;
+    return low + (high - low) * ((double)(s->random >> 34) / 1073741824.0);
+}
+
+/* A circle around a segment: a stadium, whose radius of curvature is that of its ends. */
+static dem2d_vec scene_stadium(void *user, dem2d_vec u, double *rho) {
+    const double *size = (const double *)user;
+    dem2d_vec p;
+    p.x = size[0] * u.x + (u.x >= 0 ? size[1] : -size[1]);
+    p.y = size[0] * u.y;
+    if (rho != NULL) *rho = size[0];
+    return p;
+}
+
+static dem2d_custom_desc scene_custom_desc(void) {
+    static double size[2] = {0.02, 0.015};
+    dem2d_custom_desc desc;
+    memset(&desc, 0, sizeof desc);
+    desc.support = scene_stadium;
+    desc.user = size;
+    desc.inscribed = desc.rho_min = 0.02;
+    desc.outline_points = 200;
+    desc.tag = SCENE_TAG;
+    return desc;
+}
+
+/* For dem2d_load_desc. */
+static const dem2d_custom_desc *scene_custom(void *user, int tag) {
+    dem2d_custom_desc *desc = (dem2d_custom_desc *)user;
+    if (tag != SCENE_TAG) return NULL;
+    *desc = scene_custom_desc();
+    return desc;
+}
+
+static void scene_add_shape(snapshot_scene *s, dem2d_shape *shape) {
+    scene_check(dem2d_world_add_shape(s->world, shape, &s->shapes[s->shape_count++]));
+    dem2d_shape_destroy(shape);
+}
+
+static void scene_add_polygons(snapshot_scene *s) {
+    static const dem2d_vec box[4] = {{0, 0}, {0.05, 0}, {0.05, 0.03}, {0, 0.03}};
+    static const dem2d_vec kite[5] = {{0, 0}, {0.03, -0.01}, {0.05, 0.02}, {0.03, 0.04}, {0, 0.03}};
+    static const dem2d_vec eight[8] = {{0.02, 0},    {0.03, 0},    {0.05, 0.02}, {0.05, 0.03},
+                                       {0.03, 0.05}, {0.02, 0.05}, {0, 0.03},    {0, 0.02}};
+    dem2d_shape *shape;
+    scene_check(dem2d_shape_create_polygon(NULL, box, 4, 0, &shape));
+    scene_add_shape(s, shape);
+    scene_check(dem2d_shape_create_polygon(NULL, kite, 5, 0.004, &shape));
+    scene_add_shape(s, shape);
+    scene_check(dem2d_shape_create_polygon(NULL, eight, 8, 0, &shape));
+    scene_add_shape(s, shape);
+}
+
+static void scene_add_shapes(snapshot_scene *s) {
+    /* a rounded square with straight sides, and an oval */
+    static const dem2d_vec square[24] = {
+        {0.01, 0},    {0.02, 0},    {0.03, 0},    {0.04, 0},    {0.045, 0},    {0.05, 0.005},
+        {0.05, 0.01}, {0.05, 0.02}, {0.05, 0.03}, {0.05, 0.04}, {0.05, 0.045}, {0.045, 0.05},
+        {0.04, 0.05}, {0.03, 0.05}, {0.02, 0.05}, {0.01, 0.05}, {0.005, 0.05}, {0, 0.045},
+        {0, 0.04},    {0, 0.03},    {0, 0.02},    {0, 0.01},    {0, 0.005},    {0.005, 0}};
+    static const double a[5] = {0.06, 0, 0.002, 0.001, 0.0005}, b[5] = {0, 0, 0, 0.001, 0};
+    dem2d_shape *shape;
+    dem2d_custom_desc custom = scene_custom_desc();
+    scene_check(dem2d_shape_create_circle(NULL, 0.025, &shape));
+    scene_add_shape(s, shape);
+    if (s->kind == SCENE_CIRCLES || s->kind == SCENE_RUBBING) return;
+    scene_add_polygons(s);
+    if (s->kind == SCENE_POLYGONS) return;
+    scene_check(dem2d_shape_create_ellipse(NULL, 0.035, 0.02, &shape));
+    scene_add_shape(s, shape);
+    scene_check(dem2d_shape_create_bezier(NULL, square, 8, &shape));
+    scene_add_shape(s, shape);
+    scene_check(dem2d_shape_create_fourier(NULL, a, b, 4, &shape));
+    scene_add_shape(s, shape);
+    scene_check(dem2d_shape_create_custom(NULL, &custom, &shape));
+    scene_add_shape(s, shape);
+}
+
+static void scene_add_walls(snapshot_scene *s, double width) {
+    static const double normals[SCENE_WALLS][2] = {{0, 1}, {1, 0}, {-1, 0.125}, {0, -1}};
+    for (int i = 0; i < SCENE_WALLS; i++) {
+        dem2d_wall_desc wall;
+        memset(&wall, 0, sizeof wall);
+        wall.material = i == 0 ? s->rubber : s->stone;
+        wall.normal.x = normals[i][0], wall.normal.y = normals[i][1];
+        wall.point.x = i == 2 ? width : 0;
+        if (i == 3) wall.point.y = 3 * width + 0.25;
+        if (s->kind == SCENE_MIXED && i == 2) {
+            wall.mode = DEM2D_WALL_MOVING;
+            wall.velocity.x = -0.05;
+        }
+        if (s->kind == SCENE_MIXED && i == 3) {
+            wall.mode = DEM2D_WALL_SERVO;
+            wall.stress = 2000;
+            wall.max_speed = 1;
+            wall.spans[0] = s->walls[1];
+            wall.spans[1] = s->walls[2];
+        }
+        scene_check(dem2d_world_add_wall(s->world, &wall, &s->walls[i]));
+    }
+}
+
+static dem2d_particle_id scene_add_grain(snapshot_scene *s, int shape, double x, double y) {
+    dem2d_particle_desc grain;
+    dem2d_particle_id id;
+    memset(&grain, 0, sizeof grain);
+    grain.scale = scene_random(s, 0.75, 1.25);
+    grain.shape = s->shapes[shape % s->shape_count];
+    grain.material = shape % 3 == 2 ? s->rubber : s->stone;
+    grain.position.x = x, grain.position.y = y;
+    grain.angle = scene_random(s, -4, 4);
+    grain.velocity.x = scene_random(s, -1, 1), grain.velocity.y = scene_random(s, -2, 0);
+    if (s->kind != SCENE_CIRCLES) grain.angular_velocity = scene_random(s, -20, 20);
+    scene_check(dem2d_world_add_particle(s->world, &grain, &id));
+    return id;
+}
+
+static dem2d_world_desc scene_desc(int kind) {
+    dem2d_world_desc desc;
+    memset(&desc, 0, sizeof desc);
+    desc.time_step = 1e-4;
+    desc.gravity.y = -9.81;
+    if (kind != SCENE_CIRCLES) desc.local_damping = 0.25;
+    if (kind == SCENE_MIXED) desc.global_damping = 0.5;
+    if (kind == SCENE_AREA) desc.faces = DEM2D_CONTACT_AREA;
+    if (kind == SCENE_GJK) {
+        desc.faces = DEM2D_ONE_POINT;
+        desc.solver = DEM2D_GJK_EPA;
+    }
+    return desc;
+}
+
+/* A falling heap of `count` grains; env, skin and threads as in desc. */
+static void scene_make(snapshot_scene *s, int kind, int count, const dem2d_world_desc *desc) {
+    dem2d_material_desc stone = {2700, 1e6, 1e6, 0.5}, rubber = {1000, 2e5, 1e5, 0.8};
+    int columns = 3;
+    memset(s, 0, sizeof *s);
+    s->kind = kind;
+    s->random = 1;
+    scene_check(dem2d_world_create(desc, &s->world));
+    if (kind == SCENE_CIRCLES) stone.friction = rubber.friction = 0;
+    scene_check(dem2d_world_add_material(s->world, &stone, &s->stone));
+    scene_check(dem2d_world_add_material(s->world, &rubber, &s->rubber));
+    scene_add_shapes(s);
+    while (columns * columns < count) columns++;
+    scene_add_walls(s, 0.0625 * columns);
+    for (int i = 0; i < count; i++)
+        (void)scene_add_grain(s, i, 0.03125 + 0.0625 * (i % columns),
+                              0.03125 + 0.0625 * (double)(i / columns));
+    if (kind == SCENE_MIXED && count > 4) {
+        dem2d_particle_id id = {3, 1};
+        dem2d_vec none = {0, 0}, up = {0.1, 0.2};
+        scene_check(dem2d_world_drive_particle(s->world, id, DEM2D_FIXED, none, 0));
+        id.index = 4;
+        scene_check(dem2d_world_drive_particle(s->world, id, DEM2D_DRIVEN, up, 3));
+    }
+}
+
+/* --- bytes -------------------------------------------------------------------------------------
+ */
+
+typedef struct scene_bytes {
+    char *bytes;
+    size_t size, room;
+    size_t next;  /* for reading */
+    size_t limit; /* of writing or reading, from which on it fails; 0: none */
+} scene_bytes;
+
+static bool scene_write(void *user, const char *bytes, size_t count) {
+    scene_bytes *to = (scene_bytes *)user;
+    if (to->limit > 0 && to->size + count >= to->limit) return false;
+    if (to->size + count > to->room) {
+        to->room = 2 * (to->size + count);
+        to->bytes = (char *)realloc(to->bytes, to->room);
+        if (to->bytes == NULL) abort();
+    }
+    memcpy(to->bytes + to->size, bytes, count);
+    to->size += count;
+    return true;
+}
+
+static bool scene_read(void *user, char *bytes, size_t count) {
+    scene_bytes *from = (scene_bytes *)user;
+    if (count > from->size - from->next) return false;
+    if (from->limit > 0 && from->next + count >= from->limit) return false;
+    memcpy(bytes, from->bytes + from->next, count);
+    from->next += count;
+    return true;
+}
+
+static scene_bytes scene_save(const dem2d_world *world) {
+    scene_bytes bytes;
+    dem2d_save_desc desc;
+    memset(&bytes, 0, sizeof bytes);
+    memset(&desc, 0, sizeof desc);
+    desc.write = scene_write;
+    desc.user = &bytes;
+    scene_check(dem2d_world_save(world, &desc, NULL));
+    return bytes;
+}
+
+/* custom gets room for the answer of scene_custom. */
+static dem2d_load_desc scene_load_desc(scene_bytes *bytes, dem2d_custom_desc *custom) {
+    dem2d_load_desc desc;
+    memset(&desc, 0, sizeof desc);
+    bytes->next = 0;
+    desc.read = scene_read;
+    desc.user = bytes;
+    desc.custom = scene_custom;
+    desc.custom_user = custom;
+    return desc;
+}
+
+#endif
