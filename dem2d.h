@@ -2319,7 +2319,7 @@ static inline int dem2di_sector_find(const dem2d_shape *shape, dem2d_vec u) {
         int place = (int)(dem2di_pseudo_angle(u) * (shape->sectors / 4));
         k = shape->sector[place & (shape->sectors - 1)];
     }
-    /* once around at most: by rounding all ends of two half turns may gain */
+    /* once around at most: a damaged snapshot may hold any tangents */
     for (int left = shape->count; dem2di_dot(shape->ends[k], u) > 0 && left > 0; left--)
         k = k + 1 < shape->count ? k + 1 : 0;
     return k;
@@ -12538,7 +12538,7 @@ static void dem2di_archive_shape(dem2di_archive *ar, const dem2d_env *env, dem2d
         if (!dem2di_archive_good(ar)) return;
         *shape = dem2di_shape_allocate(env, (dem2d_shape_type)type, count,
                                        dem2di_sectors_of((dem2d_shape_type)type, count));
-        if (!dem2di_archive_room(ar, *shape != NULL)) return;
+        if (*shape == NULL) ar->result = DEM2D_OUT_OF_MEMORY; /* the log knows */
     }
     if (!dem2di_archive_good(ar)) return;
     dem2d_shape *s = *shape;
@@ -12925,8 +12925,9 @@ static bool dem2di_key_sound(const dem2d_world *w, int contact) {
     const dem2di_body *b = &w->bodies[key->b];
     if (b->shape_index < 0 || key->a == key->b) return false;
     bool round = dem2di_shape_of(w, a)->type == DEM2D_CIRCLE &&
-                 dem2di_shape_of(w, b)->type == DEM2D_CIRCLE && w->faces != DEM2D_CONTACT_AREA;
-    return contact < w->list.discs ? round && !w->plan.full : w->plan.turns;
+                 dem2di_shape_of(w, b)->type == DEM2D_CIRCLE && w->faces != DEM2D_CONTACT_AREA &&
+                 !w->plan.full;
+    return round == (contact < w->list.discs) && (round || w->plan.turns);
 }
 
 static void dem2di_archive_keys(dem2di_archive *ar, dem2d_world *w) {
@@ -12975,7 +12976,7 @@ static void dem2di_archive_memory(dem2di_archive *ar, const dem2d_world *w, int 
 /* May the next step go by the plan without a look at the scene? */
 static bool dem2di_plan_holds(const dem2d_world *w) {
     const dem2di_plan *plan = &w->plan;
-    if (w->list_stale) return true;
+    if (w->list_stale || w->body_count == 0) return true;
     if (w->holes > 0 || plan->again) return false;
     dem2di_plan need = dem2di_plan_make(w);
     return plan->friction >= need.friction && plan->spin >= need.spin &&

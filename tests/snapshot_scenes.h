@@ -20,6 +20,12 @@ enum {
 static const char *const scene_names[SCENE_COUNT] = {"circles", "rubbing", "polygons",
                                                      "mixed",   "area",    "gjk"};
 
+/* After so many steps of so many grains; see `make golden`. */
+enum { GOLDEN_GRAINS = 20, GOLDEN_STEPS = 500 };
+static const uint64_t golden_hashes[SCENE_COUNT] = {0x9e98208f452f3d3du, 0x63c53e2de12b897cu,
+                                                    0xc90b2e9e00a2e492u, 0xd2c42fd5f7a39779u,
+                                                    0x8c284d44a2e17854u, 0x2be52d3bba8be0d5u};
+
 enum { SCENE_SHAPES = 8, SCENE_WALLS = 4, SCENE_TAG = -7 };
 
 typedef struct snapshot_scene {
@@ -38,7 +44,8 @@ static void scene_check(dem2d_result result) {
     exit(1);
 }
 
-/* In [low, high): exact steps of 2^-30, no library. */
+/* In [low, high): steps of 2^-30. Products here and in scene_stadium are exact, so that it does not
+   matter whether a compiler fuses them with a sum. */
 static double scene_random(snapshot_scene *s, double low, double high) {
     s->random = s->random * 6364136223846793005u + 1442695040888963407u;
     return low + (high - low) * ((double)(s->random >> 34) / 1073741824.0);
@@ -55,12 +62,12 @@ static dem2d_vec scene_stadium(void *user, dem2d_vec u, double *rho) {
 }
 
 static dem2d_custom_desc scene_custom_desc(void) {
-    static double size[2] = {0.02, 0.015};
+    static double size[2] = {0.015625, 0.015};
     dem2d_custom_desc desc;
     memset(&desc, 0, sizeof desc);
     desc.support = scene_stadium;
     desc.user = size;
-    desc.inscribed = desc.rho_min = 0.02;
+    desc.inscribed = desc.rho_min = size[0];
     desc.outline_points = 200;
     desc.tag = SCENE_TAG;
     return desc;

@@ -1,0 +1,807 @@
+/* The hash of a world's state, and snapshots: a world that was loaded goes on as if it had never
+   stopped, and no damaged snapshot is taken for a good one. */
+#define _POSIX_C_SOURCE 200809L
+#define DEM2D_IMPLEMENTATION
+#include "dem2d.h"
+#include "testing.h"
+#include "snapshot_scenes.h"
+
+#include <sys/stat.h>
+#include <unistd.h>
+
+/* --- two worlds, the same -----------------------------------------------------------------------
+ */
+
+static void assert_same_bytes(const dem2d_world *a, const dem2d_world *b) {
+    scene_bytes x = scene_save(a), y = scene_save(b);
+    assert_int_equal(x.size, y.size);
+    assert_memory_equal(x.bytes, y.bytes, x.size);
+    free(x.bytes), free(y.bytes);
+}
+
+static void assert_same_stats(const dem2d_world *a, const dem2d_world *b) {
+    dem2d_stats x, y;
+    memset(&x, 0, sizeof x), memset(&y, 0, sizeof y);
+    assert_ok(dem2d_world_stats(a, &x));
+    assert_ok(dem2d_world_stats(b, &y));
+    x.bytes = y.bytes = 0; /* capacities are not kept */
+    assert_memory_equal(&x, &y, sizeof x);
+}
+
+static void assert_same_numbers(const double *a, const double *b, int count) {
+    for (int i = 0; i < count; i++) assert_same_bits(a[i], b[i]);
+}
+
+/* What queries say, in a row of numbers. */
+static int numbers_of(const dem2d_world *world, double *to, int room) {
+    static dem2d_particle_id ids[200];
+    static dem2d_contact_info contacts[1000];
+    int count, used = 0;
+    dem2d_energy energy;
+    assert_ok(dem2d_world_energy(world, &energy));
+    to[used++] = energy.translational, to[used++] = energy.rotational;
+    to[used++] = energy.normal, to[used++] = energy.tangential, to[used++] = energy.potential;
+    assert_ok(dem2d_world_particles(world, ids, COUNT_OF(ids), &count));
+    assert_in_range(count, 0, COUNT_OF(ids));
+    for (int i = 0; i < count; i++) {
+        dem2d_particle_info p;
+        assert_ok(dem2d_world_get_particle(world, ids[i], &p));
+        const double got[] = {
+            ids[i].index,       ids[i].generation, p.shape.index,   p.material.index,
+            p.pose.position.x,  p.pose.position.y, p.pose.scale,    p.pose.rotation.c,
+            p.pose.rotation.s,  p.velocity.x,      p.velocity.y,    p.force.x,
+            p.angular_velocity, p.force.y,         p.torque,        p.mass,
+            p.inertia,          p.radius,          (double)p.motion};
+        assert_true(used + COUNT_OF(got) <= room);
+        memcpy(to + used, got, sizeof got);
+        used += COUNT_OF(got);
+    }
+    assert_ok(dem2d_world_contacts(world, contacts, COUNT_OF(contacts), &count));
+    assert_in_range(count, 0, COUNT_OF(contacts));
+    for (int i = 0; i < count; i++) {
+        const dem2d_contact_info *c = &contacts[i];
+        const double got[] = {c->a.index,  c->b.index,         c->b.generation, c->wall.index,
+                              c->normal.x, c->normal.y,        c->point.x,      c->point.y,
+                              c->depth,    c->branch.x,        c->branch.y,     c->normal_force,
+                              c->points,   c->tangential_force};
+        assert_true(used + COUNT_OF(got) <= room);
+        memcpy(to + used, got, sizeof got);
+        used += COUNT_OF(got);
+    }
+    return used;
+}
+
+static void assert_same_world(const dem2d_world *a, const dem2d_world *b) {
+    static double x[20000], y[20000];
+    const int count = numbers_of(a, x, COUNT_OF(x));
+    assert_int_equal(count, numbers_of(b, y, COUNT_OF(y)));
+    assert_same_numbers(x, y, count);
+    assert_same_stats(a, b);
+    assert_int_equal(dem2d_world_hash(a), dem2d_world_hash(b));
+    assert_same_bytes(a, b);
+}
+
+/* Items one by one, the last first. */
+static void run_backwards(void *user, dem2d_phase phase, int count, dem2d_task_fn *task,
+                          void *context) {
+    (void)user, (void)phase;
+    for (int i = count - 1; i >= 0; i--) task(context, i, i + 1);
+}
+
+static dem2d_world *load_with(scene_bytes *bytes, const dem2d_env *env, bool shared) {
+    dem2d_custom_desc custom;
+    dem2d_load_desc desc = scene_load_desc(bytes, &custom);
+    dem2d_world *world = NULL;
+    desc.env = env;
+    desc.parallel_for = shared ? run_backwards : NULL;
+    assert_ok(dem2d_world_load(&desc, NULL, &world));
+    assert_non_null(world);
+    return world;
+}
+
+/* Saves and loads a world, and takes both further; the first goes on. */
+static void check_resume(dem2d_world *world, bool shared, int steps) {
+    test_env env;
+    test_env_init(&env);
+    scene_bytes bytes = scene_save(world);
+    dem2d_world *copy = load_with(&bytes, &env.env, shared);
+    assert_same_world(world, copy);
+    for (int i = 0; i < steps; i++) {
+        int done[2];
+        const dem2d_result result = dem2d_world_step(world, 1, &done[0]);
+        assert_result(dem2d_world_step(copy, 1, &done[1]), result);
+        assert_int_equal(done[0], done[1]);
+        assert_int_equal(dem2d_world_hash(world), dem2d_world_hash(copy));
+    }
+    assert_same_world(world, copy);
+    dem2d_world_destroy(copy);
+    assert_clean(&env);
+    free(bytes.bytes);
+}
+
+/* --- going on ------------------------------------------------------------------------------------
+ */
+
+/* Between any two steps: while a list lasts, when it is worn out, contacts made and lost. */
+static void test_resume(void **state) {
+    (void)state;
+    for (int kind = 0; kind < SCENE_COUNT; kind++) {
+        snapshot_scene s;
+        dem2d_world_desc desc = scene_desc(kind);
+        int worn = 0, lasting = 0, contacts = 0;
+        scene_make(&s, kind, 20, &desc);
+        for (int i = 0; i < 24; i++) {
+            dem2d_stats stats;
+            int steps = i < 8 ? 1 : 41;
+            check_resume(s.world, i % 2 == 1, 5);
+            for (; steps > 0 || (i % 4 == 3 && !s.world->list_worn); steps--) {
+                assert_true(steps > -5000);
+                assert_ok(dem2d_world_step(s.world, 1, NULL));
+            }
+            assert_ok(dem2d_world_stats(s.world, &stats));
+            worn += s.world->list_worn, lasting += !s.world->list_stale;
+            contacts += stats.contacts + stats.wall_contacts;
+        }
+        check_resume(s.world, false, 500);
+        assert_true(worn > 4 && lasting > 4 && contacts > 100);
+        dem2d_world_destroy(s.world);
+    }
+}
+
+/* Enough for several blocks, and for sorting in memory: threads or not must not matter. */
+static void test_resume_blocks(void **state) {
+    (void)state;
+    for (int kind = SCENE_RUBBING; kind <= SCENE_MIXED; kind += SCENE_MIXED - SCENE_RUBBING) {
+        snapshot_scene s;
+        dem2d_world_desc desc = scene_desc(kind);
+        desc.parallel_for = run_backwards;
+        scene_make(&s, kind, 180, &desc);
+        assert_ok(dem2d_world_step(s.world, 60, NULL));
+        check_resume(s.world, false, 60);
+        check_resume(s.world, true, 60);
+        dem2d_world_destroy(s.world);
+    }
+}
+
+/* Never stepped, empty, emptied. */
+static void test_resume_empty(void **state) {
+    (void)state;
+    for (int kind = 0; kind < SCENE_COUNT; kind++) {
+        snapshot_scene s;
+        dem2d_world_desc desc = scene_desc(kind);
+        desc.skin = kind == SCENE_GJK ? 0.25 : 0;
+        assert_ok(dem2d_world_create(&desc, &s.world));
+        check_resume(s.world, false, 3);
+        dem2d_world_destroy(s.world);
+        scene_make(&s, kind, 0, &desc);
+        check_resume(s.world, true, 3);
+        const dem2d_particle_id id = scene_add_grain(&s, 1, 0.03, 0.03);
+        check_resume(s.world, true, 30);
+        assert_ok(dem2d_world_remove_particle(s.world, id));
+        check_resume(s.world, false, 0);
+        check_resume(s.world, false, 3);
+        dem2d_world_destroy(s.world);
+    }
+}
+
+/* One change to a scene. Returns false when there are no more. */
+static bool change_scene(snapshot_scene *s, int which) {
+    dem2d_world *w = s->world;
+    const dem2d_particle_id some = {5, 1}, other = {6, 1};
+    const dem2d_pair_desc slippery = {5e5, 0, 0}, rough = {5e5, 5e5, 1};
+    const dem2d_material_desc lead = {11000, 2e6, 0, 0.25};
+    dem2d_wall_desc wall = {0};
+    dem2d_material_id id;
+    switch (which) {
+    case 0:
+        (void)scene_add_grain(s, 2, 0.1, 0.25);
+        return true;
+    case 1:
+        assert_ok(dem2d_world_remove_particle(w, some));
+        return true;
+    case 2: /* takes the id that became free, in another slot */
+        assert_int_equal(scene_add_grain(s, 1, 0.2, 0.25).index, some.index);
+        return true;
+    case 3:
+        assert_ok(dem2d_world_move_particle(w, other, vec(0.03, 0.3), 1));
+        return true;
+    case 4:
+        assert_ok(dem2d_world_drive_particle(w, other, DEM2D_FIXED, vec(0, 0), 0));
+        return true;
+    case 5:
+        assert_ok(dem2d_world_drive_particle(w, other, DEM2D_FREE, vec(0.1, 0.1), 2));
+        return true;
+    case 6:
+        assert_ok(dem2d_world_set_pair(w, s->stone, s->rubber, &slippery));
+        return true;
+    case 7:
+        for (int i = 0; i < 3; i++)
+            assert_ok(dem2d_world_set_pair(w, i < 2 ? s->stone : s->rubber,
+                                           i < 1 ? s->stone : s->rubber, &slippery));
+        return true;
+    case 8:
+        assert_ok(dem2d_world_set_pair(w, s->stone, s->rubber, &rough));
+        return true;
+    case 9: /* five materials: a wider table of laws */
+        for (int i = 0; i < 3; i++) assert_ok(dem2d_world_add_material(w, &lead, &id));
+        return true;
+    case 10:
+        wall.material = s->rubber, wall.point = vec(0.001, 0), wall.normal = vec(1, 0);
+        assert_ok(dem2d_world_set_wall(w, s->walls[1], &wall));
+        return true;
+    case 11:
+        wall.material = s->stone, wall.point = vec(0.002, 0), wall.normal = vec(1, 0.05);
+        assert_ok(dem2d_world_set_wall(w, s->walls[1], &wall));
+        return true;
+    case 12:
+        assert_ok(dem2d_world_remove_wall(w, s->walls[0]));
+        return true;
+    case 13:
+        wall.material = s->stone, wall.point = vec(0, -0.001), wall.normal = vec(0, 1);
+        assert_ok(dem2d_world_add_wall(w, &wall, &s->walls[0]));
+        return true;
+    case 14:
+        assert_ok(dem2d_world_set_gravity(w, vec(1, -5)));
+        return true;
+    case 15:
+        assert_ok(dem2d_world_set_damping(w, 0.5, 1));
+        return true;
+    case 16:
+        assert_ok(dem2d_world_set_time_step(w, 5e-5));
+        return true;
+    default:
+        return false;
+    }
+}
+
+/* Right after each change, and one step and some later. */
+static void test_resume_changed(void **state) {
+    (void)state;
+    for (int kind = 0; kind < SCENE_COUNT; kind++) {
+        snapshot_scene s;
+        dem2d_world_desc desc = scene_desc(kind);
+        scene_make(&s, kind, 16, &desc);
+        assert_ok(dem2d_world_step(s.world, 300, NULL));
+        for (int which = 0; change_scene(&s, which); which++) {
+            check_resume(s.world, false, 0);
+            check_resume(s.world, which % 2 == 0, 1);
+            check_resume(s.world, which % 2 == 1, 2);
+            check_resume(s.world, false, 40);
+        }
+        dem2d_world_destroy(s.world);
+    }
+}
+
+/* A step that is refused may have renewed the list; circles get rotations when the first shape that
+   needs them comes. */
+static void test_resume_refused(void **state) {
+    (void)state;
+    for (int kind = 0; kind < SCENE_COUNT; kind++) {
+        snapshot_scene s;
+        dem2d_world_desc desc = scene_desc(kind);
+        static const dem2d_vec corners[3] = {{0, 0}, {0.05, 0}, {0, 0.05}};
+        dem2d_shape *triangle;
+        scene_make(&s, kind, 16, &desc);
+        assert_ok(dem2d_world_step(s.world, 700, NULL));
+        assert_ok(dem2d_shape_create_polygon(NULL, corners, 3, 0, &triangle));
+        s.shape_count = 0;
+        scene_add_shape(&s, triangle);
+        (void)scene_add_grain(&s, 0, 0.3, 0.6);
+        assert_ok(dem2d_world_set_time_step(s.world, 1));
+        const uint64_t hash = dem2d_world_hash(s.world);
+        assert_result(dem2d_world_step(s.world, 1, NULL), DEM2D_TIME_STEP);
+        assert_int_equal(dem2d_world_hash(s.world), hash);
+        check_resume(s.world, false, 2);
+        assert_ok(dem2d_world_set_time_step(s.world, 1e-4));
+        check_resume(s.world, false, 0);
+        check_resume(s.world, false, 50);
+        dem2d_world_destroy(s.world);
+    }
+}
+
+/* Ids hold in the loaded world, stale ones stay stale, and the next one is the same. */
+static void test_ids(void **state) {
+    (void)state;
+    snapshot_scene s;
+    dem2d_world_desc desc = scene_desc(SCENE_MIXED);
+    scene_make(&s, SCENE_MIXED, 10, &desc);
+    dem2d_particle_id removed[3] = {{2, 1}, {7, 1}, {5, 1}}, next[2];
+    for (int i = 0; i < 3; i++) assert_ok(dem2d_world_remove_particle(s.world, removed[i]));
+    assert_ok(dem2d_world_remove_shape(s.world, s.shapes[2]));
+    scene_bytes bytes = scene_save(s.world);
+    snapshot_scene copy = s;
+    copy.world = load_with(&bytes, NULL, false);
+    assert_null(dem2d_world_shape(copy.world, s.shapes[2]));
+    assert_non_null(dem2d_world_shape(copy.world, s.shapes[3]));
+    for (int i = 0; i < 3; i++) {
+        dem2d_particle_info info;
+        assert_result(dem2d_world_get_particle(copy.world, removed[i], &info), DEM2D_STALE_ID);
+    }
+    for (int i = 0; i < 4; i++) {
+        next[0] = scene_add_grain(&s, 3, 0.1, 0.4 + i);
+        next[1] = scene_add_grain(&copy, 3, 0.1, 0.4 + i);
+        assert_int_equal(next[0].index, next[1].index);
+        assert_int_equal(next[0].generation, next[1].generation);
+        assert_int_equal(next[0].generation, i < 3 ? 2 : 1);
+    }
+    assert_same_world(s.world, copy.world);
+    assert_result(dem2d_world_remove_wall(copy.world, s.walls[1]), DEM2D_IN_USE); /* in a span */
+    assert_result(dem2d_world_remove_shape(copy.world, s.shapes[3]), DEM2D_IN_USE);
+    free(bytes.bytes);
+    dem2d_world_destroy(s.world);
+    dem2d_world_destroy(copy.world);
+}
+
+/* --- the hash ------------------------------------------------------------------------------------
+ */
+
+/* Everything that is asked for or set must show. */
+static void test_hash_changes(void **state) {
+    (void)state;
+    uint64_t seen[64];
+    int count = 0;
+    snapshot_scene s;
+    dem2d_world_desc desc = scene_desc(SCENE_MIXED);
+    scene_make(&s, SCENE_MIXED, 16, &desc);
+    seen[count++] = dem2d_world_hash(s.world);
+    assert_ok(dem2d_world_step(s.world, 300, NULL));
+    seen[count++] = dem2d_world_hash(s.world);
+    for (int which = 0; change_scene(&s, which); which++) {
+        seen[count++] = dem2d_world_hash(s.world);
+        assert_true(count < COUNT_OF(seen) - 1);
+        assert_ok(dem2d_world_step(s.world, 1, NULL));
+        seen[count++] = dem2d_world_hash(s.world);
+    }
+    for (int i = 0; i < count; i++)
+        for (int k = 0; k < i; k++) assert_int_not_equal(seen[i], seen[k]);
+    dem2d_world_destroy(s.world);
+    assert_int_equal(dem2d_world_hash(NULL), 0);
+}
+
+/* What nobody can see does not: queries, a snapshot, the order in memory, room, threads. */
+static void test_hash_stays(void **state) {
+    (void)state;
+    snapshot_scene s, t;
+    dem2d_world_desc desc = scene_desc(SCENE_MIXED), roomy = desc;
+    roomy.particle_capacity = 1000, roomy.pair_capacity = 1000;
+    roomy.parallel_for = run_backwards;
+    scene_make(&s, SCENE_MIXED, 16, &desc);
+    scene_make(&t, SCENE_MIXED, 16, &roomy);
+    for (int i = 0; i < 10; i++) {
+        assert_ok(dem2d_world_step(s.world, 50, NULL));
+        assert_ok(dem2d_world_step(t.world, 50, NULL));
+        const uint64_t hash = dem2d_world_hash(s.world);
+        assert_int_equal(dem2d_world_hash(t.world), hash);
+        s.world->scattered = s.world->list_stale = true; /* so that all are sorted, and listed */
+        assert_true(dem2di_arrange(s.world));
+        assert_int_equal(dem2d_world_hash(s.world), hash);
+        scene_bytes bytes = scene_save(s.world);
+        free(bytes.bytes);
+        assert_int_equal(dem2d_world_hash(s.world), hash);
+    }
+    dem2d_world_destroy(s.world);
+    dem2d_world_destroy(t.world);
+}
+
+/* Circles do not depend on the list at all. */
+static void test_hash_skins(void **state) {
+    (void)state;
+    static const double skins[] = {0, 0.01, 0.1, 0.5};
+    for (int kind = SCENE_CIRCLES; kind <= SCENE_RUBBING; kind++) {
+        uint64_t hash = 0;
+        for (int i = 0; i < COUNT_OF(skins); i++) {
+            snapshot_scene s;
+            dem2d_world_desc desc = scene_desc(kind);
+            desc.skin = skins[i];
+            scene_make(&s, kind, 40, &desc);
+            assert_ok(dem2d_world_step(s.world, 1000, NULL));
+            if (i == 0) hash = dem2d_world_hash(s.world);
+            assert_int_equal(dem2d_world_hash(s.world), hash);
+            dem2d_world_destroy(s.world);
+        }
+    }
+}
+
+/* Doubles count by their bits. */
+static void test_hash_zeros(void **state) {
+    (void)state;
+    dem2d_world_desc desc = scene_desc(SCENE_CIRCLES);
+    dem2d_world *world;
+    assert_ok(dem2d_world_create(&desc, &world));
+    assert_ok(dem2d_world_set_gravity(world, vec(0, 0)));
+    const uint64_t hash = dem2d_world_hash(world);
+    assert_ok(dem2d_world_set_gravity(world, vec(-0.0, 0)));
+    assert_int_not_equal(dem2d_world_hash(world), hash);
+    dem2d_world_destroy(world);
+}
+
+/* The same on every machine and by every compiler; `make golden` compares builds. A change of these
+   numbers is a change of results, or of what is hashed. */
+static void test_golden(void **state) {
+    (void)state;
+    for (int kind = 0; kind < SCENE_COUNT; kind++) {
+        snapshot_scene s;
+        dem2d_world_desc desc = scene_desc(kind);
+        scene_make(&s, kind, GOLDEN_GRAINS, &desc);
+        assert_ok(dem2d_world_step(s.world, GOLDEN_STEPS, NULL));
+        const uint64_t hash = dem2d_world_hash(s.world);
+        if (hash != golden_hashes[kind])
+            print_error("%s: 0x%016llx\n", scene_names[kind], (unsigned long long)hash);
+        assert_int_equal(hash, golden_hashes[kind]);
+        dem2d_world_destroy(s.world);
+    }
+}
+
+/* --- damage --------------------------------------------------------------------------------------
+ */
+
+/* A small world with contacts, by its bytes. */
+static scene_bytes small_snapshot(int kind) {
+    snapshot_scene s;
+    dem2d_world_desc desc = scene_desc(kind);
+    scene_make(&s, kind, 4, &desc);
+    assert_ok(dem2d_world_step(s.world, 200, NULL));
+    (void)scene_add_grain(&s, 1, 0.05, 0.05);
+    assert_ok(dem2d_world_step(s.world, 20, NULL));
+    assert_ok(dem2d_world_remove_particle(s.world, (dem2d_particle_id){1, 1}));
+    scene_bytes bytes = scene_save(s.world);
+    dem2d_world_destroy(s.world);
+    return bytes;
+}
+
+static dem2d_world *const untouched = (dem2d_world *)(void *)&untouched;
+
+/* The result of a load, which must leave nothing behind when it fails. */
+static dem2d_result try_load(scene_bytes *bytes, test_env *env) {
+    dem2d_custom_desc custom;
+    dem2d_load_desc desc = scene_load_desc(bytes, &custom);
+    dem2d_world *world = untouched;
+    desc.env = &env->env;
+    test_log_clear(env);
+    const dem2d_result result = dem2d_world_load(&desc, NULL, &world);
+    if (result == DEM2D_OK) {
+        dem2d_world_destroy(world);
+    } else {
+        assert_ptr_equal(world, untouched);
+        assert_int_equal(env->log.count, 1);
+        assert_int_equal(env->log.result, result);
+    }
+    assert_clean(env);
+    return result;
+}
+
+static void test_flipped(void **state) {
+    (void)state;
+    scene_bytes bytes = small_snapshot(SCENE_RUBBING);
+    test_env env;
+    test_env_init(&env);
+    assert_ok(try_load(&bytes, &env));
+    for (size_t i = 0; i < bytes.size; i++)
+        for (int bit = 0; bit < 8; bit++) {
+            bytes.bytes[i] = (char)(bytes.bytes[i] ^ 1 << bit);
+            env.peak = 0;
+            const dem2d_result result = try_load(&bytes, &env);
+            const bool version = i >= 8 && i < 16, size = i >= 16 && i < 24;
+            if (size) /* a longer one can't be read */
+                assert_true(result == DEM2D_FORMAT || result == DEM2D_IO);
+            else
+                assert_result(result, version ? DEM2D_FORMAT_VERSION : DEM2D_FORMAT);
+            assert_true(env.peak <= 2 * bytes.size + 8192); /* whatever size it says it has */
+            bytes.bytes[i] = (char)(bytes.bytes[i] ^ 1 << bit);
+        }
+    assert_ok(try_load(&bytes, &env));
+    free(bytes.bytes);
+}
+
+/* By a callback, which can't tell damage from a failure, and by a file. */
+static void test_cut(void **state) {
+    (void)state;
+    const char *path = "build/test_snapshot.cut";
+    scene_bytes bytes = small_snapshot(SCENE_RUBBING);
+    const size_t size = bytes.size;
+    dem2d_load_desc desc = {0};
+    test_env env;
+    test_env_init(&env);
+    desc.env = &env.env;
+    for (bytes.size = 0; bytes.size < size; bytes.size++) {
+        dem2d_world *world = untouched;
+        assert_result(try_load(&bytes, &env), DEM2D_IO);
+        FILE *file = fopen(path, "wb");
+        assert_non_null(file);
+        assert_int_equal(fwrite(bytes.bytes, 1, bytes.size, file), bytes.size);
+        fclose(file);
+        assert_result(dem2d_world_load(&desc, path, &world), DEM2D_FORMAT);
+        assert_clean(&env);
+    }
+    remove(path);
+    free(bytes.bytes);
+}
+
+static void test_appended(void **state) {
+    (void)state;
+    static const size_t more[] = {1, 2, 8, 100, 5000};
+    test_env env;
+    test_env_init(&env);
+    for (int i = 0; i < COUNT_OF(more); i++) {
+        scene_bytes bytes = small_snapshot(SCENE_CIRCLES);
+        bytes.bytes = realloc(bytes.bytes, bytes.size + more[i]);
+        assert_non_null(bytes.bytes);
+        memset(bytes.bytes + bytes.size, i, more[i]);
+        bytes.size += more[i];
+        assert_result(try_load(&bytes, &env), DEM2D_FORMAT);
+        free(bytes.bytes);
+    }
+}
+
+static void put_word(char *bytes, uint64_t word) {
+    for (int k = 0; k < 8; k++) bytes[k] = (char)(word >> 8 * k & 255);
+}
+
+static uint64_t get_word(const char *bytes) {
+    uint64_t word = 0;
+    for (int k = 0; k < 8; k++) word |= (uint64_t)(unsigned char)bytes[k] << 8 * k;
+    return word;
+}
+
+/* The layout, byte by byte, and the checksum by its definition. */
+static void test_layout(void **state) {
+    (void)state;
+    static const unsigned char mark[8] = {0x8D, 'd', 'e', 'm', '2', 'd', '\r', '\n'};
+    scene_bytes bytes = small_snapshot(SCENE_MIXED);
+    uint64_t hash = 0x243F6A8885A308D3u;
+    char last[8] = {0};
+    assert_memory_equal(bytes.bytes, mark, 8);
+    assert_int_equal(get_word(bytes.bytes + 8), DEM2DI_SNAPSHOT_VERSION);
+    assert_int_equal(get_word(bytes.bytes + 16), bytes.size);
+    for (size_t i = 0; i < bytes.size - 8; i += 8) {
+        const size_t left = bytes.size - 8 - i;
+        memcpy(last, bytes.bytes + i, left < 8 ? left : 8);
+        if (left < 8) memset(last + left, 0, 8 - left);
+        hash = (hash ^ get_word(last)) * 0x9E3779B97F4A7C15u;
+        hash ^= hash >> 32;
+    }
+    assert_int_equal(get_word(bytes.bytes + bytes.size - 8), hash);
+    put_word(last, 0x3FF0000000000000u); /* little-endian: 1.0, if there is one */
+    const double step = 1e-4;
+    uint64_t word;
+    memcpy(&word, &step, 8);
+    assert_int_equal(get_word(bytes.bytes + 24), word); /* the first field */
+    free(bytes.bytes);
+}
+
+/* Any byte changed and the checksum made right: refused, or a world that can be stepped. */
+static void test_crafted(void **state) {
+    (void)state;
+    static const unsigned char values[] = {0, 1, 0x7F, 0x80, 0xFF};
+    int refused = 0, taken = 0;
+    for (int kind = SCENE_RUBBING; kind < SCENE_COUNT; kind += 2) {
+        scene_bytes bytes = small_snapshot(kind);
+        const size_t body = bytes.size - 8;
+        for (size_t i = 24; i < body; i += kind == SCENE_RUBBING ? 1 : 5)
+            for (int k = 0; k < COUNT_OF(values); k++) {
+                const char was = bytes.bytes[i];
+                dem2d_custom_desc custom;
+                dem2d_load_desc desc = scene_load_desc(&bytes, &custom);
+                dem2d_world *world = NULL;
+                test_env env;
+                test_env_init(&env);
+                desc.env = &env.env;
+                bytes.bytes[i] = (char)values[k];
+                put_word(bytes.bytes + body,
+                         dem2di_hash_bytes(0x243F6A8885A308D3u, (const unsigned char *)bytes.bytes,
+                                           body));
+                const dem2d_result result = dem2d_world_load(&desc, NULL, &world);
+                if (result == DEM2D_OK) {
+                    (void)dem2d_world_hash(world);
+                    (void)dem2d_world_step(world, 2, NULL);
+                    (void)dem2d_world_hash(world);
+                    taken++;
+                } else {
+                    assert_true(result == DEM2D_FORMAT || result == DEM2D_NULL_ARGUMENT);
+                    assert_null(world);
+                    refused++;
+                }
+                dem2d_world_destroy(world);
+                assert_clean(&env);
+                bytes.bytes[i] = was;
+            }
+        free(bytes.bytes);
+    }
+    assert_true(refused > 100 && taken > 100);
+}
+
+/* --- failures ------------------------------------------------------------------------------------
+ */
+
+static void test_writes_fail(void **state) {
+    (void)state;
+    snapshot_scene s;
+    dem2d_world_desc desc = scene_desc(SCENE_RUBBING);
+    test_env env;
+    test_env_init(&env);
+    desc.env = &env.env;
+    scene_make(&s, SCENE_RUBBING, 40, &desc);
+    assert_ok(dem2d_world_step(s.world, 50, NULL));
+    scene_bytes whole = scene_save(s.world), part = {0};
+    assert_true(whole.size > 2 * DEM2DI_CHUNK);
+    const dem2d_save_desc save = {scene_write, &part};
+    for (part.limit = 1; part.limit <= whole.size; part.limit++) {
+        part.size = 0;
+        test_log_clear(&env);
+        assert_result(dem2d_world_save(s.world, &save, NULL), DEM2D_IO);
+        assert_logged(&env, DEM2D_IO, -1, "snapshot");
+        assert_memory_equal(part.bytes, whole.bytes, part.size);
+    }
+    part.limit++, part.size = 0;
+    assert_ok(dem2d_world_save(s.world, &save, NULL));
+    assert_int_equal(part.size, whole.size);
+    for (whole.limit = 1; whole.limit <= whole.size; whole.limit++) {
+        test_env other;
+        test_env_init(&other);
+        assert_result(try_load(&whole, &other), DEM2D_IO);
+    }
+    free(whole.bytes), free(part.bytes);
+    dem2d_world_destroy(s.world);
+    assert_clean(&env);
+}
+
+static void test_memory_fails(void **state) {
+    (void)state;
+    for (int kind = SCENE_RUBBING; kind < SCENE_COUNT; kind++) {
+        scene_bytes bytes = small_snapshot(kind);
+        test_env env;
+        int call = 0;
+        dem2d_result result;
+        test_env_init(&env);
+        do {
+            test_env_fail(&env, ++call);
+            result = try_load(&bytes, &env);
+            if (result != DEM2D_OK) assert_result(result, DEM2D_OUT_OF_MEMORY);
+            assert_true(call < 1000);
+        } while (result != DEM2D_OK);
+        assert_true(call > 10);
+        free(bytes.bytes);
+    }
+}
+
+static bool exists(const char *path) {
+    FILE *file = fopen(path, "rb");
+    if (file) fclose(file);
+    return file != NULL;
+}
+
+static void test_files(void **state) {
+    (void)state;
+    const char *path = "build/test_snapshot.world", *aside = "build/test_snapshot.world.part";
+    const char *folder = "build/test_snapshot.folder";
+    snapshot_scene s;
+    dem2d_world_desc desc = scene_desc(SCENE_RUBBING);
+    dem2d_save_desc save = {0};
+    dem2d_load_desc load = {0};
+    dem2d_world *world = untouched;
+    test_env env;
+    test_env_init(&env);
+    desc.env = load.env = &env.env;
+    remove(path), remove(aside), rmdir(folder);
+    scene_make(&s, SCENE_RUBBING, 12, &desc);
+    const size_t bytes = env.bytes;
+    assert_result(dem2d_world_load(&load, path, &world), DEM2D_IO);
+    test_env_fail(&env, 1);
+    assert_result(dem2d_world_save(s.world, &save, path), DEM2D_OUT_OF_MEMORY);
+    assert_false(exists(path) || exists(aside));
+    test_env_fail(&env, 0);
+    assert_ok(dem2d_world_save(s.world, &save, path));
+    assert_false(exists(aside));
+    assert_int_equal(env.bytes, bytes);
+    assert_ok(dem2d_world_load(&load, path, &world));
+    assert_same_world(s.world, world);
+    dem2d_world_destroy(world);
+
+    /* the old one stays when the new one can't be written */
+    const uint64_t hash = dem2d_world_hash(s.world);
+    assert_ok(dem2d_world_step(s.world, 10, NULL));
+    if (exists("/dev/full") && symlink("/dev/full", aside) == 0) {
+        assert_result(dem2d_world_save(s.world, &save, path), DEM2D_IO);
+        assert_false(exists(aside));
+    }
+    assert_result(dem2d_world_save(s.world, &save, "no/such/folder/world"), DEM2D_IO);
+    assert_ok(dem2d_world_load(&load, path, &world));
+    assert_int_equal(dem2d_world_hash(world), hash);
+    dem2d_world_destroy(world);
+    assert_int_equal(mkdir(folder, 0777), 0);
+    assert_result(dem2d_world_save(s.world, &save, folder), DEM2D_IO);
+    assert_false(exists("build/test_snapshot.folder.part"));
+    assert_int_equal(rmdir(folder), 0);
+
+    /* replaced */
+    assert_ok(dem2d_world_save(s.world, &save, path));
+    assert_ok(dem2d_world_load(&load, path, &world));
+    assert_same_world(s.world, world);
+    dem2d_world_destroy(world);
+    FILE *file = fopen(path, "ab");
+    assert_non_null(file);
+    fputc('\n', file);
+    fclose(file);
+    world = untouched;
+    assert_result(dem2d_world_load(&load, path, &world), DEM2D_FORMAT);
+    assert_ptr_equal(world, untouched);
+    remove(path);
+    dem2d_world_destroy(s.world);
+    assert_clean(&env);
+}
+
+/* A custom shape's function is found by its tag. */
+static void test_custom(void **state) {
+    (void)state;
+    scene_bytes bytes = small_snapshot(SCENE_MIXED);
+    dem2d_custom_desc custom;
+    dem2d_load_desc desc = scene_load_desc(&bytes, &custom);
+    dem2d_world *world = untouched;
+    test_env env;
+    test_env_init(&env);
+    desc.env = &env.env;
+    desc.custom = NULL;
+    assert_result(dem2d_world_load(&desc, NULL, &world), DEM2D_NULL_ARGUMENT);
+    assert_logged(&env, DEM2D_NULL_ARGUMENT, -1, "custom");
+    assert_non_null(strstr(env.log.text, "tag -7"));
+    assert_clean(&env);
+    free(bytes.bytes);
+}
+
+static void test_arguments(void **state) {
+    (void)state;
+    scene_bytes bytes = small_snapshot(SCENE_CIRCLES);
+    dem2d_load_desc load = {0};
+    dem2d_save_desc save = {0};
+    dem2d_world *world = untouched;
+    test_env env;
+    test_env_init(&env);
+    load.env = &env.env;
+    assert_result(dem2d_world_load(NULL, "x", &world), DEM2D_NULL_ARGUMENT);
+    assert_result(dem2d_world_load(&load, "x", NULL), DEM2D_NULL_ARGUMENT);
+    assert_logged(&env, DEM2D_NULL_ARGUMENT, -1, "world");
+    assert_result(dem2d_world_load(&load, NULL, &world), DEM2D_NULL_ARGUMENT);
+    assert_logged(&env, DEM2D_NULL_ARGUMENT, -1, "read");
+    load.read = scene_read, load.user = &bytes;
+    assert_result(dem2d_world_load(&load, "x", &world), DEM2D_OUT_OF_RANGE);
+    assert_logged(&env, DEM2D_OUT_OF_RANGE, -1, "read");
+    assert_ptr_equal(world, untouched);
+    assert_ok(dem2d_world_load(&load, NULL, &world));
+    assert_result(dem2d_world_save(NULL, &save, "x"), DEM2D_NULL_ARGUMENT);
+    assert_result(dem2d_world_save(world, NULL, "x"), DEM2D_NULL_ARGUMENT);
+    assert_result(dem2d_world_save(world, &save, NULL), DEM2D_NULL_ARGUMENT);
+    assert_logged(&env, DEM2D_NULL_ARGUMENT, -1, "write");
+    save.write = scene_write;
+    assert_result(dem2d_world_save(world, &save, "x"), DEM2D_OUT_OF_RANGE);
+    assert_logged(&env, DEM2D_OUT_OF_RANGE, -1, "write");
+    dem2d_world_destroy(world);
+    assert_clean(&env);
+    free(bytes.bytes);
+}
+
+int main(void) {
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(test_resume),
+        cmocka_unit_test(test_resume_blocks),
+        cmocka_unit_test(test_resume_empty),
+        cmocka_unit_test(test_resume_changed),
+        cmocka_unit_test(test_resume_refused),
+        cmocka_unit_test(test_ids),
+        cmocka_unit_test(test_hash_changes),
+        cmocka_unit_test(test_hash_stays),
+        cmocka_unit_test(test_hash_skins),
+        cmocka_unit_test(test_hash_zeros),
+        cmocka_unit_test(test_golden),
+        cmocka_unit_test(test_flipped),
+        cmocka_unit_test(test_cut),
+        cmocka_unit_test(test_appended),
+        cmocka_unit_test(test_layout),
+        cmocka_unit_test(test_crafted),
+        cmocka_unit_test(test_writes_fail),
+        cmocka_unit_test(test_memory_fails),
+        cmocka_unit_test(test_files),
+        cmocka_unit_test(test_custom),
+        cmocka_unit_test(test_arguments),
+    };
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}
