@@ -1225,6 +1225,357 @@ static void geometry(const char *folder) {
     free(path);
 }
 
+/* --- balance --------------------------------------------------------------------------------- */
+
+/* Grains of all models under gravity on a floor between two walls; then without weight between
+   four, smooth ones, pressed together. */
+static void balance(void) {
+    static const bool kinds[KINDS] = {true, true, true, true, true};
+    dem2d_world_desc desc = world_desc(1e-4);
+    const dem2d_material_desc material = stone(KN, 0.4);
+    desc.gravity.y = -G, desc.local_damping = 0.5;
+    packing p = open_packing(&desc, &material, 0.8, 1.2, TOP);
+    random_state = 21;
+    fill(&p, 150, kinds, NULL, 0.04, 0.06);
+    step(&p.s, 20000);
+    settle(&p, 1e-8, 400000);
+    int count;
+    double weight = 0, lift = 0;
+    dem2d_particle_id *ids = all_ids(&p.s, &count);
+    for (int i = 0; i < count; i++) weight += look(&p.s, ids[i]).mass * G;
+    free(ids);
+    basis = "formula";
+    for (int i = 0; i < TOP; i++) lift -= look_wall(&p.s, p.walls[i]).force.y;
+    row_near("150 grains at rest: force of floor and walls/weight", 1, lift / weight, 1e-6);
+    basis = "measured";
+    set_gravity(&p.s, 0, 0), p.gravity = vec(0, 0);
+    smooth_walls(&p);
+    put_lid(&p);
+    control_wall(&p, TOP, DEM2D_WALL_SERVO, 1e5, 0.1);
+    control_wall(&p, RIGHT, DEM2D_WALL_SERVO, 1e5, 0.1);
+    step(&p.s, 10000);
+    settle(&p, 1e-8, 400000);
+    /* boundary: (1/A) sum of place x force over the walls' contacts, pressure positive */
+    dem2d_stress stress, boundary = {0, 0, 0, 0};
+    const dem2d_box b = inside(&p);
+    const double area = (b.upper.x - b.lower.x) * (b.upper.y - b.lower.y);
+    dem2d_contact_info *list = all_contacts(&p.s, &count);
+    for (int i = 0; i < count; i++) {
+        const dem2d_contact_info *c = &list[i];
+        const dem2d_vec f = vec(c->normal.x * c->normal_force - c->normal.y * c->tangential_force,
+                                c->normal.y * c->normal_force + c->normal.x * c->tangential_force);
+        if (c->b.generation != 0) continue;
+        boundary.xx += c->point.x * f.x / area, boundary.xy += c->point.x * f.y / area;
+        boundary.yx += c->point.y * f.x / area, boundary.yy += c->point.y * f.y / area;
+    }
+    free(list);
+    must(dem2d_world_stress(p.s.world, area, &stress), "stress");
+    const double mean = (boundary.xx + boundary.yy) / 2;
+    row_near("150 grains pressed: Love-Weber stress xx, Pa", boundary.xx, stress.xx, 1e-6);
+    row_near("150 grains pressed: Love-Weber stress yy, Pa", boundary.yy, stress.yy, 1e-6);
+    row_within("150 grains pressed: Love-Weber stress xy/mean", boundary.xy / mean,
+               stress.xy / mean, 1e-6);
+    row_within("150 grains pressed: Love-Weber stress yx/mean", boundary.yx / mean,
+               stress.yx / mean, 1e-6);
+    row_near("150 grains pressed: yy beside the lid's traction, Pa", 1e5, stress.yy, 1e-3);
+    row_near("150 grains pressed: xx beside the side's traction, Pa", 1e5, stress.xx, 1e-3);
+    close_scene(&p.s);
+}
+
+/* --- lattices and random packings ------------------------------------------------------------ */
+
+/* Discs in contact fill a region of whole cells. Triangular: cells of 2 R by 2 sqrt(3) R. */
+static void lattice(bool triangular) {
+    enum { SIDE = 12 };
+    const double radius = 0.5, rise = triangular ? sqrt(3) : 2;
+    const dem2d_world_desc desc = world_desc(1e-4);
+    const dem2d_material_desc material = stone(0, 0);
+    const scene s = open_scene(&desc, &material);
+    dem2d_shape *shape = disc(radius);
+    for (int i = 0; i < SIDE * SIDE; i++) {
+        const int row = i / SIDE;
+        const double x = 2 * radius * (i % SIDE + (triangular ? 0.5 * (row % 2) : 0));
+        add_shape(&s, shape, DEM2D_FIXED, vec(x, radius * rise * row), 0, vec(0, 0), 0);
+    }
+    dem2d_shape_destroy(shape);
+    step(&s, 1);
+    dem2d_box region;
+    double porosity;
+    region.lower = vec(4 * radius, 2 * radius * rise);
+    region.upper = vec(12 * radius, 6 * radius * rise);
+    must(dem2d_world_porosity(s.world, &region, &porosity), "porosity");
+    basis = "formula";
+    row_near(triangular ? "triangular lattice: solid fraction pi/(2 sqrt 3)"
+                        : "square lattice: solid fraction pi/4",
+             (double)PI / (triangular ? 2 * sqrt(3) : 4), 1 - porosity, 1e-12);
+    row_near("this program's solid fraction of the same", 1 - porosity, disc_fraction(&s, &region),
+             1e-4);
+    close_scene(&s);
+}
+
+/* Discs pressed together by two walls at a small pressure. Without friction as many forces as
+   degrees of freedom are left at jamming: 2 contacts a disc, walls counted, 4 ends; with very much
+   friction 3/2 contacts, 3 ends. Discs within three diameters of a wall are not counted in the
+   fraction. */
+static void random_packing(double friction) {
+    static const bool kinds[KINDS] = {true, false, false, false, false};
+    enum { DISCS = 600 };
+    dem2d_world_desc desc = world_desc(1e-4);
+    const dem2d_material_desc material = stone(friction > 0 ? KN : 0, friction);
+    desc.local_damping = 0.3;
+    packing p = open_packing(&desc, &material, 1.6, 1.6, WALLS);
+    smooth_walls(&p);
+    random_state = 31;
+    fill(&p, DISCS, kinds, NULL, 0.04, 0.06);
+    const double pressures[3] = {1e-3 * KN, 1e-4 * KN, 1e-5 * KN};
+    for (int i = 0; i < 3; i++) {
+        control_wall(&p, TOP, DEM2D_WALL_SERVO, pressures[i], 0.1);
+        control_wall(&p, RIGHT, DEM2D_WALL_SERVO, pressures[i], 0.1);
+        step(&p.s, i == 0 ? 60000 : 20000);
+        settle(&p, 1e-5, 300000);
+    }
+    const backbone b = find_backbone(&p, friction > 0 ? 2 : 3);
+    dem2d_box core = inside(&p);
+    core.lower.x += 0.15, core.lower.y += 0.15, core.upper.x -= 0.15, core.upper.y -= 0.15;
+    basis = "literature";
+    if (friction == 0)
+        row_between("random close packing, no friction: solid fraction about .84", 0.83, 0.85,
+                    disc_fraction(&p.s, &core));
+    const double ends = 2.0 * (b.contacts + b.wall_contacts) / b.particles;
+    if (friction == 0)
+        row_between("random packing, no friction: contacts a disc, no rattlers: 4", 3.95, 4.1,
+                    ends);
+    else
+        row_between(label("random packing, mu = %g: contacts a disc, no rattlers: 3", friction),
+                    2.9, 3.3, ends);
+    close_scene(&p.s);
+}
+
+/* --- the papers' packing and biaxial test ---------------------------------------------------- */
+
+enum { STRAIN_BLOCKS = 16 }; /* of 1 % */
+
+typedef struct paper_run {
+    double share[8]; /* of particles with so many contacts after the packing, walls counted */
+    double along;    /* sum of cos 2 (angle of the long axis) */
+    double axes;     /* how many have one */
+    double speed;    /* mean, m/s, at the end of the packing; its greatest on the way */
+    double most_speed;
+    double ratio;    /* kinetic over contact energy then */
+    double start[2]; /* axial and lateral stress after consolidation, Pa */
+    double lateral, lateral_worst;
+    double ratio_at[STRAIN_BLOCKS]; /* mean q/p by axial strain */
+    double strain;
+    dem2d_fabric fabric;        /* at the end */
+    double foretold, own_ratio; /* q/p by fabric and by the Love-Weber stress, means from 6 % on */
+    double inertial;            /* number, at the end */
+} paper_run;
+
+/* Principal directions are the papers' axes: loading along y. Angle to it in degrees. */
+static double off_vertical(double direction) {
+    const double degrees = fabs(direction) / DEGREE;
+    return fabs(90 - fmod(degrees, 180));
+}
+
+static void measure_packing(const packing *p, paper_run *r) {
+    int count, touching;
+    dem2d_particle_id *ids = all_ids(&p->s, &count);
+    dem2d_contact_info *list = all_contacts(&p->s, &touching);
+    int *degree = get_memory(NULL, (size_t)count, sizeof *degree);
+    memset(degree, 0, (size_t)count * sizeof *degree);
+    for (int i = 0; i < touching; i++) {
+        degree[list[i].a.index]++;
+        if (list[i].b.generation != 0) degree[list[i].b.index]++;
+    }
+    for (int i = 0; i < count; i++) {
+        double angle, ratio;
+        const dem2d_particle_info info = look(&p->s, ids[i]);
+        r->share[degree[ids[i].index] < 7 ? degree[ids[i].index] : 7] += 1.0 / count;
+        must(dem2d_shape_axis(dem2d_world_shape(p->s.world, info.shape), &angle, &ratio), "axis");
+        if (ratio < 1.05) continue;
+        r->along += cos(2 * (angle + dem2d_rot_angle(info.pose.rotation)));
+        r->axes++;
+    }
+    free(ids), free(list), free(degree);
+}
+
+static dem2d_equilibrium rest_of(const scene *s) {
+    dem2d_equilibrium e;
+    must(dem2d_world_equilibrium(s->world, &e), "equilibrium");
+    return e;
+}
+
+/* Adds a sample of q/p to the two sums. */
+static void sample_fabric(const packing *p, paper_run *r) {
+    dem2d_stress stress;
+    dem2d_principal principal;
+    const dem2d_box b = inside(p);
+    const double area = (b.upper.x - b.lower.x) * (b.upper.y - b.lower.y);
+    must(dem2d_world_fabric(p->s.world, &r->fabric), "fabric");
+    must(dem2d_world_stress(p->s.world, area, &stress), "stress");
+    must(dem2d_stress_principal(&stress, &principal), "stress");
+    r->foretold += r->fabric.stress_ratio;
+    r->own_ratio += principal.q / principal.p;
+}
+
+/* Top wall down at 0.1 m/s for 2 s, sides held. */
+static void compress(packing *p, paper_run *r) {
+    double height = 0, sums[STRAIN_BLOCKS] = {0};
+    int held = 0, samples = 0, counts[STRAIN_BLOCKS] = {0};
+    control_wall(p, TOP, DEM2D_WALL_MOVING, 0, 0.1);
+    for (int i = 0; i < 20000; i++) {
+        step(&p->s, 1);
+        const dem2d_wall_info top = look_wall(&p->s, p->walls[TOP]);
+        const dem2d_wall_info bottom = look_wall(&p->s, p->walls[BOTTOM]);
+        const dem2d_wall_info left = look_wall(&p->s, p->walls[LEFT]);
+        const dem2d_wall_info right = look_wall(&p->s, p->walls[RIGHT]);
+        const double axial = (top.stress + bottom.stress) / 2;
+        const double lateral = (left.stress + right.stress) / 2;
+        if (i == 0) height = left.length;
+        r->strain = dem2d_strain(left.length, height);
+        const int block = (int)(r->strain * 100);
+        if (block >= 0 && block < STRAIN_BLOCKS)
+            sums[block] += (axial - lateral) / (axial + lateral), counts[block]++;
+        if (r->strain < 1e-3) continue;
+        r->lateral += lateral, held++;
+        r->lateral_worst = fmax(r->lateral_worst, fabs(lateral / 1e5 - 1));
+        if (i % 200 == 199 && r->strain > 0.06) sample_fabric(p, r), samples++;
+    }
+    r->lateral /= held;
+    for (int i = 0; i < STRAIN_BLOCKS; i++)
+        r->ratio_at[i] = counts[i] > 0 ? sums[i] / counts[i] : 0;
+    r->foretold /= samples, r->own_ratio /= samples;
+    const double last = look_wall(&p->s, p->walls[LEFT]).length;
+    must(dem2d_world_inertial_number(p->s.world, 0.1 / last, r->lateral, &r->inertial),
+         "inertial number");
+}
+
+/* 500 grains of 40 to 60 mm at random in 1.0 x 3.0 m fall for 5 s; consolidated at 100 kPa for 1 s
+   without gravity, all walls smooth; compressed. kn = kt = 1e7, friction 0.2, local damping 0.7. */
+static packing pack_papers(const bool kinds[KINDS], uint64_t seed, paper_run *r) {
+    dem2d_world_desc desc = world_desc(1e-4);
+    const dem2d_material_desc material = stone(KN, 0.2);
+    desc.gravity.y = -9.8, desc.local_damping = 0.7, desc.contact_tolerance = 0;
+    packing p = open_packing(&desc, &material, 1, 3, TOP);
+    random_state = seed;
+    fill(&p, 500, kinds, NULL, 0.04, 0.06);
+    for (int i = 0; i < 500; i++) {
+        step(&p.s, 100);
+        r->speed = rest_of(&p.s).mean_speed;
+        r->most_speed = fmax(r->most_speed, r->speed);
+    }
+    r->ratio = rest_of(&p.s).kinetic_ratio;
+    measure_packing(&p, r);
+    return p;
+}
+
+static paper_run run_papers(const bool kinds[KINDS]) {
+    paper_run r;
+    memset(&r, 0, sizeof r);
+    packing p = pack_papers(kinds, 1, &r);
+    set_gravity(&p.s, 0, 0);
+    smooth_walls(&p);
+    put_lid(&p);
+    for (int i = 0; i < WALLS; i++)
+        if (i != BOTTOM) control_wall(&p, i, DEM2D_WALL_SERVO, 1e5, 0.1);
+    control_wall(&p, BOTTOM, DEM2D_WALL_STILL, 0, 0);
+    step(&p.s, 10000);
+    r.start[0] = look_wall(&p.s, p.walls[TOP]).stress;
+    r.start[1] =
+        (look_wall(&p.s, p.walls[LEFT]).stress + look_wall(&p.s, p.walls[RIGHT]).stress) / 2;
+    compress(&p, &r);
+    close_scene(&p.s);
+    return r;
+}
+
+/* Mean of q/p over strains from a to b, in percent. */
+static double mean_ratio(const paper_run *r, int a, int b) {
+    double sum = 0;
+    for (int i = a; i < b; i++) sum += r->ratio_at[i] / (b - a);
+    return sum;
+}
+
+/* "Small": a hundredth of the greatest mean speed, a hundredth of the contact energy. "Plateau":
+   from 6 % on the stress ratio stays within a quarter of its mean over 6 to 15 %, and before 1 % it
+   was below. */
+static void paper_rows(const char *name, const paper_run *r, bool irregular) {
+    basis = "paper";
+    const double four = r->share[3] + r->share[4] + (irregular ? r->share[5] : 0);
+    row_above(label("%s: share with %s contacts", name, irregular ? "3, 4 or 5" : "3 or 4"), 0.5,
+              four);
+    double other = 0;
+    for (int i = 0; i < 8; i++)
+        if (i != 3 && i != 4 && !(irregular && i == 5)) other = fmax(other, r->share[i]);
+    row_above(label("%s: the rarest of these over any other number", name), 1,
+              fmin(fmin(r->share[3], r->share[4]), irregular ? r->share[5] : 1) / other);
+    row_below(label("%s: mean speed after packing over its greatest", name), 1e-2,
+              r->speed / r->most_speed);
+    row_below(label("%s: kinetic/contact energy after packing", name), 1e-2, r->ratio);
+    row_near(label("%s: axial stress consolidated, Pa", name), 1e5, r->start[0], 0.02);
+    row_near(label("%s: lateral stress held, mean, Pa", name), 1e5, r->lateral, 0.005);
+    row_below(label("%s: lateral stress, worst step, relative", name), 0.05, r->lateral_worst);
+    const double plateau = mean_ratio(r, 6, 15);
+    double least = plateau, most = plateau;
+    for (int i = 6; i < 15; i++)
+        least = fmin(least, r->ratio_at[i]), most = fmax(most, r->ratio_at[i]);
+    row_below(label("%s: q/p in the first 1 %% of strain over the plateau", name), 1,
+              r->ratio_at[0] / plateau);
+    row_above(label("%s: plateau from 6 %% on: least over mean q/p", name), 0.75, least / plateau);
+    row_below(label("%s: plateau from 6 %% on: greatest over mean q/p", name), 1.25,
+              most / plateau);
+    row_between(label("%s: axial strain at the end (about 15, 16 %%)", name), 0.14, 0.19,
+                r->strain);
+    row_above(label("%s: anisotropy of contact normals", name), 0.05,
+              r->fabric.normals.coefficient);
+    row_below(label("%s: normals' direction off the loading, degrees", name), 15,
+              off_vertical(r->fabric.normals.direction));
+    row_below(label("%s: normal forces' direction off the loading, degrees", name), 15,
+              off_vertical(r->fabric.normal_forces.direction));
+    row_below(label("%s: inertial number", name), 1e-3, r->inertial);
+    basis = "literature";
+    row_near(label("%s: q/p by (a_c + a_b + a_n + a_t)/2", name), r->own_ratio, r->foretold, 0.2);
+}
+
+static void papers(void) {
+    static const bool irregular[KINDS] = {false, true, true, true, false};
+    static const bool discs[KINDS] = {true, false, false, false, false};
+    static const bool mixed[KINDS] = {true, true, true, true, true};
+    const paper_run a = run_papers(irregular), b = run_papers(discs), c = run_papers(mixed);
+    paper_rows("irregular", &a, true);
+    /* of N directions at random the mean of cos 2 angle has the deviation sqrt(1/2N) */
+    paper_run all = a;
+    for (uint64_t seed = 2; seed <= 4; seed++) {
+        const packing p = pack_papers(irregular, seed, &all);
+        close_scene(&p.s);
+    }
+    basis = "paper";
+    row_above("irregular: long axes horizontal, cos 2 angle, 4 packings, 3 sigma",
+              3 * sqrt(0.5 / all.axes), all.along / all.axes);
+    paper_rows("discs", &b, false);
+    basis = "paper";
+    row_above("irregular against discs: q/p of the plateau, ratio", 1,
+              mean_ratio(&a, 6, 15) / mean_ratio(&b, 6, 15));
+    row_above("irregular against discs: anisotropy of contact normals, ratio", 1,
+              a.fabric.normals.coefficient / b.fabric.normals.coefficient);
+    row_above("irregular against discs: mean number of contacts, ratio", 1,
+              (a.share[1] + 2 * a.share[2] + 3 * a.share[3] + 4 * a.share[4] + 5 * a.share[5] +
+               6 * a.share[6]) /
+                  (b.share[1] + 2 * b.share[2] + 3 * b.share[3] + 4 * b.share[4] + 5 * b.share[5] +
+                   6 * b.share[6]));
+    row_near("five models: lateral stress held, mean, Pa", 1e5, c.lateral, 0.005);
+    row_below("five models: mean speed after packing over its greatest", 1e-2,
+              c.speed / c.most_speed);
+    row_below("five models: kinetic/contact energy after packing", 1e-2, c.ratio);
+}
+
+static void assemblies(void) {
+    table_group("Assemblies");
+    balance();
+    lattice(true), lattice(false);
+    random_packing(0), random_packing(10);
+    papers();
+}
+
 int main(int argc, char **argv) {
     example_name = "verify";
     if (argc > 2) fail(STATUS_BAD_INPUT, "usage: verify [DATA]");
@@ -1237,5 +1588,6 @@ int main(int argc, char **argv) {
     rocking();
     energy();
     geometry(argc == 2 ? argv[1] : NULL);
+    assemblies();
     return table_end();
 }

@@ -463,6 +463,7 @@ enum { LEFT, RIGHT, BOTTOM, TOP, WALLS };
 
 typedef struct packing {
     scene s;
+    dem2d_material_id wall_material;
     dem2d_wall_id walls[WALLS]; /* generation 0: not there */
     dem2d_vec gravity;
     double width, height; /* of the box when it was made */
@@ -471,7 +472,7 @@ typedef struct packing {
 HELPER dem2d_wall_desc box_wall(const packing *p, int which) {
     static const double normals[WALLS][2] = {{1, 0}, {-1, 0}, {0, 1}, {0, -1}};
     dem2d_wall_desc desc = {0};
-    desc.material = p->s.material;
+    desc.material = p->wall_material;
     desc.normal = vec(normals[which][0], normals[which][1]);
     desc.point = vec(which == RIGHT ? p->width : 0, which == TOP ? p->height : 0);
     if (p->walls[which].generation) desc.point = look_wall(&p->s, p->walls[which]).point;
@@ -484,12 +485,19 @@ HELPER packing open_packing(const dem2d_world_desc *desc, const dem2d_material_d
     packing p;
     memset(&p, 0, sizeof p);
     p.s = open_scene(desc, material);
+    must(dem2d_world_add_material(p.s.world, material, &p.wall_material), "material");
     p.width = width, p.height = height, p.gravity = desc->gravity;
     for (int i = 0; i < walls; i++) {
         const dem2d_wall_desc wall = box_wall(&p, i);
         must(dem2d_world_add_wall(p.s.world, &wall, &p.walls[i]), "wall");
     }
     return p;
+}
+
+HELPER void smooth_walls(const packing *p) {
+    dem2d_pair_desc smooth = {0};
+    smooth.normal_stiffness = KN;
+    must(dem2d_world_set_pair(p->s.world, p->s.material, p->wall_material, &smooth), "friction");
 }
 
 /* A wall that is as long as two others are apart, and from now on holds a stress, or moves. */
@@ -502,6 +510,22 @@ HELPER void control_wall(packing *p, int which, dem2d_wall_mode mode, double val
         desc.velocity = vec(speed * desc.normal.x, speed * desc.normal.y);
     desc.spans[0] = p->walls[span], desc.spans[1] = p->walls[span + 1];
     must(dem2d_world_set_wall(p->s.world, p->walls[which], &desc), "wall");
+}
+
+/* The fourth wall, on the highest grain. */
+HELPER void put_lid(packing *p) {
+    int count;
+    p->height = 0;
+    dem2d_particle_id *ids = all_ids(&p->s, &count);
+    for (int i = 0; i < count; i++) {
+        const dem2d_particle_info info = look(&p->s, ids[i]);
+        dem2d_box b;
+        must(dem2d_shape_aabb(dem2d_world_shape(p->s.world, info.shape), info.pose, &b), "box");
+        p->height = fmax(p->height, b.upper.y);
+    }
+    free(ids);
+    const dem2d_wall_desc lid = box_wall(p, TOP);
+    must(dem2d_world_add_wall(p->s.world, &lid, &p->walls[TOP]), "wall");
 }
 
 HELPER dem2d_box inside(const packing *p) {
