@@ -243,7 +243,7 @@ static dem2d_wall_desc good_wall(const fixture *f) {
     return d;
 }
 
-static const dem2d_material_desc good_material = {2700, 1e6, 5e5, 0.4};
+static const dem2d_material_desc good_material = {2700, 1e6, 5e5, 0.4, 0, 0};
 
 static void fixture_shapes(fixture *f) {
     dem2d_shape *circle;

@@ -132,12 +132,18 @@ static void set_friction(bench *b, double friction) {
     check(dem2d_world_set_pair(b->world, b->material, b->material, &pair), "pair");
 }
 
+static void set_dashpot(bench *b, double damping_ratio) {
+    const dem2d_pair_desc pair = {KN, 0, 0, damping_ratio, 0};
+    check(dem2d_world_set_pair(b->world, b->material, b->material, &pair), "pair");
+}
+
 /* What is given at creation. */
 static void describe(const char *feature, int state, dem2d_world_desc *desc) {
     static int one_by_one;
     if (strcmp(feature, "parallel_for") == 0 && state != ABSENT)
         desc->parallel_for = serial, desc->parallel_user = state == ON ? &one_by_one : NULL;
     if (strcmp(feature, "empty region") == 0) desc->skin = 1e-3; /* many lists */
+    if (strcmp(feature, "ledger") == 0) desc->ledger = state == ON;
 }
 
 /* The right half moved away: by 0.5 m, by 1 km, not at all. */
@@ -202,17 +208,18 @@ static void add_fixed_pair(bench *b) {
 
 static void add_rough_material(bench *b) {
     const dem2d_material_desc rough = {DENSITY, KN, KN, 0.4, 0, 0};
-    const dem2d_pair_desc pair = {KN, KN, 0.4, 0, 0};
+    const dem2d_pair_desc pair = {KN, KN, 0.4, 0.1, 0.1};
     dem2d_material_id id;
     check(dem2d_world_add_material(b->world, &rough, &id), "material");
     check(dem2d_world_set_pair(b->world, id, id, &pair), "pair");
 }
 
 /* OFF: far below. ON: where the floor is. */
-static void add_other_wall(bench *b, int state) {
+static void add_other_wall(bench *b, int state, bool segment) {
     dem2d_wall_desc desc = {0};
     dem2d_wall_id id;
     desc.material = b->material, desc.normal.y = 1, desc.point.y = state == OFF ? -1000 : 0;
+    desc.segment = segment, desc.end.x = b->width, desc.end.y = desc.point.y;
     check(dem2d_world_add_wall(b->world, &desc, &id), "wall");
 }
 
@@ -223,7 +230,12 @@ static void add_feature(bench *b, const char *feature, int state) {
         if (state == OFF) add_rough_material(b);
         if (state == ON) set_friction(b, 0.4);
     }
-    if (strcmp(feature, "wall") == 0) add_other_wall(b, state);
+    if (strcmp(feature, "dashpot of no pair") == 0) {
+        if (state == OFF) add_rough_material(b);
+        if (state == ON) set_dashpot(b, 0.1);
+    }
+    if (strcmp(feature, "wall") == 0) add_other_wall(b, state, false);
+    if (strcmp(feature, "segment") == 0) add_other_wall(b, state, true);
     if (strcmp(feature, "fixed") == 0 && state == OFF) add_fixed_pair(b);
     if (strcmp(feature, "energy, stress") == 0) {
         b->ask = state == ON;

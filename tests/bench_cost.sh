@@ -48,6 +48,7 @@ while read -r feature; do
 done << 'END'
 friction
 friction of no pair
+dashpot of no pair
 spin
 local damping
 global damping
@@ -55,8 +56,10 @@ gravity
 polygons
 fixed
 wall
+segment
 empty region
 energy, stress
+ledger
 parallel_for
 gaps of discs
 gaps of polygons

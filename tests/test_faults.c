@@ -169,7 +169,7 @@ static dem2d_result life_move(life *l, int i) {
 }
 
 static dem2d_result life_rub(life *l, int i) {
-    const dem2d_pair_desc d = {1e6, 5e5, 0.4};
+    const dem2d_pair_desc d = {1e6, 5e5, 0.4, 0, 0};
     return dem2d_world_set_pair(l->world, l->materials[i], l->materials[i], &d);
 }
 

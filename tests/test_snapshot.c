@@ -188,8 +188,8 @@ static void test_resume_empty(void **state) {
 static bool change_scene(snapshot_scene *s, int which) {
     dem2d_world *w = s->world;
     const dem2d_particle_id some = {5, 1}, other = {6, 1};
-    const dem2d_pair_desc slippery = {5e5, 0, 0}, rough = {5e5, 5e5, 1};
-    const dem2d_material_desc lead = {11000, 2e6, 0, 0.25};
+    const dem2d_pair_desc slippery = {5e5, 0, 0, 0, 0}, rough = {5e5, 5e5, 1, 0, 0};
+    const dem2d_material_desc lead = {11000, 2e6, 0, 0.25, 0, 0};
     dem2d_wall_desc wall = {0};
     dem2d_material_id id;
     switch (which) {
