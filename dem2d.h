@@ -10504,6 +10504,18 @@ static int dem2di_shapes_look(const dem2d_world *world, dem2di_pair *pair, const
     return 1;
 }
 
+/* Two circles that overlap, among the others for the sake of the full law. */
+static int dem2di_round_geometry(const dem2di_state *a, const dem2di_state *b, dem2di_link *link,
+                                 dem2d_contact_point points[2], dem2di_count *count) {
+    dem2di_round round = dem2di_round_make(dem2di_disc_line(a, b), a->radius, b->radius, 1);
+    link->normal = round.normal;
+    link->depth = round.depth;
+    points[0].position = dem2di_scale(round.normal, round.arm_a);
+    count->looks++;
+    count->proofs[DEM2D_BY_FORM]++;
+    return round.depth > 0;
+}
+
 /* Geometry of one pair at the present positions; depth <= 0 when apart. Returns the number of
    points that carry the contact. */
 static int dem2di_pair_geometry(const dem2d_world *world, int a, int b, const dem2di_link *last,
@@ -10522,6 +10534,8 @@ static int dem2di_pair_geometry(const dem2d_world *world, int a, int b, const de
     dem2di_pair pair;
     pair.a = dem2di_shape_of(world, body_a);
     pair.b = dem2di_shape_of(world, body_b);
+    if (pair.a->type == DEM2D_CIRCLE && pair.b->type == DEM2D_CIRCLE)
+        return dem2di_round_geometry(state_a, state_b, link, points, count);
     pair.ra = state_a->q;
     pair.rb = state_b->q;
     pair.scale_a = body_a->scale;
