@@ -13238,6 +13238,7 @@ static void dem2di_put(dem2di_writer *writer, const char *text) {
 DEM2DI_PRINTF(2, 3)
 static void dem2di_print(dem2di_writer *writer, const char *format, ...) {
     char text[512];
+    if (!writer->good) return;
     va_list arguments;
     va_start(arguments, format);
     int length = vsnprintf(text, sizeof text, format, arguments);
