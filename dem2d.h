@@ -1,4 +1,4 @@
-/* dem2d.h - two-dimensional discrete element method for smooth and irregular grains, version 0.3.0
+/* dem2d.h - two-dimensional discrete element method for smooth and irregular grains, version 0.4.0
 
    One C99 header, no dependency but the C standard library. MIT licence (end of file).
 
@@ -56,11 +56,11 @@ CONTENTS (search for the anchor, ">>" and the word)
 WHAT IT IS
     Grains are convex shapes in the plane: circles, ellipses, polygons (sharp or rounded), closed
     chains of cubic Bezier arcs ("polybeziers"), Fourier series of the support function (FS), or
-    your own support function. They push each other with linear springs and Coulomb friction and
-    move by Newton's laws. The methods are those of two papers on irregular grains:
-        [P] polybezier grains: closed-form support, GJK and EPA, biaxial compression
-        [F] Fourier series of the support function: convexity, reduction, fitting
-    The stateless layer (shapes, mass, fitting, contact of two shapes) works without a world.
+    your own support function. They push each other with linear springs and Coulomb friction, or by
+    your own law, and move by Newton's laws. The methods are those of two papers on irregular
+grains: [P] polybezier grains: closed-form support, GJK and EPA, biaxial compression [F] Fourier
+series of the support function: convexity, reduction, fitting The stateless layer (shapes, mass,
+fitting, contact of two shapes) works without a world.
 
 WHAT IT DOES NOT DO
     3D; concave grains (a later version joins convex parts); bonded or breaking grains; fluids;
@@ -198,7 +198,13 @@ HOW TO
     repeat the papers    dem2d_world_desc.solver = DEM2D_GJK_EPA, faces = DEM2D_ONE_POINT.
     choose a time step   dem2d_world_time_step_bounds on a settled scene. The world checks it
                          whenever it renews its list of pairs.
+    lose energy          damping_ratio of the materials, from dem2d_damping_ratio(restitution);
+                         rolling_friction for grains that should not roll; else friction, damping.
+    use a law of yours   dem2d_world_desc.law: it gets depth, speeds and what it kept.
     stop friction        dem2d_world_set_pair for the two materials.
+    build a hopper       walls with segment: chains of them count once at their joints.
+    follow the energy    dem2d_world_desc.ledger, then dem2d_world_ledger: what gravity, walls and
+                         you put in, where it went, and by how much the sum is wrong.
     hold a stress        a wall with mode DEM2D_WALL_SERVO, stress, and a length: constant or the
                          distance between two other walls.
     stop and go on       dem2d_world_save, dem2d_world_load: to the same bits as without a stop.
@@ -370,10 +376,11 @@ COSTS (instructions per circle and step of a settled bed with 2.2 contacts each,
     local damping                                       +26
     global damping                                      +26
     gravity                                              +2
-    fixed particles, walls, parallel_for                 +1    when there are but touch nothing
+    fixed particles, walls, segments, parallel_for       +1    when there are but touch nothing
     polygons for circles                                +530
     energy and stress asked for in every step          +1600   else nothing
-    the ledger of energies                             +1000   else nothing
+    the ledger of energies                             +1600   else nothing
+    a dashpot, rolling friction, a law of your own     +1150   circles are then as other shapes
     a pair of circles listed but apart                   75    as much as one in contact: no branch
     another pair listed but apart, surely so             70    of the 700 to 2000 that a look costs
     a region without particles, a pair of fixed ones      0
@@ -408,10 +415,10 @@ DETERMINISM
    ============================================================================================ */
 
 #define DEM2D_VERSION_MAJOR 0
-#define DEM2D_VERSION_MINOR 3
+#define DEM2D_VERSION_MINOR 4
 #define DEM2D_VERSION_PATCH 0
-#define DEM2D_VERSION 300 /* major * 10000 + minor * 100 + patch */
-#define DEM2D_VERSION_STRING "0.3.0"
+#define DEM2D_VERSION 400 /* major * 10000 + minor * 100 + patch */
+#define DEM2D_VERSION_STRING "0.4.0"
 
 #if defined(DEM2D_STATIC)
 #if defined(__GNUC__)
@@ -1457,7 +1464,7 @@ typedef struct dem2d_pvd_desc {
     void *user;               ///< handed to write
 } dem2d_pvd_desc;
 
-/// A row of a history, as comma-separated values.
+/// A row of a history, as comma-separated values; with the columns of the ledger if there is one.
 typedef struct dem2d_csv_desc {
     int count;                ///< of the caller's columns, >= 0
     const char *const *names; ///< of them, without commas, quotes and line ends
@@ -13895,10 +13902,29 @@ static void dem2di_csv_values(const dem2d_world *world, double values[DEM2DI_CSV
     memcpy(values, all, sizeof all);
 }
 
-static void dem2di_csv_header(const dem2d_csv_desc *desc, dem2di_writer *writer) {
+#define DEM2DI_CSV_LEDGER 11
+
+/* Without a ledger: nothing. */
+static int dem2di_csv_ledger(const dem2d_world *world, double values[DEM2DI_CSV_LEDGER]) {
+    dem2d_ledger l;
+    if (!world->ledger.kept) return 0;
+    (void)dem2d_world_ledger(world, &l);
+    const double all[DEM2DI_CSV_LEDGER] = {l.kinetic, l.normal, l.tangential, l.gravity,
+                                           l.walls,   l.driven, l.friction,   l.dashpot,
+                                           l.damping, l.given,  l.closure};
+    memcpy(values, all, sizeof all);
+    return DEM2DI_CSV_LEDGER;
+}
+
+static void dem2di_csv_header(const dem2d_world *world, const dem2d_csv_desc *desc,
+                              dem2di_writer *writer) {
     dem2di_put(writer, "step,time,translational,rotational,normal,tangential,potential,"
                        "kinetic_ratio,mean_speed,max_speed,unbalanced,coordination,"
                        "coordination_loaded,rattlers,contacts,wall_contacts,max_overlap");
+    if (world->ledger.kept)
+        dem2di_put(writer, ",ledger_kinetic,ledger_normal,ledger_tangential,ledger_gravity,"
+                           "ledger_walls,ledger_driven,ledger_friction,ledger_dashpot,"
+                           "ledger_damping,ledger_given,ledger_closure");
     for (int i = 0; i < desc->count; i++) {
         dem2di_put(writer, ",");
         dem2di_put(writer, desc->names[i]);
@@ -13908,9 +13934,10 @@ static void dem2di_csv_header(const dem2d_csv_desc *desc, dem2di_writer *writer)
 
 static void dem2di_csv_row(const dem2d_world *world, const dem2d_csv_desc *desc,
                            dem2di_writer *writer) {
-    double values[DEM2DI_CSV_COLUMNS];
+    double values[DEM2DI_CSV_COLUMNS + DEM2DI_CSV_LEDGER];
     dem2di_csv_values(world, values);
-    for (int i = 0; i < DEM2DI_CSV_COLUMNS; i++) {
+    int own = DEM2DI_CSV_COLUMNS + dem2di_csv_ledger(world, values + DEM2DI_CSV_COLUMNS);
+    for (int i = 0; i < own; i++) {
         if (i > 0) dem2di_put(writer, ",");
         dem2di_put_number(writer, values[i]);
     }
@@ -13931,7 +13958,7 @@ DEM2D_API dem2d_result dem2d_world_write_csv(const dem2d_world *world, const dem
     if (result == DEM2D_OK)
         result = dem2di_writer_open(env, desc->write, desc->user, path, desc->append, &writer);
     if (result != DEM2D_OK) return result;
-    if (!desc->append) dem2di_csv_header(desc, &writer);
+    if (!desc->append) dem2di_csv_header(world, desc, &writer);
     dem2di_csv_row(world, desc, &writer);
     return dem2di_writer_close(env, path, &writer);
 }
@@ -13953,6 +13980,10 @@ DEM2D_API dem2d_result dem2d_world_write_csv(const dem2d_world *world, const dem
    >>licence  Changes and licence
 
    CHANGES
+     0.4.0  Dashpots by restitution, rolling friction, a caller's law, segment walls. Measures of
+            fabric, anisotropy, orientation, stress of particles, porosity of a region (no longer of
+            an area), rest; the ledger of energies. VTK files and CSV histories, scale bars.
+            Snapshots and the state hash.
      0.3.0  Steps laid out for speed: contacts by kind, circles by vector instructions, sums by
             particle, particles sorted in space; skins tuned to the motion; what a scene does not
             use is not paid for. parallel_for shares a step out to threads, to the same bits. Two
