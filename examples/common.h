@@ -1,5 +1,5 @@
-/* common.h - what the examples share: errors, random numbers, files, outlines, templates, placement
-   and the scene that is run with threads.
+/* common.h - what the examples share: errors, progress, random numbers, files, pictures, outlines,
+   templates, placement and the scene that is run with threads.
 
    Include it after dem2d.h in a source file that defines _POSIX_C_SOURCE 200809L at its top and
    sets example_name at the start of main. Nothing here calls a trigonometric function of libm:
@@ -15,6 +15,7 @@
 #include <float.h>
 #include <limits.h>
 #include <math.h>
+#include <signal.h>
 #include <stdarg.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -154,7 +155,7 @@ static inline int parse_name(const char *option, const char *text, const char *c
     fail(STATUS_BAD_INPUT, "%s %s: expected one of %s", option, text, all);
 }
 
-/* ---- clock, random numbers ---- */
+/* ---- clock ---- */
 
 /* Seconds on a clock that never jumps; for progress and speed only. */
 static inline double clock_seconds(void) {
@@ -162,6 +163,64 @@ static inline double clock_seconds(void) {
     if (clock_gettime(CLOCK_MONOTONIC, &now) != 0) return 0;
     return (double)now.tv_sec + 1e-9 * (double)now.tv_nsec;
 }
+
+/* ---- Ctrl-C, and progress on stderr ---- */
+
+enum { STATUS_STOPPED = 130 }; // what a shell says of a program that Ctrl-C has ended
+
+static volatile sig_atomic_t stop_asked;
+
+static inline void ask_stop(int number) {
+    (void)number;
+    stop_asked = 1;
+}
+
+/* The next Ctrl-C asks the program to write what it has and to end; one more ends it at once. */
+static inline void catch_interrupt(void) {
+    struct sigaction action;
+    memset(&action, 0, sizeof action);
+    action.sa_handler = ask_stop;
+    action.sa_flags = SA_RESTART | SA_RESETHAND;
+    sigemptyset(&action.sa_mask);
+    sigaction(SIGINT, &action, NULL);
+}
+
+/* A line that is renewed five times a second on a terminal; elsewhere a line every five seconds. */
+typedef struct progress {
+    const char *unit;      // of the work: steps
+    double total;          // of it
+    double started, shown; // s, on the clock: start, last line
+    double done;           // then
+    bool terminal, dirty;  // dirty: the line is not ended
+} progress;
+
+static inline void progress_start(progress *p, const char *unit, double total) {
+    p->unit = unit;
+    p->total = total;
+    p->started = p->shown = clock_seconds();
+    p->done = 0;
+    p->terminal = isatty(STDERR_FILENO) == 1;
+    p->dirty = false;
+}
+
+static inline void progress_show(progress *p, const char *stage, double done) {
+    const double now = clock_seconds();
+    if (now - p->shown < (p->terminal ? 0.2 : 5) || done <= p->done) return;
+    fprintf(stderr, "%s%s: %s, %.0f %%, %.0f %s/s, %.0f s left%s", p->terminal ? "\r\033[K" : "",
+            example_name, stage, 100 * done / p->total, (done - p->done) / (now - p->shown),
+            p->unit, (now - p->started) * (p->total - done) / done, p->terminal ? "" : "\n");
+    p->shown = now;
+    p->done = done;
+    p->dirty = p->terminal;
+}
+
+/* Wipes the line. */
+static inline void progress_end(progress *p) {
+    if (p->dirty) fputs("\r\033[K", stderr);
+    p->dirty = false;
+}
+
+/* ---- random numbers, logarithm ---- */
 
 /* 64 random bits (splitmix64): a counter stepped by 2^64 / golden ratio, then mixed. */
 static inline uint64_t random_bits(uint64_t *state) {
@@ -180,6 +239,18 @@ static inline double random_between(uint64_t *state, double low, double high) {
 /* Uniform in 0 .. count - 1. */
 static inline int random_below(uint64_t *state, int count) {
     return (int)(random_bits(state) % (uint64_t)count);
+}
+
+/* Natural logarithm of x > 0 near 1: ln x = 2 (z + z^3/3 + z^5/5 + ...), z = (x - 1)/(x + 1).
+   Not libm's, whose last bit depends on the system. */
+static inline double log_near_one(double x) {
+    const double z = (x - 1) / (x + 1);
+    double power = z, sum = z;
+    for (int n = 3; n < 400 && fabs(power) > 1e-18 * fabs(sum); n += 2) {
+        power *= z * z;
+        sum += power / n;
+    }
+    return 2 * sum;
 }
 
 /* ---- files: names, directories, writing aside ---- */
@@ -257,6 +328,77 @@ static inline void write_file(const char *path, const char *bytes, size_t count)
     bool ok = file != NULL && fwrite(bytes, 1, count, file) == count;
     if (file != NULL && fclose(file) != 0) ok = false;
     aside_finish(aside, ok);
+}
+
+/* A file that is made in memory first. */
+typedef struct draft {
+    FILE *file;
+    char *bytes;
+    size_t count;
+} draft;
+
+static inline void draft_open(draft *d) {
+    d->file = open_memstream(&d->bytes, &d->count);
+    if (d->file == NULL) fail(STATUS_FAILED, "out of memory");
+}
+
+/* Ends the writing; the bytes are there until freed. */
+static inline void draft_close(draft *d) {
+    if (fclose(d->file) != 0) fail(STATUS_FAILED, "out of memory");
+    d->file = NULL;
+}
+
+static inline void draft_write(draft *d, const char *path) {
+    draft_close(d);
+    write_file(path, d->bytes, d->count);
+    free(d->bytes);
+}
+
+/* ---- pictures ---- */
+
+/* From the input's coordinates to the picture's: y down there. */
+typedef struct frame {
+    double left, top, scale; // of the picture's upper left corner, px per unit
+} frame;
+
+static inline void svg_path(FILE *file, const frame *f, const dem2d_vec *points, int count) {
+    for (int i = 0; i < count; i++)
+        fprintf(file, "%c%.3f %.3f", i == 0 ? 'M' : 'L', (points[i].x - f->left) * f->scale,
+                (f->top - points[i].y) * f->scale);
+    fputs("Z", file);
+}
+
+/* The style that svg_difference asks for. */
+static const char difference_style[] = ".grain { fill: #c8c8c8; stroke: #505050; }\n"
+                                       ".difference { fill: #e03020; fill-rule: evenodd; }\n"
+                                       ".fit { fill: none; stroke: #1050c0; }\n";
+
+/* Grain grey, fit a blue line; filled by the even-odd rule, both paths together are the difference,
+   red. Without a fit (count 0) the grain alone. */
+static inline void svg_difference(FILE *file, const frame *f, const dem2d_vec *grain,
+                                  int grain_count, const dem2d_vec *fit, int count) {
+    fputs("<path class=\"grain\" d=\"", file);
+    svg_path(file, f, grain, grain_count);
+    fputs("\"/>\n", file);
+    if (count == 0) return;
+    fputs("<path class=\"difference\" d=\"", file);
+    svg_path(file, f, grain, grain_count);
+    svg_path(file, f, fit, count);
+    fputs("\"/>\n<path class=\"fit\" d=\"", file);
+    svg_path(file, f, fit, count);
+    fputs("\"/>\n", file);
+}
+
+static inline void widen(dem2d_box *box, dem2d_vec p) {
+    box->lower.x = fmin(box->lower.x, p.x);
+    box->lower.y = fmin(box->lower.y, p.y);
+    box->upper.x = fmax(box->upper.x, p.x);
+    box->upper.y = fmax(box->upper.y, p.y);
+}
+
+static inline dem2d_box empty_box(void) {
+    const dem2d_box box = {{HUGE_VAL, HUGE_VAL}, {-HUGE_VAL, -HUGE_VAL}};
+    return box;
 }
 
 /* ---- reading: whole files, CSV outlines, Netpbm images ---- */
@@ -570,8 +712,8 @@ static inline file_kind read_grains(const char *path, const dem2d_image_desc *se
     size_t count;
     char *bytes = read_whole(path, &count);
     const char *wrong = NULL;
-    outline o;
-    image picture;
+    outline o = {NULL, 0, NULL};
+    image picture = {NULL, 0, 0};
     int line = 0;
     file_kind kind = is_outline(bytes, count) ? FILE_OUTLINE : FILE_OTHER;
     if (is_image_name(path) || is_image(bytes, count)) kind = FILE_IMAGE;
@@ -591,7 +733,24 @@ static inline file_kind read_grains(const char *path, const dem2d_image_desc *se
     return kind;
 }
 
-/* A few grains for those who have none: r(t) = 1 + sum over n = 2..5 of c_n cos(n t + phase_n). */
+/* A lumpy grain: r(t) = 1 + sum over n = 2..5 of size[n - 2] cos(n t + phase[n - 2]). */
+static inline void list_lumpy(outline_list *list, const double size[4], const double phase[4],
+                              const char *name, int number) {
+    enum { POINTS = 120 };
+    dem2d_vec points[POINTS];
+    for (int i = 0; i < POINTS; i++) {
+        const double angle = 6.283185307179586 * i / POINTS;
+        double radius = 1;
+        for (int n = 2; n <= 5; n++)
+            radius += size[n - 2] * dem2d_rot_make(n * angle + phase[n - 2]).c;
+        const dem2d_rot direction = dem2d_rot_make(angle);
+        points[i].x = radius * direction.c;
+        points[i].y = radius * direction.s;
+    }
+    list_outline(list, points, POINTS, name, number);
+}
+
+/* A few grains for those who have none. */
 enum { SELF_MADE = 4 };
 
 static inline void list_self_made(outline_list *list, int which) {
@@ -601,18 +760,7 @@ static inline void list_self_made(outline_list *list, int which) {
                                               {0.04, 0.04, 0.05, 0.020}};
     static const double phase[SELF_MADE][4] = {
         {0.0, 0.7, 1.9, 0.3}, {1.1, 2.6, 0.4, 5.0}, {2.0, 4.4, 3.1, 1.2}, {0.6, 5.7, 2.2, 3.9}};
-    enum { POINTS = 120 };
-    dem2d_vec points[POINTS];
-    for (int i = 0; i < POINTS; i++) {
-        const double angle = 6.283185307179586 * i / POINTS;
-        double radius = 1;
-        for (int n = 2; n <= 5; n++)
-            radius += size[which][n - 2] * dem2d_rot_make(n * angle + phase[which][n - 2]).c;
-        const dem2d_rot direction = dem2d_rot_make(angle);
-        points[i].x = radius * direction.c;
-        points[i].y = radius * direction.s;
-    }
-    list_outline(list, points, POINTS, "self-made outline", which + 1);
+    list_lumpy(list, size[which], phase[which], "self-made outline", which + 1);
 }
 
 /* The outlines of all CSV files in a directory; when none of them is an outline, those of the
@@ -903,12 +1051,28 @@ static inline void add_falling(dem2d_world *world, dem2d_material_id material, i
     }
 }
 
+/* All steps, a few at a time, and how long they took. */
+static inline void take_fall(dem2d_world *world, const fall *f, const char *stage,
+                             double *seconds) {
+    enum { FEW = 50 };
+    progress p;
+    progress_start(&p, "steps", f->steps);
+    for (int done = 0; done < f->steps; done += FEW) {
+        const int left = f->steps - done;
+        must(dem2d_world_step(world, left < FEW ? left : FEW, NULL), "step");
+        progress_show(&p, stage, done + FEW < f->steps ? done + FEW : f->steps);
+        if (stop_asked) fail(STATUS_STOPPED, "stopped after %d of %d steps", done + FEW, f->steps);
+    }
+    *seconds = clock_seconds() - p.started;
+    progress_end(&p);
+}
+
 /* The world after its steps, and how long they took. Threads come in by two fields of the
    description; without them the caller's thread does all the work. */
 static inline dem2d_world *run_fall(const fall *f, dem2d_parallel_fn *parallel_for, void *user,
                                     double *seconds) {
     dem2d_world_desc scene = {0};
-    dem2d_material_desc stone = {2700, 1e7, 1e7, 0.4, 0, 0}; // kg/m2, N/m, N/m, friction
+    dem2d_material_desc stone = {2700, 1e7, 1e7, 0.4}; // kg/m2, N/m, N/m, friction
     dem2d_material_id material;
     dem2d_world *world;
     const double pitch = 0.05; // m
@@ -923,9 +1087,7 @@ static inline dem2d_world *run_fall(const fall *f, dem2d_parallel_fn *parallel_f
     must(dem2d_world_add_material(world, &stone, &material), "material");
     add_box(world, material, columns * pitch);
     add_falling(world, material, f->particles, columns, pitch);
-    const double started = clock_seconds();
-    must(dem2d_world_step(world, f->steps, NULL), "step");
-    *seconds = clock_seconds() - started;
+    take_fall(world, f, parallel_for != NULL ? "several threads" : "one thread", seconds);
     return world;
 }
 
@@ -950,6 +1112,7 @@ static inline bool same_motion(const dem2d_world *a, const dem2d_world *b, int p
 /* Runs the scene without and with threads and prints both times; the exit status. */
 static inline int compare_falls(const fall *f, dem2d_parallel_fn *parallel_for, void *user) {
     double one, several;
+    catch_interrupt();
     dem2d_world *a = run_fall(f, NULL, NULL, &one);
     dem2d_world *b = run_fall(f, parallel_for, user, &several);
     const bool same = same_motion(a, b, f->particles);

@@ -205,24 +205,6 @@ static void outline_points(const fitted *fit, dem2d_vec points[FIT_POINTS]) {
 
 /* ---- files ---- */
 
-/* A file that is made in memory first. */
-typedef struct draft {
-    FILE *file;
-    char *bytes;
-    size_t count;
-} draft;
-
-static void draft_open(draft *d) {
-    d->file = open_memstream(&d->bytes, &d->count);
-    if (d->file == NULL) fail(STATUS_FAILED, "out of memory");
-}
-
-static void draft_write(draft *d, const char *path) {
-    if (fclose(d->file) != 0) fail(STATUS_FAILED, "out of memory");
-    write_file(path, d->bytes, d->count);
-    free(d->bytes);
-}
-
 /* OUT.csv, or for grain 7 of several OUT_07.csv; with more digits where there are more grains. */
 static char *numbered_path(const char *path, int index, int count) {
     int digits = 2;
@@ -252,28 +234,9 @@ static void write_outline(const char *path, const fitted *fit) {
 
 /* ---- the picture ---- */
 
-/* From the input's coordinates to the picture's: y down there. */
-typedef struct frame {
-    double left, top, scale;
-} frame;
-
-static void write_path(FILE *file, const frame *f, const dem2d_vec *points, int count) {
-    for (int i = 0; i < count; i++)
-        fprintf(file, "%c%.3f %.3f", i == 0 ? 'M' : 'L', (points[i].x - f->left) * f->scale,
-                (f->top - points[i].y) * f->scale);
-    fputs("Z", file);
-}
-
-static void widen(dem2d_box *box, dem2d_vec p) {
-    box->lower.x = fmin(box->lower.x, p.x);
-    box->lower.y = fmin(box->lower.y, p.y);
-    box->upper.x = fmax(box->upper.x, p.x);
-    box->upper.y = fmax(box->upper.y, p.y);
-}
-
 /* All grains and fits. */
 static dem2d_box find_box(const outline_list *list, const fitted *fits) {
-    dem2d_box box = {{HUGE_VAL, HUGE_VAL}, {-HUGE_VAL, -HUGE_VAL}};
+    dem2d_box box = empty_box();
     for (int i = 0; i < list->count; i++) {
         const outline *reference = &list->items[i];
         dem2d_box own;
@@ -286,21 +249,11 @@ static dem2d_box find_box(const outline_list *list, const fitted *fits) {
     return box;
 }
 
-/* Grain grey, fit a blue line; filled by the even-odd rule, both paths together are the difference,
-   red. */
 static void draw_grain(FILE *file, const frame *f, const outline *reference, const fitted *fit) {
     dem2d_vec points[FIT_POINTS];
-    fputs("<path class=\"grain\" d=\"", file);
-    write_path(file, f, reference->points, reference->count);
-    fputs("\"/>\n", file);
-    if (fit->shape == NULL) return;
-    outline_points(fit, points);
-    fputs("<path class=\"difference\" d=\"", file);
-    write_path(file, f, reference->points, reference->count);
-    write_path(file, f, points, FIT_POINTS);
-    fputs("\"/>\n<path class=\"fit\" d=\"", file);
-    write_path(file, f, points, FIT_POINTS);
-    fputs("\"/>\n", file);
+    if (fit->shape != NULL) outline_points(fit, points);
+    svg_difference(file, f, reference->points, reference->count, points,
+                   fit->shape != NULL ? FIT_POINTS : 0);
 }
 
 static void write_picture(const char *path, const outline_list *list, const fitted *fits) {
@@ -317,11 +270,9 @@ static void write_picture(const char *path, const outline_list *list, const fitt
             "<svg xmlns=\"http://www.w3.org/2000/svg\" width=\"%.0f\" height=\"%.0f\" "
             "viewBox=\"0 0 %.3f %.3f\">\n"
             "<title>grains grey, fits blue, difference red</title>\n"
-            "<style>.grain { fill: #c8c8c8; stroke: #505050; }\n"
-            ".difference { fill: #e03020; fill-rule: evenodd; }\n"
-            ".fit { fill: none; stroke: #1050c0; }</style>\n"
+            "<style>%s</style>\n"
             "<rect width=\"100%%\" height=\"100%%\" fill=\"white\"/>\n",
-            across, down, across, down);
+            across, down, across, down, difference_style);
     for (int i = 0; i < list->count; i++) draw_grain(d.file, &f, &list->items[i], &fits[i]);
     fputs("</svg>\n", d.file);
     draft_write(&d, path);
