@@ -1061,7 +1061,9 @@ static inline void take_fall(dem2d_world *world, const fall *f, const char *stag
         const int left = f->steps - done;
         must(dem2d_world_step(world, left < FEW ? left : FEW, NULL), "step");
         progress_show(&p, stage, done + FEW < f->steps ? done + FEW : f->steps);
-        if (stop_asked) fail(STATUS_STOPPED, "stopped after %d of %d steps", done + FEW, f->steps);
+        if (!stop_asked) continue;
+        progress_end(&p);
+        fail(STATUS_STOPPED, "stopped after %d of %d steps", done + FEW, f->steps);
     }
     *seconds = clock_seconds() - p.started;
     progress_end(&p);

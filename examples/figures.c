@@ -1,0 +1,1295 @@
+/* figures.c - the figures and tables of two papers on irregular grains, made again, and whether
+   what the papers say of them holds here.
+
+       make -C examples figures                     (about a minute; needs gnuplot)
+       build/figures --help
+
+   P is the paper on polybezier grains, F the one on Fourier series (FS) of the support function.
+   `make figures` runs biaxial six times - five models, noncircular grains, circles, each with local
+   damping (as in P) and global damping (as in F) - and then this program, which reads their files,
+   fits templates to twelve outlines, writes tables for figures.gp, pictures of shapes and the page
+   figures.html. All sentences on the page follow from the numbers. Exit status: 0 if all checks
+   hold, 1 if one fails, 2 for bad usage or input.
+*/
+#define _POSIX_C_SOURCE 200809L
+#define DEM2D_IMPLEMENTATION
+#include "dem2d.h"
+#include "common.h"
+
+static const char usage[] =
+    "usage: figures DIR [options]\n"
+    "       figures --models FILE\n"
+    "Makes the papers' figures from six runs of biaxial in DIR (see make -C examples figures).\n"
+    "  --grains PATH     outlines to fit templates to: the first 12 at PATH, as for biaxial\n"
+    "                    (without PATH: 12 made here)\n"
+    "  --quick           the runs were quick ones: the checks are shown, but a failing one is no\n"
+    "                    error\n"
+    "  --models FILE     only draw the shape models to an SVG file\n"
+    "  --help            this text\n"
+    "Exit status: 0 all checks hold, 1 one failed, 2 bad usage or input.\n";
+
+static const double PI = 3.141592653589793;
+
+typedef struct options {
+    const char *folder, *grains, *models; // or NULL
+    bool quick;
+} options;
+
+static options parse_options(int count, char **arguments) {
+    static const char *const names[] = {"--grains=", "--quick", "--models="};
+    options o = {0};
+    for (int i = 1; i < count; i++) {
+        const char *value;
+        if (arguments[i][0] != '-') {
+            if (o.folder != NULL) fail(STATUS_BAD_INPUT, "one DIR only (try --help)");
+            o.folder = arguments[i];
+            continue;
+        }
+        const int which = parse_option(count, arguments, &i, usage, names, 3, &value);
+        if (which == 0) o.grains = value;
+        if (which == 1) o.quick = true;
+        if (which == 2) o.models = value;
+    }
+    if ((o.folder == NULL) == (o.models == NULL))
+        fail(STATUS_BAD_INPUT, "expected DIR or --models FILE (try --help)");
+    return o;
+}
+
+/* ---- the page: figures with what is claimed of them, and the table of all checks ---- */
+
+typedef struct page {
+    draft body, rows, failures;
+    int checks, failed;
+} page;
+
+/* One line below the figure and one in the table; on stdout, too. */
+static void put_line(page *p, const char *mark, const char *word, const char *claim,
+                     const char *got) {
+    fprintf(p->body.file, "<li class=\"%s\">%s: <b>%s</b> &ndash; %s</li>\n", mark, claim, got,
+            word);
+    fprintf(p->rows.file, "<tr class=\"%s\"><td>%s<td>%s<td>%s\n", mark, claim, got, word);
+    printf("%-8s %s: %s\n", word, claim, got);
+}
+
+#if defined(__GNUC__)
+#define PAGE_PRINTF(text, first) __attribute__((format(printf, text, first)))
+#else
+#define PAGE_PRINTF(text, first)
+#endif
+
+PAGE_PRINTF(4, 5)
+static void check(page *p, bool holds, const char *claim, const char *format, ...) {
+    char got[400];
+    va_list arguments;
+    va_start(arguments, format);
+    vsnprintf(got, sizeof got, format, arguments);
+    va_end(arguments);
+    p->checks++;
+    if (!holds) p->failed++;
+    if (!holds) fprintf(p->failures.file, "<li class=\"no\">%s: <b>%s</b></li>\n", claim, got);
+    put_line(p, holds ? "yes" : "no", holds ? "agrees" : "DIFFERS", claim, got);
+}
+
+/* A number beside the paper's that nothing is decided by. */
+PAGE_PRINTF(3, 4)
+static void note(page *p, const char *claim, const char *format, ...) {
+    char got[400];
+    va_list arguments;
+    va_start(arguments, format);
+    vsnprintf(got, sizeof got, format, arguments);
+    va_end(arguments);
+    put_line(p, "note", "not judged", claim, got);
+}
+
+/* Files: names with a space between. */
+static void open_figure(page *p, const char *title, const char *files) {
+    fprintf(p->body.file, "<section><h2>%s</h2>\n<div class=\"row\">\n", title);
+    for (const char *name = files; *name != '\0';) {
+        const int length = (int)strcspn(name, " ");
+        fprintf(p->body.file, "<img src=\"%.*s\" alt=\"%s\">\n", length, name, title);
+        name += length + (name[length] == ' ');
+    }
+    fputs("</div><ul>\n", p->body.file);
+}
+
+static void close_figure(page *p) {
+    fputs("</ul></section>\n", p->body.file);
+}
+
+static const char page_head[] =
+    "<!DOCTYPE html>\n<html lang=\"en\"><meta charset=\"utf-8\">\n"
+    "<meta name=\"viewport\" content=\"width=device-width, initial-scale=1\">\n"
+    "<title>dem2d: the papers' figures</title>\n<style>\n"
+    "body { font: 16px/1.45 sans-serif; max-width: 70em; margin: auto; padding: 0 1em; }\n"
+    "h1 { font-size: 1.5em; } h2 { font-size: 1.15em; margin: 2em 0 .5em; }\n"
+    ".row { display: flex; flex-wrap: wrap; gap: .5em; align-items: flex-start; }\n"
+    ".row img { flex: 1 1 300px; min-width: 0; max-width: 100%; height: auto; }\n"
+    "ul { padding-left: 1.2em; } .no { color: #b00020; } .note { color: #555; }\n"
+    ".wide { overflow-x: auto; } table { border-collapse: collapse; font-size: .9em; }\n"
+    "td, th { border: 1px solid #ccc; padding: .25em .5em; text-align: left; vertical-align: top; "
+    "}\n"
+    "</style>\n<h1>dem2d: the figures of two papers, made again</h1>\n"
+    "<p>P is the paper on polybezier grains, F the one on Fourier series of the support function. "
+    "Every line below a figure is written by the program from the numbers of this run: what the "
+    "paper says, <b>what came out here</b>, and whether that agrees.</p>\n";
+
+static void write_page(page *p, const char *path, bool quick) {
+    draft whole;
+    draft_close(&p->body);
+    draft_close(&p->rows);
+    draft_close(&p->failures);
+    draft_open(&whole);
+    fputs(page_head, whole.file);
+    fprintf(whole.file, "<p><b>%d of %d checks hold.</b>%s</p>\n<ul>%s</ul>\n",
+            p->checks - p->failed, p->checks,
+            quick ? " These are quick runs of 100 grains: too few to judge by." : "",
+            p->failures.bytes);
+    fputs(p->body.bytes, whole.file);
+    fprintf(whole.file,
+            "<h2>All checks</h2>\n<div class=\"wide\"><table>\n"
+            "<tr><th>expected<th>here<th>\n%s</table></div>\n</html>\n",
+            p->rows.bytes);
+    draft_write(&whole, path);
+    free(p->body.bytes);
+    free(p->rows.bytes);
+    free(p->failures.bytes);
+}
+
+/* ---- tables: columns of numbers by name ---- */
+
+typedef struct table {
+    int rows, columns;
+    char **names;
+    double *values; // row by row; NaN where a cell is empty
+} table;
+
+static double parse_cell(const char *text, size_t length) {
+    double value;
+    return parse_decimal(text, length, &value) ? value : NAN;
+}
+
+/* Next cell of a line of CSV, which loses it. */
+static rest next_cell(rest *line) {
+    rest cell = *line;
+    const char *comma = memchr(line->at, ',', (size_t)(line->end - line->at));
+    cell.end = comma != NULL ? comma : line->end;
+    line->at = comma != NULL ? comma + 1 : line->end;
+    return cell;
+}
+
+static void add_name(table *t, const char *text, size_t length) {
+    t->names = get_memory(t->names, (size_t)t->columns + 1, sizeof *t->names);
+    char *name = get_memory(NULL, length, 1);
+    memcpy(name, text, length);
+    name[length] = '\0'; // get_memory gives one byte more
+    t->names[t->columns++] = name;
+}
+
+/* A CSV file whose first line has the names. */
+static table read_table(const char *path) {
+    size_t count;
+    char *bytes = read_whole(path, &count);
+    rest r = rest_make(bytes, count), line = r;
+    table t = {0, 0, NULL, NULL};
+    if (!next_line(&r, &line)) fail(STATUS_BAD_INPUT, "%s is empty", path);
+    while (line.at < line.end) {
+        const rest cell = next_cell(&line);
+        add_name(&t, cell.at, (size_t)(cell.end - cell.at));
+    }
+    while (next_line(&r, &line)) {
+        const size_t columns = (size_t)t.columns;
+        t.values = get_memory(t.values, columns * ((size_t)t.rows + 1), sizeof *t.values);
+        for (size_t i = 0; i < columns; i++) {
+            const rest cell = next_cell(&line);
+            t.values[columns * (size_t)t.rows + i] =
+                parse_cell(cell.at, (size_t)(cell.end - cell.at));
+        }
+        t.rows++;
+    }
+    free(bytes);
+    return t;
+}
+
+/* What biaxial printed, lines "name value unit", as a table of one row. */
+static table read_results(const char *path) {
+    size_t count;
+    char *bytes = read_whole(path, &count);
+    rest r = rest_make(bytes, count), line = r;
+    table t = {1, 0, NULL, NULL};
+    while (next_line(&r, &line)) {
+        const char *space = memchr(line.at, ' ', (size_t)(line.end - line.at));
+        if (space == NULL) continue;
+        const char *value = space + 1;
+        const char *stop = memchr(value, ' ', (size_t)(line.end - value));
+        t.values = get_memory(t.values, (size_t)t.columns + 1, sizeof *t.values);
+        t.values[t.columns] = parse_cell(value, (size_t)((stop != NULL ? stop : line.end) - value));
+        add_name(&t, line.at, (size_t)(space - line.at));
+    }
+    free(bytes);
+    return t;
+}
+
+static int column(const table *t, const char *name) {
+    for (int i = 0; i < t->columns; i++)
+        if (strcmp(t->names[i], name) == 0) return i;
+    fail(STATUS_BAD_INPUT, "no column %s in a file of biaxial", name);
+}
+
+static double cell(const table *t, int row, const char *name) {
+    return t->values[row * t->columns + column(t, name)];
+}
+
+static void free_table(table *t) {
+    for (int i = 0; i < t->columns; i++) free(t->names[i]);
+    free(t->names);
+    free(t->values);
+}
+
+/* ---- the runs of biaxial ---- */
+
+enum { IRREGULAR, NONCIRCULAR, CIRCULAR, SETS };
+enum { LOCAL, GLOBAL, DAMPINGS };
+static const char *const set_names[SETS] = {"irregular", "noncircular", "circular"};
+static const char *const damping_names[DAMPINGS] = {"local", "global"};
+
+typedef struct run {
+    table results, history, settled, final, pairs;
+} run;
+
+typedef struct study {
+    const options *options;
+    run runs[SETS][DAMPINGS];
+    page page;
+} study;
+
+static char *run_path(const study *s, int set, int damping, const char *file) {
+    char name[100];
+    snprintf(name, sizeof name, "%s_%s/%s", set_names[set], damping_names[damping], file);
+    return join_text(s->options->folder, "/", name);
+}
+
+static table read_run_table(const study *s, int set, int damping, const char *file) {
+    char *path = run_path(s, set, damping, file);
+    const table t = strcmp(file, "results.txt") == 0 ? read_results(path) : read_table(path);
+    free(path);
+    return t;
+}
+
+static void read_runs(study *s) {
+    for (int set = 0; set < SETS; set++) {
+        for (int d = 0; d < DAMPINGS; d++) {
+            run *r = &s->runs[set][d];
+            r->results = read_run_table(s, set, d, "results.txt");
+            r->history = read_run_table(s, set, d, "history.csv");
+            r->settled = read_run_table(s, set, d, "settled.csv");
+            r->final = read_run_table(s, set, d, "final.csv");
+            r->pairs = read_run_table(s, set, d, "pairs.csv");
+        }
+    }
+}
+
+static void free_runs(study *s) {
+    for (int i = 0; i < SETS * DAMPINGS; i++) {
+        run *r = &s->runs[i / DAMPINGS][i % DAMPINGS];
+        table *const tables[] = {&r->results, &r->history, &r->settled, &r->final, &r->pairs};
+        for (int k = 0; k < 5; k++) free_table(tables[k]);
+    }
+}
+
+static double result(const study *s, int set, int damping, const char *name) {
+    return cell(&s->runs[set][damping].results, 0, name);
+}
+
+/* A draft for DIR/name. */
+static void finish(const study *s, draft *d, const char *name) {
+    char *path = join_text(s->options->folder, "/", name);
+    draft_write(d, path);
+    free(path);
+}
+
+/* ---- fits of templates to outlines ---- */
+
+enum { TEMPLATES = 12, MOST = 16, FIT_POINTS = 240 };
+typedef enum way { AS_BEZIER, AS_POLYGON, AS_RADIAL, AS_REDUCED, AS_CONSTRAINED, WAYS } way;
+static const char *const way_texts[WAYS] = {"polybezier", "polygon", "original FS: radius by angle",
+                                            "new FS by the paper's reduction",
+                                            "new FS by constrained least squares"};
+static const char *const way_names[WAYS] = {"bezier", "polygon", "radial", "reduced",
+                                            "constrained"};
+
+typedef struct fits {
+    outline_list outlines;
+    int templates;
+    double coverage[WAYS][MOST + 1][TEMPLATES]; // by number of segments or order
+    double convex[WAYS][TEMPLATES];             // of the convex hulls, FS of order 8
+    double solidity[TEMPLATES];                 // area over area of the hull
+} fits;
+
+/* Twelve lumpy grains: those of the other examples, and more between the least and the greatest of
+   their amplitudes. */
+static outline_list make_outlines(void) {
+    static const double low[4] = {0.04, 0.03, 0.02, 0.005}, high[4] = {0.22, 0.08, 0.05, 0.02};
+    outline_list list = {NULL, 0};
+    uint64_t random = 1;
+    for (int i = 0; i < SELF_MADE; i++) list_self_made(&list, i);
+    for (int i = SELF_MADE; i < TEMPLATES; i++) {
+        double size[4], phase[4];
+        for (int n = 0; n < 4; n++) {
+            size[n] = random_between(&random, low[n], high[n]);
+            phase[n] = random_between(&random, 0, 2 * PI);
+        }
+        list_lumpy(&list, size, phase, "self-made outline", i + 1);
+    }
+    return list;
+}
+
+/* Distance from c along a unit direction to the farthest crossing with an outline. */
+static double ray_length(const outline *o, dem2d_vec c, dem2d_rot direction) {
+    double length = 0;
+    for (int i = 0; i < o->count; i++) {
+        const dem2d_vec p = o->points[i], q = o->points[(i + 1) % o->count];
+        const double px = p.x - c.x, py = p.y - c.y, qx = q.x - c.x, qy = q.y - c.y;
+        const double left = direction.c * py - direction.s * px; // of the ray, p and q
+        const double right = direction.c * qy - direction.s * qx;
+        if ((left > 0) == (right > 0)) continue;
+        const double t = left / (left - right);
+        const double along =
+            direction.c * (px + t * (qx - px)) + direction.s * (py + t * (qy - py));
+        length = fmax(length, along);
+    }
+    return length;
+}
+
+/* The radius about the centroid as a Fourier series: the grains of the original FS model. */
+static void radial_points(const outline *o, int order, dem2d_vec points[FIT_POINTS]) {
+    double a[MOST + 1] = {0}, b[MOST + 1] = {0};
+    dem2d_mass mass;
+    must(dem2d_polygon_mass(o->points, o->count, &mass), o->name);
+    for (int i = 0; i < FIT_POINTS; i++) {
+        const double angle = 2 * PI * i / FIT_POINTS;
+        const double radius = ray_length(o, mass.centroid, dem2d_rot_make(angle));
+        for (int n = 0; n <= order; n++) {
+            const dem2d_rot turn = dem2d_rot_make(n * angle);
+            a[n] += radius * turn.c * (n == 0 ? 1.0 : 2.0) / FIT_POINTS;
+            b[n] += radius * turn.s * 2.0 / FIT_POINTS;
+        }
+    }
+    for (int i = 0; i < FIT_POINTS; i++) {
+        const double angle = 2 * PI * i / FIT_POINTS;
+        const dem2d_rot direction = dem2d_rot_make(angle);
+        double radius = a[0];
+        for (int n = 1; n <= order; n++) {
+            const dem2d_rot turn = dem2d_rot_make(n * angle);
+            radius += a[n] * turn.c + b[n] * turn.s;
+        }
+        points[i].x = mass.centroid.x + radius * direction.c;
+        points[i].y = mass.centroid.y + radius * direction.s;
+    }
+}
+
+/* Coverage of a fit with `count` segments or of this order, and its outline unless points is NULL.
+ */
+static double fit(const outline *o, way how, int count, dem2d_vec *points) {
+    static const dem2d_shape_type models[WAYS] = {DEM2D_BEZIER, DEM2D_POLYGON, DEM2D_CUSTOM,
+                                                  DEM2D_FOURIER, DEM2D_FOURIER};
+    if (how == AS_RADIAL) {
+        dem2d_difference difference;
+        must(dem2d_radial_compare(example_env(), o->points, o->count, count, &difference), o->name);
+        if (points != NULL) radial_points(o, count, points);
+        return difference.coverage;
+    }
+    dem2d_fit_desc desc = {0};
+    dem2d_fit_report report;
+    dem2d_shape *shape;
+    desc.model = models[how];
+    desc.count = count;
+    desc.method = how == AS_REDUCED ? DEM2D_FIT_REDUCTION : DEM2D_FIT_DEFAULT;
+    must(dem2d_outline_fit(example_env(), o->points, o->count, &desc, &shape, &report), o->name);
+    if (points != NULL) must(dem2d_shape_outline(shape, report.pose, FIT_POINTS, points), o->name);
+    dem2d_shape_destroy(shape);
+    return report.coverage;
+}
+
+static int least_count(way how) {
+    return how == AS_BEZIER || how == AS_POLYGON ? 3 : 1;
+}
+
+static outline hull_of(const outline *o) {
+    outline hull = {get_memory(NULL, (size_t)o->count, sizeof(dem2d_vec)), 0, o->name};
+    must(dem2d_polygon_hull(example_env(), o->points, o->count, hull.points, &hull.count), o->name);
+    return hull;
+}
+
+static void make_fits(fits *f, const options *o) {
+    progress p;
+    f->outlines = o->grains != NULL ? load_grains(o->grains) : make_outlines();
+    f->templates = f->outlines.count < TEMPLATES ? f->outlines.count : TEMPLATES;
+    progress_start(&p, "templates", f->templates);
+    for (int i = 0; i < f->templates; i++) {
+        const outline *grain = &f->outlines.items[i];
+        outline hull = hull_of(grain);
+        dem2d_outline_info info;
+        must(dem2d_outline_measure(example_env(), grain->points, grain->count, &info), grain->name);
+        f->solidity[i] = info.solidity;
+        for (way how = AS_BEZIER; how < WAYS; how++) {
+            for (int n = least_count(how); n <= MOST; n++)
+                f->coverage[how][n][i] = fit(grain, how, n, NULL);
+            f->convex[how][i] = fit(&hull, how, FOURIER_ORDER, NULL);
+        }
+        free(hull.points);
+        progress_show(&p, "fitting", i + 1);
+        if (stop_asked) fail(STATUS_STOPPED, "stopped while fitting; nothing is written");
+    }
+    progress_end(&p);
+}
+
+static double mean(const double *values, int count) {
+    double sum = 0;
+    for (int i = 0; i < count; i++) sum += values[i];
+    return sum / count;
+}
+
+/* Coverage of the templates by number, in columns `name_1` .., and their mean `name`. */
+static void write_coverage(const study *s, const fits *f, const char *file, way first, way last) {
+    draft d;
+    draft_open(&d);
+    fputs("count", d.file);
+    for (way how = first; how <= last; how++) {
+        fprintf(d.file, ",%s", way_names[how]);
+        for (int i = 0; i < f->templates; i++) fprintf(d.file, ",%s_%d", way_names[how], i + 1);
+    }
+    for (int n = least_count(first); n <= MOST; n++) {
+        fprintf(d.file, "\n%d", n);
+        for (way how = first; how <= last; how++) {
+            fprintf(d.file, ",%.6f", mean(f->coverage[how][n], f->templates));
+            for (int i = 0; i < f->templates; i++) fprintf(d.file, ",%.6f", f->coverage[how][n][i]);
+        }
+    }
+    fputc('\n', d.file);
+    finish(s, &d, file);
+}
+
+/* ---- pictures of shapes ---- */
+
+enum { CELL = 120, LINE = 22, CAPTION = 18 }; // px
+
+static void open_picture(draft *d, double width, double height, const char *title) {
+    draft_open(d);
+    fprintf(d->file,
+            "<svg xmlns=\"http://www.w3.org/2000/svg\" width=\"%.0f\" height=\"%.0f\" "
+            "viewBox=\"0 0 %.0f %.0f\" font-family=\"sans-serif\" font-size=\"13\">\n"
+            "<title>%s</title>\n<style>%s</style>\n"
+            "<rect width=\"100%%\" height=\"100%%\" fill=\"white\"/>\n",
+            width, height, width, height, title, difference_style);
+}
+
+/* A grain with its fit in a square cell whose upper left corner is at (x, y), a caption below. */
+static void draw_cell(FILE *file, double x, double y, const outline *grain, const dem2d_vec *points,
+                      const char *caption) {
+    dem2d_box box = empty_box();
+    for (int i = 0; i < grain->count; i++) widen(&box, grain->points[i]);
+    for (int i = 0; i < FIT_POINTS; i++) widen(&box, points[i]);
+    const double wide = box.upper.x - box.lower.x, high = box.upper.y - box.lower.y;
+    frame f = {0, 0, (CELL - 12) / fmax(wide, high)};
+    f.left = 0.5 * (box.lower.x + box.upper.x) - (x + 0.5 * CELL) / f.scale;
+    f.top = 0.5 * (box.lower.y + box.upper.y) + (y + 0.5 * CELL) / f.scale;
+    svg_difference(file, &f, grain->points, grain->count, points, FIT_POINTS);
+    fprintf(file, "<text x=\"%.0f\" y=\"%.0f\" text-anchor=\"middle\">%s</text>\n", x + 0.5 * CELL,
+            y + CELL + 12, caption);
+}
+
+/* Rows of fits with growing numbers: of the least convex grain, A, and the most convex one, B. */
+static void draw_evolution(const study *s, const fits *f, const char *file, const char *letter,
+                           const int numbers[5], way first, way last) {
+    const int ways = (int)last - (int)first + 1;
+    const double row = LINE + CELL + CAPTION;
+    int grains[2] = {0, 0};
+    for (int i = 1; i < f->templates; i++) {
+        if (f->solidity[i] < f->solidity[grains[0]]) grains[0] = i;
+        if (f->solidity[i] > f->solidity[grains[1]]) grains[1] = i;
+    }
+    draft d;
+    open_picture(&d, 5 * CELL, 2 * ways * row + 6, "grains grey, fits blue, difference red");
+    for (int k = 0; k < 2 * ways; k++) {
+        const outline *grain = &f->outlines.items[grains[k / ways]];
+        const way how = (way)((int)first + k % ways);
+        fprintf(d.file, "<text x=\"6\" y=\"%.0f\" font-weight=\"bold\">%c: %s</text>\n",
+                k * row + 16, "AB"[k / ways], way_texts[how]);
+        for (int i = 0; i < 5; i++) {
+            dem2d_vec points[FIT_POINTS];
+            char caption[64];
+            const double coverage = fit(grain, how, numbers[i], points);
+            snprintf(caption, sizeof caption, "%s = %d: %.1f %%", letter, numbers[i],
+                     100 * coverage);
+            draw_cell(d.file, i * CELL, k * row + LINE, grain, points, caption);
+        }
+    }
+    fputs("</svg>\n", d.file);
+    finish(s, &d, file);
+}
+
+/* All templates with polybeziers of ten arcs. */
+static void draw_chart(const study *s, const fits *f) {
+    const int rows = (f->templates + 3) / 4;
+    draft d;
+    open_picture(&d, 4 * CELL, rows * (CELL + CAPTION) + 6, "grains and their polybeziers");
+    for (int i = 0; i < f->templates; i++) {
+        dem2d_vec points[FIT_POINTS];
+        char caption[64];
+        const outline *grain = &f->outlines.items[i];
+        snprintf(caption, sizeof caption, "%d: %.1f %%", i + 1,
+                 100 * fit(grain, AS_BEZIER, BEZIER_ARCS, points));
+        draw_cell(d.file, i % 4 * CELL, (double)(i / 4) * (CELL + CAPTION), grain, points, caption);
+    }
+    fputs("</svg>\n", d.file);
+    finish(s, &d, "shapes_chart.svg");
+}
+
+/* ---- what is said of shapes ---- */
+
+static double mean_coverage(const fits *f, way how, int count) {
+    return 100 * mean(f->coverage[how][count], f->templates);
+}
+
+static void report_segments(study *s, const fits *f) {
+    page *p = &s->page;
+    double least = 100, bezier = 0, polygon = 0, worst = 1;
+    for (int i = 0; i < f->templates; i++) worst = fmin(worst, f->coverage[AS_BEZIER][10][i]);
+    for (int n = 3; n <= 10; n++) {
+        least = fmin(least, mean_coverage(f, AS_BEZIER, n));
+        bezier += mean_coverage(f, AS_BEZIER, n) / 8;
+        polygon += mean_coverage(f, AS_POLYGON, n) / 8;
+    }
+    open_figure(p, "Grains as polybeziers of 10 segments (P fig. 7)", "shapes_chart.svg");
+    check(p, mean_coverage(f, AS_BEZIER, 10) >= 90,
+          "P: polybeziers of 10 segments match fairly well; here: mean coverage 90 % or more",
+          "%.1f %%, least %.1f %%", mean_coverage(f, AS_BEZIER, 10), 100 * worst);
+    close_figure(p);
+    open_figure(p, "Accuracy by number of segments (P figs. 8, 9)",
+                "p08_accuracy.svg shapes_segments.svg");
+    check(p, mean_coverage(f, AS_BEZIER, 10) > mean_coverage(f, AS_BEZIER, 3),
+          "P: the accuracy of polybeziers rises from 3 to 10 segments", "%.1f to %.1f %%",
+          mean_coverage(f, AS_BEZIER, 3), mean_coverage(f, AS_BEZIER, 10));
+    check(p, least >= 90, "P: it is 90 % or more from 3 to 10 segments (mean of the grains)",
+          "least mean %.1f %%", least);
+    check(p, mean_coverage(f, AS_BEZIER, 10) > mean_coverage(f, AS_POLYGON, 10) && bezier > polygon,
+          "P: polygons need more segments: less at 10, and less in the mean over 3 to 10",
+          "at 10: %.1f against %.1f %%; mean %.1f against %.1f %%",
+          mean_coverage(f, AS_POLYGON, 10), mean_coverage(f, AS_BEZIER, 10), polygon, bezier);
+    close_figure(p);
+}
+
+static void report_orders(study *s, const fits *f) {
+    page *p = &s->page;
+    const double radial = mean_coverage(f, AS_RADIAL, 8), reduced = mean_coverage(f, AS_REDUCED, 8);
+    const double constrained = mean_coverage(f, AS_CONSTRAINED, 8);
+    open_figure(p, "Coverage by order of the Fourier series (F figs. 4, 5)",
+                "f05_coverage.svg shapes_orders.svg");
+    for (way how = AS_REDUCED; how <= AS_CONSTRAINED; how++)
+        check(p, mean(f->convex[how], f->templates) > 0.95,
+              how == AS_REDUCED
+                  ? "F: new FS above 95 % at order 8, mean of the convex hulls, paper's reduction"
+                  : "the same by constrained least squares",
+              "%.2f %%", 100 * mean(f->convex[how], f->templates));
+    check(p, radial > reduced, "F: at order 8 the original FS is above the new one, 99.2 to 95.8 %",
+          "%.1f to %.1f %%", radial, reduced);
+    check(p, mean_coverage(f, AS_REDUCED, 8) > mean_coverage(f, AS_REDUCED, 2),
+          "F: coverage rises with the order", "reduction, order 2 to 8: %.1f to %.1f %%",
+          mean_coverage(f, AS_REDUCED, 2), reduced);
+    note(p, "F: from some order on the reduction gains nothing", "order 16 to 8: %+.2f %%",
+         mean_coverage(f, AS_REDUCED, 16) - reduced);
+    note(p, "our constrained fit in place of the reduction, the same grains, order 8", "%.1f %%",
+         constrained);
+    close_figure(p);
+}
+
+static void study_shapes(study *s) {
+    static const int segments[5] = {3, 4, 6, 8, 10}, orders[5] = {1, 2, 4, 8, 16};
+    fits *f = get_memory(NULL, 1, sizeof *f);
+    make_fits(f, s->options);
+    write_coverage(s, f, "accuracy.csv", AS_BEZIER, AS_POLYGON);
+    write_coverage(s, f, "coverage.csv", AS_RADIAL, AS_CONSTRAINED);
+    draw_chart(s, f);
+    draw_evolution(s, f, "shapes_segments.svg", "N", segments, AS_BEZIER, AS_POLYGON);
+    draw_evolution(s, f, "shapes_orders.svg", "N", orders, AS_RADIAL, AS_CONSTRAINED);
+    report_segments(s, f);
+    report_orders(s, f);
+    free_outlines(&f->outlines);
+    free(f);
+}
+
+/* ---- random packing ---- */
+
+/* The greatest value of a column while a stage lasts, and the last one. */
+typedef struct course {
+    double greatest, last;
+} course;
+
+static course follow(const table *history, const char *name, int stage) {
+    course c = {0, NAN};
+    for (int i = 0; i < history->rows; i++) {
+        if (cell(history, i, "stage") != stage) continue;
+        c.last = cell(history, i, name);
+        c.greatest = fmax(c.greatest, c.last);
+    }
+    return c;
+}
+
+static void report_packing(study *s) {
+    page *p = &s->page;
+    open_figure(p, "Random packing: noncircular, circular, all five models (P fig. 10, F fig. 6a)",
+                "noncircular_local/settled.svg circular_local/settled.svg "
+                "irregular_local/settled.svg");
+    for (int d = 0; d < DAMPINGS; d++)
+        note(p,
+             d == LOCAL ? "porosity after consolidation, noncircular, circular, all (local damping)"
+                        : "the same with global damping",
+             "%.3f, %.3f, %.3f", result(s, NONCIRCULAR, d, "porosity_packed"),
+             result(s, CIRCULAR, d, "porosity_packed"), result(s, IRREGULAR, d, "porosity_packed"));
+    close_figure(p);
+    open_figure(p, "Speed and relative kinetic energy while packing (P fig. 11, F fig. 6b)",
+                "p11_speed.svg p11_kinetic.svg");
+    for (int d = 0; d < DAMPINGS; d++) {
+        double speed = 0, ratio = 0;
+        for (int set = 0; set < SETS; set++) {
+            const table *history = &s->runs[set][d].history;
+            const course v = follow(history, "mean_speed", 0);
+            speed = fmax(speed, v.last / v.greatest);
+            ratio = fmax(ratio, follow(history, "kinetic_ratio", 0).last);
+        }
+        check(p, speed < 0.05 && ratio < 0.01,
+              d == LOCAL
+                  ? "P: both fall to small values with local damping: speed below 5 % of its "
+                    "greatest, kinetic energy below 1 % of that in contacts, in every set"
+                  : "F: the same with global damping",
+              "%.2g %% and %.2g %%", 100 * speed, 100 * ratio);
+    }
+    close_figure(p);
+}
+
+/* A polar diagram for gnuplot: 36 sectors, angle in degrees and one radius for each name, so that
+   their outlines are drawn; values[k] belongs to name k. */
+enum { BINS = 36 };
+
+static void write_polar(const study *s, const char *file, int count, const char *const *names,
+                        double values[][BINS]) {
+    draft d;
+    draft_open(&d);
+    fputs("angle", d.file);
+    for (int k = 0; k < count; k++) fprintf(d.file, ",%s", names[k]);
+    for (int i = 0; i < BINS; i++) {
+        for (int corner = 0; corner < 8; corner++) { // the middle, seven on the arc
+            fprintf(d.file, "\n%.9g", 10.0 * i + (corner < 1 ? 0 : (corner - 1) * 10.0 / 6));
+            for (int k = 0; k < count; k++)
+                fprintf(d.file, ",%.9g", corner == 0 ? 0.0 : values[k][i]);
+        }
+    }
+    fputs("\n360,", d.file);
+    for (int k = 0; k < count; k++) fprintf(d.file, "%s0", k > 0 ? "," : "");
+    fputc('\n', d.file);
+    finish(s, &d, file);
+}
+
+/* Column of a table of histograms, as parts of its sum in per cent. */
+static void read_parts(const table *t, const char *name, double parts[BINS]) {
+    double sum = 0;
+    for (int i = 0; i < BINS; i++) sum += cell(t, i, name);
+    for (int i = 0; i < BINS; i++) parts[i] = 100 * cell(t, i, name) / sum;
+}
+
+/* Of directions in 36 parts of half a turn: coefficient and angle (degrees) of the anisotropy, and
+   the part within 45 degrees of the horizontal. */
+typedef struct alignment {
+    double coefficient, angle, flat;
+} alignment;
+
+static alignment read_alignment(const table *t) {
+    alignment a = {0, 0, 0};
+    double parts[BINS], c = 0, w = 0;
+    read_parts(t, "orientation", parts);
+    for (int i = 0; i < BINS; i++) {
+        const dem2d_rot twice = dem2d_rot_make(2 * PI * (i + 0.5) / BINS);
+        c += 2 * parts[i] * twice.c / 100;
+        w += 2 * parts[i] * twice.s / 100;
+        if (twice.c > 0) a.flat += parts[i];
+    }
+    const dem2d_rot sum = {c, w};
+    a.coefficient = sqrt(c * c + w * w);
+    a.angle = 90 / PI * dem2d_rot_angle(sum);
+    return a;
+}
+
+static void report_alignment(study *s) {
+    static const char *const names[] = {"noncircular", "irregular"};
+    static const int sets[] = {NONCIRCULAR, IRREGULAR};
+    page *p = &s->page;
+    double values[2][BINS];
+    open_figure(p, "Directions of long axes after packing (P fig. 12)", "p12_alignment.svg");
+    for (int k = 0; k < 2; k++) {
+        double parts[BINS];
+        read_parts(&s->runs[sets[k]][LOCAL].settled, "orientation", parts);
+        for (int i = 0; i < BINS / 2; i++) // 10 degrees each, and once more half a turn on
+            values[k][i] = values[k][i + BINS / 2] = parts[2 * i] + parts[2 * i + 1];
+    }
+    write_polar(s, "alignment.csv", 2, names, values);
+    for (int d = 0; d < DAMPINGS; d++) {
+        const alignment a = read_alignment(&s->runs[NONCIRCULAR][d].settled);
+        check(p, fabs(a.angle) <= 22.5 && a.flat > 55,
+              d == LOCAL
+                  ? "P: long axes lie rather horizontal: direction of anisotropy within 22.5 "
+                    "degrees of it, and more than 55 % of the axes within 45 degrees"
+                  : "the same with global damping",
+              "%.1f degrees (coefficient %.2f), %.0f %%", a.angle, a.coefficient, a.flat);
+    }
+    close_figure(p);
+}
+
+/* The commonest number of contacts. */
+static int mode(const table *t) {
+    int best = 0;
+    for (int i = 1; i < t->rows; i++)
+        if (cell(t, i, "coordination") > cell(t, best, "coordination")) best = i;
+    return best;
+}
+
+static void write_coordination(const study *s) {
+    draft d;
+    double parts[SETS][BINS];
+    draft_open(&d);
+    fputs("contacts,irregular,noncircular,circular", d.file);
+    for (int set = 0; set < SETS; set++)
+        read_parts(&s->runs[set][LOCAL].settled, "coordination", parts[set]);
+    for (int i = 0; i <= 8; i++)
+        fprintf(d.file, "\n%d,%.6g,%.6g,%.6g", i, parts[0][i], parts[1][i], parts[2][i]);
+    fputc('\n', d.file);
+    finish(s, &d, "coordination.csv");
+}
+
+static void report_coordination(study *s) {
+    page *p = &s->page;
+    write_coordination(s);
+    open_figure(p, "Contacts per grain after packing (P fig. 13)", "p13_coordination.svg");
+    for (int d = 0; d < DAMPINGS; d++) {
+        const double circular = result(s, CIRCULAR, d, "coordination_settled");
+        const double noncircular = result(s, NONCIRCULAR, d, "coordination_settled");
+        const double irregular = result(s, IRREGULAR, d, "coordination_settled");
+        check(p, noncircular > circular && irregular > circular,
+              d == LOCAL ? "P: noncircular grains have more contacts than circles (the five models "
+                           "mixed, too)"
+                         : "the same with global damping",
+              "%.2f (%.2f) to %.2f", noncircular, irregular, circular);
+    }
+    const int noncircular = mode(&s->runs[NONCIRCULAR][LOCAL].settled);
+    const int circular = mode(&s->runs[CIRCULAR][LOCAL].settled);
+    check(p, noncircular >= 3 && noncircular <= 5, "P: noncircular grains mostly have 3, 4 or 5",
+          "%d is commonest", noncircular);
+    check(p, circular == 3 || circular == 4, "P: circles mostly have 3 or 4", "%d is commonest",
+          circular);
+    close_figure(p);
+}
+
+/* ---- GJK and EPA ---- */
+
+enum { CALLS = 16, RESIDUALS = 30 };
+
+typedef struct tally {
+    double pairs, calls;
+    double histogram[CALLS]; // pairs with so many calls; the last: or more
+} tally;
+
+static double mean_calls(const tally *t) {
+    return t->pairs > 0 ? t->calls / t->pairs : NAN;
+}
+
+/* Of pairs of two types in any order (negative: any type), in contact or not (-1: both). */
+static tally count_calls(const table *pairs, int type, int other, int contact) {
+    tally t = {0};
+    for (int i = 0; i < pairs->rows; i++) {
+        const int a = (int)cell(pairs, i, "a"), b = (int)cell(pairs, i, "b");
+        const int calls = (int)cell(pairs, i, "calls");
+        if (type >= 0 && !((a == type && b == other) || (a == other && b == type))) continue;
+        if (contact >= 0 && cell(pairs, i, "contact") != contact) continue;
+        t.pairs++;
+        t.calls += calls;
+        t.histogram[calls < CALLS ? calls : CALLS - 1]++;
+    }
+    return t;
+}
+
+static void write_calls(const study *s, const char *file, const table *pairs, int type) {
+    const tally none = count_calls(pairs, type, type, 0), touch = count_calls(pairs, type, type, 1);
+    draft d;
+    draft_open(&d);
+    fputs("calls,none,contact", d.file);
+    for (int i = 0; i < CALLS; i++)
+        fprintf(d.file, "\n%d,%.6g,%.6g", i,
+                none.pairs > 0 ? 100 * none.histogram[i] / none.pairs : 0,
+                touch.pairs > 0 ? 100 * touch.histogram[i] / touch.pairs : 0);
+    fputc('\n', d.file);
+    finish(s, &d, file);
+}
+
+/* Mean calls by types beside the paper's in brackets. */
+static void put_calls_table(page *p, const char *title, const table *pairs, int count,
+                            const int *types, const double *paper) {
+    static const char *const names[] = {"circle", "ellipse", "polygon", "polybezier", "FS"};
+    fprintf(p->body.file, "</ul><p>%s: ours (the paper's)</p><div class=\"wide\"><table><tr><th>",
+            title);
+    for (int i = 0; i < count; i++) fprintf(p->body.file, "<th>%s", names[types[i]]);
+    for (int i = 0; i < count; i++) {
+        fprintf(p->body.file, "\n<tr><th>%s", names[types[i]]);
+        for (int k = 0; k < count; k++) {
+            const tally t = count_calls(pairs, types[i], types[k], -1);
+            if (k < i)
+                fputs("<td>&ndash;", p->body.file);
+            else
+                fprintf(p->body.file, "<td>%.2f (%.2f)", mean_calls(&t), paper[i * count + k]);
+        }
+    }
+    fputs("\n</table></div><ul>\n", p->body.file);
+}
+
+/* Polygons take the fewest calls of the pairs of one type. */
+static void check_polygons(page *p, const char *claim, const table *pairs, int count,
+                           const int *types) {
+    const tally polygons = count_calls(pairs, DEM2D_POLYGON, DEM2D_POLYGON, -1);
+    double least = HUGE_VAL;
+    for (int i = 0; i < count; i++) {
+        if (types[i] == DEM2D_POLYGON) continue;
+        const tally t = count_calls(pairs, types[i], types[i], -1);
+        if (t.pairs > 0) least = fmin(least, mean_calls(&t));
+    }
+    check(p, mean_calls(&polygons) < least, claim, "%.2f, least of the others %.2f",
+          mean_calls(&polygons), least);
+}
+
+static void report_gjk(study *s) {
+    static const int p_types[] = {DEM2D_ELLIPSE, DEM2D_POLYGON, DEM2D_BEZIER};
+    static const int f_types[] = {DEM2D_FOURIER, DEM2D_CIRCLE, DEM2D_ELLIPSE, DEM2D_POLYGON,
+                                  DEM2D_BEZIER};
+    static const double p_table[] = {5.33, 4.48, 5.72, 0, 2.64, 3.96, 0, 0, 4.99};
+    static const double f_table[] = {4.63, 5.51, 5.51, 4.34, 5.46, 0,    3.00, 6.04, 4.52,
+                                     5.52, 0,    0,    5.20, 4.35, 5.45, 0,    0,    0,
+                                     2.91, 3.92, 0,    0,    0,    0,    5.10};
+    page *p = &s->page;
+    const table *noncircular = &s->runs[NONCIRCULAR][LOCAL].pairs;
+    const table *all = &s->runs[IRREGULAR][LOCAL].pairs;
+    const tally p_touch = count_calls(noncircular, -1, -1, 1);
+    const tally p_none = count_calls(noncircular, -1, -1, 0);
+    const tally f_touch = count_calls(all, DEM2D_FOURIER, DEM2D_FOURIER, 1);
+    const tally f_none = count_calls(all, DEM2D_FOURIER, DEM2D_FOURIER, 0);
+    write_calls(s, "calls_noncircular.csv", noncircular, -1);
+    write_calls(s, "calls_fs.csv", all, DEM2D_FOURIER);
+    write_calls(s, "calls_polygon.csv", all, DEM2D_POLYGON);
+    write_calls(s, "calls_bezier.csv", all, DEM2D_BEZIER);
+    open_figure(p, "Support calls of GJK in one step, near pairs of noncircular grains (P fig. 14)",
+                "p14_calls.svg");
+    check(p, mean_calls(&p_touch) > mean_calls(&p_none),
+          "P: pairs in contact take more calls than others, 5.77 to 1.85", "%.2f to %.2f",
+          mean_calls(&p_touch), mean_calls(&p_none));
+    check_polygons(p, "P table 1: two polygons take the fewest of like pairs", noncircular, 3,
+                   p_types);
+    put_calls_table(p, "Mean calls, P table 1", noncircular, 3, p_types, p_table);
+    close_figure(p);
+    open_figure(p, "Support calls of GJK for pairs of one model (F fig. 8, left)",
+                "f08_calls_fs.svg f08_calls_polygon.svg f08_calls_bezier.svg");
+    check(p, mean_calls(&f_touch) > mean_calls(&f_none),
+          "F: pairs of FS in contact take more calls than others, 6.4 to 1.0", "%.2f to %.2f",
+          mean_calls(&f_touch), mean_calls(&f_none));
+    check_polygons(p, "F table 1: two polygons take the fewest of like pairs", all, 5, f_types);
+    put_calls_table(p, "Mean calls, F table 1", all, 5, f_types, f_table);
+    close_figure(p);
+}
+
+/* Residual after k iterations over the pair's size; NaN before EPA has begun. */
+static double residual(const table *pairs, int row, int k) {
+    return pairs->values[row * pairs->columns + 4 + k] / pairs->values[row * pairs->columns + 4];
+}
+
+static bool is_like_contact(const table *pairs, int row, int type) {
+    return cell(pairs, row, "contact") == 1 && cell(pairs, row, "a") == type &&
+           cell(pairs, row, "b") == type;
+}
+
+static int compare_numbers(const void *a, const void *b) {
+    const double x = *(const double *)a, y = *(const double *)b;
+    return (x > y) - (x < y);
+}
+
+/* The curves of all pairs of one type in contact, with empty lines between; and their medians. */
+static void write_profiles(const study *s, const char *name, const table *pairs, int type) {
+    char file[60];
+    double *values = get_memory(NULL, (size_t)pairs->rows, sizeof *values);
+    draft d;
+    draft_open(&d);
+    fputs("iteration,residual\n", d.file);
+    for (int i = 0; i < pairs->rows; i++) {
+        if (!is_like_contact(pairs, i, type)) continue;
+        for (int k = 1; k <= RESIDUALS; k++)
+            if (residual(pairs, i, k) > 0) fprintf(d.file, "%d,%.6g\n", k, residual(pairs, i, k));
+        fputc('\n', d.file);
+    }
+    snprintf(file, sizeof file, "epa_%s.csv", name);
+    finish(s, &d, file);
+    draft_open(&d);
+    fputs("iteration,median\n", d.file);
+    for (int k = 1; k <= RESIDUALS; k++) {
+        int count = 0;
+        for (int i = 0; i < pairs->rows; i++)
+            if (is_like_contact(pairs, i, type) && residual(pairs, i, k) >= 0)
+                values[count++] = residual(pairs, i, k);
+        if (count == 0) continue;
+        qsort(values, (size_t)count, sizeof *values, compare_numbers);
+        if (values[count / 2] > 0) fprintf(d.file, "%d,%.6g\n", k, values[count / 2]);
+    }
+    snprintf(file, sizeof file, "epa_%s_median.csv", name);
+    finish(s, &d, file);
+    free(values);
+}
+
+/* Geometric mean, over pairs of a type in contact, of the factor by which the residual falls in the
+   first ten iterations after that at which EPA begins. Residuals count as 1e-16 at least: they are
+   of sums of doubles. */
+static double ten_iterations(const table *pairs, int type) {
+    double sum = 0;
+    int count = 0;
+    for (int i = 0; i < pairs->rows; i++) {
+        int first = 1;
+        if (!is_like_contact(pairs, i, type)) continue;
+        while (first <= RESIDUALS - 10 && isnan(residual(pairs, i, first))) first++;
+        if (first > RESIDUALS - 10) continue;
+        sum += log10(fmax(residual(pairs, i, first), 1e-16));
+        sum -= log10(fmax(residual(pairs, i, first + 10), 1e-16));
+        count++;
+    }
+    return sum / count;
+}
+
+static void report_epa(study *s) {
+    page *p = &s->page;
+    const table *noncircular = &s->runs[NONCIRCULAR][LOCAL].pairs;
+    const table *all = &s->runs[IRREGULAR][LOCAL].pairs;
+    const double bezier = ten_iterations(noncircular, DEM2D_BEZIER);
+    const double fs = ten_iterations(all, DEM2D_FOURIER);
+    write_profiles(s, "bezier", noncircular, DEM2D_BEZIER);
+    write_profiles(s, "fs", all, DEM2D_FOURIER);
+    write_profiles(s, "polygon", all, DEM2D_POLYGON);
+    open_figure(p, "Convergence of EPA (P fig. 15, F fig. 8, right)",
+                "p15_epa_bezier.svg f08_epa_fs.svg f08_epa_polygon.svg");
+    check(p, bezier >= 5,
+          "P: the residual falls by 10<sup>6</sup> in 10 iterations, polybeziers; "
+          "here: by 10<sup>5</sup> or more in the geometric mean",
+          "10<sup>%.1f</sup>", bezier);
+    check(p, fs >= 5, "F: the same for FS", "10<sup>%.1f</sup>", fs);
+    note(p, "F: polygons", "10<sup>%.1f</sup>; two polygons often end exactly",
+         ten_iterations(all, DEM2D_POLYGON));
+    close_figure(p);
+}
+
+/* ---- biaxial compression ---- */
+
+/* Mean of a column over the rows of the compression with an axial strain from low to high. */
+static double mean_between(const table *history, const char *name, double low, double high) {
+    double sum = 0, count = 0;
+    for (int i = 0; i < history->rows; i++) {
+        const double strain = cell(history, i, "axial_strain");
+        if (cell(history, i, "stage") != 2 || strain < low || strain > high) continue;
+        sum += cell(history, i, name);
+        count++;
+    }
+    return sum / count;
+}
+
+static double final_strain(const study *s, int set, int damping) {
+    return result(s, set, damping, "axial_strain_final");
+}
+
+/* Mean stress ratio of the second half of the strain. */
+static double strength(const study *s, int set, int damping) {
+    const double end = final_strain(s, set, damping);
+    return mean_between(&s->runs[set][damping].history, "stress_ratio", end / 2, 2 * end);
+}
+
+static const char *with_damping(int damping) {
+    return damping == LOCAL ? "local damping" : "global damping";
+}
+
+/* A claim with the damping at its end; lives until the next call. */
+static const char *claim(const char *text, int damping) {
+    static char whole[300];
+    snprintf(whole, sizeof whole, "%s (%s)", text, with_damping(damping));
+    return whole;
+}
+
+static void report_chains(study *s) {
+    page *p = &s->page;
+    open_figure(p, "Force chains after compression: noncircular, circular, all (P fig. 16)",
+                "noncircular_local/final.svg circular_local/final.svg irregular_local/final.svg");
+    for (int d = 0; d < DAMPINGS; d++) {
+        double worst = 0, least = HUGE_VAL;
+        for (int set = 0; set < SETS; set++) {
+            const double angle = fabs(result(s, set, d, "direction_normal_forces"));
+            worst = fmax(worst, fabs(90 - angle));
+            least = fmin(least, result(s, set, d, "anisotropy_normal_forces"));
+        }
+        check(p, worst <= 15 && least > 0,
+              claim("P: strong force chains in the vertical direction: the anisotropy of normal "
+                    "forces is positive and within 15 degrees of it, in every set",
+                    d),
+              "%.1f degrees at most, coefficient %.2f at least", worst, least);
+    }
+    close_figure(p);
+}
+
+static void report_strength(study *s) {
+    page *p = &s->page;
+    open_figure(p, "Stress ratio and volumetric strain (P fig. 17, F fig. 7b)",
+                "p17_ratio.svg p17_volume.svg");
+    for (int d = 0; d < DAMPINGS; d++) {
+        const double circular = strength(s, CIRCULAR, d);
+        const double noncircular = strength(s, NONCIRCULAR, d);
+        const double irregular = strength(s, IRREGULAR, d);
+        check(
+            p, noncircular > circular && irregular > circular,
+            claim("P: noncircular grains (and all five mixed) are stronger than circles: q/p over "
+                  "the second half",
+                  d),
+            "%.3f (%.3f) to %.3f", noncircular, irregular, circular);
+    }
+    for (int set = 0; set < SETS; set++) {
+        for (int d = 0; d < DAMPINGS; d++) {
+            const table *history = &s->runs[set][d].history;
+            const double six = final_strain(s, set, d) * 6 / 16;
+            const double there =
+                mean_between(history, "stress_ratio", 5.0 / 6 * six, 7.0 / 6 * six);
+            const double late = strength(s, set, d);
+            char text[200];
+            snprintf(
+                text, sizeof text,
+                "F: q/p almost plateaus from 6 of 16 %% of strain: there 0.8 to 1.25 of its mean "
+                "over the second half, %s",
+                set_names[set]);
+            check(p, there / late >= 0.8 && there / late <= 1.25, claim(text, d),
+                  "%.2f, at a strain of %.1f %%", there / late, 100 * six);
+        }
+    }
+    for (int d = 0; d < DAMPINGS; d++) {
+        double least = HUGE_VAL, most = 0;
+        for (int set = 0; set < SETS; set++) {
+            least = fmin(least, final_strain(s, set, d));
+            most = fmax(most, final_strain(s, set, d));
+        }
+        check(
+            p, least >= 0.124 && most <= 0.186,
+            claim("P, F: the final axial strain is 15 to 16 %; here: within a fifth of 15.5 %", d),
+            "%.1f to %.1f %%", 100 * least, 100 * most);
+    }
+    for (int set = 0; set < SETS; set++)
+        note(p, claim("volumetric strain at the end (compression positive)", LOCAL), "%s %+.2f %%",
+             set_names[set],
+             100 * follow(&s->runs[set][LOCAL].history, "volumetric_strain", 2).last);
+    close_figure(p);
+}
+
+static void report_stresses(study *s) {
+    page *p = &s->page;
+    open_figure(p, "Axial and lateral stress in time (F fig. 7a)", "f07_stress.svg");
+    for (int d = 0; d < DAMPINGS; d++) {
+        double mean_error = 0, axial_error = 0;
+        for (int set = 0; set < SETS; set++) {
+            const double lateral = result(s, set, d, "lateral_stress_mean_kpa");
+            const double axial = follow(&s->runs[set][d].history, "axial_stress", 1).last / 1000;
+            mean_error = fmax(mean_error, fabs(lateral - 100));
+            axial_error = fmax(axial_error, fabs(axial - 100));
+        }
+        check(p, mean_error <= 0.5,
+              claim("F: the lateral stress is held at 100 kPa: mean within 0.5 % in every set", d),
+              "error at most %.3f %%", mean_error);
+        check(p, axial_error <= 5,
+              claim("F: the axial stress is 100 kPa before the compression: within 5 %", d),
+              "error at most %.3f %%", axial_error);
+        note(p, claim("greatest error of the lateral stress in any one step, all five models", d),
+             "%.2f %%", result(s, IRREGULAR, d, "lateral_stress_max_error_percent"));
+    }
+    close_figure(p);
+}
+
+/* ---- anisotropy ---- */
+
+static void write_anisotropy(const study *s) {
+    static const char *const files[] = {"polar_normals.csv", "polar_forces.csv", "polar_shear.csv"};
+    static const char *const columns[] = {"normal", "normal_force", "tangential_force"};
+    for (int k = 0; k < 3; k++) {
+        double values[SETS][BINS];
+        for (int set = 0; set < SETS; set++) {
+            const table *t = &s->runs[set][LOCAL].final;
+            if (k == 0) read_parts(t, columns[k], values[set]);
+            for (int i = 0; k > 0 && i < BINS; i++) // kN/m
+                values[set][i] = fabs(cell(t, i, columns[k])) / 1000;
+        }
+        write_polar(s, files[k], SETS, set_names, values);
+    }
+}
+
+static void check_order(study *s, const char *text, const char *name, const char *unit) {
+    for (int d = 0; d < DAMPINGS; d++) {
+        const double noncircular = result(s, NONCIRCULAR, d, name);
+        const double circular = result(s, CIRCULAR, d, name);
+        check(&s->page, noncircular > circular, claim(text, d), "%.4g to %.4g%s", noncircular,
+              circular, unit);
+    }
+}
+
+/* A row for each run. */
+static void put_runs(const study *s) {
+    static const char *const names[] = {"coordination_settled",     "coordination_number",
+                                        "porosity_packed",          "anisotropy_normals",
+                                        "anisotropy_normal_forces", "anisotropy_shear_forces",
+                                        "anisotropy_branches",      "final_stress_ratio_foretold",
+                                        "final_stress_ratio",       "mean_normal_force",
+                                        "mean_shear_force",         "axial_strain_final"};
+    static const char *const heads[] = {"contacts, settled",
+                                        "packed",
+                                        "porosity",
+                                        "a_c",
+                                        "a_n",
+                                        "a_t",
+                                        "a_b",
+                                        "(a_c + a_n + a_t + a_b)/2",
+                                        "q/p at the end",
+                                        "f_n, N/m",
+                                        "f_t, N/m",
+                                        "strain"};
+    const int count = (int)(sizeof names / sizeof names[0]);
+    FILE *file = s->page.body.file;
+    fputs("</ul><div class=\"wide\"><table><tr><th>run", file);
+    for (int i = 0; i < count; i++) fprintf(file, "<th>%s", heads[i]);
+    for (int set = 0; set < SETS; set++) {
+        for (int d = 0; d < DAMPINGS; d++) {
+            fprintf(file, "\n<tr><th>%s, %s", set_names[set], damping_names[d]);
+            for (int i = 0; i < count; i++) fprintf(file, "<td>%.3g", result(s, set, d, names[i]));
+        }
+    }
+    fputs("\n</table></div><ul>\n", file);
+}
+
+static void report_anisotropy(study *s) {
+    page *p = &s->page;
+    write_anisotropy(s);
+    open_figure(p, "Contact normals, normal forces and shear forces at the end (P fig. 18)",
+                "p18_normals.svg p18_forces.svg p18_shear.svg");
+    check_order(
+        s, "P: contact normals are more elongated for noncircular grains than for circles: a_c",
+        "anisotropy_normals", "");
+    check_order(s, "P: so are normal forces: a_n", "anisotropy_normal_forces", "");
+    check_order(s, "P: noncircular grains have the greater shear forces (mean size)",
+                "mean_shear_force", " N/m");
+    for (int set = 0; set < SETS; set++) {
+        for (int d = 0; d < DAMPINGS; d++) {
+            const double foretold = result(s, set, d, "final_stress_ratio_foretold");
+            const double ratio = result(s, set, d, "final_stress_ratio");
+            char text[100];
+            snprintf(text, sizeof text, "(a_c + a_n + a_t + a_b)/2 is q/p within 20 %%, %s",
+                     set_names[set]);
+            check(p, fabs(foretold / ratio - 1) <= 0.2, claim(text, d), "%.3f to %.3f", foretold,
+                  ratio);
+        }
+    }
+    put_runs(s);
+    close_figure(p);
+}
+
+static void report_runs(study *s) {
+    page *p = &s->page;
+    open_figure(p, "The runs", "");
+    for (int set = 0; set < SETS; set++)
+        for (int d = 0; d < DAMPINGS; d++)
+            check(p, result(s, set, d, "exit_status") == 0, claim("biaxial's own checks hold", d),
+                  "%s: exit status %.0f, %.0f steps", set_names[set],
+                  result(s, set, d, "exit_status"), result(s, set, d, "steps"));
+    close_figure(p);
+}
+
+/* ---- the models ---- */
+
+static void draw_models(const char *path) {
+    static const char *const captions[] = {"circle",           "ellipse",    "polygon",
+                                           "polygon, rounded", "polybezier", "Fourier series"};
+    static const char *const colours[] = {"#e8c468", "#8fb9d8", "#b9a3d6",
+                                          "#b9a3d6", "#94c99b", "#e59a83"};
+    const dem2d_vec corners[5] = {{-0.9, -0.5}, {0.2, -0.8}, {0.9, -0.1}, {0.5, 0.7}, {-0.6, 0.6}};
+    dem2d_vec inner[5];
+    dem2d_shape *shapes[6];
+    outline_list list = {NULL, 0};
+    const dem2d_env *env = example_env();
+    for (int i = 0; i < 5; i++) {
+        inner[i].x = 0.75 * corners[i].x;
+        inner[i].y = 0.75 * corners[i].y;
+    }
+    for (int i = 0; i < SELF_MADE; i++) list_self_made(&list, i);
+    must(dem2d_shape_create_circle(env, 0.85, &shapes[0]), "circle");
+    must(dem2d_shape_create_ellipse(env, 1, 0.6, &shapes[1]), "ellipse");
+    must(dem2d_shape_create_polygon(env, corners, 5, 0, &shapes[2]), "polygon");
+    must(dem2d_shape_create_polygon(env, inner, 5, 0.25, &shapes[3]), "polygon");
+    shapes[4] = fitted_template(&list.items[2], DEM2D_BEZIER, BEZIER_ARCS);
+    shapes[5] = fitted_template(&list.items[1], DEM2D_FOURIER, FOURIER_ORDER);
+    free_outlines(&list);
+    draft d;
+    open_picture(&d, 6 * CELL, CELL + CAPTION + 6, "the shape models");
+    for (int i = 0; i < 6; i++) {
+        dem2d_vec points[60];
+        dem2d_shape_info info;
+        must(dem2d_shape_get(shapes[i], &info), "shape");
+        const double scale = 0.85 / info.equivalent; // all of one area
+        must(dem2d_shape_outline(shapes[i], dem2d_pose_make(0, 0, 0, scale), 60, points),
+             "outline");
+        const frame f = {-(i + 0.5) * CELL / 50, 0.5 * CELL / 50, 50};
+        fprintf(d.file, "<path fill=\"%s\" stroke=\"#333\" d=\"", colours[i]);
+        svg_path(d.file, &f, points, 60);
+        fprintf(d.file, "\"/>\n<text x=\"%.0f\" y=\"%d\" text-anchor=\"middle\">%s</text>\n",
+                (i + 0.5) * CELL, CELL + 12, captions[i]);
+        dem2d_shape_destroy(shapes[i]);
+    }
+    fputs("</svg>\n", d.file);
+    draft_write(&d, path);
+}
+
+int main(int count, char **arguments) {
+    example_name = "figures";
+    const options o = parse_options(count, arguments);
+    if (o.models != NULL) {
+        draw_models(o.models);
+        return STATUS_OK;
+    }
+    study *s = get_memory(NULL, 1, sizeof *s);
+    memset(s, 0, sizeof *s);
+    s->options = &o;
+    catch_interrupt();
+    read_runs(s);
+    draft_open(&s->page.body);
+    draft_open(&s->page.rows);
+    draft_open(&s->page.failures);
+    study_shapes(s);
+    report_packing(s);
+    report_alignment(s);
+    report_coordination(s);
+    report_gjk(s);
+    report_epa(s);
+    report_chains(s);
+    report_strength(s);
+    report_stresses(s);
+    report_anisotropy(s);
+    report_runs(s);
+    char *path = join_text(o.folder, "/", "figures.html");
+    write_page(&s->page, path, o.quick);
+    const int failed = s->page.failed;
+    printf("%d of %d checks hold; see %s\n", s->page.checks - failed, s->page.checks, path);
+    if (failed > 0)
+        fprintf(stderr, "figures: %d of %d checks FAIL%s\n", failed, s->page.checks,
+                o.quick ? " (quick runs: not an error)" : "");
+    free(path);
+    free_runs(s);
+    free(s);
+    if (fflush(stdout) != 0) fail(STATUS_BAD_INPUT, "cannot write to stdout");
+    return failed == 0 || o.quick ? STATUS_OK : STATUS_FAILED;
+}
