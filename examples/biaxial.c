@@ -12,8 +12,9 @@
    3. Compression   The top wall goes down at a constant speed; left and right hold 100 kPa.
 
    Then the figures go to stdout ("name value unit"), and the exit status tells whether they are
-   what physics asks for: 0 yes, 1 no (stderr names the check), 2 bad usage or input. history.csv
-   has no clock in it: the same options give the same bytes, whatever the compiler.
+   what physics asks for: 0 yes, 1 no (stderr names the check), 2 bad usage or input. After Ctrl-C
+   what there is gets written; exit status 130. history.csv has no clock in it: the same options
+   give the same bytes, whatever the compiler. `make figures` draws what is in the files.
 */
 #define _POSIX_C_SOURCE 200809L
 #define DEM2D_IMPLEMENTATION
@@ -33,10 +34,15 @@ static const char usage[] =
     "  --grains PATH     bezier and fs grains from an image (PBM, PGM), an outline (CSV, first\n"
     "                    line \"x,y\"), or a directory of outlines, without any of images\n"
     "                    (without PATH: a few outlines made here)\n"
-    "  --out DIR         for history.csv, packed.svg, final.svg; made if its parent exists (out)\n"
+    "  --out DIR         for history.csv and a picture (SVG) and histograms (CSV) of the settled,\n"
+    "                    packed and final state; made if its parent exists (out)\n"
+    "  --pairs           also pairs.csv: support calls and residuals of GJK and EPA for all near\n"
+    "                    pairs of the settled state\n"
+    "  --vtk             also particles.pvd and contacts.pvd with 40 frames in vtk/, for ParaView\n"
     "  --quick           a small, hasty run of 8000 steps with wider bands for the checks\n"
     "  --help            this text\n"
-    "Exit status: 0 all physical checks hold, 1 one failed, 2 bad usage or input.\n";
+    "Exit status: 0 all physical checks hold, 1 one failed, 2 bad usage or input, 130 stopped by\n"
+    "Ctrl-C, with what there was written.\n";
 
 static const double STRESS = 1e5;     // Pa, on the sides, and on the top while consolidating
 static const double TIME_STEP = 1e-4; // s
@@ -48,7 +54,7 @@ typedef struct options {
     uint64_t seed;
     bool kinds[KINDS];
     bool global_damping;
-    bool quick;
+    bool quick, pairs, vtk;
     int solver, faces;  // dem2d_solver, dem2d_face_rule
     const char *grains; // or NULL
     const char *out;
@@ -60,14 +66,14 @@ static options parse_options(int count, char **arguments) {
     o.out = "out";
     parse_shapes("mixed", o.kinds);
     static const char *const names[] = {
-        "--quick",   "--particles=", "--seed=",   "--shapes=", "--damping=",
-        "--grains=", "--out=",       "--solver=", "--faces="};
+        "--quick", "--particles=", "--seed=",  "--shapes=", "--damping=", "--grains=",
+        "--out=",  "--solver=",    "--faces=", "--pairs",   "--vtk"};
     static const char *const dampings[] = {"local", "global"};
     static const char *const solvers[] = {"certified", "gjk"};
     static const char *const rules[] = {"two", "one", "area"};
     for (int i = 1; i < count; i++) {
         const char *name = arguments[i], *value;
-        const int which = parse_option(count, arguments, &i, usage, names, 9, &value);
+        const int which = parse_option(count, arguments, &i, usage, names, 11, &value);
         if (which == 0) o.quick = true;
         if (which == 1) o.particles = (int)parse_integer(name, value, 10, 1000000);
         if (which == 2) o.seed = parse_integer(name, value, 0, UINT64_MAX);
@@ -77,6 +83,8 @@ static options parse_options(int count, char **arguments) {
         if (which == 6) o.out = value;
         if (which == 7) o.solver = parse_name(name, value, solvers, 2);
         if (which == 8) o.faces = parse_name(name, value, rules, 3);
+        if (which == 9) o.pairs = true;
+        if (which == 10) o.vtk = true;
     }
     if (o.particles == 0) o.particles = o.quick ? 100 : 500;
     return o;
@@ -92,6 +100,7 @@ typedef struct plan {
     double local_damping;              // -
     double global_damping;             // 1/s
     int settle, consolidate, compress; // steps
+    int frame;                         // steps from one VTK file to the next
     int particles;
 } plan;
 
@@ -100,7 +109,8 @@ typedef struct plan {
 static plan full_plan(const options *o) {
     const double more = o->particles > 500 ? o->particles / 500.0 : 1;
     const double fewer = o->particles < 500 ? o->particles / 500.0 : 1;
-    plan p = {1.0, 3.0 * more, 9.8, 0.1, 0.1 * fewer, 0.7, 0, 50000, 10000, 20000, o->particles};
+    plan p = {1.0, 3.0 * more, 9.8,   0.1,   0.1 * fewer, 0.7,
+              0,   50000,      10000, 20000, 2000,        o->particles};
     return p;
 }
 
@@ -109,7 +119,7 @@ static plan full_plan(const options *o) {
    Other numbers of grains scale the box both ways, and speeds and gravity with it. */
 static plan quick_plan(const options *o) {
     const double s = sqrt(o->particles / 100.0);
-    plan p = {0.45 * s, s, 49 * s, 0.5 * s, 0.1 * s, 0.7, 0, 3500, 1500, 3000, o->particles};
+    plan p = {0.45 * s, s, 49 * s, 0.5 * s, 0.1 * s, 0.7, 0, 3500, 1500, 3000, 500, o->particles};
     return p;
 }
 
@@ -154,20 +164,25 @@ static grain *draw_grains(dem2d_world *world, const options *o, template_set *se
 /* ---- the run ---- */
 
 enum { TOP, BOTTOM, LEFT, RIGHT, WALLS };
+enum { SETTLING, CONSOLIDATION, COMPRESSION };
+static const char *const stage_names[] = {"settling", "consolidation", "compression"};
+enum { FRAMES = 50 };
 
 typedef struct job {
     plan plan;
+    const options *options;
     dem2d_world *world;
     dem2d_material_id grain_material, wall_material;
     dem2d_wall_id walls[WALLS]; // TOP: generation 0 before consolidation
-    FILE *history;
-    const char *stage;
-    double started, shown, seconds; // on the clock: start, last progress line, whole run
-    int steps;                      // done
-    int bad_rows;                   // of the history, with a number that is not finite
-    double width0, height0;         // m, at the end of consolidation; 0 before
-    double packed_ratio;            // stress ratio then
-    dem2d_packing packed;           // and packing
+    draft history;
+    int stage; // SETTLING, CONSOLIDATION, COMPRESSION
+    progress progress;
+    double seconds;         // of the whole run
+    int steps;              // done
+    int rows, bad_rows;     // of the history; bad: with a number that is not finite
+    double width0, height0; // m, at the end of consolidation; 0 before
+    double packed_ratio;    // stress ratio then
+    dem2d_packing settled, packed;
     double porosity;
     double max_overlap; // over consolidation and compression
     double near_pairs, near_samples;
@@ -177,6 +192,8 @@ typedef struct job {
     double block_sum; // stress ratio, summed over the present block of steps
     double *blocks;   // its mean over each block
     int block_count;
+    double frame_times[FRAMES]; // s
+    int frames;                 // of VTK
 } job;
 
 enum { BLOCK = 100 }; // steps of the compression averaged in one stress ratio
@@ -211,55 +228,187 @@ static reading read_walls(const job *j) {
     return r;
 }
 
-/* Mean speed of the grains, and the height of the highest point of any. */
-static void scan_grains(const job *j, double *speed, double *highest) {
+/* Height of the highest point of any grain. */
+static double highest_point(const job *j) {
     const int particles = j->plan.particles;
     dem2d_particle_id *ids = get_memory(NULL, (size_t)particles, sizeof *ids);
     int count;
+    double highest = 0;
     must(dem2d_world_particles(j->world, ids, particles, &count), "particles");
-    *speed = *highest = 0;
     for (int i = 0; i < count; i++) {
         dem2d_particle_info info;
         dem2d_box box;
         must(dem2d_world_get_particle(j->world, ids[i], &info), "particle");
-        const dem2d_shape *shape = dem2d_world_shape(j->world, info.shape);
-        must(dem2d_shape_aabb(shape, info.pose, &box), "particle");
-        const dem2d_vec v = info.velocity;
-        *speed += sqrt(v.x * v.x + v.y * v.y) / count;
-        if (box.upper.y > *highest) *highest = box.upper.y;
+        must(dem2d_shape_aabb(dem2d_world_shape(j->world, info.shape), info.pose, &box), "box");
+        if (box.upper.y > highest) highest = box.upper.y;
     }
     free(ids);
+    return highest;
 }
 
-/* Strains are 0 before the compression; stresses of walls without a length (the sides while
-   settling) are 0. */
+static bool write_draft(void *user, const char *bytes, size_t count) {
+    const draft *d = user;
+    return fwrite(bytes, 1, count, d->file) == count;
+}
+
+/* The world's own columns, then those of the walls. Strains are 0 before the compression; stresses
+   of walls without a length (the sides while settling) are 0. */
 static void write_row(job *j, const reading *r) {
-    dem2d_energy e;
-    double speed, highest;
-    scan_grains(j, &speed, &highest);
-    must(dem2d_world_energy(j->world, &e), "energy");
-    const double row[] = {
-        j->steps * TIME_STEP, r->axial,         r->lateral,   r->stress[TOP],   r->stress[BOTTOM],
-        r->stress[LEFT],      r->stress[RIGHT], r->strain,    r->volume_strain, e.translational,
-        e.rotational,         e.normal,         e.tangential, e.potential,      speed};
-    const int columns = (int)(sizeof row / sizeof row[0]);
-    bool finite = true;
-    for (int i = 0; i < columns; i++) {
-        finite = finite && isfinite(row[i]);
-        fprintf(j->history, "%.17g%c", row[i], i + 1 < columns ? ',' : '\n');
-    }
-    if (!finite) j->bad_rows++;
+    static const char *const names[] = {
+        "stage",         "axial_stress", "lateral_stress",    "top_stress",
+        "bottom_stress", "left_stress",  "right_stress",      "width",
+        "height",        "axial_strain", "volumetric_strain", "stress_ratio"};
+    const double values[] = {j->stage,          r->axial,        r->lateral,       r->stress[TOP],
+                             r->stress[BOTTOM], r->stress[LEFT], r->stress[RIGHT], r->width,
+                             r->height,         r->strain,       r->volume_strain, r->ratio};
+    dem2d_csv_desc row = {0};
+    row.count = (int)(sizeof values / sizeof values[0]);
+    row.names = names;
+    row.values = values;
+    row.append = j->rows > 0;
+    row.write = write_draft;
+    row.user = &j->history;
+    const dem2d_result result = dem2d_world_write_csv(j->world, &row, NULL);
+    if (result == DEM2D_NOT_FINITE)
+        j->bad_rows++;
+    else
+        must(result, "history");
+    j->rows++;
 }
 
-static void show_progress(job *j) {
-    const plan *p = &j->plan;
-    const int total = p->settle + p->consolidate + p->compress;
-    const double now = clock_seconds();
-    if (now - j->shown < 5) return;
-    j->shown = now;
-    const double left = (now - j->started) * (total - j->steps) / j->steps;
-    fprintf(stderr, "biaxial: %s, step %d of %d, %.0f s left\n", j->stage, j->steps, total, left);
+/* ---- files of a state ---- */
+
+/* DIR/name.svg with the force chains, or without. */
+static void draw(const job *j, const char *name, bool chains) {
+    dem2d_svg_desc picture = {0};
+    picture.force_chains = chains;
+    char *path = join_text(j->options->out, "/", name), *aside = aside_name(path);
+    const dem2d_result result = dem2d_world_write_svg(j->world, &picture, aside);
+    if (result != DEM2D_IO) must(result, name);
+    aside_finish(aside, result == DEM2D_OK);
+    free(path);
 }
+
+static void write_out(const job *j, const char *name, draft *d) {
+    char *path = join_text(j->options->out, "/", name);
+    draft_write(d, path);
+    free(path);
+}
+
+/* All histograms side by side: row i has the grains with i contacts, and those and the contacts
+   whose direction is in part i of 36. */
+static void write_histograms(const job *j, const char *name) {
+    enum { BINS = 36 };
+    static const char *const names[DEM2D_HISTOGRAM_COUNT] = {
+        "coordination", "orientation", "normal", "branch", "normal_force", "tangential_force"};
+    double values[DEM2D_HISTOGRAM_COUNT][BINS];
+    draft d;
+    draft_open(&d);
+    fputs("bin", d.file);
+    for (int k = 0; k < DEM2D_HISTOGRAM_COUNT; k++) {
+        must(dem2d_world_histogram(j->world, (dem2d_histogram)k, BINS, values[k]), names[k]);
+        fprintf(d.file, ",%s", names[k]);
+    }
+    for (int i = 0; i < BINS; i++) {
+        fprintf(d.file, "\n%d", i);
+        for (int k = 0; k < DEM2D_HISTOGRAM_COUNT; k++) fprintf(d.file, ",%.9g", values[k][i]);
+    }
+    fputc('\n', d.file);
+    write_out(j, name, &d);
+}
+
+/* A file of each part for ParaView, numbered; the series are written at the end. */
+static const dem2d_vtp_part vtk_parts[2] = {DEM2D_VTP_PARTICLES, DEM2D_VTP_CONTACTS};
+static const char *const vtk_names[2] = {"particles", "contacts"};
+
+static void write_frame(job *j) {
+    if (j->frames == FRAMES) return;
+    for (int k = 0; k < 2; k++) {
+        char name[40];
+        dem2d_vtp_desc desc = {0};
+        desc.part = vtk_parts[k];
+        snprintf(name, sizeof name, "vtk/%s_%02d.vtp", vtk_names[k], j->frames);
+        char *path = join_text(j->options->out, "/", name);
+        need(dem2d_world_write_vtp(j->world, &desc, path), STATUS_BAD_INPUT, path);
+        free(path);
+    }
+    j->frame_times[j->frames++] = j->steps * TIME_STEP;
+}
+
+static void write_series(const job *j) {
+    char names[FRAMES][40];
+    const char *files[FRAMES];
+    for (int k = 0; k < 2; k++) {
+        for (int i = 0; i < j->frames; i++) {
+            snprintf(names[i], sizeof names[i], "vtk/%s_%02d.vtp", vtk_names[k], i);
+            files[i] = names[i];
+        }
+        const dem2d_pvd_desc desc = {j->frames, j->frame_times, files, NULL, NULL};
+        char *folder = join_text(j->options->out, "/", vtk_names[k]);
+        char *path = join_text(folder, ".", "pvd");
+        need(dem2d_pvd_write(example_env(), &desc, path), STATUS_BAD_INPUT, path);
+        free(path);
+        free(folder);
+    }
+}
+
+/* ---- what GJK and EPA do with the pairs of a state ---- */
+
+enum { RESIDUALS = 30 };
+
+/* A row of a pair whose bounding circles overlap: kinds, whether it is in contact, support calls of
+   GJK from the line of centres; then the size that tolerances are relative to (m) and, of two in
+   contact, the residual (m) that EPA has after 1, 2, .. iterations: the difference of its bounds of
+   the depth. Cells are empty until GJK has found its simplex in as many iterations. */
+static void write_pair(FILE *file, const dem2d_world *world, const dem2d_particle_info *a,
+                       const dem2d_particle_info *b) {
+    const dem2d_shape *one = dem2d_world_shape(world, a->shape);
+    const dem2d_shape *other = dem2d_world_shape(world, b->shape);
+    const double dx = b->pose.position.x - a->pose.position.x;
+    const double dy = b->pose.position.y - a->pose.position.y, reach = a->radius + b->radius;
+    if (dx * dx + dy * dy >= reach * reach) return;
+    dem2d_shape_info info[2];
+    dem2d_contact gjk, epa;
+    must(dem2d_shape_get(one, &info[0]), "shape");
+    must(dem2d_shape_get(other, &info[1]), "shape");
+    must(dem2d_pair_overlap(one, a->pose, other, b->pose, NULL, &gjk), "overlap");
+    const bool touch = gjk.state != DEM2D_SEPARATED;
+    fprintf(file, "%d,%d,%d,%d,%.9g", (int)info[0].type, (int)info[1].type, touch,
+            gjk.support_calls, reach + sqrt(dx * dx + dy * dy));
+    for (int k = 1; k <= RESIDUALS; k++) {
+        dem2d_contact_desc desc = {0};
+        desc.solver = DEM2D_GJK_EPA;
+        desc.tolerance = 1e-16;
+        desc.max_iterations = k;
+        fputc(',', file);
+        if (!touch || k < gjk.iterations) continue;
+        must(dem2d_pair_contact(one, a->pose, other, b->pose, &desc, &epa), "contact");
+        fprintf(file, "%.9g", epa.error);
+    }
+    fputc('\n', file);
+}
+
+static void write_pairs(const job *j) {
+    const int room = j->plan.particles;
+    dem2d_particle_id *ids = get_memory(NULL, (size_t)room, sizeof *ids);
+    dem2d_particle_info *grains = get_memory(NULL, (size_t)room, sizeof *grains);
+    int count;
+    draft d;
+    draft_open(&d);
+    fputs("a,b,contact,calls,size", d.file);
+    for (int k = 1; k <= RESIDUALS; k++) fprintf(d.file, ",residual_%d", k);
+    fputc('\n', d.file);
+    must(dem2d_world_particles(j->world, ids, room, &count), "particles");
+    for (int i = 0; i < count; i++) {
+        must(dem2d_world_get_particle(j->world, ids[i], &grains[i]), "particle");
+        for (int k = 0; k < i; k++) write_pair(d.file, j->world, &grains[k], &grains[i]);
+    }
+    write_out(j, "pairs.csv", &d);
+    free(ids);
+    free(grains);
+}
+
+/* ---- steps, and what is watched meanwhile ---- */
 
 /* Pairs whose bounding circles overlap and that do not touch: those a step might have to look at
    in vain. Every WATCH steps and in small scenes, as it takes the square of their number. */
@@ -287,15 +436,18 @@ static void watch_near_pairs(job *j) {
     free(grains);
 }
 
-static void take_steps(job *j, int count) {
+/* Whether to go on. */
+static bool take_steps(job *j, int count) {
     int done = 0;
     const dem2d_result result = dem2d_world_step(j->world, count, &done);
     char what[64];
-    snprintf(what, sizeof what, "%s, step %d", j->stage, j->steps + done + 1);
+    snprintf(what, sizeof what, "%s, step %d", stage_names[j->stage], j->steps + done + 1);
     must(result, what);
     j->steps += count;
     if (j->steps % WATCH == 0 && j->plan.particles <= WATCHED) watch_near_pairs(j);
-    show_progress(j);
+    if (j->options->vtk && j->steps % j->plan.frame == 0) write_frame(j);
+    progress_show(&j->progress, stage_names[j->stage], j->steps);
+    return !stop_asked;
 }
 
 /* The greater one; a NaN stays, so that a check can find it. */
@@ -363,14 +515,17 @@ static void fill_box(job *j, grain *grains, uint64_t *random) {
     add_wall(j, BOTTOM, 0, 0, 0, 1);
 }
 
-static void settle(job *j) {
+static bool settle(job *j) {
     enum { ROW = 500 };
-    j->stage = "settling";
-    for (int done = 0; done < j->plan.settle; done += ROW) {
-        take_steps(j, ROW);
+    bool going = true;
+    j->stage = SETTLING;
+    for (int done = 0; going && done < j->plan.settle; done += ROW) {
+        going = take_steps(j, ROW);
         const reading r = read_walls(j);
         write_row(j, &r);
     }
+    must(dem2d_world_packing(j->world, &j->settled), "packing");
+    return going;
 }
 
 /* ---- 2. consolidation ---- */
@@ -395,23 +550,22 @@ static void control_wall(job *j, int which, dem2d_wall_mode mode, int span_a, in
     must(dem2d_world_set_wall(j->world, j->walls[which], &wall), "wall");
 }
 
-static void consolidate(job *j) {
+static bool consolidate(job *j) {
     enum { SAMPLE = 10, ROW = 500 };
     const dem2d_vec no_gravity = {0, 0};
-    double speed, highest;
+    bool going = true;
     dem2d_pair_desc smooth = {0};
     smooth.normal_stiffness = 1e7;
     smooth.tangential_stiffness = 1e7;
-    j->stage = "consolidation";
+    j->stage = CONSOLIDATION;
     must(dem2d_world_set_gravity(j->world, no_gravity), "gravity");
     must(dem2d_world_set_pair(j->world, j->grain_material, j->wall_material, &smooth), "friction");
-    scan_grains(j, &speed, &highest);
-    add_wall(j, TOP, 0, highest, 0, -1);
+    add_wall(j, TOP, 0, highest_point(j), 0, -1);
     control_wall(j, TOP, DEM2D_WALL_SERVO, LEFT, RIGHT);
     control_wall(j, LEFT, DEM2D_WALL_SERVO, BOTTOM, TOP);
     control_wall(j, RIGHT, DEM2D_WALL_SERVO, BOTTOM, TOP);
-    for (int done = SAMPLE; done <= j->plan.consolidate; done += SAMPLE) {
-        take_steps(j, SAMPLE);
+    for (int done = SAMPLE; going && done <= j->plan.consolidate; done += SAMPLE) {
+        going = take_steps(j, SAMPLE);
         watch_overlap(j);
         if (done % ROW != 0) continue;
         const reading r = read_walls(j);
@@ -423,18 +577,21 @@ static void consolidate(job *j) {
     j->packed_ratio = r.ratio;
     j->width0 = r.width;
     j->height0 = r.height;
+    return going;
 }
 
 /* ---- 3. compression ---- */
 
-static double compress(job *j) {
+/* Gives the axial strain. */
+static bool compress(job *j, double *strain) {
     enum { SAMPLE = 10 };
     reading r = {{0}, 0, 0, 0, 0, 0, 0, 0};
-    j->stage = "compression";
+    bool going = true;
+    j->stage = COMPRESSION;
     j->blocks = get_memory(NULL, (size_t)(j->plan.compress / BLOCK), sizeof *j->blocks);
     control_wall(j, TOP, DEM2D_WALL_MOVING, LEFT, RIGHT);
-    for (int done = 1; done <= j->plan.compress; done++) {
-        take_steps(j, 1);
+    for (int done = 1; going && done <= j->plan.compress; done++) {
+        going = take_steps(j, 1);
         r = read_walls(j);
         if (r.strain >= 0.001) {
             j->lateral_sum += r.lateral;
@@ -448,19 +605,37 @@ static double compress(job *j) {
         j->block_sum = 0;
         write_row(j, &r);
     }
-    return r.strain;
+    *strain = r.strain;
+    return going;
 }
 
 /* ---- results ---- */
 
-static void draw(const job *j, const char *out, const char *name) {
-    dem2d_svg_desc picture = {0};
-    picture.force_chains = true;
-    char *path = join_text(out, "/", name), *aside = aside_name(path);
-    const dem2d_result result = dem2d_world_write_svg(j->world, &picture, aside);
-    if (result != DEM2D_IO) must(result, name);
-    aside_finish(aside, result == DEM2D_OK);
-    free(path);
+/* How the grains carry the load at the end: fabric, stress, and the mean size of shear forces. */
+typedef struct loading {
+    dem2d_fabric fabric;
+    double ratio; // q/p of the mean stress
+    double shear; // N/m
+} loading;
+
+static loading measure_loading(const job *j) {
+    loading l = {0};
+    dem2d_stress stress;
+    dem2d_principal principal;
+    dem2d_stats stats;
+    int count;
+    const reading r = read_walls(j);
+    must(dem2d_world_fabric(j->world, &l.fabric), "fabric");
+    must(dem2d_world_stress(j->world, r.width * r.height, &stress), "stress");
+    must(dem2d_stress_principal(&stress, &principal), "stress");
+    if (principal.p > 0) l.ratio = principal.q / principal.p;
+    must(dem2d_world_stats(j->world, &stats), "stats");
+    dem2d_contact_info *contacts = get_memory(NULL, (size_t)stats.contacts, sizeof *contacts);
+    must(dem2d_world_contacts(j->world, contacts, stats.contacts, &count), "contacts");
+    for (int i = 0; i < stats.contacts; i++)
+        l.shear += fabs(contacts[i].tangential_force) / stats.contacts;
+    free(contacts);
+    return l;
 }
 
 /* A figure for stdout; a check fails when it is outside its band. */
@@ -496,12 +671,16 @@ static bool report(const job *j, const options *o, double strain) {
     dem2d_stats stats;
     must(dem2d_world_stats(j->world, &stats), "stats");
     const double looks = stats.looks > 0 ? (double)stats.looks : 1;
+    const loading end = measure_loading(j);
+    const dem2d_fabric *f = &end.fabric;
+    const double degree = 3.141592653589793 / 180;
     const figure figures[] = {
         {"particles", particles, "-", FINITE, FINITE},
         {"steps", steps, "-", FINITE, FINITE},
         {"elapsed_seconds", j->seconds, "s", FINITE, FINITE},
         {"ns_per_particle_step", 1e9 * j->seconds / steps / particles, "ns", FINITE, FINITE},
         {"memory_per_particle", (double)stats.bytes / particles, "B", FINITE, FINITE},
+        {"coordination_settled", j->settled.coordination, "-", FINITE, FINITE},
         {"coordination_number", j->packed.coordination, "-", {3, 5}, {2.5, 5.5}},
         {"porosity_packed", j->porosity, "-", FINITE, FINITE},
         {"mean_overlap_over_radius", j->packed.mean_overlap, "-", {0.01, 0.04}, {0.005, 0.06}},
@@ -516,6 +695,16 @@ static bool report(const job *j, const options *o, double strain) {
         {"peak_stress_ratio", peak, "-", {0.1, 0.7}, {0.1, 0.7}},
         {"plateau_over_peak", plateau / peak, "-", {0.7, 1.01}, {0.6, 1.01}},
         {"axial_strain_final", strain, "-", {0.001, 2}, {0.001, 2}},
+        {"final_stress_ratio", end.ratio, "-", FINITE, FINITE},
+        {"final_stress_ratio_foretold", f->stress_ratio, "-", FINITE, FINITE},
+        {"anisotropy_normals", f->normals.coefficient, "-", FINITE, FINITE},
+        {"direction_normals", f->normals.direction / degree, "degrees", FINITE, FINITE},
+        {"anisotropy_branches", f->branches.coefficient, "-", FINITE, FINITE},
+        {"anisotropy_normal_forces", f->normal_forces.coefficient, "-", FINITE, FINITE},
+        {"direction_normal_forces", f->normal_forces.direction / degree, "degrees", FINITE, FINITE},
+        {"anisotropy_shear_forces", f->tangential_forces.coefficient, "-", FINITE, FINITE},
+        {"mean_normal_force", f->mean_force, "N/m", FINITE, FINITE},
+        {"mean_shear_force", end.shear, "N/m", FINITE, FINITE},
         {"looks_per_step", (double)stats.looks / steps, "-", FINITE, FINITE},
         {"support_calls_per_look", (double)stats.support_calls / looks, "-", FINITE, FINITE},
         {"near_pairs_skipped_percent",
@@ -532,59 +721,67 @@ static bool report(const job *j, const options *o, double strain) {
     };
     bool good = true;
     for (size_t i = 0; i < sizeof figures / sizeof figures[0]; i++) {
-        const figure *f = &figures[i];
-        const double *band = o->quick ? f->quick : f->full;
-        printf("%s %.9g %s\n", f->name, f->value, f->unit);
-        if (f->value >= band[0] && f->value <= band[1]) continue; // false for a NaN
-        fprintf(stderr, "biaxial: check failed: %s is %.6g, not in %g to %g\n", f->name, f->value,
-                band[0], band[1]);
+        const figure *now = &figures[i];
+        const double *band = o->quick ? now->quick : now->full;
+        printf("%s %.9g %s\n", now->name, now->value, now->unit);
+        if (now->value >= band[0] && now->value <= band[1]) continue; // false for a NaN
+        fprintf(stderr, "biaxial: check failed: %s is %.6g, not in %g to %g\n", now->name,
+                now->value, band[0], band[1]);
         good = false;
     }
     return good;
 }
 
-static const char header[] =
-    "time_s,axial_stress_pa,lateral_stress_pa,top_stress_pa,bottom_stress_pa,left_stress_pa,"
-    "right_stress_pa,axial_strain,volumetric_strain,kinetic_translational_j_per_m,"
-    "kinetic_rotational_j_per_m,normal_energy_j_per_m,tangential_energy_j_per_m,"
-    "potential_energy_j_per_m,mean_speed_m_per_s\n";
+/* All three stages, with the files of their ends; false when stopped. */
+static bool run(job *j, double *strain) {
+    if (!settle(j)) return false;
+    draw(j, "settled.svg", false);
+    write_histograms(j, "settled.csv");
+    if (j->options->pairs) write_pairs(j);
+    if (!consolidate(j)) return false;
+    draw(j, "packed.svg", true);
+    write_histograms(j, "packed.csv");
+    return compress(j, strain);
+}
 
 int main(int count, char **arguments) {
     example_name = "biaxial";
     const options o = parse_options(count, arguments);
     template_set set = load_templates(o.grains);
     make_directory(o.out); // all input is known to be good; nothing was written before
-
+    if (o.vtk) {
+        char *folder = join_text(o.out, "/", "vtk");
+        make_directory(folder);
+        free(folder);
+    }
     job j = {0};
-    char *history = NULL;
-    size_t history_size = 0;
     uint64_t random = o.seed;
+    j.options = &o;
     j.plan = make_plan(&o);
-    j.history = open_memstream(&history, &history_size);
-    if (j.history == NULL) fail(STATUS_FAILED, "out of memory");
-    fputs(header, j.history);
+    draft_open(&j.history);
     build_world(&j, &o);
     grain *grains = draw_grains(j.world, &o, &set, &random);
     fill_box(&j, grains, &random);
     free(grains); // the world has its own copies of all
     free_templates(&set);
 
-    j.started = j.shown = clock_seconds();
-    settle(&j);
-    consolidate(&j);
-    draw(&j, o.out, "packed.svg");
-    const double strain = compress(&j);
-    j.seconds = clock_seconds() - j.started;
-    draw(&j, o.out, "final.svg");
-    if (fclose(j.history) != 0) fail(STATUS_FAILED, "out of memory");
-    char *path = join_text(o.out, "/", "history.csv");
-    write_file(path, history, history_size);
-
-    const bool good = report(&j, &o, strain);
-    free(path);
-    free(history);
+    const int total = j.plan.settle + j.plan.consolidate + j.plan.compress;
+    double strain = 0;
+    catch_interrupt();
+    progress_start(&j.progress, "steps", total);
+    const bool finished = run(&j, &strain);
+    j.seconds = clock_seconds() - j.progress.started;
+    progress_end(&j.progress);
+    draw(&j, "final.svg", true);
+    write_histograms(&j, "final.csv");
+    if (o.vtk) write_series(&j);
+    write_out(&j, "history.csv", &j.history);
+    if (!finished)
+        fprintf(stderr, "biaxial: stopped after %d of %d steps; the state is in %s, unchecked\n",
+                j.steps, total, o.out);
+    const bool good = finished && report(&j, &o, strain);
     free(j.blocks);
     dem2d_world_destroy(j.world);
     if (fflush(stdout) != 0) fail(STATUS_BAD_INPUT, "cannot write to stdout");
-    return good ? STATUS_OK : STATUS_FAILED;
+    return finished ? good ? STATUS_OK : STATUS_FAILED : STATUS_STOPPED;
 }
