@@ -449,24 +449,30 @@ static double mean(const double *values, int count) {
     return sum / count;
 }
 
-/* Coverage of the templates by number, in columns `name_1` .., and their mean `name`. */
+/* Per cent of coverage by number: a file with the means of some ways in columns, and for each way
+   one with the curves of all grains, empty lines between. */
 static void write_coverage(const study *s, const fits *f, const char *file, way first, way last) {
     draft d;
     draft_open(&d);
     fputs("count", d.file);
-    for (way how = first; how <= last; how++) {
-        fprintf(d.file, ",%s", way_names[how]);
-        for (int i = 0; i < f->templates; i++) fprintf(d.file, ",%s_%d", way_names[how], i + 1);
-    }
+    for (way how = first; how <= last; how++) fprintf(d.file, ",%s", way_names[how]);
     for (int n = least_count(first); n <= MOST; n++) {
         fprintf(d.file, "\n%d", n);
-        for (way how = first; how <= last; how++) {
-            fprintf(d.file, ",%.6f", mean(f->coverage[how][n], f->templates));
-            for (int i = 0; i < f->templates; i++) fprintf(d.file, ",%.6f", f->coverage[how][n][i]);
-        }
+        for (way how = first; how <= last; how++)
+            fprintf(d.file, ",%.6g", 100 * mean(f->coverage[how][n], f->templates));
     }
     fputc('\n', d.file);
     finish(s, &d, file);
+    for (way how = first; how <= last; how++) {
+        char name[40];
+        snprintf(name, sizeof name, "fits_%s.csv", way_names[how]);
+        draft_open(&d);
+        fputs("count,coverage\n", d.file);
+        for (int i = 0; i < f->templates; i++, fputc('\n', d.file))
+            for (int n = least_count(how); n <= MOST; n++)
+                fprintf(d.file, "%d,%.6g\n", n, 100 * f->coverage[how][n][i]);
+        finish(s, &d, name);
+    }
 }
 
 /* ---- pictures of shapes ---- */

@@ -1,0 +1,190 @@
+# figures.gp - draws what biaxial and figures have written into the folder it is started in: see
+# make -C examples figures.
+
+set datafile separator comma
+set terminal svg size 520,400 font "sans-serif,15" background "white"
+set grid linecolor "#d8d8d8"
+set border linecolor "#444444"
+unset key
+
+array names[3] = ["noncircular", "circular", "irregular"]
+array colours[3] = ["#1f5fbf", "#c8382c", "#3d8f4f"]
+
+# ---- shapes: thin lines are the grains, thick ones their mean ----
+
+set key bottom right reverse Left samplen 2
+set output "p08_accuracy.svg"
+set xlabel "segments"
+set ylabel "accuracy, %"
+set xrange [3:16]
+set yrange [*:100]
+plot "fits_polygon.csv" using 1:2 with lines linecolor "#f0c4bf" notitle, \
+     "fits_bezier.csv" using 1:2 with lines linecolor "#c0d4ee" notitle, \
+     "accuracy.csv" using "count":"polygon" with linespoints linewidth 2 pointtype 6 \
+         linecolor "#c8382c" title "polygon", \
+     "" using "count":"bezier" with linespoints linewidth 2 pointtype 7 linecolor "#1f5fbf" \
+         title "polybezier"
+
+set output "f05_coverage.svg"
+set xlabel "order"
+set ylabel "coverage, %"
+set xrange [1:16]
+plot "fits_radial.csv" using 1:2 with lines linecolor "#d8d8d8" notitle, \
+     "fits_reduced.csv" using 1:2 with lines linecolor "#f0c4bf" notitle, \
+     "fits_constrained.csv" using 1:2 with lines linecolor "#c0d4ee" notitle, \
+     "coverage.csv" using "count":"radial" with linespoints linewidth 2 pointtype 4 \
+         linecolor "#666666" title "original FS (radius)", \
+     "" using "count":"reduced" with linespoints linewidth 2 pointtype 6 linecolor "#c8382c" \
+         title "new FS, reduction", \
+     "" using "count":"constrained" with linespoints linewidth 2 pointtype 7 \
+         linecolor "#1f5fbf" title "new FS, constrained fit"
+
+# ---- packing: full lines local, dashed ones global damping ----
+
+set key top right noreverse Right samplen 2
+set xlabel "time, s"
+set xrange [0:*]
+set yrange [*:*]
+set logscale y
+set format y "10^{%L}"
+set output "p11_speed.svg"
+set ylabel "mean speed, m/s"
+plot for [i=1:3] names[i]."_local/history.csv" using "time":($18 == 0 ? column("mean_speed") : NaN) \
+         with lines linecolor rgb colours[i] title names[i], \
+     for [i=1:3] names[i]."_global/history.csv" using "time":($18 == 0 ? column("mean_speed") : NaN) \
+         with lines dashtype 2 linecolor rgb colours[i] notitle
+set output "p11_kinetic.svg"
+set ylabel "kinetic energy / energy in contacts"
+plot for [i=1:3] names[i]."_local/history.csv" using "time":($18 == 0 ? column("kinetic_ratio") : NaN) \
+         with lines linecolor rgb colours[i] title names[i], \
+     for [i=1:3] names[i]."_global/history.csv" using "time":($18 == 0 ? column("kinetic_ratio") : NaN) \
+         with lines dashtype 2 linecolor rgb colours[i] notitle
+unset logscale y
+set format y
+
+# ---- histograms ----
+
+set style fill solid 0.8 noborder
+set style histogram clustered gap 1
+set style data histograms
+set boxwidth 0.9
+set yrange [0:*]
+set xrange [*:*]
+set output "p13_coordination.svg"
+set xlabel "contacts of a grain"
+set ylabel "grains, %"
+plot for [i=1:3] "coordination.csv" using names[i]:xtic(1) linecolor rgb colours[i] title names[i]
+
+set xlabel "support calls of GJK"
+set ylabel "pairs, %"
+array calls[4] = ["noncircular", "fs", "polygon", "bezier"]
+array outputs[4] = ["p14_calls", "f08_calls_fs", "f08_calls_polygon", "f08_calls_bezier"]
+array texts[4] = ["noncircular grains", "FS and FS", "polygon and polygon", \
+                  "polybezier and polybezier"]
+do for [i=1:4] {
+    set output outputs[i].".svg"
+    set title texts[i] font ",15"
+    plot "calls_".calls[i].".csv" using "none":xtic(1) linecolor rgb "#999999" title "apart", \
+         "" using "contact" linecolor rgb "#1f5fbf" title "in contact"
+}
+
+# ---- EPA: every pair in contact, and the median ----
+
+set style data lines
+set logscale y
+set format y "10^{%L}"
+set xlabel "iterations of EPA"
+set ylabel "residual / size of the pair"
+set xrange [0:30]
+set yrange [1e-17:1]
+array models[3] = ["bezier", "fs", "polygon"]
+array epas[3] = ["p15_epa_bezier", "f08_epa_fs", "f08_epa_polygon"]
+array pairs[3] = ["polybezier and polybezier", "FS and FS", "polygon and polygon"]
+do for [i=1:3] {
+    set output epas[i].".svg"
+    set title pairs[i] font ",15"
+    plot "epa_".models[i].".csv" using 1:2 with lines linecolor "#b9cce6" title "a pair", \
+         "epa_".models[i]."_median.csv" using 1:2 with lines linewidth 3 linecolor "#1f5fbf" \
+             title "median", \
+         1e-2 * 4.0**(-x) with lines dashtype 2 linewidth 2 linecolor "#c8382c" \
+             title "1/4 per iteration"
+}
+unset title
+unset logscale y
+set format y
+
+# ---- biaxial compression ----
+
+set key bottom right
+set xrange [0:*]
+set yrange [0:*]
+set xlabel "axial strain, %"
+set output "p17_ratio.svg"
+set ylabel "stress ratio q/p"
+plot for [i=1:3] names[i]."_local/history.csv" \
+         using (100 * column("axial_strain")):($18 == 2 ? column("stress_ratio") : NaN) \
+         with lines linecolor rgb colours[i] title names[i], \
+     for [i=1:3] names[i]."_global/history.csv" \
+         using (100 * column("axial_strain")):($18 == 2 ? column("stress_ratio") : NaN) \
+         with lines dashtype 2 linecolor rgb colours[i] notitle
+set yrange [*:*]
+set key bottom left
+set output "p17_volume.svg"
+set ylabel "volumetric strain (compression positive), %"
+plot for [i=1:3] names[i]."_local/history.csv" \
+         using (100 * column("axial_strain")):($18 == 2 ? 100 * column("volumetric_strain") : NaN) \
+         with lines linecolor rgb colours[i] title names[i], \
+     for [i=1:3] names[i]."_global/history.csv" \
+         using (100 * column("axial_strain")):($18 == 2 ? 100 * column("volumetric_strain") : NaN) \
+         with lines dashtype 2 linecolor rgb colours[i] notitle
+
+set key top left
+set yrange [0:*]
+set xrange [*:*]
+set output "f07_stress.svg"
+set xlabel "time, s"
+set ylabel "stress, kPa"
+set arrow 1 from graph 0, first 100 to graph 1, first 100 nohead dashtype 3 linecolor "#444444"
+plot for [i=1:3] names[i]."_local/history.csv" \
+         using "time":($18 > 0 ? column("axial_stress") / 1000 : NaN) \
+         with lines linecolor rgb colours[i] title names[i].", axial", \
+     for [i=1:3] names[i]."_local/history.csv" \
+         using "time":($18 > 0 ? column("lateral_stress") / 1000 : NaN) \
+         with lines dashtype 2 linecolor rgb colours[i] title names[i].", lateral"
+unset arrow 1
+
+# ---- polar diagrams ----
+
+set terminal svg size 460,480 font "sans-serif,15" background "white"
+set polar
+set angles degrees
+set size square
+unset border
+unset xtics
+unset ytics
+unset xlabel
+unset ylabel
+set grid polar 30 linecolor "#d8d8d8"
+set ttics 0, 30 format "%g" font ",13"
+set rrange [0:*]
+set xrange [*:*]
+set yrange [*:*]
+set rtics font ",12"
+set style fill transparent solid 0.35 border
+set key outside center bottom horizontal
+
+set output "p12_alignment.svg"
+set title "long axes, % in 10 degrees" font ",15"
+plot "alignment.csv" using "angle":"noncircular" with filledcurves linecolor rgb colours[1] \
+         title "noncircular"
+
+array polars[3] = ["normals", "forces", "shear"]
+array heads[3] = ["contact normals, % in 10 degrees", "mean normal force, kN/m", \
+                  "mean shear force, kN/m"]
+do for [k=1:3] {
+    set output "p18_".polars[k].".svg"
+    set title heads[k] font ",15"
+    plot for [i=1:2] "polar_".polars[k].".csv" using "angle":names[i] with filledcurves \
+             linecolor rgb colours[i] title names[i]
+}
+set output
