@@ -611,29 +611,43 @@ static bool compress(job *j, double *strain) {
 
 /* ---- results ---- */
 
-/* How the grains carry the load at the end: fabric, stress, and the mean size of shear forces. */
+/* How the grains carry the load at the end. */
 typedef struct loading {
     dem2d_fabric fabric;
-    double ratio; // q/p of the mean stress
-    double shear; // N/m
+    double ratio;  // q/p of the mean stress
+    double normal; // q/p of contacts between grains, of their branches only the part along normals
+    double shear;  // N/m, mean size of shear forces
 } loading;
+
+static double stress_ratio(const dem2d_stress *stress) {
+    dem2d_principal principal;
+    must(dem2d_stress_principal(stress, &principal), "stress");
+    return principal.p > 0 ? principal.q / principal.p : 0;
+}
 
 static loading measure_loading(const job *j) {
     loading l = {0};
-    dem2d_stress stress;
-    dem2d_principal principal;
+    dem2d_stress stress, normal = {0};
     dem2d_stats stats;
     int count;
     const reading r = read_walls(j);
     must(dem2d_world_fabric(j->world, &l.fabric), "fabric");
     must(dem2d_world_stress(j->world, r.width * r.height, &stress), "stress");
-    must(dem2d_stress_principal(&stress, &principal), "stress");
-    if (principal.p > 0) l.ratio = principal.q / principal.p;
     must(dem2d_world_stats(j->world, &stats), "stats");
     dem2d_contact_info *contacts = get_memory(NULL, (size_t)stats.contacts, sizeof *contacts);
     must(dem2d_world_contacts(j->world, contacts, stats.contacts, &count), "contacts");
-    for (int i = 0; i < stats.contacts; i++)
-        l.shear += fabs(contacts[i].tangential_force) / stats.contacts;
+    for (int i = 0; i < stats.contacts; i++) {
+        const dem2d_vec n = contacts[i].normal, branch = contacts[i].branch;
+        const double f = contacts[i].normal_force, t = contacts[i].tangential_force;
+        const double length = branch.x * n.x + branch.y * n.y;
+        normal.xx += (f * n.x - t * n.y) * length * n.x;
+        normal.xy += (f * n.y + t * n.x) * length * n.x;
+        normal.yx += (f * n.x - t * n.y) * length * n.y;
+        normal.yy += (f * n.y + t * n.x) * length * n.y;
+        l.shear += fabs(t) / stats.contacts;
+    }
+    l.ratio = stress_ratio(&stress);
+    l.normal = stress_ratio(&normal);
     free(contacts);
     return l;
 }
@@ -696,6 +710,7 @@ static bool report(const job *j, const options *o, double strain) {
         {"plateau_over_peak", plateau / peak, "-", {0.7, 1.01}, {0.6, 1.01}},
         {"axial_strain_final", strain, "-", {0.001, 2}, {0.001, 2}},
         {"final_stress_ratio", end.ratio, "-", FINITE, FINITE},
+        {"final_ratio_normal_branches", end.normal, "-", FINITE, FINITE},
         {"final_stress_ratio_foretold", f->stress_ratio, "-", FINITE, FINITE},
         {"anisotropy_normals", f->normals.coefficient, "-", FINITE, FINITE},
         {"direction_normals", f->normals.direction / degree, "degrees", FINITE, FINITE},

@@ -206,9 +206,10 @@ static inline void progress_start(progress *p, const char *unit, double total) {
 static inline void progress_show(progress *p, const char *stage, double done) {
     const double now = clock_seconds();
     if (now - p->shown < (p->terminal ? 0.2 : 5) || done <= p->done) return;
-    fprintf(stderr, "%s%s: %s, %.0f %%, %.0f %s/s, %.0f s left%s", p->terminal ? "\r\033[K" : "",
-            example_name, stage, 100 * done / p->total, (done - p->done) / (now - p->shown),
-            p->unit, (now - p->started) * (p->total - done) / done, p->terminal ? "" : "\n");
+    const double speed = (done - p->done) / (now - p->shown);
+    fprintf(stderr, "%s%s: %s, %.0f %%, %.*f %s/s, %.0f s left%s", p->terminal ? "\r\033[K" : "",
+            example_name, stage, 100 * done / p->total, speed < 10, speed, p->unit,
+            (now - p->started) * (p->total - done) / done, p->terminal ? "" : "\n");
     p->shown = now;
     p->done = done;
     p->dirty = p->terminal;

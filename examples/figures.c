@@ -253,12 +253,13 @@ static const char *const set_names[SETS] = {"irregular", "noncircular", "circula
 static const char *const damping_names[DAMPINGS] = {"local", "global"};
 
 typedef struct run {
-    table results, history, settled, final, pairs;
+    table results, history, settled, final;
 } run;
 
 typedef struct study {
     const options *options;
     run runs[SETS][DAMPINGS];
+    table pairs[SETS]; // of both dampings; none of circles
     page page;
 } study;
 
@@ -283,7 +284,6 @@ static void read_runs(study *s) {
             r->history = read_run_table(s, set, d, "history.csv");
             r->settled = read_run_table(s, set, d, "settled.csv");
             r->final = read_run_table(s, set, d, "final.csv");
-            r->pairs = read_run_table(s, set, d, "pairs.csv");
         }
     }
 }
@@ -291,8 +291,8 @@ static void read_runs(study *s) {
 static void free_runs(study *s) {
     for (int i = 0; i < SETS * DAMPINGS; i++) {
         run *r = &s->runs[i / DAMPINGS][i % DAMPINGS];
-        table *const tables[] = {&r->results, &r->history, &r->settled, &r->final, &r->pairs};
-        for (int k = 0; k < 5; k++) free_table(tables[k]);
+        table *const tables[] = {&r->results, &r->history, &r->settled, &r->final};
+        for (int k = 0; k < 4; k++) free_table(tables[k]);
     }
 }
 
@@ -309,7 +309,7 @@ static void finish(const study *s, draft *d, const char *name) {
 
 /* ---- fits of templates to outlines ---- */
 
-enum { TEMPLATES = 12, MOST = 16, FIT_POINTS = 240 };
+enum { TEMPLATES = 12, MOST = 16, FIT_POINTS = 240 }; // most: the greatest order
 typedef enum way { AS_BEZIER, AS_POLYGON, AS_RADIAL, AS_REDUCED, AS_CONSTRAINED, WAYS } way;
 static const char *const way_texts[WAYS] = {"polybezier", "polygon", "original FS: radius by angle",
                                             "new FS by the paper's reduction",
@@ -325,21 +325,33 @@ typedef struct fits {
     double solidity[TEMPLATES];                 // area over area of the hull
 } fits;
 
-/* Twelve lumpy grains: those of the other examples, and more between the least and the greatest of
-   their amplitudes. */
+/* A polygon of 5 to 9 corners near an ellipse of this aspect, with rounded corners. */
+static void list_rounded(outline_list *list, double aspect, double rounding, uint64_t *random,
+                         int number) {
+    enum { POINTS = 180 };
+    const int count = 5 + random_below(random, 5);
+    dem2d_vec corners[9], points[POINTS];
+    dem2d_shape *shape;
+    for (int i = 0; i < count; i++) {
+        const double place = i + random_between(random, -0.3, 0.3);
+        const dem2d_rot direction = dem2d_rot_make(2 * PI * place / count);
+        corners[i].x = direction.c * aspect;
+        corners[i].y = direction.s;
+    }
+    must(dem2d_shape_create_polygon(example_env(), corners, count, rounding, &shape), "outline");
+    must(dem2d_shape_outline(shape, dem2d_pose_make(0, 0, 0, 1), POINTS, points), "outline");
+    list_outline(list, points, POINTS, "rounded polygon", number);
+    dem2d_shape_destroy(shape);
+}
+
+/* Twelve grains: the lumpy ones of the other examples, not quite convex, and convex ones of four
+   aspects, each angular and round (as in the charts of sphericity and roundness). */
 static outline_list make_outlines(void) {
-    static const double low[4] = {0.04, 0.03, 0.02, 0.005}, high[4] = {0.22, 0.08, 0.05, 0.02};
     outline_list list = {NULL, 0};
     uint64_t random = 1;
     for (int i = 0; i < SELF_MADE; i++) list_self_made(&list, i);
-    for (int i = SELF_MADE; i < TEMPLATES; i++) {
-        double size[4], phase[4];
-        for (int n = 0; n < 4; n++) {
-            size[n] = random_between(&random, low[n], high[n]);
-            phase[n] = random_between(&random, 0, 2 * PI);
-        }
-        list_lumpy(&list, size, phase, "self-made outline", i + 1);
-    }
+    for (int i = SELF_MADE; i < TEMPLATES; i++)
+        list_rounded(&list, 1 + 0.3 * (i % 4), i < 8 ? 0.1 : 0.4, &random, i + 1);
     return list;
 }
 
@@ -410,8 +422,13 @@ static double fit(const outline *o, way how, int count, dem2d_vec *points) {
     return report.coverage;
 }
 
+/* The papers' ranges: 3 to 10 segments, order 1 to 16. */
 static int least_count(way how) {
     return how == AS_BEZIER || how == AS_POLYGON ? 3 : 1;
+}
+
+static int greatest_count(way how) {
+    return how == AS_BEZIER || how == AS_POLYGON ? 10 : MOST;
 }
 
 static outline hull_of(const outline *o) {
@@ -432,9 +449,9 @@ static void make_fits(fits *f, const options *o) {
         must(dem2d_outline_measure(example_env(), grain->points, grain->count, &info), grain->name);
         f->solidity[i] = info.solidity;
         for (way how = AS_BEZIER; how < WAYS; how++) {
-            for (int n = least_count(how); n <= MOST; n++)
+            for (int n = least_count(how); n <= greatest_count(how); n++)
                 f->coverage[how][n][i] = fit(grain, how, n, NULL);
-            f->convex[how][i] = fit(&hull, how, FOURIER_ORDER, NULL);
+            if (how >= AS_RADIAL) f->convex[how][i] = fit(&hull, how, FOURIER_ORDER, NULL);
         }
         free(hull.points);
         progress_show(&p, "fitting", i + 1);
@@ -456,7 +473,7 @@ static void write_coverage(const study *s, const fits *f, const char *file, way 
     draft_open(&d);
     fputs("count", d.file);
     for (way how = first; how <= last; how++) fprintf(d.file, ",%s", way_names[how]);
-    for (int n = least_count(first); n <= MOST; n++) {
+    for (int n = least_count(first); n <= greatest_count(first); n++) {
         fprintf(d.file, "\n%d", n);
         for (way how = first; how <= last; how++)
             fprintf(d.file, ",%.6g", 100 * mean(f->coverage[how][n], f->templates));
@@ -469,7 +486,7 @@ static void write_coverage(const study *s, const fits *f, const char *file, way 
         draft_open(&d);
         fputs("count,coverage\n", d.file);
         for (int i = 0; i < f->templates; i++, fputc('\n', d.file))
-            for (int n = least_count(how); n <= MOST; n++)
+            for (int n = least_count(how); n <= greatest_count(how); n++)
                 fprintf(d.file, "%d,%.6g\n", n, 100 * f->coverage[how][n][i]);
         finish(s, &d, name);
     }
@@ -745,7 +762,7 @@ static void report_alignment(study *s) {
                   ? "P: long axes lie rather horizontal: direction of anisotropy within 22.5 "
                     "degrees of it, and more than 55 % of the axes within 45 degrees"
                   : "the same with global damping",
-              "%.1f degrees (coefficient %.2f), %.0f %%", a.angle, a.coefficient, a.flat);
+              "%.1f degrees (coefficient %.2f), %.1f %%", a.angle, a.coefficient, a.flat);
     }
     close_figure(p);
 }
@@ -805,6 +822,20 @@ typedef struct tally {
 
 static double mean_calls(const tally *t) {
     return t->pairs > 0 ? t->calls / t->pairs : NAN;
+}
+
+/* Pairs of a set, of the runs with both dampings. */
+static table read_pairs(const study *s, int set) {
+    table t = read_run_table(s, set, LOCAL, "pairs.csv");
+    table more = read_run_table(s, set, GLOBAL, "pairs.csv");
+    const size_t columns = (size_t)t.columns, have = columns * (size_t)t.rows;
+    const size_t extra = columns * (size_t)more.rows;
+    if (more.columns != t.columns) fail(STATUS_BAD_INPUT, "two pairs.csv do not match");
+    t.values = get_memory(t.values, have + extra, sizeof *t.values);
+    memcpy(t.values + have, more.values, extra * sizeof *t.values);
+    t.rows += more.rows;
+    free_table(&more);
+    return t;
 }
 
 /* Of pairs of two types in any order (negative: any type), in contact or not (-1: both). */
@@ -878,8 +909,8 @@ static void report_gjk(study *s) {
                                      5.52, 0,    0,    5.20, 4.35, 5.45, 0,    0,    0,
                                      2.91, 3.92, 0,    0,    0,    0,    5.10};
     page *p = &s->page;
-    const table *noncircular = &s->runs[NONCIRCULAR][LOCAL].pairs;
-    const table *all = &s->runs[IRREGULAR][LOCAL].pairs;
+    const table *noncircular = &s->pairs[NONCIRCULAR];
+    const table *all = &s->pairs[IRREGULAR];
     const tally p_touch = count_calls(noncircular, -1, -1, 1);
     const tally p_none = count_calls(noncircular, -1, -1, 0);
     const tally f_touch = count_calls(all, DEM2D_FOURIER, DEM2D_FOURIER, 1);
@@ -891,8 +922,9 @@ static void report_gjk(study *s) {
     open_figure(p, "Support calls of GJK in one step, near pairs of noncircular grains (P fig. 14)",
                 "p14_calls.svg");
     check(p, mean_calls(&p_touch) > mean_calls(&p_none),
-          "P: pairs in contact take more calls than others, 5.77 to 1.85", "%.2f to %.2f",
-          mean_calls(&p_touch), mean_calls(&p_none));
+          "P: pairs in contact take more calls than others, 5.77 to 1.85",
+          "%.2f to %.2f (%.0f and %.0f pairs)", mean_calls(&p_touch), mean_calls(&p_none),
+          p_touch.pairs, p_none.pairs);
     check_polygons(p, "P table 1: two polygons take the fewest of like pairs", noncircular, 3,
                    p_types);
     put_calls_table(p, "Mean calls, P table 1", noncircular, 3, p_types, p_table);
@@ -900,8 +932,9 @@ static void report_gjk(study *s) {
     open_figure(p, "Support calls of GJK for pairs of one model (F fig. 8, left)",
                 "f08_calls_fs.svg f08_calls_polygon.svg f08_calls_bezier.svg");
     check(p, mean_calls(&f_touch) > mean_calls(&f_none),
-          "F: pairs of FS in contact take more calls than others, 6.4 to 1.0", "%.2f to %.2f",
-          mean_calls(&f_touch), mean_calls(&f_none));
+          "F: pairs of FS in contact take more calls than others, 6.4 to 1.0",
+          "%.2f to %.2f (%.0f and %.0f pairs)", mean_calls(&f_touch), mean_calls(&f_none),
+          f_touch.pairs, f_none.pairs);
     check_polygons(p, "F table 1: two polygons take the fewest of like pairs", all, 5, f_types);
     put_calls_table(p, "Mean calls, F table 1", all, 5, f_types, f_table);
     close_figure(p);
@@ -971,10 +1004,37 @@ static double ten_iterations(const table *pairs, int type) {
     return sum / count;
 }
 
+/* Mean of the first iteration with a residual below a limit. */
+static double iterations_to(const table *pairs, int type, double limit) {
+    double sum = 0, count = 0;
+    for (int i = 0; i < pairs->rows; i++) {
+        int k = 1;
+        if (!is_like_contact(pairs, i, type)) continue;
+        while (k < RESIDUALS && !(residual(pairs, i, k) < limit)) k++;
+        sum += k;
+        count++;
+    }
+    return sum / count;
+}
+
+/* Curves with a residual above the one before, and above rounding. */
+static int count_rises(const table *pairs, int type) {
+    int count = 0;
+    for (int i = 0; i < pairs->rows; i++) {
+        int k = 1;
+        if (!is_like_contact(pairs, i, type)) continue;
+        while (k < RESIDUALS && !(residual(pairs, i, k + 1) > residual(pairs, i, k) &&
+                                  residual(pairs, i, k + 1) > 1e-12))
+            k++;
+        count += k < RESIDUALS;
+    }
+    return count;
+}
+
 static void report_epa(study *s) {
     page *p = &s->page;
-    const table *noncircular = &s->runs[NONCIRCULAR][LOCAL].pairs;
-    const table *all = &s->runs[IRREGULAR][LOCAL].pairs;
+    const table *noncircular = &s->pairs[NONCIRCULAR];
+    const table *all = &s->pairs[IRREGULAR];
     const double bezier = ten_iterations(noncircular, DEM2D_BEZIER);
     const double fs = ten_iterations(all, DEM2D_FOURIER);
     write_profiles(s, "bezier", noncircular, DEM2D_BEZIER);
@@ -987,8 +1047,14 @@ static void report_epa(study *s) {
           "here: by 10<sup>5</sup> or more in the geometric mean",
           "10<sup>%.1f</sup>", bezier);
     check(p, fs >= 5, "F: the same for FS", "10<sup>%.1f</sup>", fs);
-    note(p, "F: polygons", "10<sup>%.1f</sup>; two polygons often end exactly",
-         ten_iterations(all, DEM2D_POLYGON));
+    note(p, "EPA's iterations until two polygons are exact to 10<sup>-13</sup> of their size, mean",
+         "%.1f; FS take %.1f", iterations_to(all, DEM2D_POLYGON, 1e-13),
+         iterations_to(all, DEM2D_FOURIER, 1e-13));
+    note(p,
+         "P: the residual can rise for a while; here it is the difference of the best bounds so "
+         "far: "
+         "curves of polybeziers with a rise",
+         "%d", count_rises(noncircular, DEM2D_BEZIER));
     close_figure(p);
 }
 
@@ -1148,12 +1214,12 @@ static void check_order(study *s, const char *text, const char *name, const char
 
 /* A row for each run. */
 static void put_runs(const study *s) {
-    static const char *const names[] = {"coordination_settled",     "coordination_number",
-                                        "porosity_packed",          "anisotropy_normals",
-                                        "anisotropy_normal_forces", "anisotropy_shear_forces",
-                                        "anisotropy_branches",      "final_stress_ratio_foretold",
-                                        "final_stress_ratio",       "mean_normal_force",
-                                        "mean_shear_force",         "axial_strain_final"};
+    static const char *const names[] = {
+        "coordination_settled",        "coordination_number",         "porosity_packed",
+        "anisotropy_normals",          "anisotropy_normal_forces",    "anisotropy_shear_forces",
+        "anisotropy_branches",         "final_stress_ratio_foretold", "final_stress_ratio",
+        "final_ratio_normal_branches", "mean_normal_force",           "mean_shear_force",
+        "axial_strain_final"};
     static const char *const heads[] = {"contacts, settled",
                                         "packed",
                                         "porosity",
@@ -1163,6 +1229,7 @@ static void put_runs(const study *s) {
                                         "a_b",
                                         "(a_c + a_n + a_t + a_b)/2",
                                         "q/p at the end",
+                                        "q/p, branches along normals",
                                         "f_n, N/m",
                                         "f_t, N/m",
                                         "strain"};
@@ -1201,6 +1268,12 @@ static void report_anisotropy(study *s) {
                   ratio);
         }
     }
+    note(
+        p,
+        "the sum takes branches as if along the normals, which those of grains that are no circles "
+        "are not; q/p with no more than that part of them (noncircular, local damping)",
+        "%.3f; with all of them %.3f", result(s, NONCIRCULAR, LOCAL, "final_ratio_normal_branches"),
+        result(s, NONCIRCULAR, LOCAL, "final_stress_ratio"));
     put_runs(s);
     close_figure(p);
 }
@@ -1272,6 +1345,8 @@ int main(int count, char **arguments) {
     s->options = &o;
     catch_interrupt();
     read_runs(s);
+    s->pairs[IRREGULAR] = read_pairs(s, IRREGULAR);
+    s->pairs[NONCIRCULAR] = read_pairs(s, NONCIRCULAR);
     draft_open(&s->page.body);
     draft_open(&s->page.rows);
     draft_open(&s->page.failures);
@@ -1290,11 +1365,14 @@ int main(int count, char **arguments) {
     write_page(&s->page, path, o.quick);
     const int failed = s->page.failed;
     printf("%d of %d checks hold; see %s\n", s->page.checks - failed, s->page.checks, path);
+    fflush(stdout);
     if (failed > 0)
         fprintf(stderr, "figures: %d of %d checks FAIL%s\n", failed, s->page.checks,
                 o.quick ? " (quick runs: not an error)" : "");
     free(path);
     free_runs(s);
+    free_table(&s->pairs[IRREGULAR]);
+    free_table(&s->pairs[NONCIRCULAR]);
     free(s);
     if (fflush(stdout) != 0) fail(STATUS_BAD_INPUT, "cannot write to stdout");
     return failed == 0 || o.quick ? STATUS_OK : STATUS_FAILED;

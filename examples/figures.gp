@@ -2,7 +2,7 @@
 # make -C examples figures.
 
 set datafile separator comma
-set terminal svg size 520,400 font "sans-serif,15" background "white"
+set terminal svg size 520,420 font "sans-serif,15" background "white"
 set grid linecolor "#d8d8d8"
 set border linecolor "#444444"
 unset key
@@ -16,7 +16,7 @@ set key bottom right reverse Left samplen 2
 set output "p08_accuracy.svg"
 set xlabel "segments"
 set ylabel "accuracy, %"
-set xrange [3:16]
+set xrange [3:10]
 set yrange [*:100]
 plot "fits_polygon.csv" using 1:2 with lines linecolor "#f0c4bf" notitle, \
      "fits_bezier.csv" using 1:2 with lines linecolor "#c0d4ee" notitle, \
@@ -41,26 +41,28 @@ plot "fits_radial.csv" using 1:2 with lines linecolor "#d8d8d8" notitle, \
 
 # ---- packing: full lines local, dashed ones global damping ----
 
-set key top right noreverse Right samplen 2
+set key outside center top horizontal reverse Left samplen 1.5 width -3 maxrows 1
 set xlabel "time, s"
-set xrange [0:*]
+set xrange [*:*]
 set yrange [*:*]
 set logscale y
+set title "full: local damping, dashed: global damping" font ",15"
 set format y "10^{%L}"
 set output "p11_speed.svg"
 set ylabel "mean speed, m/s"
-plot for [i=1:3] names[i]."_local/history.csv" using "time":($18 == 0 ? column("mean_speed") : NaN) \
+plot for [i=1:3] names[i]."_local/history.csv" using ($18 == 0 ? column("time") : NaN):"mean_speed" \
          with lines linecolor rgb colours[i] title names[i], \
-     for [i=1:3] names[i]."_global/history.csv" using "time":($18 == 0 ? column("mean_speed") : NaN) \
+     for [i=1:3] names[i]."_global/history.csv" using ($18 == 0 ? column("time") : NaN):"mean_speed" \
          with lines dashtype 2 linecolor rgb colours[i] notitle
 set output "p11_kinetic.svg"
 set ylabel "kinetic energy / energy in contacts"
-plot for [i=1:3] names[i]."_local/history.csv" using "time":($18 == 0 ? column("kinetic_ratio") : NaN) \
+plot for [i=1:3] names[i]."_local/history.csv" using ($18 == 0 ? column("time") : NaN):"kinetic_ratio" \
          with lines linecolor rgb colours[i] title names[i], \
-     for [i=1:3] names[i]."_global/history.csv" using "time":($18 == 0 ? column("kinetic_ratio") : NaN) \
+     for [i=1:3] names[i]."_global/history.csv" using ($18 == 0 ? column("time") : NaN):"kinetic_ratio" \
          with lines dashtype 2 linecolor rgb colours[i] notitle
 unset logscale y
 set format y
+unset title
 
 # ---- histograms ----
 
@@ -81,6 +83,7 @@ array calls[4] = ["noncircular", "fs", "polygon", "bezier"]
 array outputs[4] = ["p14_calls", "f08_calls_fs", "f08_calls_polygon", "f08_calls_bezier"]
 array texts[4] = ["noncircular grains", "FS and FS", "polygon and polygon", \
                   "polybezier and polybezier"]
+set yrange [0:100]
 do for [i=1:4] {
     set output outputs[i].".svg"
     set title texts[i] font ",15"
@@ -115,10 +118,10 @@ set format y
 
 # ---- biaxial compression ----
 
-set key bottom right
 set xrange [0:*]
 set yrange [0:*]
 set xlabel "axial strain, %"
+set title "full: local damping, dashed: global damping" font ",15"
 set output "p17_ratio.svg"
 set ylabel "stress ratio q/p"
 plot for [i=1:3] names[i]."_local/history.csv" \
@@ -128,9 +131,8 @@ plot for [i=1:3] names[i]."_local/history.csv" \
          using (100 * column("axial_strain")):($18 == 2 ? column("stress_ratio") : NaN) \
          with lines dashtype 2 linecolor rgb colours[i] notitle
 set yrange [*:*]
-set key bottom left
 set output "p17_volume.svg"
-set ylabel "volumetric strain (compression positive), %"
+set ylabel "volumetric strain (compression > 0), %"
 plot for [i=1:3] names[i]."_local/history.csv" \
          using (100 * column("axial_strain")):($18 == 2 ? 100 * column("volumetric_strain") : NaN) \
          with lines linecolor rgb colours[i] title names[i], \
@@ -138,7 +140,7 @@ plot for [i=1:3] names[i]."_local/history.csv" \
          using (100 * column("axial_strain")):($18 == 2 ? 100 * column("volumetric_strain") : NaN) \
          with lines dashtype 2 linecolor rgb colours[i] notitle
 
-set key top left
+set title "full: axial, dashed: lateral" font ",15"
 set yrange [0:*]
 set xrange [*:*]
 set output "f07_stress.svg"
@@ -146,16 +148,33 @@ set xlabel "time, s"
 set ylabel "stress, kPa"
 set arrow 1 from graph 0, first 100 to graph 1, first 100 nohead dashtype 3 linecolor "#444444"
 plot for [i=1:3] names[i]."_local/history.csv" \
-         using "time":($18 > 0 ? column("axial_stress") / 1000 : NaN) \
-         with lines linecolor rgb colours[i] title names[i].", axial", \
+         using ($18 > 0 ? column("time") : NaN):(column("axial_stress") / 1000) \
+         with lines linecolor rgb colours[i] title names[i], \
      for [i=1:3] names[i]."_local/history.csv" \
-         using "time":($18 > 0 ? column("lateral_stress") / 1000 : NaN) \
-         with lines dashtype 2 linecolor rgb colours[i] title names[i].", lateral"
+         using ($18 > 0 ? column("time") : NaN):(column("lateral_stress") / 1000) \
+         with lines dashtype 2 linecolor rgb colours[i] notitle
 unset arrow 1
+unset title
 
 # ---- polar diagrams ----
 
-set terminal svg size 460,480 font "sans-serif,15" background "white"
+# Greatest radii first: stats does not work in polar mode.
+array polars[4] = ["alignment", "polar_normals", "polar_forces", "polar_shear"]
+array roses[4] = ["p12_alignment", "p18_normals", "p18_forces", "p18_shear"]
+array heads[4] = ["long axes, % in 10 degrees", "contact normals, % in 10 degrees", \
+                  "mean normal force, kN/m", "mean shear force, kN/m"]
+array others[4] = ["irregular", "circular", "circular", "circular"]
+array reach[4]
+array step[4]
+do for [k=1:4] {
+    stats polars[k].".csv" using "noncircular" name "A" nooutput
+    stats polars[k].".csv" using others[k] name "B" nooutput
+    top = A_max > B_max ? A_max : B_max
+    ten = 10.0**floor(log10(top))
+    step[k] = top / ten < 2 ? ten / 2 : top / ten < 5 ? ten : 2 * ten
+    reach[k] = step[k] * ceil(top / step[k])
+}
+set terminal svg size 460,500 font "sans-serif,15" background "white"
 set polar
 set angles degrees
 set size square
@@ -164,27 +183,22 @@ unset xtics
 unset ytics
 unset xlabel
 unset ylabel
-set grid polar 30 linecolor "#d8d8d8"
+set grid polar 30 linecolor "#c8c8c8"
 set ttics 0, 30 format "%g" font ",13"
-set rrange [0:*]
-set xrange [*:*]
-set yrange [*:*]
-set rtics font ",12"
 set style fill transparent solid 0.35 border
-set key outside center bottom horizontal
-
-set output "p12_alignment.svg"
-set title "long axes, % in 10 degrees" font ",15"
-plot "alignment.csv" using "angle":"noncircular" with filledcurves linecolor rgb colours[1] \
-         title "noncircular"
-
-array polars[3] = ["normals", "forces", "shear"]
-array heads[3] = ["contact normals, % in 10 degrees", "mean normal force, kN/m", \
-                  "mean shear force, kN/m"]
-do for [k=1:3] {
-    set output "p18_".polars[k].".svg"
+set key outside center bottom horizontal noreverse Right samplen 2 width 0 maxrows auto
+set lmargin 4
+set rmargin 4
+do for [k=1:4] {
+    set output roses[k].".svg"
     set title heads[k] font ",15"
-    plot for [i=1:2] "polar_".polars[k].".csv" using "angle":names[i] with filledcurves \
-             linecolor rgb colours[i] title names[i]
+    set rrange [0:reach[k]]
+    set rtics step[k] font ",12"
+    set xrange [-reach[k]:reach[k]]
+    set yrange [-reach[k]:reach[k]]
+    plot polars[k].".csv" using "angle":"noncircular" with filledcurves \
+             linecolor rgb colours[1] title "noncircular", \
+         "" using "angle":others[k] with filledcurves \
+             linecolor rgb (k == 1 ? colours[3] : colours[2]) title others[k]
 }
 set output
