@@ -669,6 +669,21 @@ static double share(const dem2d_stats *stats, dem2d_proof proof) {
     return found > 0 ? 100 * (double)stats->proofs[proof] / found : 0;
 }
 
+/* Prints figures and tells whether each lies in its band. */
+static bool print_figures(const figure *figures, int count, bool quick) {
+    bool good = true;
+    for (int i = 0; i < count; i++) {
+        const figure *f = &figures[i];
+        const double *band = quick ? f->quick : f->full;
+        printf("%s %.9g %s\n", f->name, f->value, f->unit);
+        if (f->value >= band[0] && f->value <= band[1]) continue; // false for a NaN
+        fprintf(stderr, "biaxial: check failed: %s is %.6g, not in %g to %g\n", f->name, f->value,
+                band[0], band[1]);
+        good = false;
+    }
+    return good;
+}
+
 /* Prints the figures and returns whether each lies in its band. The plateau: the mean stress ratio
    of the last fifth of the compression over the peak; a ratio that falls back or never stops
    jumping is below the band. It rises because it is about 0 at the end of consolidation. */
@@ -734,17 +749,7 @@ static bool report(const job *j, const options *o, double strain) {
         {"contacts_not_converged", (double)stats.not_converged, "-", {0, 0}, {0, 0}},
         {"rows_not_finite", j->bad_rows, "-", {0, 0}, {0, 0}},
     };
-    bool good = true;
-    for (size_t i = 0; i < sizeof figures / sizeof figures[0]; i++) {
-        const figure *now = &figures[i];
-        const double *band = o->quick ? now->quick : now->full;
-        printf("%s %.9g %s\n", now->name, now->value, now->unit);
-        if (now->value >= band[0] && now->value <= band[1]) continue; // false for a NaN
-        fprintf(stderr, "biaxial: check failed: %s is %.6g, not in %g to %g\n", now->name,
-                now->value, band[0], band[1]);
-        good = false;
-    }
-    return good;
+    return print_figures(figures, (int)(sizeof figures / sizeof figures[0]), o->quick);
 }
 
 /* All three stages, with the files of their ends; false when stopped. */

@@ -180,7 +180,7 @@ static inline void catch_interrupt(void) {
     struct sigaction action;
     memset(&action, 0, sizeof action);
     action.sa_handler = ask_stop;
-    action.sa_flags = SA_RESTART | SA_RESETHAND;
+    action.sa_flags = (int)(SA_RESTART | SA_RESETHAND);
     sigemptyset(&action.sa_mask);
     sigaction(SIGINT, &action, NULL);
 }

@@ -165,7 +165,7 @@ typedef struct table {
 
 static double parse_cell(const char *text, size_t length) {
     double value;
-    return parse_decimal(text, length, &value) ? value : NAN;
+    return parse_decimal(text, length, &value) ? value : (double)NAN;
 }
 
 /* Next cell of a line of CSV, which loses it. */
@@ -443,14 +443,15 @@ static void make_fits(fits *f, const options *o) {
     f->templates = f->outlines.count < TEMPLATES ? f->outlines.count : TEMPLATES;
     progress_start(&p, "templates", f->templates);
     for (int i = 0; i < f->templates; i++) {
-        const outline *grain = &f->outlines.items[i];
-        outline hull = hull_of(grain);
+        const outline *reference = &f->outlines.items[i];
+        outline hull = hull_of(reference);
         dem2d_outline_info info;
-        must(dem2d_outline_measure(example_env(), grain->points, grain->count, &info), grain->name);
+        must(dem2d_outline_measure(example_env(), reference->points, reference->count, &info),
+             reference->name);
         f->solidity[i] = info.solidity;
         for (way how = AS_BEZIER; how < WAYS; how++) {
             for (int n = least_count(how); n <= greatest_count(how); n++)
-                f->coverage[how][n][i] = fit(grain, how, n, NULL);
+                f->coverage[how][n][i] = fit(reference, how, n, NULL);
             if (how >= AS_RADIAL) f->convex[how][i] = fit(&hull, how, FOURIER_ORDER, NULL);
         }
         free(hull.points);
@@ -507,21 +508,22 @@ static void open_picture(draft *d, double width, double height, const char *titl
 }
 
 /* A grain with its fit in a square cell whose upper left corner is at (x, y), a caption below. */
-static void draw_cell(FILE *file, double x, double y, const outline *grain, const dem2d_vec *points,
-                      const char *caption) {
+static void draw_cell(FILE *file, double x, double y, const outline *reference,
+                      const dem2d_vec *points, const char *caption) {
     dem2d_box box = empty_box();
-    for (int i = 0; i < grain->count; i++) widen(&box, grain->points[i]);
+    for (int i = 0; i < reference->count; i++) widen(&box, reference->points[i]);
     for (int i = 0; i < FIT_POINTS; i++) widen(&box, points[i]);
     const double wide = box.upper.x - box.lower.x, high = box.upper.y - box.lower.y;
     frame f = {0, 0, (CELL - 12) / fmax(wide, high)};
     f.left = 0.5 * (box.lower.x + box.upper.x) - (x + 0.5 * CELL) / f.scale;
     f.top = 0.5 * (box.lower.y + box.upper.y) + (y + 0.5 * CELL) / f.scale;
-    svg_difference(file, &f, grain->points, grain->count, points, FIT_POINTS);
+    svg_difference(file, &f, reference->points, reference->count, points, FIT_POINTS);
     fprintf(file, "<text x=\"%.0f\" y=\"%.0f\" text-anchor=\"middle\">%s</text>\n", x + 0.5 * CELL,
             y + CELL + 12, caption);
 }
 
-/* Rows of fits with growing numbers: of the least convex grain, A, and the most convex one, B. */
+/* Rows of fits with growing numbers: of the least convex grain, A, and the most convex one, B.
+ */
 static void draw_evolution(const study *s, const fits *f, const char *file, const char *letter,
                            const int numbers[5], way first, way last) {
     const int ways = (int)last - (int)first + 1;
@@ -534,17 +536,17 @@ static void draw_evolution(const study *s, const fits *f, const char *file, cons
     draft d;
     open_picture(&d, 5 * CELL, 2 * ways * row + 6, "grains grey, fits blue, difference red");
     for (int k = 0; k < 2 * ways; k++) {
-        const outline *grain = &f->outlines.items[grains[k / ways]];
+        const outline *reference = &f->outlines.items[grains[k / ways]];
         const way how = (way)((int)first + k % ways);
         fprintf(d.file, "<text x=\"6\" y=\"%.0f\" font-weight=\"bold\">%c: %s</text>\n",
                 k * row + 16, "AB"[k / ways], way_texts[how]);
         for (int i = 0; i < 5; i++) {
             dem2d_vec points[FIT_POINTS];
             char caption[64];
-            const double coverage = fit(grain, how, numbers[i], points);
+            const double coverage = fit(reference, how, numbers[i], points);
             snprintf(caption, sizeof caption, "%s = %d: %.1f %%", letter, numbers[i],
                      100 * coverage);
-            draw_cell(d.file, i * CELL, k * row + LINE, grain, points, caption);
+            draw_cell(d.file, i * CELL, k * row + LINE, reference, points, caption);
         }
     }
     fputs("</svg>\n", d.file);
@@ -559,10 +561,11 @@ static void draw_chart(const study *s, const fits *f) {
     for (int i = 0; i < f->templates; i++) {
         dem2d_vec points[FIT_POINTS];
         char caption[64];
-        const outline *grain = &f->outlines.items[i];
+        const outline *reference = &f->outlines.items[i];
         snprintf(caption, sizeof caption, "%d: %.1f %%", i + 1,
-                 100 * fit(grain, AS_BEZIER, BEZIER_ARCS, points));
-        draw_cell(d.file, i % 4 * CELL, (double)(i / 4) * (CELL + CAPTION), grain, points, caption);
+                 100 * fit(reference, AS_BEZIER, BEZIER_ARCS, points));
+        draw_cell(d.file, i % 4 * CELL, (double)(i / 4) * (CELL + CAPTION), reference, points,
+                  caption);
     }
     fputs("</svg>\n", d.file);
     finish(s, &d, "shapes_chart.svg");
@@ -649,7 +652,7 @@ typedef struct course {
 } course;
 
 static course follow(const table *history, const char *name, int stage) {
-    course c = {0, NAN};
+    course c = {0, (double)NAN};
     for (int i = 0; i < history->rows; i++) {
         if (cell(history, i, "stage") != stage) continue;
         c.last = cell(history, i, name);
@@ -821,7 +824,7 @@ typedef struct tally {
 } tally;
 
 static double mean_calls(const tally *t) {
-    return t->pairs > 0 ? t->calls / t->pairs : NAN;
+    return t->pairs > 0 ? t->calls / t->pairs : (double)NAN;
 }
 
 /* Pairs of a set, of the runs with both dampings. */
@@ -1291,37 +1294,54 @@ static void report_runs(study *s) {
 
 /* ---- the models ---- */
 
-static void draw_models(const char *path) {
-    static const char *const captions[] = {"circle",           "ellipse",    "polygon",
-                                           "polygon, rounded", "polybezier", "Fourier series"};
-    static const char *const colours[] = {"#e8c468", "#8fb9d8", "#b9a3d6",
-                                          "#b9a3d6", "#94c99b", "#e59a83"};
+/* A custom support function: a stadium, a segment with a disc at each end. */
+static dem2d_vec stadium(void *user, dem2d_vec direction, double *rho) {
+    const dem2d_vec point = {0.5 * direction.x + (direction.x > 0 ? 0.5 : -0.5), 0.5 * direction.y};
+    (void)user;
+    if (rho != NULL) *rho = 0.5;
+    return point;
+}
+
+enum { MODELS = 7 };
+
+static void make_models(dem2d_shape *shapes[MODELS]) {
     const dem2d_vec corners[5] = {{-0.9, -0.5}, {0.2, -0.8}, {0.9, -0.1}, {0.5, 0.7}, {-0.6, 0.6}};
     dem2d_vec inner[5];
-    dem2d_shape *shapes[6];
     outline_list list = {NULL, 0};
+    dem2d_custom_desc custom = {0};
     const dem2d_env *env = example_env();
     for (int i = 0; i < 5; i++) {
         inner[i].x = 0.75 * corners[i].x;
         inner[i].y = 0.75 * corners[i].y;
     }
     for (int i = 0; i < SELF_MADE; i++) list_self_made(&list, i);
-    must(dem2d_shape_create_circle(env, 0.85, &shapes[0]), "circle");
+    custom.support = stadium;
+    custom.rho_min = custom.inscribed = 0.5;
+    must(dem2d_shape_create_circle(env, 1, &shapes[0]), "circle");
     must(dem2d_shape_create_ellipse(env, 1, 0.6, &shapes[1]), "ellipse");
     must(dem2d_shape_create_polygon(env, corners, 5, 0, &shapes[2]), "polygon");
-    must(dem2d_shape_create_polygon(env, inner, 5, 0.25, &shapes[3]), "polygon");
+    must(dem2d_shape_create_polygon(env, inner, 5, 0.25, &shapes[3]), "rounded polygon");
     shapes[4] = fitted_template(&list.items[2], DEM2D_BEZIER, BEZIER_ARCS);
     shapes[5] = fitted_template(&list.items[1], DEM2D_FOURIER, FOURIER_ORDER);
+    must(dem2d_shape_create_custom(env, &custom, &shapes[6]), "custom shape");
     free_outlines(&list);
+}
+
+static void draw_models(const char *path) {
+    static const char *const captions[MODELS] = {
+        "circle", "ellipse", "polygon", "rounded", "polybezier", "Fourier series", "custom"};
+    static const char *const colours[MODELS] = {"#e8c468", "#8fb9d8", "#b9a3d6", "#b9a3d6",
+                                                "#94c99b", "#e59a83", "#c9c9c9"};
+    dem2d_shape *shapes[MODELS];
     draft d;
-    open_picture(&d, 6 * CELL, CELL + CAPTION + 6, "the shape models");
-    for (int i = 0; i < 6; i++) {
+    make_models(shapes);
+    open_picture(&d, MODELS * CELL, CELL + CAPTION + 6, "the shape models");
+    for (int i = 0; i < MODELS; i++) {
         dem2d_vec points[60];
         dem2d_shape_info info;
         must(dem2d_shape_get(shapes[i], &info), "shape");
-        const double scale = 0.85 / info.equivalent; // all of one area
-        must(dem2d_shape_outline(shapes[i], dem2d_pose_make(0, 0, 0, scale), 60, points),
-             "outline");
+        const dem2d_pose pose = dem2d_pose_make(0, 0, 0, 0.85 / info.equivalent); // of one area
+        must(dem2d_shape_outline(shapes[i], pose, 60, points), "outline");
         const frame f = {-(i + 0.5) * CELL / 50, 0.5 * CELL / 50, 50};
         fprintf(d.file, "<path fill=\"%s\" stroke=\"#333\" d=\"", colours[i]);
         svg_path(d.file, &f, points, 60);
