@@ -221,7 +221,7 @@ static inline void progress_end(progress *p) {
     p->dirty = false;
 }
 
-/* ---- random numbers, logarithm ---- */
+/* ---- random numbers ---- */
 
 /* 64 random bits (splitmix64): a counter stepped by 2^64 / golden ratio, then mixed. */
 static inline uint64_t random_bits(uint64_t *state) {
@@ -240,18 +240,6 @@ static inline double random_between(uint64_t *state, double low, double high) {
 /* Uniform in 0 .. count - 1. */
 static inline int random_below(uint64_t *state, int count) {
     return (int)(random_bits(state) % (uint64_t)count);
-}
-
-/* Natural logarithm of x > 0 near 1: ln x = 2 (z + z^3/3 + z^5/5 + ...), z = (x - 1)/(x + 1).
-   Not libm's, whose last bit depends on the system. */
-static inline double log_near_one(double x) {
-    const double z = (x - 1) / (x + 1);
-    double power = z, sum = z;
-    for (int n = 3; n < 400 && fabs(power) > 1e-18 * fabs(sum); n += 2) {
-        power *= z * z;
-        sum += power / n;
-    }
-    return 2 * sum;
 }
 
 /* ---- files: names, directories, writing aside ---- */
@@ -1075,7 +1063,7 @@ static inline void take_fall(dem2d_world *world, const fall *f, const char *stag
 static inline dem2d_world *run_fall(const fall *f, dem2d_parallel_fn *parallel_for, void *user,
                                     double *seconds) {
     dem2d_world_desc scene = {0};
-    dem2d_material_desc stone = {2700, 1e7, 1e7, 0.4}; // kg/m2, N/m, N/m, friction
+    dem2d_material_desc stone = {2700, 1e7, 1e7, 0.4, 0, 0}; // kg/m2, N/m, N/m, friction
     dem2d_material_id material;
     dem2d_world *world;
     const double pitch = 0.05; // m
