@@ -38,6 +38,8 @@ static const char usage[] =
     "                    packed and final state; made if its parent exists (out)\n"
     "  --pairs           also pairs.csv: support calls and residuals of GJK and EPA for all near\n"
     "                    pairs of the settled state\n"
+    "  --ledger          keep the ledger of energies: its columns in history.csv, and a check\n"
+    "                    that it closes\n"
     "  --vtk             also particles.pvd and contacts.pvd with 40 frames in vtk/, for ParaView\n"
     "  --quick           a small, hasty run of 8000 steps with wider bands for the checks\n"
     "  --help            this text\n"
@@ -54,7 +56,7 @@ typedef struct options {
     uint64_t seed;
     bool kinds[KINDS];
     bool global_damping;
-    bool quick, pairs, vtk;
+    bool quick, pairs, vtk, ledger;
     int solver, faces;  // dem2d_solver, dem2d_face_rule
     const char *grains; // or NULL
     const char *out;
@@ -67,13 +69,13 @@ static options parse_options(int count, char **arguments) {
     parse_shapes("mixed", o.kinds);
     static const char *const names[] = {
         "--quick", "--particles=", "--seed=",  "--shapes=", "--damping=", "--grains=",
-        "--out=",  "--solver=",    "--faces=", "--pairs",   "--vtk"};
+        "--out=",  "--solver=",    "--faces=", "--pairs",   "--vtk",      "--ledger"};
     static const char *const dampings[] = {"local", "global"};
     static const char *const solvers[] = {"certified", "gjk"};
     static const char *const rules[] = {"two", "one", "area"};
     for (int i = 1; i < count; i++) {
         const char *name = arguments[i], *value;
-        const int which = parse_option(count, arguments, &i, usage, names, 11, &value);
+        const int which = parse_option(count, arguments, &i, usage, names, 12, &value);
         if (which == 0) o.quick = true;
         if (which == 1) o.particles = (int)parse_integer(name, value, 10, 1000000);
         if (which == 2) o.seed = parse_integer(name, value, 0, UINT64_MAX);
@@ -85,6 +87,7 @@ static options parse_options(int count, char **arguments) {
         if (which == 8) o.faces = parse_name(name, value, rules, 3);
         if (which == 9) o.pairs = true;
         if (which == 10) o.vtk = true;
+        if (which == 11) o.ledger = true;
     }
     if (o.particles == 0) o.particles = o.quick ? 100 : 500;
     return o;
@@ -472,6 +475,7 @@ static void build_world(job *j, const options *o) {
     scene.particle_capacity = j->plan.particles;
     scene.solver = (dem2d_solver)o->solver;
     scene.faces = (dem2d_face_rule)o->faces;
+    scene.ledger = o->ledger;
     scene.env = example_env();
     must(dem2d_world_create(&scene, &j->world), "world");
     dem2d_material_desc stone = {0};
@@ -684,6 +688,14 @@ static bool print_figures(const figure *figures, int count, bool quick) {
     return good;
 }
 
+/* Error of the ledger over the energy that gravity, walls and the start put in; 0 without one. */
+static double ledger_closure(const job *j) {
+    dem2d_ledger l;
+    if (!j->options->ledger) return 0;
+    must(dem2d_world_ledger(j->world, &l), "ledger");
+    return l.closure / (fabs(l.gravity) + fabs(l.walls) + fabs(l.given));
+}
+
 /* Prints the figures and returns whether each lies in its band. The plateau: the mean stress ratio
    of the last fifth of the compression over the peak; a ratio that falls back or never stops
    jumping is below the band. It rises because it is about 0 at the end of consolidation. */
@@ -748,6 +760,7 @@ static bool report(const job *j, const options *o, double strain) {
         {"proved_by_polytope_percent", share(&stats, DEM2D_BY_POLYTOPE), "%", FINITE, FINITE},
         {"contacts_not_converged", (double)stats.not_converged, "-", {0, 0}, {0, 0}},
         {"rows_not_finite", j->bad_rows, "-", {0, 0}, {0, 0}},
+        {"ledger_closure", ledger_closure(j), "-", {-1e-3, 1e-3}, {-1e-3, 1e-3}},
     };
     return print_figures(figures, (int)(sizeof figures / sizeof figures[0]), o->quick);
 }

@@ -661,6 +661,17 @@ static course follow(const table *history, const char *name, int stage) {
     return c;
 }
 
+static const char *with_damping(int damping) {
+    return damping == LOCAL ? "local damping" : "global damping";
+}
+
+/* A claim with the damping at its end; lives until the next call. */
+static const char *claim(const char *text, int damping) {
+    static char whole[300];
+    snprintf(whole, sizeof whole, "%s (%s)", text, with_damping(damping));
+    return whole;
+}
+
 static void report_packing(study *s) {
     page *p = &s->page;
     open_figure(p, "Random packing: noncircular, circular, all five models (P fig. 10, F fig. 6a)",
@@ -690,6 +701,21 @@ static void report_packing(study *s) {
                   : "F: the same with global damping",
               "%.2g %% and %.2g %%", 100 * speed, 100 * ratio);
     }
+    close_figure(p);
+}
+
+/* What the ledger of each run is off by, of the energy put in. */
+static void report_energy(study *s) {
+    page *p = &s->page;
+    open_figure(p, "Where the energy went (not in the papers)", "energy.svg");
+    for (int set = 0; set < SETS; set++)
+        for (int d = 0; d < DAMPINGS; d++) {
+            const double closure = result(s, set, d, "ledger_closure");
+            char text[100];
+            snprintf(text, sizeof text, "the ledger of energies closes to 1e-3, %s",
+                     set_names[set]);
+            check(p, fabs(closure) <= 1e-3, claim(text, d), "%.2g of the energy put in", closure);
+        }
     close_figure(p);
 }
 
@@ -1085,17 +1111,6 @@ static double strength(const study *s, int set, int damping) {
     return mean_between(&s->runs[set][damping].history, "stress_ratio", end / 2, 2 * end);
 }
 
-static const char *with_damping(int damping) {
-    return damping == LOCAL ? "local damping" : "global damping";
-}
-
-/* A claim with the damping at its end; lives until the next call. */
-static const char *claim(const char *text, int damping) {
-    static char whole[300];
-    snprintf(whole, sizeof whole, "%s (%s)", text, with_damping(damping));
-    return whole;
-}
-
 static void report_chains(study *s) {
     page *p = &s->page;
     open_figure(p, "Force chains after compression: noncircular, circular, all (P fig. 16)",
@@ -1372,6 +1387,7 @@ int main(int count, char **arguments) {
     draft_open(&s->page.failures);
     study_shapes(s);
     report_packing(s);
+    report_energy(s);
     report_alignment(s);
     report_coordination(s);
     report_gjk(s);

@@ -50,18 +50,36 @@ set title "full: local damping, dashed: global damping" font ",15"
 set format y "10^{%L}"
 set output "p11_speed.svg"
 set ylabel "mean speed, m/s"
-plot for [i=1:3] names[i]."_local/history.csv" using ($18 == 0 ? column("time") : NaN):"mean_speed" \
+plot for [i=1:3] names[i]."_local/history.csv" using (column("stage") == 0 ? column("time") : NaN):"mean_speed" \
          with lines linecolor rgb colours[i] title names[i], \
-     for [i=1:3] names[i]."_global/history.csv" using ($18 == 0 ? column("time") : NaN):"mean_speed" \
+     for [i=1:3] names[i]."_global/history.csv" using (column("stage") == 0 ? column("time") : NaN):"mean_speed" \
          with lines dashtype 2 linecolor rgb colours[i] notitle
 set output "p11_kinetic.svg"
 set ylabel "kinetic energy / energy in contacts"
-plot for [i=1:3] names[i]."_local/history.csv" using ($18 == 0 ? column("time") : NaN):"kinetic_ratio" \
+plot for [i=1:3] names[i]."_local/history.csv" using (column("stage") == 0 ? column("time") : NaN):"kinetic_ratio" \
          with lines linecolor rgb colours[i] title names[i], \
-     for [i=1:3] names[i]."_global/history.csv" using ($18 == 0 ? column("time") : NaN):"kinetic_ratio" \
+     for [i=1:3] names[i]."_global/history.csv" using (column("stage") == 0 ? column("time") : NaN):"kinetic_ratio" \
          with lines dashtype 2 linecolor rgb colours[i] notitle
 unset logscale y
 set format y
+unset title
+
+# ---- energy: full lines noncircular, dashed ones circular grains, local damping ----
+
+set output "energy.svg"
+set ylabel "energy, kJ/m"
+set title "full: noncircular, dashed: circular (local damping)" font ",15"
+array runs[2] = ["noncircular_local/history.csv", "circular_local/history.csv"]
+array dashes[2] = [1, 2]
+kilo(name) = column("ledger_".name) / 1000
+plot for [i=1:2] runs[i] using "time":(kilo("gravity") + kilo("walls") + kilo("given")) with lines \
+         linewidth 2 dashtype dashes[i] linecolor "#222222" title i == 1 ? "put in" : "", \
+     for [i=1:2] runs[i] using "time":(kilo("damping")) with lines dashtype dashes[i] \
+         linecolor "#1f5fbf" title i == 1 ? "damping" : "", \
+     for [i=1:2] runs[i] using "time":(kilo("friction")) with lines dashtype dashes[i] \
+         linecolor "#c8382c" title i == 1 ? "friction" : "", \
+     for [i=1:2] runs[i] using "time":(kilo("kinetic") + kilo("normal") + kilo("tangential")) \
+         with lines dashtype dashes[i] linecolor "#3a8f4d" title i == 1 ? "stored" : ""
 unset title
 
 # ---- histograms ----
@@ -125,19 +143,19 @@ set title "full: local damping, dashed: global damping" font ",15"
 set output "p17_ratio.svg"
 set ylabel "stress ratio q/p"
 plot for [i=1:3] names[i]."_local/history.csv" \
-         using (100 * column("axial_strain")):($18 == 2 ? column("stress_ratio") : NaN) \
+         using (100 * column("axial_strain")):(column("stage") == 2 ? column("stress_ratio") : NaN) \
          with lines linecolor rgb colours[i] title names[i], \
      for [i=1:3] names[i]."_global/history.csv" \
-         using (100 * column("axial_strain")):($18 == 2 ? column("stress_ratio") : NaN) \
+         using (100 * column("axial_strain")):(column("stage") == 2 ? column("stress_ratio") : NaN) \
          with lines dashtype 2 linecolor rgb colours[i] notitle
 set yrange [*:*]
 set output "p17_volume.svg"
 set ylabel "volumetric strain (compression > 0), %"
 plot for [i=1:3] names[i]."_local/history.csv" \
-         using (100 * column("axial_strain")):($18 == 2 ? 100 * column("volumetric_strain") : NaN) \
+         using (100 * column("axial_strain")):(column("stage") == 2 ? 100 * column("volumetric_strain") : NaN) \
          with lines linecolor rgb colours[i] title names[i], \
      for [i=1:3] names[i]."_global/history.csv" \
-         using (100 * column("axial_strain")):($18 == 2 ? 100 * column("volumetric_strain") : NaN) \
+         using (100 * column("axial_strain")):(column("stage") == 2 ? 100 * column("volumetric_strain") : NaN) \
          with lines dashtype 2 linecolor rgb colours[i] notitle
 
 set title "full: axial, dashed: lateral" font ",15"
@@ -148,10 +166,10 @@ set xlabel "time, s"
 set ylabel "stress, kPa"
 set arrow 1 from graph 0, first 100 to graph 1, first 100 nohead dashtype 3 linecolor "#444444"
 plot for [i=1:3] names[i]."_local/history.csv" \
-         using ($18 > 0 ? column("time") : NaN):(column("axial_stress") / 1000) \
+         using (column("stage") > 0 ? column("time") : NaN):(column("axial_stress") / 1000) \
          with lines linecolor rgb colours[i] title names[i], \
      for [i=1:3] names[i]."_local/history.csv" \
-         using ($18 > 0 ? column("time") : NaN):(column("lateral_stress") / 1000) \
+         using (column("stage") > 0 ? column("time") : NaN):(column("lateral_stress") / 1000) \
          with lines dashtype 2 linecolor rgb colours[i] notitle
 unset arrow 1
 unset title
