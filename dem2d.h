@@ -180,7 +180,9 @@ CONCEPTS
                 before the last move. Kinetic energy is the mean of the two half steps around it.
     Damping     local (Cundall): each force component reduced by alpha |F| sign(v).
                 global viscous: v <- ((1 - xi dt/2) v + dt F/m) / (1 + xi dt/2).
-    Stress      Compression positive.
+    Stress      Compression positive, strains too.
+    Measures    Queries and writers tell of the last force pass and change nothing; asked for
+                between any two steps, the run goes on to the same bits.
 
 HOW TO
     make a shape         dem2d_shape_create_*; give it to a world with dem2d_world_add_shape

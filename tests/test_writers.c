@@ -245,6 +245,21 @@ static void test_failing_paths(void **state) {
     assert_clean(&env);
 }
 
+/* A write that fails is told of even if the file can be closed. */
+static void test_failing_write(void **state) {
+    (void)state;
+    const char *const path = "build/test_writers.read";
+    FILE *file = fopen(path, "wb");
+    assert_non_null(file);
+    assert_int_equal(fclose(file), 0);
+    dem2di_writer writer = {NULL, NULL, fopen(path, "rb"), true};
+    assert_non_null(writer.file);
+    dem2di_put(&writer, "a");
+    assert_false(writer.good);
+    assert_result(dem2di_writer_close(NULL, path, &writer), DEM2D_IO);
+    assert_int_equal(remove(path), 0);
+}
+
 /* A file's bytes, with an end. */
 static char *read_file(const char *path) {
     static char text[SINK_ROOM];
@@ -400,8 +415,10 @@ static void test_scale_bar(void **state) {
         make_scene(&s, NULL);
         grain.scale = sizes[i], grain.shape = s.shapes[0], grain.material = s.materials[0];
         assert_ok(dem2d_world_add_particle(s.world, &grain, &id));
+        const dem2d_wall_id gone = add_wall(&s, vec(0, 0), vec(1, 0));
         (void)add_wall(&s, vec(0, 0), vec(1, 2));             /* a line from border to border */
         (void)add_wall(&s, vec(0, -2 * sizes[i]), vec(0, 1)); /* below the picture */
+        assert_ok(dem2d_world_remove_wall(s.world, gone));
         const char *text = text_of(put_svg, s.world), *bar = strstr(text, "<g stroke=\"#222\"");
         assert_non_null(strstr(text, labels[i]));
         assert_non_null(bar);
@@ -755,6 +772,7 @@ static void test_vtp_walls(void **state) {
     grain.scale = 1, grain.shape = s.shapes[0], grain.material = s.materials[0];
     grain.motion = DEM2D_DRIVEN;
     assert_ok(dem2d_world_add_particle(s.world, &grain, &id));
+    const dem2d_wall_id gone = add_wall(&s, vec(0, 0), vec(1, 0)); /* leaves a gap among the ids */
     for (int i = 0; i < 4; i++)
         s.walls[i] = add_wall(&s, vec(at[i][0], at[i][1]), vec(at[i][2], at[i][3]));
     dem2d_wall_desc moving = {0};
@@ -762,6 +780,7 @@ static void test_vtp_walls(void **state) {
     moving.point = vec(0, 3), moving.velocity = vec(0.5, -2);
     dem2d_wall_id last;
     assert_ok(dem2d_world_add_wall(s.world, &moving, &last));
+    assert_ok(dem2d_world_remove_wall(s.world, gone));
     step(&s, 1);
     const char *text = text_of(put_walls, s.world);
     for (int i = 0; i < 4; i++) {
@@ -938,6 +957,7 @@ int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(test_failing_callbacks),
         cmocka_unit_test(test_failing_paths),
+        cmocka_unit_test(test_failing_write),
         cmocka_unit_test(test_files),
         cmocka_unit_test(test_null_arguments),
         cmocka_unit_test(test_output_changes_nothing),
