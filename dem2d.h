@@ -395,12 +395,21 @@ MEMORY
     each pair that is listed. Particles are now and then
     sorted in memory by their place in space; ids, orders and results do not change by it.
 
+SNAPSHOTS
+    dem2d_world_save writes all that later steps and queries depend on, the list of pairs and the
+    order in memory too; dem2d_world_load goes on to the same bits, on whatever machine and with
+    whatever threads. Not in it: capacities, the environment, parallel_for. Support functions are
+    found by the tags of custom shapes. A file of another version is refused, not converted: keep
+    the header that wrote it. Damage is found by a checksum before anything is made of the bytes,
+    and all numbers have to be in their ranges; that is no protection from forgery.
+
 DETERMINISM
     Same input, same bits: on gcc and clang, C and C++, -O0 to -O3, with or without FMA hardware
     (contraction is off inside this header). Steps use only + - * / and sqrt; sine, cosine and
     arctangent are the header's own. A pair is (lower id, higher id) and forces are summed in the
     order of the partner's id, so neither addresses nor storage order can change a bit. Not
-    covered: clang -ffp-contract=fast on the command line, and 80-bit x87 arithmetic.
+    covered: clang -ffp-contract=fast on the command line, and 80-bit x87 arithmetic. Whether two
+    runs are the same is told by dem2d_world_hash.
     gcc does not inline across the header's floating-point region: calls into it stay calls.
 ================================================================================================
 */
