@@ -70,6 +70,8 @@ LIMITS
     * Doubles only. At most 2^30 particles, and as many listed contacts. Sizes and coordinates are
       best within 1e-60 to 1e60.
     * Rotations of a step are right to angle^5/120: a particle should not turn by more than 0.01.
+    * One that moves or turns by more than its inscribed radius in a step may pass through others.
+      That is looked for when the list of pairs is renewed: dem2d_stats.fast_motion, one message.
     * A custom support function that is not convex can't be detected; contacts are then wrong.
     * Two points carry a contact of faces. A box on a wall then conserves its energy; between two
       free polygons, where the reference edge changes, no rule of points does exactly.
@@ -1162,6 +1164,7 @@ typedef struct dem2d_stats {
     int64_t proofs[DEM2D_PROOF_COUNT]; ///< of the other looks, by what proves them
     int64_t not_converged;             ///< contacts whose search reached its cap, in all steps
     int64_t slow_time_step;            ///< checks that found the time step above the safe bound
+    int64_t fast_motion;               ///< lists that found a particle fast enough to pass others
     int particles;                     ///< alive
     int walls;                         ///< alive
     int pairs;                         ///< in the list, walls included
@@ -8262,6 +8265,7 @@ typedef struct dem2di_tally {
     dem2di_count count;
     dem2di_stiffest stiffest;
     double most;    /* greatest reach of the discs; greatest square of speed over skin */
+    int fast;       /* slot of the one of least id that may pass through others, or -1 */
     int64_t spread; /* sum of the distances in memory of the partners found */
 } dem2di_tally;
 
@@ -8340,7 +8344,7 @@ struct dem2d_world {
     double rounding; /* m, of a position */
     bool bounded;    /* no state can become infinite while the list lasts */
     double spread;   /* mean distance in memory of two partners when last sorted */
-    int64_t steps, rebuilds, slow_time_step, listed_at;
+    int64_t steps, rebuilds, slow_time_step, fast_motion, listed_at;
     dem2di_count count;
     dem2di_plan plan;
     dem2di_ledger ledger;
@@ -9876,11 +9880,28 @@ static double dem2di_skin_make(const dem2d_world *world, int slot) {
     return skin;
 }
 
+/* Does it move by more than its inscribed radius in a step? Two of which neither does come to
+   overlap before one's centre has passed the other's. */
+static bool dem2di_outruns(const dem2d_world *world, int slot) {
+    const dem2di_state *now = &world->now[slot];
+    const dem2d_shape *shape = dem2di_shape_of(world, &world->bodies[slot]);
+    double speed = dem2di_length(now->v), inner = shape->inscribed;
+    if (!(inner > 0)) inner = shape->circumscribed; /* of a custom one it may be unknown */
+    if (shape->type != DEM2D_CIRCLE) speed += fabs(now->w) * now->radius;
+    return speed * world->time_step > inner * world->bodies[slot].scale;
+}
+
+/* The one of lower id of two slots; -1 is none. */
+static int dem2di_first_of(const dem2d_world *world, int one, int other) {
+    if (one < 0 || other < 0) return one < 0 ? other : one;
+    return world->bodies[one].index < world->bodies[other].index ? one : other;
+}
+
 static void dem2di_disc_task(void *context, int begin, int end) {
     dem2di_build *build = (dem2di_build *)context;
     dem2d_world *world = build->world;
     for (int block = begin; block < end; block++) {
-        int first = block * DEM2DI_BLOCK;
+        int first = block * DEM2DI_BLOCK, fast = -1;
         double largest = 0;
         for (int i = first; i < dem2di_block_end(first, DEM2DI_BLOCK, world->body_count); i++) {
             const dem2di_body *body = &world->bodies[i];
@@ -9894,8 +9915,10 @@ static void dem2di_disc_task(void *context, int begin, int end) {
             disc->round = dem2di_shape_of(world, body)->type == DEM2D_CIRCLE &&
                           world->faces != DEM2D_CONTACT_AREA && !build->plan.full;
             largest = dem2di_max(largest, disc->reach);
+            if (dem2di_outruns(world, i)) fast = dem2di_first_of(world, fast, i);
         }
         world->tallies[block].most = largest;
+        world->tallies[block].fast = fast;
     }
 }
 
@@ -11506,6 +11529,20 @@ static dem2d_result dem2di_check_step(dem2d_world *world, bool *slow) {
     return DEM2D_OK;
 }
 
+/* Did the list that was just renewed find a particle that may pass through others? The first time
+   the log is told. */
+static bool dem2di_check_motions(const dem2d_world *world) {
+    int fast = -1;
+    for (int k = 0; k < dem2di_blocks(world->body_count, DEM2DI_BLOCK); k++)
+        fast = dem2di_first_of(world, fast, world->tallies[k].fast);
+    if (fast >= 0 && world->fast_motion == 0)
+        (void)dem2di_fail(&world->env, DEM2D_OK, world->bodies[fast].index,
+                          "particle %d moves by more than its inscribed radius in a step: it may "
+                          "pass through others",
+                          world->bodies[fast].index);
+    return fast >= 0;
+}
+
 DEM2D_API dem2d_result dem2d_world_time_step_bounds(const dem2d_world *world, double *safe,
                                                     double *limit,
                                                     dem2d_particle_id *limit_particle) {
@@ -11552,10 +11589,11 @@ static void dem2di_use_laws(dem2d_world *world) {
    the states of the last force pass: a failure only has to return. */
 static dem2d_result dem2di_step(dem2d_world *world) {
     dem2di_count count = world->count;
-    bool slow = false, listed = world->list_stale;
+    bool slow = false, fast = false, listed = world->list_stale;
     if (listed) {
         dem2d_result result = dem2di_build_list(world);
         if (result != DEM2D_OK) return result;
+        fast = dem2di_check_motions(world);
     }
     world->list_stale = listed; /* should the step fail, the next try begins with a list as well */
     dem2di_contact_pass(world, &count);
@@ -11586,6 +11624,7 @@ static dem2d_result dem2di_step(dem2d_world *world) {
     world->rebuilds += listed;
     world->count = count;
     world->slow_time_step += slow;
+    world->fast_motion += fast;
     dem2di_commit(world);
     return DEM2D_OK;
 }
@@ -11661,6 +11700,7 @@ DEM2D_API dem2d_result dem2d_world_stats(const dem2d_world *world, dem2d_stats *
     memcpy(stats->proofs, world->count.proofs, sizeof stats->proofs);
     stats->not_converged = world->count.proofs[DEM2D_BY_NOTHING];
     stats->slow_time_step = world->slow_time_step;
+    stats->fast_motion = world->fast_motion;
     stats->particles = world->body_count - world->holes;
     stats->walls = 0;
     for (int j = 0; j < world->wall_count; j++) stats->walls += world->walls[j].alive;

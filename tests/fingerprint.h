@@ -150,6 +150,7 @@ TEST_HELPER void fingerprint_stats(fingerprint *f, const dem2d_world *world) {
                               (double)s.not_converged,
                               s.particles,
                               (double)s.slow_time_step,
+                              (double)s.fast_motion,
                               s.walls,
                               s.pairs,
                               s.contacts,

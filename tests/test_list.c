@@ -348,6 +348,111 @@ static void test_deep_lever(void **state) {
     }
 }
 
+/* --- particles that outrun the steps ------------------------------------------------------------
+ */
+
+static dem2d_stats stats_of(const dem2d_world *world) {
+    dem2d_stats stats;
+    assert_ok(dem2d_world_stats(world, &stats));
+    return stats;
+}
+
+/* A particle that moves or spins by `part` of its inscribed radius in a step, among two at rest. */
+static void check_fast(int shape, bool spins, double part, bool found) {
+    test_env env;
+    test_env_init(&env);
+    dem2d_world_desc desc = quiet_desc();
+    desc.env = &env.env;
+    const scene s = open_scene(&desc, 1e5, 0);
+    dem2d_shape_info info;
+    assert_ok(dem2d_shape_get(dem2d_world_shape(s.world, s.shapes[shape]), &info));
+    add(&s, 0, 1, -100, 0, 0);
+    const dem2d_particle_id id = add(&s, shape, 3, 0, 0, 0);
+    add(&s, 1, 1, 100, 0, 0);
+    const double path = part * 3 * info.inscribed / desc.time_step;
+    const dem2d_vec v = {0, spins ? 0 : -path};
+    const double w = spins ? path / (3 * info.circumscribed) : 0;
+    assert_ok(dem2d_world_drive_particle(s.world, id, DEM2D_FREE, v, w));
+    assert_int_equal(stats_of(s.world).fast_motion, 0);
+    assert_ok(dem2d_world_step(s.world, 1, NULL)); /* before it has moved */
+    assert_int_equal(stats_of(s.world).fast_motion, found);
+    assert_ok(dem2d_world_step(s.world, 20, NULL));
+    const dem2d_stats n = stats_of(s.world);
+    if (found) {
+        assert_int_equal(env.log.count, 1);
+        assert_logged(&env, DEM2D_OK, (int)id.index, "inscribed");
+        assert_int_equal(n.fast_motion, n.list_rebuilds);
+    } else {
+        assert_int_equal(env.log.count, 0);
+        assert_int_equal(n.fast_motion, 0);
+    }
+    dem2d_world_destroy(s.world);
+    assert_clean(&env);
+}
+
+static void test_fast(void **state) {
+    (void)state;
+    for (int shape = 0; shape < 3; shape++) {
+        check_fast(shape, false, 0.99, false);
+        check_fast(shape, false, 1.01, true);
+        if (shape > 0) check_fast(shape, true, 0.99, false);
+        check_fast(shape, true, 1.01, shape > 0); /* the spin of a circle is no motion */
+    }
+}
+
+/* One that falls faster and faster is found before it is through another, whatever the skin. */
+static void test_falls_fast(void **state) {
+    (void)state;
+    for (int k = 0; k < 3; k++) {
+        dem2d_world_desc desc = quiet_desc();
+        desc.gravity.y = -1e7, desc.skin = k;
+        const scene s = open_scene(&desc, 1e-3, 0);
+        dem2d_particle_info info;
+        const dem2d_particle_id id = add(&s, 0, 1, 0, 0, 0);
+        int steps = 0, slow = 0;
+        for (; stats_of(s.world).fast_motion == 0; steps++) {
+            assert_true(steps < 100);
+            assert_ok(dem2d_world_step(s.world, 1, NULL));
+            assert_ok(dem2d_world_get_particle(s.world, id, &info));
+            slow += -info.velocity.y * desc.time_step <= 1;
+        }
+        assert_true(slow >= 9); /* 1e3 m/s in each: 10 steps to a radius of 1 in a step */
+        assert_true(steps - slow <= 1 + k + 1); /* and the steps that a list then lasts */
+        dem2d_world_destroy(s.world);
+    }
+}
+
+static dem2d_vec unknown_inside(void *user, dem2d_vec u, double *rho) {
+    (void)user;
+    if (rho) *rho = 1;
+    return u;
+}
+
+/* Of a custom shape that does not say what is inside, the bounding circle counts. */
+static void test_fast_custom(void **state) {
+    (void)state;
+    for (int found = 0; found < 2; found++) {
+        const dem2d_world_desc desc = quiet_desc();
+        const scene s = open_scene(&desc, 1e5, 0);
+        dem2d_particle_desc grain = {0};
+        dem2d_particle_id id;
+        dem2d_shape_info info;
+        dem2d_shape *shape;
+        dem2d_custom_desc custom = {0};
+        custom.support = unknown_inside;
+        assert_ok(dem2d_shape_create_custom(NULL, &custom, &shape));
+        assert_ok(dem2d_shape_get(shape, &info));
+        assert_ok(dem2d_world_add_shape(s.world, shape, &grain.shape));
+        dem2d_shape_destroy(shape);
+        grain.scale = 1, grain.material = s.material;
+        grain.velocity.x = (found ? 1.01 : 0.99) * info.circumscribed / desc.time_step;
+        assert_ok(dem2d_world_add_particle(s.world, &grain, &id));
+        assert_ok(dem2d_world_step(s.world, 1, NULL));
+        assert_int_equal(stats_of(s.world).fast_motion, found);
+        dem2d_world_destroy(s.world);
+    }
+}
+
 int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(test_clouds),        cmocka_unit_test(test_far_crawl),
@@ -355,6 +460,8 @@ int main(void) {
         cmocka_unit_test(test_same_bits),     cmocka_unit_test(test_refused_law),
         cmocka_unit_test(test_refused_state), cmocka_unit_test(test_rotations),
         cmocka_unit_test(test_angles),        cmocka_unit_test(test_deep_lever),
+        cmocka_unit_test(test_fast),          cmocka_unit_test(test_falls_fast),
+        cmocka_unit_test(test_fast_custom),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }
