@@ -315,7 +315,7 @@ OPTIONS (zero means: physical zero for physical fields; "library default" where 
     dem2d_wall_desc         point                 m      0          finite
     dem2d_wall_desc         normal                -      none       not zero; normalised
     dem2d_wall_desc         segment               -      false      not with CONTACT_AREA
-    dem2d_wall_desc         end                   m      0          not the point, for a segment
+    dem2d_wall_desc         end                   m      0          finite, of segments not point
     dem2d_wall_desc         velocity              m/s    0          finite; MOVING only
     dem2d_wall_desc         stress                Pa     0          finite; SERVO only
     dem2d_wall_desc         max_speed             m/s    none       > 0 for SERVO
@@ -9267,8 +9267,6 @@ static dem2d_result dem2di_check_spans(const dem2d_world *world, const dem2d_wal
 
 static dem2d_result dem2di_check_segment(const dem2d_world *world, const dem2d_wall_desc *desc) {
     const dem2d_env *env = &world->env;
-    dem2d_result result = dem2di_check_vec(env, "end", desc->end);
-    if (result != DEM2D_OK) return result;
     if (world->faces == DEM2D_CONTACT_AREA)
         return dem2di_fail(env, DEM2D_OUT_OF_RANGE, -1, "segment: not with the contact-area rule");
     double length = dem2di_length(dem2di_sub(desc->end, desc->point));
@@ -9283,6 +9281,7 @@ static dem2d_result dem2di_check_wall(const dem2d_world *world, const dem2d_wall
         return dem2di_stale(world, "material", desc->material.index);
     dem2d_result result = dem2di_check_vec(env, "point", desc->point);
     if (result == DEM2D_OK) result = dem2di_check_vec(env, "normal", desc->normal);
+    if (result == DEM2D_OK) result = dem2di_check_vec(env, "end", desc->end);
     if (result == DEM2D_OK) result = dem2di_check_vec(env, "velocity", desc->velocity);
     if (result == DEM2D_OK) result = dem2di_check_finite(env, "stress", desc->stress);
     if (result == DEM2D_OK) result = dem2di_check_not_negative(env, "max_speed", desc->max_speed);

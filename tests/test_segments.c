@@ -275,6 +275,9 @@ static void test_moves(void **state) {
     assert_result(dem2d_world_set_wall(world, floor_id, &moving), DEM2D_OUT_OF_RANGE);
     moving.end.x = (double)NAN;
     assert_result(dem2d_world_set_wall(world, floor_id, &moving), DEM2D_NOT_FINITE);
+    moving.segment = false, moving.normal = vec(0, 1); /* it would be saved with the wall */
+    assert_result(dem2d_world_set_wall(world, floor_id, &moving), DEM2D_NOT_FINITE);
+    moving.segment = true;
     assert_ok(dem2d_world_remove_wall(world, lid_id));
     assert_ok(dem2d_world_step(world, 10, NULL));
     dem2d_world_destroy(world);
