@@ -12844,8 +12844,9 @@ static void dem2di_archive_callers_law(dem2di_archive *ar, dem2d_world *w) {
     if (!dem2di_archive_loaded(ar) || !has) return;
     const dem2d_load_desc *load = ar->load;
     if (load->law == NULL || load->law_tag != w->law_tag) {
-        ar->result =
-            dem2di_fail(ar->env, DEM2D_NULL_ARGUMENT, -1, "law: none given for tag %d", w->law_tag);
+        const char *which = load->law == NULL ? "law: none is given" : "law_tag is another";
+        ar->result = dem2di_fail(ar->env, DEM2D_NULL_ARGUMENT, -1, "%s: the world's has tag %d",
+                                 which, w->law_tag);
         return;
     }
     w->law = load->law;
