@@ -16,6 +16,7 @@ typedef enum kind {
     POSITIVE,     /* a finite double above 0 */
     NOT_NEGATIVE, /* a finite double, at least 0 */
     FRACTION,     /* in [0, 1) */
+    PORTION,      /* in (0, 1] */
     INSIDE,       /* 0 or inside (0, 1) */
     ANGLE,        /* at most 2^30 */
     SIZE,         /* above 0 and with a mass; 0 is ZERO_AREA */
@@ -23,6 +24,8 @@ typedef enum kind {
     UNREAD,       /* a double of any value, NaN too */
     VECTOR,       /* finite */
     DIRECTION,    /* finite, not 0 */
+    UPPER,        /* finite, above the box's lower corner */
+    ELSEWHERE,    /* finite, not the wall's point */
     POSE,         /* finite, rotation not 0, scale above 0 */
     INTEGER,      /* from low to high, else `result` */
     INTEGER_OR_0, /* 0, or from low to high, else `result` */
@@ -32,7 +35,10 @@ typedef enum kind {
     PARTICLE_ID,
     WALL_ID,
     SPAN_ID,     /* of a wall; generation 0 in both: none */
+    FILE_NAME,   /* not NULL, no control bytes */
+    COLUMN,      /* not NULL, no comma, quote or line end */
     ANY_POINTER, /* nothing is wrong with any value of these */
+    ANY_INT,
     ANY_BOOL,
     ANY_SEED
 } kind;
@@ -59,6 +65,7 @@ typedef struct desc_table {
     { #field, offsetof(dem2d_##type, field), kind, DEM2D_OUT_OF_RANGE, low, high }
 #define FIELD_ENUM(type, field, count) FIELD_INT(type, field, ENUM, 0, (int)(count)-1)
 #define COUNT_MOST (1 << 30) /* of a count in a desc */
+#define LAW_TAG 5            /* of the world that is loaded */
 
 static const row custom_rows[] = {
     FIELD(custom_desc, support, POINTER),
@@ -69,6 +76,7 @@ static const row custom_rows[] = {
     FIELD(custom_desc, mass.centroid, VECTOR),
     FIELD(custom_desc, mass.polar_moment, POSITIVE),
     FIELD_INT(custom_desc, outline_points, INTEGER_OR_0, 3, INT_MAX),
+    FIELD(custom_desc, tag, ANY_INT),
 };
 static const row reduction_rows[] = {
     FIELD_ENUM(reduction_desc, test, DEM2D_NO_TEST + 1),
@@ -124,6 +132,10 @@ static const row world_rows[] = {
     FIELD_INT(world_desc, particle_capacity, INTEGER, 0, COUNT_MOST),
     FIELD_INT(world_desc, pair_capacity, INTEGER, 0, COUNT_MOST),
     FIELD(world_desc, skip_time_step_check, ANY_BOOL),
+    FIELD(world_desc, ledger, ANY_BOOL),
+    FIELD(world_desc, law, ANY_POINTER),
+    FIELD(world_desc, law_user, ANY_POINTER),
+    FIELD(world_desc, law_tag, ANY_INT),
     FIELD(world_desc, parallel_for, ANY_POINTER),
     FIELD(world_desc, parallel_user, ANY_POINTER),
     FIELD(world_desc, env, OPTIONAL),
@@ -133,11 +145,15 @@ static const row material_rows[] = {
     FIELD(material_desc, normal_stiffness, POSITIVE),
     FIELD(material_desc, tangential_stiffness, NOT_NEGATIVE),
     FIELD(material_desc, friction, NOT_NEGATIVE),
+    FIELD(material_desc, damping_ratio, NOT_NEGATIVE),
+    FIELD(material_desc, rolling_friction, NOT_NEGATIVE),
 };
 static const row pair_rows[] = {
     FIELD(pair_desc, normal_stiffness, POSITIVE),
     FIELD(pair_desc, tangential_stiffness, NOT_NEGATIVE),
     FIELD(pair_desc, friction, NOT_NEGATIVE),
+    FIELD(pair_desc, damping_ratio, NOT_NEGATIVE),
+    FIELD(pair_desc, rolling_friction, NOT_NEGATIVE),
 };
 static const row particle_rows[] = {
     FIELD(particle_desc, scale, POSITIVE),
@@ -149,13 +165,32 @@ static const row particle_rows[] = {
     FIELD(particle_desc, velocity, VECTOR),
     FIELD(particle_desc, angular_velocity, FINITE),
 };
-/* Of a servo wall without spans. */
-static const row wall_rows[] = {
-    FIELD(wall_desc, length, POSITIVE),      FIELD_ENUM(wall_desc, mode, DEM2D_WALL_SERVO + 1),
-    FIELD(wall_desc, material, MATERIAL_ID), FIELD(wall_desc, point, VECTOR),
-    FIELD(wall_desc, normal, DIRECTION),     FIELD(wall_desc, velocity, VECTOR),
-    FIELD(wall_desc, stress, FINITE),        FIELD(wall_desc, max_speed, POSITIVE),
-    FIELD(wall_desc, spans[0], SPAN_ID),     FIELD(wall_desc, spans[1], SPAN_ID),
+/* Of a servo wall without spans: a half-plane, a segment. */
+#define WALL_ROWS(length_kind, normal_kind, end_kind)                                         \
+    FIELD(wall_desc, length, length_kind), FIELD_ENUM(wall_desc, mode, DEM2D_WALL_SERVO + 1), \
+        FIELD(wall_desc, material, MATERIAL_ID), FIELD(wall_desc, point, VECTOR),             \
+        FIELD(wall_desc, normal, normal_kind), FIELD(wall_desc, segment, ANY_BOOL),           \
+        FIELD(wall_desc, end, end_kind), FIELD(wall_desc, velocity, VECTOR),                  \
+        FIELD(wall_desc, stress, FINITE), FIELD(wall_desc, max_speed, POSITIVE),              \
+        FIELD(wall_desc, spans[0], SPAN_ID), FIELD(wall_desc, spans[1], SPAN_ID)
+static const row wall_rows[] = {WALL_ROWS(POSITIVE, DIRECTION, VECTOR)};
+static const row segment_rows[] = {WALL_ROWS(NOT_NEGATIVE, VECTOR, ELSEWHERE)};
+static const row save_rows[] = {
+    FIELD(save_desc, write, POINTER), /* there is no path, as below */
+    FIELD(save_desc, user, ANY_POINTER),
+};
+/* Of a world with a custom shape and a law; a law with another tag is none. */
+static const row load_rows[] = {
+    FIELD(load_desc, read, POINTER),
+    FIELD(load_desc, user, ANY_POINTER),
+    FIELD(load_desc, parallel_for, ANY_POINTER),
+    FIELD(load_desc, parallel_user, ANY_POINTER),
+    FIELD(load_desc, custom, POINTER),
+    FIELD(load_desc, custom_user, ANY_POINTER),
+    FIELD(load_desc, law, POINTER),
+    FIELD(load_desc, law_user, ANY_POINTER),
+    {"law_tag", offsetof(dem2d_load_desc, law_tag), INTEGER, DEM2D_NULL_ARGUMENT, LAW_TAG, LAW_TAG},
+    FIELD(load_desc, env, OPTIONAL),
 };
 static const row svg_rows[] = {
     FIELD(svg_desc, width, NOT_NEGATIVE),
@@ -163,6 +198,29 @@ static const row svg_rows[] = {
     FIELD(svg_desc, force_chains, ANY_BOOL),
     FIELD(svg_desc, write, POINTER), /* there is no path */
     FIELD(svg_desc, user, ANY_POINTER),
+};
+
+static const row vtp_rows[] = {
+    FIELD_INT(vtp_desc, outline_points, INTEGER_OR_0, 3, INT_MAX),
+    FIELD_ENUM(vtp_desc, part, DEM2D_VTP_PART_COUNT),
+    FIELD(vtp_desc, write, POINTER),
+    FIELD(vtp_desc, user, ANY_POINTER),
+};
+/* Arrays of NAMED; what is in them is among the arguments. */
+static const row pvd_rows[] = {
+    FIELD_INT(pvd_desc, count, INTEGER, 0, COUNT_MOST),
+    FIELD(pvd_desc, times, POINTER),
+    FIELD(pvd_desc, files, POINTER),
+    FIELD(pvd_desc, write, POINTER),
+    FIELD(pvd_desc, user, ANY_POINTER),
+};
+static const row csv_rows[] = {
+    FIELD_INT(csv_desc, count, INTEGER, 0, COUNT_MOST),
+    FIELD(csv_desc, names, POINTER),
+    FIELD(csv_desc, values, POINTER),
+    FIELD(csv_desc, append, ANY_BOOL),
+    FIELD(csv_desc, write, POINTER),
+    FIELD(csv_desc, user, ANY_POINTER),
 };
 
 #define DESC(name) \
@@ -180,13 +238,35 @@ enum {
     PAIR,
     PARTICLE,
     WALL,
+    SAVE,
+    LOAD,
     SVG,
+    VTP,
+    PVD,
+    CSV,
+    SEGMENT, /* dem2d_wall_desc once more */
     DESCS
 };
 
 static const desc_table descs[DESCS] = {
-    DESC(custom), DESC(reduction), DESC(image), DESC(fit),      DESC(virtual), DESC(contact),
-    DESC(world),  DESC(material),  DESC(pair),  DESC(particle), DESC(wall),    DESC(svg),
+    DESC(custom),
+    DESC(reduction),
+    DESC(image),
+    DESC(fit),
+    DESC(virtual),
+    DESC(contact),
+    DESC(world),
+    DESC(material),
+    DESC(pair),
+    DESC(particle),
+    DESC(wall),
+    DESC(save),
+    DESC(load),
+    DESC(svg),
+    DESC(vtp),
+    DESC(pvd),
+    DESC(csv),
+    {"dem2d_wall_desc", sizeof(dem2d_wall_desc), segment_rows, COUNT_OF(segment_rows)},
 };
 
 /* --- a world to call them on ----------------------------------------------------------------- */
@@ -194,6 +274,14 @@ static const desc_table descs[DESCS] = {
 /* Ids that name nothing in the world: 0, of what was removed, of a slot that was taken again, of a
    slot that never was, of another world. */
 enum { STALE = 5 };
+
+enum { SEGMENTS = 2 };
+
+/* A snapshot in memory. */
+typedef struct store {
+    char *bytes;
+    size_t size, next;
+} store;
 
 typedef struct fixture {
     test_env env; /* of the world and of what is called; the fixture must not be moved */
@@ -203,7 +291,10 @@ typedef struct fixture {
     dem2d_shape_id shape, spare_shape, stale_shapes[STALE];
     dem2d_material_id materials[2], stale_materials[STALE];
     dem2d_particle_id particle, stale_particles[STALE];
-    dem2d_wall_id walls[4], free_wall, stale_walls[STALE]; /* floor, left, right, lid; spare */
+    dem2d_wall_id walls[4 + SEGMENTS]; /* floor, left, right, lid; two that are joined */
+    dem2d_wall_id free_wall, stale_walls[STALE];
+    store snapshot;           /* of another world */
+    dem2d_custom_desc custom; /* room for what is found by a tag */
 } fixture;
 
 static const uint8_t pixels[8 * 8] = {/* one grain of 4 x 5 */
@@ -245,6 +336,9 @@ static dem2d_wall_desc good_wall(const fixture *f) {
 
 static const dem2d_material_desc good_material = {2700, 1e6, 5e5, 0.4, 0, 0};
 
+/* With all that the full law has. */
+static const dem2d_material_desc full_material = {2700, 1e6, 5e5, 0.4, 0.1, 0.05};
+
 static void fixture_shapes(fixture *f) {
     dem2d_shape *circle;
     dem2d_shape_id id;
@@ -271,6 +365,12 @@ static void fixture_walls(fixture *f) {
             d.spans[0] = f->walls[1], d.spans[1] = f->walls[2];
         }
         assert_ok(dem2d_world_add_wall(f->world, &d, &f->walls[i]));
+    }
+    static const dem2d_vec roof[SEGMENTS + 1] = {{0.13, 0.1}, {0.2, 0.16}, {0.27, 0.1}};
+    for (int i = 0; i < SEGMENTS; i++) {
+        dem2d_wall_desc d = {0};
+        d.material = f->materials[i], d.segment = true, d.point = roof[i], d.end = roof[i + 1];
+        assert_ok(dem2d_world_add_wall(f->world, &d, &f->walls[4 + i]));
     }
     dem2d_wall_desc d = good_wall(f);
     assert_ok(dem2d_world_add_wall(f->world, &d, &f->stale_walls[1]));
@@ -333,18 +433,21 @@ static void fixture_stale(fixture *f) {
     fixture_strangers(f, 4);
 }
 
-/* A box of grains of three shapes, after `steps` steps. Two of them hold the same to the bit. */
+/* A box of grains of three shapes with the full law, a ledger and two segments, after `steps`
+   steps. Two of them hold the same to the bit. */
 static void fixture_make(fixture *f, int steps) {
     memset(f, 0, sizeof *f);
     test_env_init(&f->env);
-    const dem2d_world_desc d = good_world(&f->env.env);
+    dem2d_world_desc d = good_world(&f->env.env);
     const dem2d_image_desc image = good_image();
+    d.ledger = true;
     assert_ok(dem2d_shape_create_ellipse(&f->env.env, 1.2, 0.8, &f->ellipse));
     assert_ok(dem2d_shape_create_polygon(&f->env.env, five_corners, 5, 0, &f->polygon));
     assert_ok(dem2d_image_outlines(&f->env.env, &image, &f->set));
     assert_ok(dem2d_world_create(&d, &f->world));
     for (int i = 0; i < 2; i++)
-        assert_ok(dem2d_world_add_material(f->world, &good_material, &f->materials[i]));
+        assert_ok(dem2d_world_add_material(f->world, i == 0 ? &good_material : &full_material,
+                                           &f->materials[i]));
     fixture_shapes(f);
     fixture_walls(f);
     fixture_particles(f);
@@ -354,7 +457,7 @@ static void fixture_make(fixture *f, int steps) {
 }
 
 static fingerprint fixture_print(const fixture *f) {
-    return fingerprint_take(f->world, f->walls, 4);
+    return fingerprint_take(f->world, f->walls, COUNT_OF(f->walls));
 }
 
 static void fixture_end(fixture *f) {
@@ -362,6 +465,7 @@ static void fixture_end(fixture *f) {
     dem2d_shape_destroy(f->ellipse);
     dem2d_shape_destroy(f->polygon);
     dem2d_outline_set_destroy(f->set);
+    free(f->snapshot.bytes);
     assert_clean(&f->env);
 }
 
@@ -373,6 +477,8 @@ typedef union output {
     unsigned char bytes[4096];
 } output;
 
+enum { NAMED = 2 }; /* columns of a history, files of a series */
+
 typedef struct args {
     const dem2d_env *env;
     dem2d_world *world;
@@ -380,7 +486,9 @@ typedef struct args {
     const dem2d_outline_set *set;
     const void *desc;
     const dem2d_vec *points, *others;
-    double *a, *b; /* of a series; fourier_reduce writes them */
+    const dem2d_box *region;
+    store *snapshot; /* that is read */
+    double *a, *b;   /* of a series; fourier_reduce writes them */
     void *out, *second, *third;
     dem2d_pose pose, pose_b;
     dem2d_vec vector, direction;
@@ -404,8 +512,17 @@ typedef struct args {
         dem2d_pair_desc pair;
         dem2d_particle_desc particle;
         dem2d_wall_desc wall;
+        dem2d_save_desc save;
+        dem2d_load_desc load;
         dem2d_svg_desc svg;
+        dem2d_vtp_desc vtp;
+        dem2d_pvd_desc pvd;
+        dem2d_csv_desc csv;
+        dem2d_stress stress;
     } d;
+    dem2d_box box;
+    const char *names[NAMED];
+    double values[NAMED];
     dem2d_vec p[12], q[5];
     double series_a[8], series_b[8];
     uint64_t hash;
@@ -434,6 +551,8 @@ static void args_make(args *a, fixture *f) {
     memcpy(a->p, five_corners, sizeof five_corners);
     for (int i = 0; i < 5; i++) a->q[i] = vec(1.1 * a->p[i].x + 0.1, 0.9 * a->p[i].y);
     a->series_a[0] = 2, a->series_a[2] = 0.1, a->series_b[3] = 0.05; /* order 3 or more */
+    a->region = &a->box, a->box.lower = vec(0.05, 0.02), a->box.upper = vec(0.3, 0.31);
+    for (int i = 0; i < NAMED; i++) a->names[i] = i == 0 ? "one" : "two", a->values[i] = i;
     args_fill(a);
 }
 
@@ -501,9 +620,95 @@ static void with_particle(args *a, fixture *f) {
 static void with_wall(args *a, fixture *f) {
     a->d.wall = good_wall(f);
 }
+static void with_segment(args *a, fixture *f) {
+    a->d.wall = good_wall(f), a->d.wall.segment = true, a->d.wall.end = vec(0.4, 5.1);
+}
 static void with_svg(args *a, fixture *f) {
     (void)f;
     a->d.svg.write = fingerprint_hash, a->d.svg.user = &a->hash;
+}
+static void with_vtp(args *a, fixture *f) {
+    (void)f;
+    a->d.vtp.write = fingerprint_hash, a->d.vtp.user = &a->hash;
+}
+static void with_pvd(args *a, fixture *f) {
+    (void)f;
+    a->d.pvd.count = NAMED, a->d.pvd.files = a->names, a->d.pvd.times = a->values;
+    a->d.pvd.write = fingerprint_hash, a->d.pvd.user = &a->hash;
+}
+static void with_csv(args *a, fixture *f) {
+    (void)f;
+    a->d.csv.count = NAMED, a->d.csv.names = a->names, a->d.csv.values = a->values;
+    a->d.csv.write = fingerprint_hash, a->d.csv.user = &a->hash;
+}
+static void with_stress(args *a, fixture *f) {
+    const dem2d_stress stress = {3, 1, 2, -1};
+    (void)f;
+    a->d.stress = stress;
+}
+static void with_save(args *a, fixture *f) {
+    (void)f;
+    a->d.save.write = fingerprint_hash, a->d.save.user = &a->hash;
+}
+
+/* --- a snapshot to load ---------------------------------------------------------------------- */
+
+static bool store_write(void *user, const char *bytes, size_t count) {
+    store *to = user;
+    to->bytes = realloc(to->bytes, to->size + count);
+    if (!to->bytes) abort();
+    memcpy(to->bytes + to->size, bytes, count);
+    to->size += count;
+    return true;
+}
+
+static bool store_read(void *user, char *bytes, size_t count) {
+    store *from = user;
+    if (count > from->size - from->next) return false;
+    memcpy(bytes, from->bytes + from->next, count);
+    from->next += count;
+    return true;
+}
+
+static const dem2d_custom_desc *find_custom(void *user, int tag) {
+    dem2d_custom_desc *desc = user;
+    if (tag != LAW_TAG) return NULL;
+    desc->support = round_support;
+    return desc;
+}
+
+static void soft_law(void *user, const dem2d_law_input *in, dem2d_law_output *out) {
+    (void)user;
+    out->normal_force = in->pair.normal_stiffness * in->depth;
+    out->tangential_force = 1e-3 * out->normal_force, out->state[0] += 1;
+}
+
+static void with_load(args *a, fixture *f) { /* two round grains in contact, by a law */
+    dem2d_world_desc d = good_world(NULL);
+    const dem2d_save_desc save = {store_write, &f->snapshot};
+    dem2d_custom_desc custom = {0};
+    dem2d_particle_desc grain = good_particle(f);
+    dem2d_particle_id id;
+    dem2d_world *world;
+    dem2d_shape *shape;
+    d.law = soft_law, d.law_tag = custom.tag = LAW_TAG, d.ledger = true;
+    custom.support = round_support;
+    assert_ok(dem2d_world_create(&d, &world));
+    assert_ok(dem2d_world_add_material(world, &full_material, &grain.material));
+    assert_ok(dem2d_shape_create_custom(NULL, &custom, &shape));
+    assert_ok(dem2d_world_add_shape(world, shape, &grain.shape));
+    dem2d_shape_destroy(shape);
+    for (int i = 0; i < 2; i++) {
+        grain.position = vec(0.0799 * i, 0);
+        assert_ok(dem2d_world_add_particle(world, &grain, &id));
+    }
+    assert_ok(dem2d_world_step(world, 3, NULL));
+    assert_ok(dem2d_world_save(world, &save, NULL));
+    dem2d_world_destroy(world);
+    a->snapshot = &f->snapshot;
+    a->d.load.read = store_read, a->d.load.user = &f->snapshot;
+    a->d.load.custom = find_custom, a->d.load.custom_user = &f->custom;
+    a->d.load.law = soft_law, a->d.load.law_tag = LAW_TAG, a->d.load.env = &f->env.env;
 }
 
 /* --- calls ----------------------------------------------------------------------------------- */
@@ -570,11 +775,36 @@ CALL(world_contacts, v->world, v->out, v->count, v->second)
 CALL(world_energy, v->world, v->out)
 CALL(world_stress, v->world, v->x, v->out)
 CALL(world_packing, v->world, v->out)
-CALL(world_porosity, v->world, v->x, v->out)
+CALL(world_porosity, v->world, v->region, v->out)
+CALL(world_ledger, v->world, v->out)
+CALL(world_particle_stress, v->world, v->particle, v->out)
+CALL(stress_principal, v->desc, v->out)
+CALL(world_fabric, v->world, v->out)
+CALL(world_histogram, v->world, (dem2d_histogram)v->number, v->count, v->out)
+CALL(world_equilibrium, v->world, v->out)
+CALL(world_inertial_number, v->world, v->x, v->y, v->out)
+CALL(world_save, v->world, v->desc, NULL)
 CALL(world_write_svg, v->world, v->desc, NULL)
+CALL(world_write_vtp, v->world, v->desc, NULL)
+CALL(world_write_csv, v->world, v->desc, NULL)
+CALL(pvd_write, v->env, v->desc, NULL)
+CALL(shape_axis, v->shape, v->out, v->second)
+CALL(damping_ratio, v->x, v->out)
+
+static dem2d_result call_world_load(args *v) {
+    v->snapshot->next = 0;
+    return dem2d_world_load(v->desc, NULL, v->out);
+}
 
 static dem2d_result call_fourier_fit_order(args *v) { /* its order is number, samples 0 */
     return dem2d_fourier_fit(v->env, v->points, v->count, v->number, 0, v->out, v->second);
+}
+
+static dem2d_result call_world_add_segment(args *v) {
+    return dem2d_world_add_wall(v->world, v->desc, v->out);
+}
+static dem2d_result call_world_set_segment(args *v) {
+    return dem2d_world_set_wall(v->world, v->wall, v->desc);
 }
 
 /* What a call made, when it went well. */
@@ -715,8 +945,35 @@ static const row rows_world_contacts[] = {
 static const row rows_world_energy[] = {IN_WORLD, OUT};
 static const row rows_world_stress[] = {IN_WORLD, ARG(x, "area", POSITIVE), OUT};
 static const row rows_world_packing[] = {IN_WORLD, OUT};
-static const row rows_world_porosity[] = {IN_WORLD, ARG(x, "area", POSITIVE), OUT};
+static const row rows_world_porosity[] = {IN_WORLD, ARG(region, "region", POINTER),
+                                          ARG(box.lower, "region", VECTOR),
+                                          ARG(box.upper, "region", UPPER), OUT};
+static const row rows_world_ledger[] = {IN_WORLD, OUT};
+static const row rows_world_particle_stress[] = {IN_WORLD, ARG(particle, "particle", PARTICLE_ID),
+                                                 OUT};
+static const row rows_stress_principal[] = {
+    ARG(desc, "stress", POINTER),   ARG(d.stress.xx, "xx", FINITE), ARG(d.stress.xy, "xy", FINITE),
+    ARG(d.stress.yx, "yx", FINITE), ARG(d.stress.yy, "yy", FINITE), OUT};
+static const row rows_world_fabric[] = {IN_WORLD, OUT};
+static const row rows_world_histogram[] = {
+    IN_WORLD, ARG_INT(number, "kind", ENUM, 0, DEM2D_HISTOGRAM_COUNT - 1, OUT_OF_RANGE),
+    ARG_INT(count, "bins", INTEGER, 1, INT_MAX, OUT_OF_RANGE), OUT};
+static const row rows_world_equilibrium[] = {IN_WORLD, OUT};
+static const row rows_world_inertial_number[] = {IN_WORLD, ARG(x, "strain_rate", FINITE),
+                                                 ARG(y, "pressure", POSITIVE), OUT};
+static const row rows_world_save[] = {IN_WORLD, THE_DESC};
+static const row rows_world_load[] = {THE_DESC, OUT};
 static const row rows_world_write_svg[] = {IN_WORLD, THE_DESC};
+static const row rows_world_write_vtp[] = {IN_WORLD, THE_DESC};
+#define NAMES(kind, text, numbers)                                                                 \
+    ARG(names[0], text, kind), ARG(names[NAMED - 1], text, kind), ARG(values[0], numbers, FINITE), \
+        ARG(values[NAMED - 1], numbers, FINITE)
+static const row rows_world_write_csv[] = {IN_WORLD, THE_DESC, NAMES(COLUMN, "names", "values")};
+static const row rows_pvd_write[] = {ENV, THE_DESC, NAMES(FILE_NAME, "files", "times")};
+static const row rows_shape_axis[] = {ARG(shape, "shape", POINTER), OUT, SECOND};
+static const row rows_damping_ratio[] = {ARG(x, "restitution", PORTION), OUT};
+static const row rows_world_add_segment[] = {IN_WORLD, THE_DESC, OUT};
+static const row rows_world_set_segment[] = {IN_WORLD, ARG(wall, "wall", WALL_ID), THE_DESC};
 
 /* --- the table ------------------------------------------------------------------------------- */
 
@@ -798,7 +1055,23 @@ static const function functions[] = {
     LOGS(world_stress),
     LOGS(world_packing),
     LOGS(world_porosity),
+    LOGS(world_ledger),
+    LOGS(world_particle_stress),
+    SILENT(stress_principal, -1, with_stress),
+    LOGS(world_fabric),
+    LOGS(world_histogram),
+    LOGS(world_equilibrium),
+    LOGS(world_inertial_number),
+    DESCRIBED(world_save, SAVE, with_save),
+    MAKES(world_load, LOAD, with_load, free_world),
     DESCRIBED(world_write_svg, SVG, with_svg),
+    DESCRIBED(world_write_vtp, VTP, with_vtp),
+    DESCRIBED(world_write_csv, CSV, with_csv),
+    DESCRIBED(pvd_write, PVD, with_pvd),
+    PLAIN(shape_axis),
+    PLAIN(damping_ratio),
+    DESCRIBED(world_add_segment, SEGMENT, with_segment),
+    DESCRIBED(world_set_segment, SEGMENT, with_segment),
 };
 
 #endif

@@ -88,6 +88,7 @@ TEST_HELPER void fingerprint_contacts(fingerprint *f, const dem2d_world *world) 
         fingerprint_put(f, "depth of contact", i, c->depth);
         fingerprint_put(f, "normal_force of contact", i, c->normal_force);
         fingerprint_put(f, "tangential_force of contact", i, c->tangential_force);
+        fingerprint_put(f, "moment of contact", i, c->moment);
     }
     free(list);
 }
@@ -100,6 +101,8 @@ TEST_HELPER void fingerprint_wall(fingerprint *f, const dem2d_world *world, dem2
     FINGERPRINT_ID(f, "material of wall", i, w.material);
     fingerprint_put_vec(f, "point of wall", i, w.point);
     fingerprint_put_vec(f, "normal of wall", i, w.normal);
+    fingerprint_put(f, "segment of wall", i, w.segment);
+    fingerprint_put_vec(f, "end of wall", i, w.end);
     fingerprint_put_vec(f, "velocity of wall", i, w.velocity);
     fingerprint_put_vec(f, "force of wall", i, w.force);
     fingerprint_put(f, "length of wall", i, w.length);
@@ -121,6 +124,7 @@ TEST_HELPER void fingerprint_measures(fingerprint *f, const dem2d_world *world) 
                               e.rotational,
                               e.normal,
                               e.tangential,
+                              e.rolling,
                               e.potential,
                               s.xx,
                               s.xy,
@@ -136,6 +140,16 @@ TEST_HELPER void fingerprint_measures(fingerprint *f, const dem2d_world *world) 
                               worst.generation};
     for (int i = 0; i < COUNT_OF(numbers); i++) fingerprint_put(f, "measure", i, numbers[i]);
     fingerprint_put(f, "coordination_loaded", 0, p.coordination_loaded);
+    fingerprint_put(f, "rattlers", 0, p.rattlers);
+}
+
+/* Of a world that keeps one. */
+TEST_HELPER void fingerprint_ledger(fingerprint *f, const dem2d_world *world) {
+    dem2d_ledger l;
+    if (dem2d_world_ledger(world, &l) != DEM2D_OK) return;
+    const double numbers[] = {l.kinetic,  l.normal,  l.tangential, l.gravity, l.walls,  l.driven,
+                              l.friction, l.dashpot, l.damping,    l.given,   l.closure};
+    for (int i = 0; i < COUNT_OF(numbers); i++) fingerprint_put(f, "ledger", i, numbers[i]);
 }
 
 /* All counters but the bytes in use: arrays may have grown for what then failed. */
@@ -188,7 +202,11 @@ TEST_HELPER fingerprint fingerprint_take(const dem2d_world *world, const dem2d_w
     for (int i = 0; i < count; i++) fingerprint_wall(&f, world, walls[i], i);
     fingerprint_measures(&f, world);
     fingerprint_stats(&f, world);
+    fingerprint_ledger(&f, world);
     fingerprint_picture(&f, world);
+    const uint64_t hash = dem2d_world_hash(world);
+    fingerprint_put(&f, "hash", 0, (double)(hash >> 32));
+    fingerprint_put(&f, "hash", 1, (double)(hash & 0xffffffffu));
     return f;
 }
 

@@ -71,6 +71,11 @@ static void wrong_number(wrongs *w, kind kind) {
         add_number(w, -DBL_MAX, DEM2D_OUT_OF_RANGE);
         return;
     }
+    if (kind == PORTION) {
+        const double values[] = {0, -0.0, -least, -1, 1 + DBL_EPSILON, DBL_MAX, -DBL_MAX};
+        for (int i = 0; i < COUNT_OF(values); i++) add_number(w, values[i], DEM2D_OUT_OF_RANGE);
+        return;
+    }
     const dem2d_result negative = kind == LEADING ? DEM2D_ZERO_AREA : DEM2D_OUT_OF_RANGE;
     add_number(w, -1, negative);
     add_number(w, -least, negative);
@@ -88,13 +93,33 @@ static void wrong_number(wrongs *w, kind kind) {
     }
 }
 
-static void wrong_vector(wrongs *w, kind kind) {
+static void wrong_vector(wrongs *w, const fixture *f, kind kind) {
     const double bad[] = {NAN, INFINITY, -INFINITY};
     for (int i = 0; i < COUNT_OF(bad); i++) {
         add_vec(w, bad[i], 1, DEM2D_NOT_FINITE);
         add_vec(w, 1, bad[i], DEM2D_NOT_FINITE);
     }
     if (kind == DIRECTION) add_vec(w, 0, -0.0, DEM2D_OUT_OF_RANGE);
+    if (kind == ELSEWHERE) {
+        const dem2d_vec point = good_wall(f).point;
+        add_vec(w, point.x, point.y, DEM2D_OUT_OF_RANGE);
+    }
+    if (kind != UPPER) return;
+    const dem2d_vec lower = {0.05, 0.02}, beyond[] = {{1, 0.02}, {0.05, 1}, {1, -1}, {-1, -1}};
+    add_vec(w, lower.x, lower.y, DEM2D_OUT_OF_RANGE);
+    for (int i = 0; i < COUNT_OF(beyond); i++)
+        add_vec(w, beyond[i].x, beyond[i].y, DEM2D_OUT_OF_RANGE);
+}
+
+static void wrong_text(wrongs *w, kind kind) {
+    static const char *const control[] = {"\001", "a\nb", "a.vtp\037"};
+    static const char *const column[] = {"a,b", "\"", "a\n", "\rb"};
+    static const char *const fine[] = {"", "a b", "&<>'"};
+    const char *none = NULL;
+    add(w, &none, sizeof none, DEM2D_NULL_ARGUMENT, true);
+    for (int i = 0; i < (kind == COLUMN ? COUNT_OF(column) : COUNT_OF(control)); i++)
+        add(w, kind == COLUMN ? &column[i] : &control[i], sizeof *column, DEM2D_OUT_OF_RANGE, true);
+    for (int i = 0; i < COUNT_OF(fine); i++) add(w, &fine[i], sizeof *fine, DEM2D_OK, false);
 }
 
 static void wrong_pose(wrongs *w) {
@@ -151,6 +176,7 @@ static void wrong_values(wrongs *w, const fixture *f, const row *r) {
     case POSITIVE:
     case NOT_NEGATIVE:
     case FRACTION:
+    case PORTION:
     case INSIDE:
     case ANGLE:
     case SIZE:
@@ -160,7 +186,9 @@ static void wrong_values(wrongs *w, const fixture *f, const row *r) {
         break;
     case VECTOR:
     case DIRECTION:
-        wrong_vector(w, r->kind);
+    case UPPER:
+    case ELSEWHERE:
+        wrong_vector(w, f, r->kind);
         break;
     case POSE:
         wrong_pose(w);
@@ -177,7 +205,12 @@ static void wrong_values(wrongs *w, const fixture *f, const row *r) {
     case SPAN_ID:
         wrong_id(w, f, r);
         break;
+    case FILE_NAME:
+    case COLUMN:
+        wrong_text(w, r->kind);
+        break;
     case ANY_POINTER:
+    case ANY_INT:
     case ANY_BOOL:
     case ANY_SEED:
         break;
@@ -300,6 +333,7 @@ static int doubles_of(kind kind) {
     case POSITIVE:
     case NOT_NEGATIVE:
     case FRACTION:
+    case PORTION:
     case INSIDE:
     case ANGLE:
     case SIZE:
@@ -308,6 +342,8 @@ static int doubles_of(kind kind) {
         return 1;
     case VECTOR:
     case DIRECTION:
+    case UPPER:
+    case ELSEWHERE:
         return 2;
     default:
         return 0;
@@ -384,16 +420,21 @@ static extent extent_of(kind kind) {
     switch (kind) {
     case POINTER:
     case OPTIONAL:
+    case FILE_NAME:
+    case COLUMN:
     case ANY_POINTER:
         return EXTENT(void *);
     case VECTOR:
     case DIRECTION:
+    case UPPER:
+    case ELSEWHERE:
         return EXTENT(dem2d_vec);
     case POSE:
         return EXTENT(dem2d_pose);
     case INTEGER:
     case INTEGER_OR_0:
     case ENUM:
+    case ANY_INT:
         return EXTENT(int);
     case SHAPE_ID:
     case MATERIAL_ID:
@@ -432,21 +473,41 @@ static void test_all_fields(void **state) {
     }
 }
 
-/* Every declaration of a function that returns a result names one of the table. */
+static FILE *open_header(void) {
+    FILE *file = fopen("../dem2d.h", "r");
+    if (!file) fail_msg("../dem2d.h can't be opened (tests run inside tests/)");
+    return file;
+}
+
+/* Every declaration of a function that returns a result names one of the table; the others are in
+   the list of test_others. */
 static void test_all_functions(void **state) {
-    static const char start[] = "DEM2D_API dem2d_result dem2d_";
+    static const char start[] = "DEM2D_API ";
+    static const char *const others[] = {"version",
+                                         "result_text",
+                                         "rot_make",
+                                         "rot_angle",
+                                         "pose_make",
+                                         "shape_destroy",
+                                         "outline_set_count",
+                                         "outline_set_destroy",
+                                         "world_destroy",
+                                         "world_shape",
+                                         "strain",
+                                         "world_hash"};
     char line[256];
     int found = 0, missing = 0;
     (void)state;
-    FILE *file = fopen("../dem2d.h", "r");
-    if (!file) fail_msg("../dem2d.h can't be opened (tests run inside tests/)");
+    FILE *file = open_header();
     while (fgets(line, sizeof line, file) && !strstr(line, "#ifdef DEM2D_IMPLEMENTATION")) {
         if (strncmp(line, start, sizeof start - 1) != 0) continue;
-        char *name = line + sizeof start - 1;
-        name[strcspn(name, "(")] = 0;
-        int i = 0;
-        while (i < COUNT_OF(functions) && strcmp(functions[i].name, name) != 0) i++;
-        if (i == COUNT_OF(functions)) {
+        const bool result = strncmp(line + sizeof start - 1, "dem2d_result ", 13) == 0;
+        line[strcspn(line, "(")] = 0;
+        const char *name = line + sizeof start - 1;
+        for (const char *at = name; (at = strstr(at, "dem2d_")) != NULL;) name = at += 6;
+        int i = 0, count = result ? COUNT_OF(functions) : COUNT_OF(others);
+        while (i < count && strcmp(result ? functions[i].name : others[i], name) != 0) i++;
+        if (i == count) {
             print_error("dem2d_%s has no row in api_calls.h\n", name);
             missing++;
         }
@@ -454,7 +515,48 @@ static void test_all_functions(void **state) {
     }
     fclose(file);
     assert_int_equal(missing, 0);
-    assert_true(found > 50);
+    assert_true(found > 80);
+}
+
+/* Whether a desc's table has rows of a field or of its parts. */
+static bool has_row(const desc_table *desc, const char *field) {
+    const size_t length = strlen(field);
+    for (int i = 0; i < desc->count; i++) {
+        const char *name = desc->rows[i].name;
+        if (strncmp(name, field, length) == 0 && strchr(".[", name[length])) return true;
+    }
+    return false;
+}
+
+/* Every desc in the header has a table, and every field of it a row. */
+static void test_all_descs(void **state) {
+    char line[256], fields[64][64];
+    int count = 0, found = 0, missing = 0;
+    (void)state;
+    FILE *file = open_header();
+    while (fgets(line, sizeof line, file) && !strstr(line, "#ifdef DEM2D_IMPLEMENTATION")) {
+        if (strncmp(line, "typedef struct ", 15) == 0) count = 0;
+        const char *body = line + strspn(line, " "), *end = body + strcspn(body, "[;");
+        const char *word = end;
+        while (word > body && !strchr(" *", word[-1])) word--;
+        if (*end && *body != '/' && *body != '}' && count < 64 && line[0] == ' ')
+            snprintf(fields[count++], sizeof *fields, "%.*s", (int)(end - word), word);
+        if (line[0] != '}' || end - word < 5 || strncmp(end - 5, "_desc", 5) != 0) continue;
+        int d = 0;
+        while (d < DESCS && strncmp(descs[d].name, word, strlen(descs[d].name)) != 0) d++;
+        if (d == DESCS) print_error("%.*s has no table in api_calls.h\n", (int)(end - word), word);
+        missing += d == DESCS;
+        for (int i = 0; d < DESCS && i < count; i++) {
+            if (has_row(&descs[d], fields[i])) continue;
+            print_error("%s: %s has no row in api_calls.h\n", descs[d].name, fields[i]);
+            missing++;
+        }
+        assert_true(count > 0);
+        found++;
+    }
+    fclose(file);
+    assert_int_equal(missing, 0);
+    assert_int_equal(found, DESCS - 1); /* walls are there twice */
 }
 
 /* --- what returns no result ------------------------------------------------------------------ */
@@ -475,6 +577,11 @@ static void test_others(void **state) {
         assert_true(isnan(dem2d_rot_make(angles[i]).c) && isnan(dem2d_rot_make(angles[i]).s));
         assert_true(isnan(dem2d_pose_make(0, 0, angles[i], 1).rotation.c));
     }
+    static const double lengths[] = {NAN, INFINITY, -INFINITY, 0, -0.0, -1};
+    for (int i = 0; i < COUNT_OF(lengths); i++)
+        assert_true(isnan(dem2d_strain(lengths[i], 1)) && isnan(dem2d_strain(1, lengths[i])));
+    assert_int_equal(dem2d_version(), DEM2D_VERSION);
+    assert_true(dem2d_rot_angle(dem2d_rot_make(0)) == 0 && dem2d_world_hash(NULL) == 0);
     assert_null(dem2d_world_shape(NULL, f.shape));
     for (int i = 0; i < STALE; i++) assert_null(dem2d_world_shape(f.world, f.stale_shapes[i]));
     fixture_end(&f);
@@ -642,7 +749,9 @@ static void test_limits(void **state) {
     }
     check_goes_on(&f, &twin);
     for (int i = 2; i < 256; i++)
-        assert_ok(dem2d_world_add_material(f.world, &good_material, &material));
+        for (int k = 0; k < 2; k++)
+            assert_ok(
+                dem2d_world_add_material(k == 0 ? twin.world : f.world, &good_material, &material));
     assert_int_equal(material.index, 255);
     assert_result(dem2d_world_add_material(f.world, &good_material, &material), DEM2D_OUT_OF_RANGE);
     assert_int_equal(material.index, 255);
@@ -654,10 +763,11 @@ static void test_limits(void **state) {
 int main(void) {
     static struct CMUnitTest tests[COUNT_OF(functions) + 9];
     const struct CMUnitTest others[] = {
-        cmocka_unit_test(test_all_fields), cmocka_unit_test(test_all_functions),
-        cmocka_unit_test(test_others),     cmocka_unit_test(test_unfinished_worlds),
-        cmocka_unit_test(test_in_use),     cmocka_unit_test(test_emptied),
-        cmocka_unit_test(test_limits),     cmocka_unit_test(test_extremes),
+        cmocka_unit_test(test_all_fields),        cmocka_unit_test(test_all_functions),
+        cmocka_unit_test(test_all_descs),         cmocka_unit_test(test_others),
+        cmocka_unit_test(test_unfinished_worlds), cmocka_unit_test(test_in_use),
+        cmocka_unit_test(test_emptied),           cmocka_unit_test(test_limits),
+        cmocka_unit_test(test_extremes),
     };
     size_t count = 0;
     for (int i = 0; i < COUNT_OF(functions); i++) {
