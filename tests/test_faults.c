@@ -1,5 +1,5 @@
 /* Calls that fail half way: every allocation of every function, of worlds that are made, filled,
-   changed and stepped, and every write of a picture. The result says so, the log what for; nothing
+   changed and stepped, and every write. The result says so, the log what for; nothing
    leaks, inputs, outputs and world are as before the call, and what follows is what would have
    followed without the failure, to the bit. */
 #define DEM2D_IMPLEMENTATION
@@ -79,7 +79,7 @@ static void test_calls(void **state) {
 
 /* --- the life of a world --------------------------------------------------------------------- */
 
-enum { WALLS = 4, SHAPES = 5, LIFE_MATERIALS = 9, GRAINS = 40 };
+enum { PLANES = 4, WALLS = 7, SHAPES = 5, LIFE_MATERIALS = 9, GRAINS = 40 };
 
 typedef struct life_desc {
     const char *name;
@@ -89,8 +89,13 @@ typedef struct life_desc {
     bool blocks; /* with a parallel_for */
     int capacity;
     double skin;
-    bool rush; /* grains begin apart and run together: lists wear out and grow */
+    bool rush;     /* grains begin apart and run together: lists wear out and grow */
+    bool segments; /* two that are joined, and one more late */
+    bool ledger;
+    int full; /* EARLY: dashpots and rolling friction; LATE: from the middle on; BY_CALLER */
 } life_desc;
+
+enum { EARLY = 1, LATE, BY_CALLER };
 
 /* What happens to a world, one call after the other; one allocation in all of them fails. */
 typedef struct life {
@@ -119,11 +124,13 @@ static dem2d_result life_create(life *l, int i) {
     d.faces = l->desc->faces, d.skin = l->desc->skin;
     d.particle_capacity = l->desc->capacity, d.pair_capacity = 2 * l->desc->capacity;
     d.parallel_for = l->desc->blocks ? backwards : NULL;
+    d.ledger = l->desc->ledger, d.law_tag = LAW_TAG;
+    if (l->desc->full == BY_CALLER) d.law = soft_law;
     return dem2d_world_create(&d, &l->world);
 }
 
 static dem2d_result life_material(life *l, int i) {
-    dem2d_material_desc d = good_material;
+    dem2d_material_desc d = l->desc->full == EARLY ? full_material : good_material;
     if (l->desc->smooth) d.friction = 0;
     return dem2d_world_add_material(l->world, &d, &l->materials[i]);
 }
@@ -134,10 +141,12 @@ static dem2d_result life_shape(life *l, int i) {
 
 static dem2d_result life_wall(life *l, int i) {
     static const double at[WALLS][4] = {
-        {0, 0, 0, 1}, {0, 0, 1, 0}, {0.8, 0, -1, 0}, {0, 0.8, 0, -1}};
+        {0, 0, 0, 1},         {0, 0, 1, 0},         {0.8, 0, -1, 0},     {0, 0.8, 0, -1},
+        {0.2, 0.2, 0.4, 0.3}, {0.4, 0.3, 0.6, 0.2}, {0.6, 0.2, 0.7, 0.3}};
     dem2d_wall_desc d = {0};
+    if (i >= PLANES && !l->desc->segments) return DEM2D_OK;
     d.material = l->materials[i], d.point = vec(at[i][0], at[i][1]);
-    d.normal = vec(at[i][2], at[i][3]);
+    d.normal = d.end = vec(at[i][2], at[i][3]), d.segment = i >= PLANES;
     const dem2d_result result = dem2d_world_add_wall(l->world, &d, &l->walls[i]);
     if (result == DEM2D_OK) l->wall_count = i + 1;
     return result;
@@ -174,7 +183,8 @@ static dem2d_result life_move(life *l, int i) {
 }
 
 static dem2d_result life_rub(life *l, int i) {
-    const dem2d_pair_desc d = {1e6, 5e5, 0.4, 0, 0};
+    dem2d_pair_desc d = {1e6, 5e5, 0.4, 0, 0};
+    if (l->desc->full == LATE) d.damping_ratio = 0.2, d.rolling_friction = 0.1;
     return dem2d_world_set_pair(l->world, l->materials[i], l->materials[i], &d);
 }
 
@@ -187,6 +197,26 @@ static dem2d_result life_guest(life *l, int i) {
     return dem2d_world_add_particle(l->world, &d, &l->grains[i]);
 }
 
+/* The world is saved, and goes on from there. */
+static dem2d_result life_reload(life *l, int i) {
+    store bytes = {NULL, 0, 0};
+    const dem2d_save_desc save = {store_write, &bytes};
+    dem2d_load_desc load = {0};
+    dem2d_world *world = l->world;
+    (void)i;
+    load.read = store_read, load.user = &bytes, load.env = &l->env.env;
+    load.parallel_for = l->desc->blocks ? backwards : NULL;
+    load.law = soft_law, load.law_tag = LAW_TAG;
+    assert_ok(dem2d_world_save(l->world, &save, NULL));
+    const dem2d_result result = dem2d_world_load(&load, NULL, &world);
+    assert_true((world == l->world) == (result != DEM2D_OK));
+    free(bytes.bytes);
+    if (result != DEM2D_OK) return result;
+    dem2d_world_destroy(l->world);
+    l->world = world;
+    return DEM2D_OK;
+}
+
 typedef struct life_event {
     const char *name;
     dem2d_result (*call)(life *l, int i);
@@ -197,7 +227,7 @@ static const life_event events[] = {
     {"create", life_create, 0, 0},
     {"add material", life_material, 0, LIFE_MATERIALS - 1},
     {"add shape", life_shape, 0, SHAPES - 1},
-    {"add wall", life_wall, 0, WALLS - 1},
+    {"add wall", life_wall, 0, WALLS - 2},
     {"first step, without a grain", life_step, 0, 0},
     {"add grain", life_grain, 0, 9},
     {"step", life_step, 0, 20},
@@ -207,6 +237,8 @@ static const life_event events[] = {
     {"set pair", life_rub, 0, LIFE_MATERIALS - 1},
     {"move grain", life_move, 12, 12},
     {"step", life_step, 0, 30},
+    {"save and load", life_reload, 0, 0},
+    {"add wall", life_wall, WALLS - 1, WALLS - 1},
     {"add another", life_guest, 3, 3},
     {"step", life_step, 0, 30},
 };
@@ -285,12 +317,27 @@ static int live(const life_desc *desc, int at, int k, int allocations[CALLS], fi
 }
 
 static const life_desc lives[] = {
-    {"all shapes", DEM2D_TWO_POINTS, -1, false, false, 0, 0, false},
-    {"circles, friction and a polygon late", DEM2D_TWO_POINTS, 0, true, false, 0, 0, false},
-    {"one point, in blocks", DEM2D_ONE_POINT, -1, true, true, 0, 0, false},
-    {"contact area, in blocks", DEM2D_CONTACT_AREA, 4, false, true, 0, 0, false},
-    {"capacities given, a thin skin", DEM2D_TWO_POINTS, -1, false, false, 16, 0.01, false},
-    {"running together", DEM2D_TWO_POINTS, -1, false, false, 0, 0, true},
+    {.name = "all shapes", .only = -1},
+    {.name = "circles, friction and a polygon late", .smooth = true},
+    {.name = "one point, in blocks",
+     .faces = DEM2D_ONE_POINT,
+     .only = -1,
+     .smooth = true,
+     .blocks = true},
+    {.name = "contact area, in blocks", .faces = DEM2D_CONTACT_AREA, .only = 4, .blocks = true},
+    {.name = "capacities given, a thin skin", .only = -1, .capacity = 16, .skin = 0.01},
+    {.name = "the full law, segments, a ledger",
+     .only = -1,
+     .segments = true,
+     .ledger = true,
+     .full = EARLY},
+    {.name = "circles, the full law late, in blocks",
+     .blocks = true,
+     .segments = true,
+     .ledger = true,
+     .full = LATE},
+    {.name = "a caller's law", .only = -1, .segments = true, .ledger = true, .full = BY_CALLER},
+    {.name = "running together", .only = -1, .rush = true},
 };
 
 static void test_life(void **state) {
@@ -353,31 +400,57 @@ static bool take(void *user, const char *bytes, size_t count) {
     return ++s->calls < s->fail_at;
 }
 
+/* What is written, to a callback or a file. */
+enum { SVG_FILE, SNAPSHOT, VTP_GRAINS, VTP_CONTACTS, VTP_LINES, CSV_FILE, PVD_FILE, WRITERS };
+
+static dem2d_result write_to(const fixture *f, int which, dem2d_write_fn *write, void *user,
+                             const char *path) {
+    static const char *const names[] = {"a", "b & c"};
+    static const double values[] = {1, -0.1};
+    dem2d_svg_desc svg = {0};
+    dem2d_vtp_desc vtp = {0};
+    const dem2d_save_desc save = {write, user};
+    const dem2d_csv_desc csv = {2, names, values, false, write, user};
+    const dem2d_pvd_desc pvd = {2, values, names, write, user};
+    svg.write = write, svg.user = user, svg.force_chains = true, svg.outline_points = 5;
+    vtp.write = write, vtp.user = user, vtp.outline_points = 5;
+    vtp.part = which == VTP_GRAINS     ? DEM2D_VTP_PARTICLES
+               : which == VTP_CONTACTS ? DEM2D_VTP_CONTACTS
+                                       : DEM2D_VTP_WALLS;
+    if (which == SVG_FILE) return dem2d_world_write_svg(f->world, &svg, path);
+    if (which == SNAPSHOT) return dem2d_world_save(f->world, &save, path);
+    if (which == CSV_FILE) return dem2d_world_write_csv(f->world, &csv, path);
+    if (which == PVD_FILE) return dem2d_pvd_write(&f->env.env, &pvd, path);
+    return dem2d_world_write_vtp(f->world, &vtp, path);
+}
+
 static void test_writes(void **state) {
     (void)state;
     fixture f;
-    dem2d_svg_desc svg = {0};
     sink s = {0, INT_MAX};
     fixture_make(&f, 30);
-    svg.write = take, svg.user = &s, svg.force_chains = true, svg.outline_points = 5;
-    assert_ok(dem2d_world_write_svg(f.world, &svg, NULL));
-    const int writes = s.calls;
-    assert_true(writes > 50);
     fingerprint was = fixture_print(&f);
-    for (int k = 1; k <= writes; k++) {
-        s.calls = 0, s.fail_at = k;
-        test_log_clear(&f.env);
-        assert_result(dem2d_world_write_svg(f.world, &svg, NULL), DEM2D_IO);
-        assert_int_equal(s.calls, k);
-        assert_logged(&f.env, DEM2D_IO, -1, "could not write");
-        assert_int_equal(f.env.log.count, 1);
-    }
-    svg.write = NULL;
-    FILE *full = fopen("/dev/full", "w"); /* takes all, and has no room when it is closed */
-    if (full) {
-        fclose(full);
-        assert_result(dem2d_world_write_svg(f.world, &svg, "/dev/full"), DEM2D_IO);
-        assert_logged(&f.env, DEM2D_IO, -1, "/dev/full");
+    for (int which = 0; which < WRITERS; which++) {
+        s.calls = 0, s.fail_at = INT_MAX;
+        assert_ok(write_to(&f, which, take, &s, NULL));
+        const int writes = s.calls;
+        assert_true(writes > (which == SNAPSHOT ? 2 : which >= CSV_FILE ? 8 : 50));
+        for (int k = 1; k <= writes; k++) {
+            s.calls = 0, s.fail_at = k;
+            test_log_clear(&f.env);
+            assert_result(write_to(&f, which, take, &s, NULL), DEM2D_IO);
+            assert_int_equal(s.calls, k);
+            assert_logged(&f.env, DEM2D_IO, -1, which == SNAPSHOT ? "snapshot" : "callback");
+            assert_int_equal(f.env.log.count, 1);
+        }
+        FILE *full = fopen("/dev/full", "w"); /* takes all, and has no room when it is closed */
+        if (full && which != SNAPSHOT) {      /* which goes to another file first */
+            assert_result(write_to(&f, which, NULL, NULL, "/dev/full"), DEM2D_IO);
+            assert_logged(&f.env, DEM2D_IO, -1, "/dev/full");
+        }
+        if (full) fclose(full);
+        assert_result(write_to(&f, which, NULL, NULL, "no/such/folder/file"), DEM2D_IO);
+        assert_non_null(strstr(f.env.log.text, "no/such/folder/file"));
     }
     fingerprint now = fixture_print(&f);
     assert_true(fingerprint_same(&was, &now));
