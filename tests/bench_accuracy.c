@@ -284,11 +284,12 @@ static void draw(const char *folder, const task *tasks, const measured *m) {
     char *path = join_text(folder, "/", "accuracy.gp"), command[512];
     FILE *file = fopen(path, "w");
     if (file == NULL) fail(STATUS_BAD_INPUT, "cannot write %s", path);
-    fprintf(file, "if (strstrt(GPVAL_TERMINALS, 'pngcairo')) {\n"
-                  "    set terminal pngcairo size 1400,620\n} else {\n"
-                  "    set terminal png size 1400,620\n}\n"
-                  "set output 'accuracy.png'\nset multiplot layout 1,2\nset logscale xy\n"
-                  "set grid\nset format xy '10^{%%L}'\nset key bottom right\n");
+    fprintf(file,
+            "if (strstrt(GPVAL_TERMINALS, 'pngcairo')) {\n"
+            "    set terminal pngcairo size 1400,620\n} else {\n"
+            "    set terminal png size 1400,620\n}\n"
+            "set output 'accuracy.png'\nset multiplot layout 1,2\nset logscale xy\n"
+            "set grid\nset yrange [1e-11:1]\nset format xy '10^{%%L}'\nset key bottom right\n");
     for (int i = 0; i < TASKS; i++) {
         fprintf(file, "$t%d << EOD\n", i);
         for (int k = 0; k < STEPS; k++)
