@@ -1317,9 +1317,11 @@ typedef struct dem2d_fabric {
     double mean_force;                  ///< N/m, normal
     dem2d_anisotropy normals;           ///< a_c: where the contacts are
     dem2d_anisotropy branches;          ///< a_b: of the branches along the normal
+    dem2d_anisotropy branch_tangents;   ///< a_bt: across it, -mean a_bt sin 2 (angle - direction)
     dem2d_anisotropy normal_forces;     ///< a_n
     dem2d_anisotropy tangential_forces; ///< a_t: f_t = -f0 a_t sin 2 (angle - direction)
-    double stress_ratio; ///< q/p foretold: (a_c + a_b + a_n + a_t)/2, parts along a_c's direction
+    /// q/p foretold: (a_c + a_b + a_bt + a_n + a_t)/2, parts along the direction of a_c.
+    double stress_ratio;
 } dem2d_fabric;
 
 /// What a histogram counts or averages. Directions of normals fill [0, 2 pi), and each contact
@@ -12062,7 +12064,7 @@ static double dem2di_cos_twice(dem2d_vec n, dem2d_rot axis) {
 typedef struct dem2di_fabric_sums {
     int count;
     double branch, force;
-    dem2di_tensor normals, branches, normal_forces, tangential_forces;
+    dem2di_tensor normals, branches, branch_tangents, normal_forces, tangential_forces;
 } dem2di_fabric_sums;
 
 /* Sums with the density of contacts 1 + coefficient cos 2 (t - t0). */
@@ -12081,6 +12083,8 @@ static dem2di_fabric_sums dem2di_fabric_sum(const dem2d_world *world, dem2d_anis
         sums.force += link->force;
         dem2di_tensor_add(&sums.normals, 1, n, n);
         dem2di_tensor_add(&sums.branches, length / weight, n, n);
+        dem2di_tensor_add(&sums.branch_tangents, dem2di_cross(n, walk.branch) / weight, n,
+                          dem2di_perp(n));
         dem2di_tensor_add(&sums.normal_forces, link->force / weight, n, n);
         dem2di_tensor_add(&sums.tangential_forces, link->shear / weight, n, dem2di_perp(n));
     }
@@ -12108,13 +12112,15 @@ DEM2D_API dem2d_result dem2d_world_fabric(const dem2d_world *world, dem2d_fabric
     fabric->deviator = fabric->normals.coefficient / 2;
     sums = dem2di_fabric_sum(world, fabric->normals);
     double force = sums.normal_forces.xx + sums.normal_forces.yy;
-    fabric->branches = dem2di_anisotropy(sums.branches, sums.branches.xx + sums.branches.yy);
+    double branch = sums.branches.xx + sums.branches.yy;
+    fabric->branches = dem2di_anisotropy(sums.branches, branch);
+    fabric->branch_tangents = dem2di_anisotropy(sums.branch_tangents, branch);
     fabric->normal_forces = dem2di_anisotropy(sums.normal_forces, force);
     fabric->tangential_forces = dem2di_anisotropy(sums.tangential_forces, force);
     dem2d_rot axis = dem2d_rot_make(fabric->normals.direction);
-    const dem2d_anisotropy parts[4] = {fabric->normals, fabric->branches, fabric->normal_forces,
-                                       fabric->tangential_forces};
-    for (int i = 0; i < 4; i++) fabric->stress_ratio += dem2di_anisotropy_along(parts[i], axis) / 2;
+    const dem2d_anisotropy parts[5] = {fabric->normals, fabric->branches, fabric->branch_tangents,
+                                       fabric->normal_forces, fabric->tangential_forces};
+    for (int i = 0; i < 5; i++) fabric->stress_ratio += dem2di_anisotropy_along(parts[i], axis) / 2;
     return DEM2D_OK;
 }
 
