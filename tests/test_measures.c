@@ -527,14 +527,14 @@ static void test_fabric(void **state) {
     (void)state;
     static const second_order sets[3][4] = {
         {{0.3, 1.5}, {0.05, 0.4}, {0.4, -1.2}, {0.2, 1.3}},
-        {{0.7, 0.1}, {0.1, -1.5}, {0.6, 0.2}, {0.3, -0.1}},
+        {{0.85, 0.1}, {0.1, -1.5}, {0.6, 0.2}, {0.3, -0.1}},
         {{0.1, -0.7}, {0.02, 1.1}, {0.1, 0.9}, {0.05, 0.3}},
     };
     for (int i = 0; i < 3; i++) {
         const second_order *a = sets[i];
         dem2d_world *world = new_world(NULL);
         dem2d_fabric fabric;
-        enum { PAIRS = 300 };
+        enum { PAIRS = 600 };
         make_pairs(world, PAIRS, a);
         assert_ok(dem2d_world_fabric(world, &fabric));
         assert_int_equal(fabric.contacts, PAIRS);
