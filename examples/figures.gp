@@ -67,6 +67,7 @@ unset title
 # ---- energy: full lines noncircular, dashed ones circular grains, local damping ----
 
 set output "energy.svg"
+set key width 1
 set ylabel "energy, kJ/m"
 set title "full: noncircular, dashed: circular (local damping)" font ",15"
 array runs[2] = ["noncircular_local/history.csv", "circular_local/history.csv"]
@@ -80,6 +81,7 @@ plot for [i=1:2] runs[i] using "time":(kilo("gravity") + kilo("walls") + kilo("g
          linecolor "#c8382c" title i == 1 ? "friction" : "", \
      for [i=1:2] runs[i] using "time":(kilo("kinetic") + kilo("normal") + kilo("tangential")) \
          with lines dashtype dashes[i] linecolor "#3a8f4d" title i == 1 ? "stored" : ""
+set key width -3
 unset title
 
 # ---- histograms ----
