@@ -299,6 +299,29 @@ static void test_resume_refused(void **state) {
     }
 }
 
+/* Settings that are not the defaults; a step that is too long is taken when it is not checked. */
+static void test_settings(void **state) {
+    (void)state;
+    for (int k = 0; k < 2; k++) {
+        snapshot_scene s;
+        dem2d_world_desc desc = scene_desc(SCENE_MIXED);
+        desc.contact_tolerance = 1e-5;
+        desc.max_iterations = 3;
+        desc.skin = 0.0625;
+        desc.skip_time_step_check = k == 1;
+        scene_make(&s, SCENE_MIXED, 16, &desc);
+        assert_ok(dem2d_world_step(s.world, 700, NULL));
+        check_resume(s.world, false, 100);
+        scene_bytes bytes = scene_save(s.world);
+        dem2d_world *copy = load_with(&bytes, NULL, false);
+        assert_ok(dem2d_world_set_time_step(copy, 0.5));
+        assert_result(dem2d_world_step(copy, 1, NULL), k == 1 ? DEM2D_OK : DEM2D_TIME_STEP);
+        dem2d_world_destroy(copy);
+        dem2d_world_destroy(s.world);
+        free(bytes.bytes);
+    }
+}
+
 /* Ids hold in the loaded world, stale ones stay stale, and the next one is the same. */
 static void test_ids(void **state) {
     (void)state;
@@ -324,6 +347,12 @@ static void test_ids(void **state) {
         assert_int_equal(next[0].generation, next[1].generation);
         assert_int_equal(next[0].generation, i < 3 ? 2 : 1);
     }
+    assert_same_world(s.world, copy.world);
+    const dem2d_material_desc lead = {11000, 2e6, 3e5, 0.75}; /* meets all that are there */
+    dem2d_material_id more[2];
+    assert_ok(dem2d_world_add_material(s.world, &lead, &more[0]));
+    assert_ok(dem2d_world_add_material(copy.world, &lead, &more[1]));
+    assert_int_equal(more[0].index, more[1].index);
     assert_same_world(s.world, copy.world);
     assert_result(dem2d_world_remove_wall(copy.world, s.walls[1]), DEM2D_IN_USE); /* in a span */
     assert_result(dem2d_world_remove_shape(copy.world, s.shapes[3]), DEM2D_IN_USE);
@@ -786,6 +815,7 @@ int main(void) {
         cmocka_unit_test(test_resume_empty),
         cmocka_unit_test(test_resume_changed),
         cmocka_unit_test(test_resume_refused),
+        cmocka_unit_test(test_settings),
         cmocka_unit_test(test_ids),
         cmocka_unit_test(test_hash_changes),
         cmocka_unit_test(test_hash_stays),
