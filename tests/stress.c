@@ -298,8 +298,8 @@ static double contact_time(double mass, double stiffness, bool like) {
     return PI * sqrt((like ? mass / 2 : mass) / stiffness);
 }
 
-static const dem2d_material_desc stone = {2700, 1e7, 5e6, 0.4};
-static const dem2d_material_desc glass = {2700, 1e7, 0, 0}; /* elastic, without friction */
+static const dem2d_material_desc stone = {2700, 1e7, 5e6, 0.4, 0, 0};
+static const dem2d_material_desc glass = {2700, 1e7, 0, 0, 0, 0}; /* elastic, without friction */
 
 /* A pile of all kinds in a box `width` grains wide, dropped from a lattice. */
 static scene make_pile(const dem2d_world_desc *desc, const dem2d_material_desc *material, int count,
@@ -441,7 +441,7 @@ static void case_step(void) {
  * percent.
  */
 static void case_stiffness(void) {
-    const dem2d_material_desc soft = {10, 1e4, 1e4, 0.3}, hard = {10, 1e10, 1e10, 0.3};
+    const dem2d_material_desc soft = {10, 1e4, 1e4, 0.3, 0, 0}, hard = {10, 1e10, 1e10, 0.3, 0, 0};
     dem2d_world_desc d = {0};
     dem2d_material_id other;
     const double r = 0.1, mass = 10 * PI * r * r;

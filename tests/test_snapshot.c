@@ -348,7 +348,7 @@ static void test_ids(void **state) {
         assert_int_equal(next[0].generation, i < 3 ? 2 : 1);
     }
     assert_same_world(s.world, copy.world);
-    const dem2d_material_desc lead = {11000, 2e6, 3e5, 0.75}; /* meets all that are there */
+    const dem2d_material_desc lead = {11000, 2e6, 3e5, 0.75, 0, 0}; /* meets all that are there */
     dem2d_material_id more[2];
     assert_ok(dem2d_world_add_material(s.world, &lead, &more[0]));
     assert_ok(dem2d_world_add_material(copy.world, &lead, &more[1]));
