@@ -68,6 +68,17 @@ static int numbers_of(const dem2d_world *world, double *to, int room) {
         memcpy(to + used, got, sizeof got);
         used += COUNT_OF(got);
     }
+    for (int j = 0; j < world->wall_count; j++) {
+        const dem2d_wall_id id = {(uint32_t)j, world->walls[j].generation};
+        dem2d_wall_info w;
+        if (dem2d_world_get_wall(world, id, &w) != DEM2D_OK) continue;
+        const double got[] = {w.point.x,    w.point.y,    w.normal.x, w.normal.y,
+                              w.velocity.x, w.velocity.y, w.force.x,  w.force.y,
+                              w.length,     w.stress,     w.target,   (double)w.mode};
+        assert_true(used + COUNT_OF(got) <= room);
+        memcpy(to + used, got, sizeof got);
+        used += COUNT_OF(got);
+    }
     return used;
 }
 
@@ -322,6 +333,24 @@ static void test_settings(void **state) {
     }
 }
 
+/* A servo wall that holds its stress has a drift; one of a given length. */
+static void test_servo(void **state) {
+    (void)state;
+    snapshot_scene s;
+    dem2d_world_desc desc = scene_desc(SCENE_MIXED);
+    dem2d_wall_desc wall = {0};
+    scene_make(&s, SCENE_MIXED, 16, &desc);
+    wall.mode = DEM2D_WALL_SERVO;
+    wall.material = s.stone;
+    wall.point.y = 0.3, wall.normal.y = -1;
+    wall.stress = 3000, wall.max_speed = 4, wall.length = 0.25;
+    assert_ok(dem2d_world_set_wall(s.world, s.walls[3], &wall));
+    assert_ok(dem2d_world_step(s.world, 2000, NULL));
+    assert_true(s.world->wall_now[3].drift != 0 && s.world->wall_now[3].force.y > 0);
+    check_resume(s.world, true, 200);
+    dem2d_world_destroy(s.world);
+}
+
 /* Ids hold in the loaded world, stale ones stay stale, and the next one is the same. */
 static void test_ids(void **state) {
     (void)state;
@@ -429,6 +458,35 @@ static void test_hash_skins(void **state) {
             dem2d_world_destroy(s.world);
         }
     }
+}
+
+/* The same scene by other ids is another. */
+static void test_hash_ids(void **state) {
+    (void)state;
+    uint64_t hash[3];
+    for (int k = 0; k < 3; k++) {
+        snapshot_scene s;
+        dem2d_world_desc desc = scene_desc(SCENE_CIRCLES);
+        dem2d_wall_desc wall = {0};
+        scene_make(&s, SCENE_CIRCLES, 0, &desc);
+        const uint64_t random = s.random;
+        const dem2d_particle_id id = scene_add_grain(&s, 0, 0.03, 0.03);
+        if (k == 1) {
+            assert_ok(dem2d_world_remove_particle(s.world, id));
+            s.random = random;
+            assert_int_equal(scene_add_grain(&s, 0, 0.03, 0.03).index, id.index);
+        }
+        if (k == 2) {
+            wall.material = s.rubber, wall.normal.y = 1;
+            assert_ok(dem2d_world_remove_wall(s.world, s.walls[0]));
+            assert_ok(dem2d_world_add_wall(s.world, &wall, &s.walls[0]));
+            assert_int_equal(s.walls[0].index, 0);
+        }
+        hash[k] = dem2d_world_hash(s.world);
+        dem2d_world_destroy(s.world);
+    }
+    assert_int_not_equal(hash[0], hash[1]);
+    assert_int_not_equal(hash[0], hash[2]);
 }
 
 /* Doubles count by their bits. */
@@ -810,28 +868,18 @@ static void test_arguments(void **state) {
 
 int main(void) {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(test_resume),
-        cmocka_unit_test(test_resume_blocks),
-        cmocka_unit_test(test_resume_empty),
-        cmocka_unit_test(test_resume_changed),
-        cmocka_unit_test(test_resume_refused),
-        cmocka_unit_test(test_settings),
-        cmocka_unit_test(test_ids),
-        cmocka_unit_test(test_hash_changes),
-        cmocka_unit_test(test_hash_stays),
-        cmocka_unit_test(test_hash_skins),
-        cmocka_unit_test(test_hash_zeros),
-        cmocka_unit_test(test_golden),
-        cmocka_unit_test(test_flipped),
-        cmocka_unit_test(test_cut),
-        cmocka_unit_test(test_appended),
-        cmocka_unit_test(test_layout),
-        cmocka_unit_test(test_crafted),
-        cmocka_unit_test(test_writes_fail),
-        cmocka_unit_test(test_memory_fails),
-        cmocka_unit_test(test_files),
-        cmocka_unit_test(test_custom),
-        cmocka_unit_test(test_arguments),
+        cmocka_unit_test(test_resume),         cmocka_unit_test(test_resume_blocks),
+        cmocka_unit_test(test_resume_empty),   cmocka_unit_test(test_resume_changed),
+        cmocka_unit_test(test_resume_refused), cmocka_unit_test(test_settings),
+        cmocka_unit_test(test_servo),          cmocka_unit_test(test_ids),
+        cmocka_unit_test(test_hash_changes),   cmocka_unit_test(test_hash_stays),
+        cmocka_unit_test(test_hash_skins),     cmocka_unit_test(test_hash_zeros),
+        cmocka_unit_test(test_hash_ids),       cmocka_unit_test(test_golden),
+        cmocka_unit_test(test_flipped),        cmocka_unit_test(test_cut),
+        cmocka_unit_test(test_appended),       cmocka_unit_test(test_layout),
+        cmocka_unit_test(test_crafted),        cmocka_unit_test(test_writes_fail),
+        cmocka_unit_test(test_memory_fails),   cmocka_unit_test(test_files),
+        cmocka_unit_test(test_custom),         cmocka_unit_test(test_arguments),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }
