@@ -333,6 +333,24 @@ static void test_settings(void **state) {
     }
 }
 
+/* All particles of one material, which is not the first: steps go by its law alone. And counters
+   that are 0 in other tests. */
+static void test_one_material(void **state) {
+    (void)state;
+    snapshot_scene s;
+    dem2d_world_desc desc = scene_desc(SCENE_RUBBING);
+    scene_make(&s, SCENE_RUBBING, 40, &desc);
+    for (uint32_t i = 0; i < 40; i++)
+        if (i % 3 != 2) assert_ok(dem2d_world_remove_particle(s.world, (dem2d_particle_id){i, 1}));
+    assert_ok(dem2d_world_step(s.world, 1500, NULL));
+    while (s.world->list_stale) assert_ok(dem2d_world_step(s.world, 1, NULL));
+    assert_true(s.world->plan.one_law && s.world->plan.material == 1);
+    assert_true(s.world->list.discs > 0);
+    s.world->slow_time_step = 3, s.world->count.unsound = 2;
+    check_resume(s.world, false, 300);
+    dem2d_world_destroy(s.world);
+}
+
 /* A servo wall that holds its stress has a drift; one of a given length. */
 static void test_servo(void **state) {
     (void)state;
@@ -868,18 +886,31 @@ static void test_arguments(void **state) {
 
 int main(void) {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(test_resume),         cmocka_unit_test(test_resume_blocks),
-        cmocka_unit_test(test_resume_empty),   cmocka_unit_test(test_resume_changed),
-        cmocka_unit_test(test_resume_refused), cmocka_unit_test(test_settings),
-        cmocka_unit_test(test_servo),          cmocka_unit_test(test_ids),
-        cmocka_unit_test(test_hash_changes),   cmocka_unit_test(test_hash_stays),
-        cmocka_unit_test(test_hash_skins),     cmocka_unit_test(test_hash_zeros),
-        cmocka_unit_test(test_hash_ids),       cmocka_unit_test(test_golden),
-        cmocka_unit_test(test_flipped),        cmocka_unit_test(test_cut),
-        cmocka_unit_test(test_appended),       cmocka_unit_test(test_layout),
-        cmocka_unit_test(test_crafted),        cmocka_unit_test(test_writes_fail),
-        cmocka_unit_test(test_memory_fails),   cmocka_unit_test(test_files),
-        cmocka_unit_test(test_custom),         cmocka_unit_test(test_arguments),
+        cmocka_unit_test(test_resume),
+        cmocka_unit_test(test_resume_blocks),
+        cmocka_unit_test(test_resume_empty),
+        cmocka_unit_test(test_resume_changed),
+        cmocka_unit_test(test_resume_refused),
+        cmocka_unit_test(test_settings),
+        cmocka_unit_test(test_servo),
+        cmocka_unit_test(test_one_material),
+        cmocka_unit_test(test_ids),
+        cmocka_unit_test(test_hash_changes),
+        cmocka_unit_test(test_hash_stays),
+        cmocka_unit_test(test_hash_skins),
+        cmocka_unit_test(test_hash_zeros),
+        cmocka_unit_test(test_hash_ids),
+        cmocka_unit_test(test_golden),
+        cmocka_unit_test(test_flipped),
+        cmocka_unit_test(test_cut),
+        cmocka_unit_test(test_appended),
+        cmocka_unit_test(test_layout),
+        cmocka_unit_test(test_crafted),
+        cmocka_unit_test(test_writes_fail),
+        cmocka_unit_test(test_memory_fails),
+        cmocka_unit_test(test_files),
+        cmocka_unit_test(test_custom),
+        cmocka_unit_test(test_arguments),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }
