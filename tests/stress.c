@@ -718,9 +718,12 @@ static void case_gas(void) {
     }
 }
 
-/* A dozen grains with friction, at rest: places after many steps. */
+/* A dozen grains with friction, at rest: places after many steps. What rolls freely has no force on
+   it that local damping could act on, so there is some of the global kind. (Without, one grain went
+   on at 5e-14 m/s, which is inertia, and 2e-9 radii in 1e7 steps.) */
 static void case_rest(void) {
-    const dem2d_world_desc d = pile_desc();
+    dem2d_world_desc d = pile_desc();
+    d.global_damping = 10;
     scene s = make_pile(&d, &stone, 12, 4, 0, 0);
     dem2d_particle_info at[12];
     const int64_t steps = quick ? 300000 : 10000000;
@@ -1032,7 +1035,7 @@ static uint64_t come_and_go(int kinds, double skin, int rounds, double bytes[2],
     enum { GRAINS = 200, WIDE = 20 };
     dem2d_world_desc d = pile_desc();
     const double r = 0.025, cell = 2.7 * r;
-    d.local_damping = 0.3, d.skin = skin;
+    d.skin = skin;
     scene s = make_scene(&d, &stone);
     *sound = true;
     for (int i = 0; i < GRAINS; i++) {
@@ -1050,7 +1053,7 @@ static uint64_t come_and_go(int kinds, double skin, int rounds, double bytes[2],
             dem2d_particle_desc g =
                 grain_desc(&s, k % kinds, i % VARIANTS, r * uniform(0.7, 1),
                            cell * (10 * i + k % 10 + 0.5), cell * 12); /* where none is any more */
-            g.angle = k, g.velocity.y = -6;
+            g.angle = k, g.velocity.y = -3;
             must(dem2d_world_remove_particle(s.world, s.grains[which]), "remove");
             must(dem2d_world_add_particle(s.world, &g, &s.grains[which]), "add");
         }
@@ -1060,7 +1063,7 @@ static uint64_t come_and_go(int kinds, double skin, int rounds, double bytes[2],
     int count;
     bytes[1] = (double)stats_of(&s).bytes;
     must(dem2d_world_particles(s.world, ids, GRAINS, &count), "ids");
-    *sound = count == GRAINS && all_finite(&s) && stats_of(&s).contacts > GRAINS / 2;
+    *sound = count == GRAINS && all_finite(&s) && stats_of(&s).contacts > GRAINS / 4;
     for (int i = 0; i < count; i++) {
         const dem2d_vec x = info_of(&s, ids[i]).pose.position;
         *sound = *sound && x.x > 0 && x.x < WIDE * cell && x.y > 0 && (int)ids[i].index == i;
