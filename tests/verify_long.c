@@ -77,8 +77,6 @@ static void run_for(const scene *s, double stiffness, double seconds) {
 
 /* --- flow out of a silo ---------------------------------------------------------------------- */
 
-enum { COLUMNS = 30 };
-
 typedef struct silo {
     scene s;
     double width, top; /* of the silo; where grains come back */
@@ -93,8 +91,9 @@ static double refill(silo *p) {
     for (int i = 0; i < count; i++) {
         const dem2d_particle_info info = look(&p->s, ids[i]);
         if (info.pose.position.y > -3 * MEAN) continue;
-        const double x = (p->column + 0.5) * p->width / COLUMNS;
-        p->column = (p->column + 7) % COLUMNS; /* neighbours do not fall side by side */
+        const int columns = (int)(p->width / (1.3 * MEAN));
+        const double x = (p->column + 0.5) * p->width / columns;
+        p->column = (p->column + 7) % columns; /* neighbours do not fall side by side */
         must(dem2d_world_move_particle(p->s.world, ids[i], vec(x, p->top), 0), "refill");
         must(dem2d_world_drive_particle(p->s.world, ids[i], DEM2D_FREE, vec(0, -1), 0), "refill");
         mass += info.mass;
@@ -103,10 +102,12 @@ static double refill(silo *p) {
     return mass;
 }
 
-/* Flow in kg/(m s) through a slot in the floor of a silo of 40 d, filled by so many grains. */
-static double silo_flow(double slot, int grains, double seconds) {
+/* Flow in kg/(m s) through a slot in the floor of a silo, filled by so many grains. For the law to
+   hold a silo is at least 2.5 slots wide and filled higher than 1.2 widths; slots below 6 d clog.
+ */
+static double silo_flow(double slot, double width, int grains, double seconds) {
     const double stiffness = 4e5, interval = 6e-3;
-    silo p = {open_bin(stiffness), 40 * MEAN, 0, 0};
+    silo p = {open_bin(stiffness), width, 0, 0};
     const double left = (p.width - slot) / 2, right = left + slot;
     random_state = 41;
     add_plane(&p.s, 0, 0, 1, 0), add_plane(&p.s, p.width, 0, -1, 0);
@@ -146,11 +147,11 @@ static double log_slope(const double *x, const double *y, int count, double *res
 }
 
 static void hopper(void) {
-    static const double slots[] = {5, 7, 9, 11, 13, 15};
+    static const double slots[] = {6, 8, 10, 12, 14, 16};
     enum { SLOTS = COUNT_OF(slots) };
     double flow[SLOTS], open[SLOTS], best = HUGE_VAL, exponent = 0, reach = 0, residual;
     for (int i = 0; i < SLOTS; i++) {
-        flow[i] = silo_flow(slots[i] * MEAN, 1600, 2.5);
+        flow[i] = silo_flow(slots[i] * MEAN, 40 * MEAN, 2100, 2.5);
         printf("slot of %g d: %.4g kg/(m s)\n", slots[i], flow[i]);
         fflush(stdout);
     }
@@ -163,7 +164,8 @@ static void hopper(void) {
     row_within("flow out of a silo, (D - k d)^n: n, with the k that fits best", 1.5, exponent, 0.1);
     row_between("flow out of a silo: that k", 0.5, 3, reach);
     row_below("flow out of a silo: rms of the fit, relative", 0.03, best);
-    const double low = silo_flow(0.1, 1400, 2.5), high = silo_flow(0.1, 2800, 2.5);
+    const double low = silo_flow(10 * MEAN, 25 * MEAN, 1050, 4);
+    const double high = silo_flow(10 * MEAN, 25 * MEAN, 2100, 4);
     row_near("flow out of a silo: twice the head, ratio of flows", 1, high / low, 0.05);
 }
 
@@ -324,42 +326,29 @@ static void bidisperse(void) {
 
 /* --- collapse of a column -------------------------------------------------------------------- */
 
-/* The farthest place, in x, of the heap: grains that are joined by contacts to the one nearest the
-   corner. Discs that roll away are not part of it. */
+/* Where the heap ends, from the wall on: at the first piece of 2.5 d with less than half a layer of
+   discs. What has rolled away from it does not count. */
 static double heap_end(const scene *s) {
-    int count, touching;
+    enum { PIECES = 1000 };
+    const double piece = 2.5 * MEAN;
+    double area[PIECES] = {0};
+    int count, end = 0;
     dem2d_particle_id *ids = all_ids(s, &count);
-    dem2d_contact_info *list = all_contacts(s, &touching);
-    bool *in = get_memory(NULL, (size_t)count, sizeof *in);
-    double nearest = HUGE_VAL, end = 0;
-    int first = 0;
-    memset(in, 0, (size_t)count * sizeof *in);
-    for (int i = 0; i < count; i++) {
-        const dem2d_vec at = look(s, ids[i]).pose.position;
-        if (hypot(at.x, at.y) < nearest) nearest = hypot(at.x, at.y), first = i;
-    }
-    in[ids[first].index] = true;
-    for (bool grown = true; grown;) {
-        grown = false;
-        for (int i = 0; i < touching; i++) {
-            const dem2d_contact_info *c = &list[i];
-            if (c->b.generation == 0 || in[c->a.index] == in[c->b.index]) continue;
-            in[c->a.index] = in[c->b.index] = grown = true;
-        }
-    }
     for (int i = 0; i < count; i++) {
         const dem2d_particle_info info = look(s, ids[i]);
-        if (in[ids[i].index]) end = fmax(end, info.pose.position.x + info.radius);
+        const double at = info.pose.position.x / piece;
+        if (at >= 0 && at < PIECES) area[(int)at] += (double)PI * info.equivalent * info.equivalent;
     }
-    free(ids), free(list), free(in);
-    return end;
+    free(ids);
+    while (end < PIECES && area[end] > 0.5 * piece * (double)PI / 4 * MEAN) end++;
+    return end * piece;
 }
 
 /* Run-out over width of a column of 1,500 discs beside a wall, and its aspect: its height is twice
    that of its centre of mass. */
 static double collapse(double aspect, uint64_t seed, double *actual) {
     enum { DISCS = 1500 };
-    const double stiffness = 2e6, area = DISCS * (double)PI / 4 * MEAN * MEAN * 1.01 / 0.81;
+    const double stiffness = 1e6, area = DISCS * (double)PI / 4 * MEAN * MEAN * 1.01 / 0.81;
     const double width = sqrt(area / aspect);
     const scene s = open_bin(stiffness);
     random_state = seed;
@@ -373,7 +362,7 @@ static double collapse(double aspect, uint64_t seed, double *actual) {
     for (int i = 0; i < count; i++) height += 2 * look(&s, ids[i]).pose.position.y / count;
     free(ids);
     must(dem2d_world_remove_wall(s.world, gate), "gate");
-    run_for(&s, stiffness, 6 * sqrt(2 * height / G));
+    run_for(&s, stiffness, 5 * sqrt(2 * height / G));
     const double end = heap_end(&s);
     close_scene(&s);
     *actual = height / width;
