@@ -13045,7 +13045,7 @@ static void dem2di_archive_memory(dem2di_archive *ar, const dem2d_world *w, int 
     if (link->depth > 0 && w->plan.full)
         dem2di_archive_extra(ar, &list->extras[contact - list->discs]);
     if (contact >= list->pairs && !w->walls[list->keys[contact].b].desc.segment) return;
-    dem2di_archive_finite(ar, "budget", &link->budget);
+    if (contact < list->pairs) dem2di_archive_finite(ar, "budget", &link->budget);
     dem2di_archive_int(ar, "feature", &link->feature.own, INT_MIN, INT_MAX);
     for (int k = 0; k < 2; k++)
         dem2di_archive_int(ar, "corner", &link->feature.corner[k], INT_MIN, INT_MAX);
