@@ -9331,7 +9331,7 @@ static void dem2di_wall_place(dem2d_world *world, int slot, const dem2d_wall_des
     world->ledger.edited = true;
 }
 
-/* The line that segments are made of, when the first comes. */
+/* The line that segments are made of, when the first comes. The log knows if there is no memory. */
 static bool dem2di_line_make(dem2d_world *world, const dem2d_wall_desc *desc) {
     if (!desc->segment || world->line != NULL) return true;
     dem2d_shape *line = dem2di_shape_allocate(&world->env, DEM2D_POLYGON, 2, 0);
@@ -9358,9 +9358,9 @@ DEM2D_API dem2d_result dem2d_world_add_wall(dem2d_world *world, const dem2d_wall
     if (result != DEM2D_OK) return result;
     int slot = 0;
     while (slot < world->wall_count && world->walls[slot].alive) slot++;
-    if (!dem2di_group_reserve(world, DEM2DI_WALLS, slot + 1, false) ||
-        !dem2di_line_make(world, desc))
+    if (!dem2di_group_reserve(world, DEM2DI_WALLS, slot + 1, false))
         return dem2di_out_of_memory(world, "a wall");
+    if (!dem2di_line_make(world, desc)) return DEM2D_OUT_OF_MEMORY;
     dem2di_wall *wall = &world->walls[slot];
     wall->alive = true;
     wall->generation++;
@@ -9400,7 +9400,7 @@ DEM2D_API dem2d_result dem2d_world_set_wall(dem2d_world *world, dem2d_wall_id id
     if (!dem2di_wall_lives(world, id)) return dem2di_stale(world, "wall", id.index);
     dem2d_result result = dem2di_check_wall(world, desc);
     if (result != DEM2D_OK) return result;
-    if (!dem2di_line_make(world, desc)) return dem2di_out_of_memory(world, "a segment");
+    if (!dem2di_line_make(world, desc)) return DEM2D_OUT_OF_MEMORY;
     dem2di_wall *wall = &world->walls[id.index];
     dem2di_wall old = *wall;
     dem2d_vec moved = dem2di_sub(desc->point, world->wall_now[id.index].point);
@@ -12961,7 +12961,9 @@ static void dem2di_archive_erect(dem2di_archive *ar, dem2d_world *w) {
         dem2d_vec n = wall->desc.normal;
         dem2di_archive_check(ar, dem2di_check_wall(w, &wall->desc));
         dem2di_archive_expect(ar, dem2di_is_unit(n.x, n.y), "a normal is not of unit length");
-        if (!dem2di_archive_room(ar, dem2di_line_make(w, &wall->desc))) return;
+        if (dem2di_archive_loaded(ar) && !dem2di_line_make(w, &wall->desc))
+            ar->result = DEM2D_OUT_OF_MEMORY;
+        if (!dem2di_archive_good(ar)) return;
         if (wall->desc.segment) dem2di_segment_set(wall);
         for (int i = 0; i < 2 && dem2di_archive_good(ar); i++) {
             if (wall->desc.spans[i].generation == 0) continue;
