@@ -14,19 +14,25 @@ enum {
     SCENE_MIXED, /* all models, a custom one too; servo and moving walls, one driven, one fixed */
     SCENE_AREA,  /* the contact-area rule */
     SCENE_GJK,   /* all models by GJK and EPA, one point */
+    /* these on a chain of segments, with a ledger: */
+    SCENE_DASHED, /* circles with dashpots and rolling friction */
+    SCENE_FULL,   /* as mixed, with both and two points where faces meet */
+    SCENE_CHAIN,  /* polygons, springs and friction alone */
+    SCENE_LAW,    /* all models by a caller's law */
     SCENE_COUNT
 };
 
-static const char *const scene_names[SCENE_COUNT] = {"circles", "rubbing", "polygons",
-                                                     "mixed",   "area",    "gjk"};
+static const char *const scene_names[SCENE_COUNT] = {
+    "circles", "rubbing", "polygons", "mixed", "area", "gjk", "dashed", "full", "chain", "law"};
 
 /* After so many steps of so many grains; see `make golden`. */
 enum { GOLDEN_GRAINS = 20, GOLDEN_STEPS = 500 };
-static const uint64_t golden_hashes[SCENE_COUNT] = {0x9e98208f452f3d3du, 0x63c53e2de12b897cu,
-                                                    0xc90b2e9e00a2e492u, 0xd2c42fd5f7a39779u,
-                                                    0x8c284d44a2e17854u, 0x2be52d3bba8be0d5u};
+static const uint64_t golden_hashes[SCENE_COUNT] = {
+    0x621b516151175caau, 0xd34904dce5b4a7e6u, 0x184fc17fb9a156ebu, 0x381389f663ca2962u,
+    0x7492d567aafa5123u, 0x44a26f37880e0469u, 0xcf2f52352202734du, 0xb7be4c15518e453bu,
+    0xb3617a255fefad82u, 0x75d4cc2d085f253bu};
 
-enum { SCENE_SHAPES = 8, SCENE_WALLS = 4, SCENE_TAG = -7 };
+enum { SCENE_SHAPES = 8, SCENE_WALLS = 4, SCENE_LINKS = 3, SCENE_TAG = -7, SCENE_LAW_TAG = 12 };
 
 typedef struct snapshot_scene {
     int kind;
@@ -34,7 +40,7 @@ typedef struct snapshot_scene {
     dem2d_material_id stone, rubber;
     dem2d_shape_id shapes[SCENE_SHAPES];
     int shape_count;
-    dem2d_wall_id walls[SCENE_WALLS];
+    dem2d_wall_id walls[SCENE_WALLS], chain[SCENE_LINKS];
     uint64_t random;
 } snapshot_scene;
 
@@ -71,6 +77,24 @@ static dem2d_custom_desc scene_custom_desc(void) {
     desc.outline_points = 200;
     desc.tag = SCENE_TAG;
     return desc;
+}
+
+/* A spring with a dashpot that may pull, friction, and a state that counts. Products are stored, so
+   that no compiler fuses them with a sum. */
+static void scene_law(void *user, const dem2d_law_input *in, dem2d_law_output *out) {
+    volatile double spring = in->pair.normal_stiffness * in->depth;
+    volatile double dashpot = 20 * (in->mass * in->closing);
+    volatile double limit = in->pair.friction * spring;
+    volatile double slid = in->pair.tangential_stiffness * (in->slip * in->time_step);
+    volatile double turn = 0.001 * (spring * in->turning) * in->radius;
+    double shear = in->tangential_force - slid;
+    (void)user;
+    out->normal_force = spring + dashpot;
+    out->tangential_force = shear > limit ? limit : shear < -limit ? -limit : shear;
+    out->moment = -turn;
+    out->energy = spring * in->depth / 2;
+    out->state[0] = in->state[0] + 1;
+    out->state[1] = shear;
 }
 
 /* For dem2d_load_desc. */
@@ -112,9 +136,9 @@ static void scene_add_shapes(snapshot_scene *s) {
     dem2d_custom_desc custom = scene_custom_desc();
     scene_check(dem2d_shape_create_circle(NULL, 0.025, &shape));
     scene_add_shape(s, shape);
-    if (s->kind == SCENE_CIRCLES || s->kind == SCENE_RUBBING) return;
+    if (s->kind == SCENE_CIRCLES || s->kind == SCENE_RUBBING || s->kind == SCENE_DASHED) return;
     scene_add_polygons(s);
-    if (s->kind == SCENE_POLYGONS) return;
+    if (s->kind == SCENE_POLYGONS || s->kind == SCENE_CHAIN) return;
     scene_check(dem2d_shape_create_ellipse(NULL, 0.035, 0.02, &shape));
     scene_add_shape(s, shape);
     scene_check(dem2d_shape_create_bezier(NULL, square, 8, &shape));
@@ -125,6 +149,30 @@ static void scene_add_shapes(snapshot_scene *s) {
     scene_add_shape(s, shape);
 }
 
+static bool scene_driven(int kind) { /* walls and particles */
+    return kind == SCENE_MIXED || kind == SCENE_FULL;
+}
+
+/* A floor with a valley and a crest, some of it from right to left. */
+static void scene_add_chain(snapshot_scene *s, double width) {
+    const double at[SCENE_LINKS + 1][2] = {
+        {-0.125, 0}, {0.25 * width, -0.03125}, {0.625 * width, 0}, {width + 0.25, -0.03125}};
+    for (int i = 0; i < SCENE_LINKS; i++) {
+        const double *from = at[i == 1 ? i + 1 : i], *to = at[i == 1 ? i : i + 1];
+        dem2d_wall_desc wall;
+        memset(&wall, 0, sizeof wall);
+        wall.material = i == 0 ? s->rubber : s->stone;
+        wall.segment = true;
+        wall.point.x = from[0], wall.point.y = from[1];
+        wall.end.x = to[0], wall.end.y = to[1];
+        if (scene_driven(s->kind) && i == 2) { /* away from its neighbour */
+            wall.mode = DEM2D_WALL_MOVING;
+            wall.velocity.x = 0.03125;
+        }
+        scene_check(dem2d_world_add_wall(s->world, &wall, &s->chain[i]));
+    }
+}
+
 static void scene_add_walls(snapshot_scene *s, double width) {
     static const double normals[SCENE_WALLS][2] = {{0, 1}, {1, 0}, {-1, 0.125}, {0, -1}};
     for (int i = 0; i < SCENE_WALLS; i++) {
@@ -133,12 +181,13 @@ static void scene_add_walls(snapshot_scene *s, double width) {
         wall.material = i == 0 ? s->rubber : s->stone;
         wall.normal.x = normals[i][0], wall.normal.y = normals[i][1];
         wall.point.x = i == 2 ? width : 0;
+        if (i == 0 && s->kind >= SCENE_DASHED) wall.point.y = -0.25;
         if (i == 3) wall.point.y = 3 * width + 0.25;
-        if (s->kind == SCENE_MIXED && i == 2) {
+        if (scene_driven(s->kind) && i == 2) {
             wall.mode = DEM2D_WALL_MOVING;
             wall.velocity.x = -0.05;
         }
-        if (s->kind == SCENE_MIXED && i == 3) {
+        if (scene_driven(s->kind) && i == 3) {
             wall.mode = DEM2D_WALL_SERVO;
             wall.stress = 2000;
             wall.max_speed = 1;
@@ -147,6 +196,7 @@ static void scene_add_walls(snapshot_scene *s, double width) {
         }
         scene_check(dem2d_world_add_wall(s->world, &wall, &s->walls[i]));
     }
+    if (s->kind >= SCENE_DASHED) scene_add_chain(s, width);
 }
 
 static dem2d_particle_id scene_add_grain(snapshot_scene *s, int shape, double x, double y) {
@@ -170,7 +220,12 @@ static dem2d_world_desc scene_desc(int kind) {
     desc.time_step = 1e-4;
     desc.gravity.y = -9.81;
     if (kind != SCENE_CIRCLES) desc.local_damping = 0.25;
-    if (kind == SCENE_MIXED) desc.global_damping = 0.5;
+    if (scene_driven(kind)) desc.global_damping = 0.5;
+    desc.ledger = kind >= SCENE_DASHED;
+    if (kind == SCENE_LAW) {
+        desc.law = scene_law;
+        desc.law_tag = SCENE_LAW_TAG;
+    }
     if (kind == SCENE_AREA) desc.faces = DEM2D_CONTACT_AREA;
     if (kind == SCENE_GJK) {
         desc.faces = DEM2D_ONE_POINT;
@@ -188,6 +243,10 @@ static void scene_make(snapshot_scene *s, int kind, int count, const dem2d_world
     s->random = 1;
     scene_check(dem2d_world_create(desc, &s->world));
     if (kind == SCENE_CIRCLES) stone.friction = rubber.friction = 0;
+    if (kind == SCENE_DASHED || kind == SCENE_FULL) {
+        stone.damping_ratio = 0.125, rubber.damping_ratio = 0.5;
+        stone.rolling_friction = 0.0625, rubber.rolling_friction = 0.25;
+    }
     scene_check(dem2d_world_add_material(s->world, &stone, &s->stone));
     scene_check(dem2d_world_add_material(s->world, &rubber, &s->rubber));
     scene_add_shapes(s);
@@ -196,7 +255,7 @@ static void scene_make(snapshot_scene *s, int kind, int count, const dem2d_world
     for (int i = 0; i < count; i++)
         (void)scene_add_grain(s, i, 0.03125 + 0.0625 * (i % columns),
                               0.03125 + 0.0625 * (double)(i / columns));
-    if (kind == SCENE_MIXED && count > 4) {
+    if (scene_driven(kind) && count > 4) {
         dem2d_particle_id id = {3, 1};
         dem2d_vec none = {0, 0}, up = {0.1, 0.2};
         scene_check(dem2d_world_drive_particle(s->world, id, DEM2D_FIXED, none, 0));
@@ -257,6 +316,8 @@ static dem2d_load_desc scene_load_desc(scene_bytes *bytes, dem2d_custom_desc *cu
     desc.user = bytes;
     desc.custom = scene_custom;
     desc.custom_user = custom;
+    desc.law = scene_law;
+    desc.law_tag = SCENE_LAW_TAG;
     return desc;
 }
 
