@@ -1,5 +1,6 @@
 /* A step's work on other threads: whatever runs the callback's items, in whatever order and ranges,
-   a world must come out the same to the last bit as on one thread. */
+   a world must come out the same to the last bit as on one thread; and so it must in whatever order
+   its particles are in memory. */
 #define _POSIX_C_SOURCE 200809L
 #define DEM2D_IMPLEMENTATION
 #include "dem2d.h"
@@ -7,7 +8,8 @@
 
 #include <pthread.h>
 
-enum { GRAINS = 640, COLUMNS = 32, WALLS = 4, MOST_THREADS = 7 }; /* some blocks of a few hundred */
+enum { GRAINS = 640, COLUMNS = 32, MOST_THREADS = 7 }; /* some blocks of a few hundred */
+enum { WALLS = 4, LINKS = 12 };                        /* half-planes, segments of a chain */
 
 #define RADIUS 0.025
 #define PITCH (1.85 * RADIUS)
@@ -184,6 +186,10 @@ typedef struct scene {
     bool drive;  /* some are fixed, some driven */
     dem2d_solver solver;
     dem2d_face_rule faces;
+    bool full;  /* dashpots, rolling friction */
+    bool law;   /* a caller's */
+    bool chain; /* the floor is one of segments */
+    bool book;  /* a ledger */
     int rounds; /* the state is compared after each */
     int steps;  /* of a round; 0 for 40 */
     calls calls;
@@ -200,13 +206,40 @@ static scene scenes[] = {
     {.name = "GJK and EPA", .friction = 0.4, .solver = DEM2D_GJK_EPA, .rounds = 2, .steps = 8},
     {.name = "one point", .friction = 0.4, .faces = DEM2D_ONE_POINT, .rounds = 2},
     {.name = "contact area", .friction = 0.4, .faces = DEM2D_CONTACT_AREA, .rounds = 1, .steps = 2},
+    {.name = "discs by the full law",
+     .discs = true,
+     .friction = 0.4,
+     .full = true,
+     .book = true,
+     .rounds = 2},
+    {.name = "five shapes on a chain",
+     .friction = 0.4,
+     .chain = true,
+     .change = true,
+     .book = true,
+     .rounds = 2},
+    {.name = "the full law on a chain, below a servo wall",
+     .friction = 0.4,
+     .full = true,
+     .chain = true,
+     .lid = true,
+     .drive = true,
+     .book = true,
+     .rounds = 2},
+    {.name = "a caller's law",
+     .friction = 0.4,
+     .law = true,
+     .chain = true,
+     .change = true,
+     .book = true,
+     .rounds = 2},
 };
 
 typedef struct run {
     dem2d_world *world;
     dem2d_shape_id shapes[5];
     dem2d_material_id material;
-    dem2d_wall_id walls[WALLS];
+    dem2d_wall_id walls[WALLS + LINKS];
     int wall_count;
     test_random random;
     dem2d_env env;
@@ -236,9 +269,10 @@ static dem2d_shape *make_shape(int kind) {
     return shape;
 }
 
-static void add_grain(run *r, const scene *s, int place) {
+static dem2d_particle_id add_grain(run *r, const scene *s, int place) {
     dem2d_particle_desc desc = {0};
     dem2d_particle_id id;
+    r->random.state = (uint64_t)place + 7; /* whenever it comes */
     desc.shape = r->shapes[s->discs ? 0 : place % 5], desc.material = r->material;
     desc.scale = test_uniform(&r->random, 0.9, 1) * (s->discs ? 1 : 1.2); /* most touch */
     desc.position.x = PITCH * (0.5 + place % COLUMNS);
@@ -252,6 +286,56 @@ static void add_grain(run *r, const scene *s, int place) {
         desc.angular_velocity = test_uniform(&r->random, -20, 20);
     }
     assert_ok(dem2d_world_add_particle(r->world, &desc, &id));
+    return id;
+}
+
+/* Grains with the same ids in an order of memory of their own: those that were there before have
+   left their ids in that order. */
+static void add_in_order(run *r, const scene *s, uint64_t seed) {
+    dem2d_particle_id ids[GRAINS];
+    int order[GRAINS];
+    test_random random = {seed};
+    for (int i = 0; i < GRAINS; i++) {
+        const int k = seed > 0 ? test_below(&random, i + 1) : i;
+        ids[i] = add_grain(r, s, i);
+        order[i] = order[k], order[k] = i;
+    }
+    for (int i = GRAINS; i-- > 0;) assert_ok(dem2d_world_remove_particle(r->world, ids[order[i]]));
+    for (int i = 0; i < GRAINS; i++)
+        assert_int_equal(add_grain(r, s, order[i]).index, ids[order[i]].index);
+    for (int i = 1; i < GRAINS; i++)
+        assert_true(r->world->names[order[i - 1]].slot < r->world->names[order[i]].slot);
+}
+
+/* Flat in its middle, by turns from the left and from the right; the ends are beyond the walls. */
+static void add_chain(run *r) {
+    const double piece = PITCH * COLUMNS / (LINKS - 2);
+    for (int i = 0; i < LINKS; i++) {
+        dem2d_wall_desc desc = {0};
+        dem2d_vec at[2];
+        for (int k = 0; k < 2; k++) {
+            const int joint = i + k;
+            const bool flat = joint >= 5 && joint <= 7;
+            at[k] = vec(piece * (joint - 1), -0.2 * RADIUS * (flat ? 0.5 : joint % 2));
+        }
+        desc.material = r->material, desc.segment = true;
+        desc.point = at[i % 3 == 0], desc.end = at[i % 3 != 0];
+        if (i == 3) desc.mode = DEM2D_WALL_MOVING, desc.velocity = vec(0, -0.01);
+        assert_ok(dem2d_world_add_wall(r->world, &desc, &r->walls[r->wall_count++]));
+    }
+}
+
+/* A spring and a dashpot, friction, a moment against turning, a state that grows. */
+static void own_law(void *user, const dem2d_law_input *in, dem2d_law_output *out) {
+    const double spring = in->pair.normal_stiffness * in->depth, limit = 0.3 * spring;
+    const double shear =
+        in->tangential_force - in->pair.tangential_stiffness * in->slip * in->time_step;
+    (void)user;
+    out->normal_force = spring + 30 * in->mass * in->closing;
+    out->tangential_force = shear > limit ? limit : shear < -limit ? -limit : shear;
+    out->moment = -1e-3 * in->radius * in->radius * in->turning * in->mass + 1e-6 * in->state[0];
+    out->energy = spring * in->depth / 2;
+    out->state[0] = in->state[0] + in->depth, out->state[1] = in->moment;
 }
 
 static void add_walls(run *r, const scene *s) {
@@ -262,20 +346,21 @@ static void add_walls(run *r, const scene *s) {
         dem2d_wall_desc desc = {0};
         desc.material = r->material;
         desc.point = vec(at[i][0], at[i][1]), desc.normal = vec(at[i][2], at[i][3]);
+        if (i == 0 && s->chain) desc.point.y = -5 * RADIUS;
         if (i == 3) {
             desc.mode = DEM2D_WALL_SERVO, desc.stress = 2e4, desc.max_speed = 0.5;
             desc.spans[0] = r->walls[1], desc.spans[1] = r->walls[2];
         }
         assert_ok(dem2d_world_add_wall(r->world, &desc, &r->walls[i]));
     }
+    if (s->chain) add_chain(r);
 }
 
 /* Without a runner the library does its work itself. */
-static void make_run(run *r, const scene *s, const runner *runner, calls *calls) {
-    const dem2d_material_desc stone = {2700, 1e6, s->friction > 0 ? 1e6 : 0, s->friction, 0, 0};
+static void make_empty(run *r, const scene *s, const runner *runner, calls *calls) {
+    dem2d_material_desc stone = {2700, 1e6, s->friction > 0 ? 1e6 : 0, s->friction, 0, 0};
     dem2d_world_desc desc = {0};
     memset(r, 0, sizeof *r);
-    r->random.state = 7;
     r->host.runner = runner, r->host.calls = calls, r->host.caller = pthread_self();
     if (runner && runner->way == ON_THREADS) crew_start(&r->host.crew, runner->threads);
     test_env_init(&r->host.env);
@@ -283,6 +368,8 @@ static void make_run(run *r, const scene *s, const runner *runner, calls *calls)
     desc.time_step = 1e-4, desc.gravity.y = -9.81, desc.local_damping = 0.3;
     desc.solver = s->solver, desc.faces = s->faces, desc.env = &r->env;
     desc.parallel_for = runner ? run_items : NULL, desc.parallel_user = &r->host;
+    desc.ledger = s->book, desc.law = s->law ? own_law : NULL;
+    if (s->full) stone.damping_ratio = 0.15, stone.rolling_friction = 0.1;
     assert_ok(dem2d_world_create(&desc, &r->world));
     assert_ok(dem2d_world_add_material(r->world, &stone, &r->material));
     for (int i = 0; i < COUNT_OF(r->shapes); i++) {
@@ -291,6 +378,10 @@ static void make_run(run *r, const scene *s, const runner *runner, calls *calls)
         dem2d_shape_destroy(shape);
     }
     add_walls(r, s);
+}
+
+static void make_run(run *r, const scene *s, const runner *runner, calls *calls) {
+    make_empty(r, s, runner, calls);
     for (int i = 0; i < GRAINS; i++) add_grain(r, s, i);
 }
 
@@ -364,7 +455,7 @@ static void put_contacts(numbers *n, const dem2d_world *world) {
         const dem2d_contact_info *c = &list[i];
         PUT(n, c->a.index, c->b.index, c->b.generation, c->wall.index, c->wall.generation,
             c->normal.x, c->normal.y, c->point.x, c->point.y, c->branch.x, c->branch.y, c->points,
-            c->depth, c->normal_force, c->tangential_force);
+            c->depth, c->normal_force, c->tangential_force, c->moment);
     }
 }
 
@@ -373,7 +464,7 @@ static void put_walls(numbers *n, const run *r) {
         dem2d_wall_info w;
         assert_ok(dem2d_world_get_wall(r->world, r->walls[i], &w));
         PUT(n, w.point.x, w.point.y, w.velocity.x, w.velocity.y, w.force.x, w.force.y, w.length,
-            w.stress);
+            w.stress, w.end.x, w.end.y);
     }
 }
 
@@ -387,9 +478,17 @@ static void put_measures(numbers *n, const dem2d_world *world) {
     assert_ok(dem2d_world_stress(world, 1, &s));
     assert_ok(dem2d_world_packing(world, &p));
     assert_ok(dem2d_world_time_step_bounds(world, &safe, &limit, &limit_at));
-    PUT(n, e.translational, e.rotational, e.normal, e.tangential, e.potential, s.xx, s.xy, s.yx,
-        s.yy, p.coordination, p.coordination_loaded, p.mean_overlap, p.max_overlap, p.solid_area,
-        safe, limit, limit_at.index, limit_at.generation);
+    PUT(n, e.translational, e.rotational, e.normal, e.tangential, e.rolling, e.potential, s.xx,
+        s.xy, s.yx, s.yy, p.coordination, p.coordination_loaded, p.mean_overlap, p.max_overlap,
+        p.solid_area, safe, limit, limit_at.index, limit_at.generation);
+}
+
+/* Of a world that keeps one. */
+static void put_ledger(numbers *n, const dem2d_world *world) {
+    dem2d_ledger l;
+    if (dem2d_world_ledger(world, &l) != DEM2D_OK) return;
+    PUT(n, l.kinetic, l.normal, l.tangential, l.gravity, l.walls, l.driven, l.friction, l.dashpot,
+        l.damping, l.given, l.closure);
 }
 
 /* All counters; the bytes in use may differ by scratch memory of the blocks. */
@@ -408,18 +507,40 @@ static void put_state(numbers *n, const run *r) {
     put_walls(n, r);
     put_measures(n, r->world);
     put_stats(n, r->world);
+    put_ledger(n, r->world);
+    const uint64_t hash = dem2d_world_hash(r->world);
+    PUT(n, (double)(hash >> 32), (double)(hash & 0xffffffffu));
 }
 
 /* --- tests ----------------------------------------------------------------------------------- */
 
-static numbers run_scene(scene *s, const runner *runner) {
+/* What the scene has is there: else little was tested. */
+static void check_books(const dem2d_world *world, const scene *s) {
+    dem2d_ledger l;
+    dem2d_energy e;
+    assert_ok(dem2d_world_ledger(world, &l));
+    assert_ok(dem2d_world_energy(world, &e));
+    assert_true(l.kinetic > 0 && l.normal > 0 && l.friction != 0 && l.closure != 0);
+    assert_true((l.dashpot != 0) == s->full);
+    assert_true((e.rolling > 0) == s->full);
+    if (s->lid) assert_true(l.walls != 0);
+    if (s->drive) assert_true(l.driven != 0);
+}
+
+/* order: of the particles in memory, see add_in_order; -1 as they come. */
+static numbers run_scene(scene *s, const runner *runner, int order) {
     static run r;
     numbers n = {NULL, 0, 0};
-    make_run(&r, s, runner, &s->calls);
+    if (order < 0)
+        make_run(&r, s, runner, &s->calls);
+    else
+        make_empty(&r, s, runner, &s->calls), add_in_order(&r, s, (uint64_t)order);
     for (int i = 0; i < s->rounds; i++) {
+        if (order >= 0) r.world->scattered = order == 2; /* sorted by place, or left as they are */
         take_round(&r, s, i);
         put_state(&n, &r);
     }
+    if (s->book) check_books(r.world, s);
     dem2d_stats stats;
     assert_ok(dem2d_world_stats(r.world, &stats));
     assert_true(stats.contacts > GRAINS / 4); /* else little was tested */
@@ -442,13 +563,30 @@ static void assert_same(const numbers *one, const numbers *other, const char *na
 
 static void test_scene(void **state) {
     scene *s = *state;
-    numbers one = run_scene(s, NULL);
+    numbers one = run_scene(s, NULL, -1);
     for (int i = 0; i < COUNT_OF(runners); i++) {
-        numbers other = run_scene(s, &runners[i]);
+        numbers other = run_scene(s, &runners[i], -1);
         assert_same(&one, &other, runners[i].name);
         free(other.at);
     }
     free(one.at);
+}
+
+/* In memory as their ids, at random, and sorted by their place in space. */
+static void test_storage(void **state) {
+    static const char *const names[] = {"by ids", "at random", "at random, then by place"};
+    (void)state;
+    for (int i = 0; i < COUNT_OF(scenes); i++) {
+        scene *s = &scenes[i];
+        if (s->faces == DEM2D_CONTACT_AREA || s->solver == DEM2D_GJK_EPA) continue; /* slow */
+        numbers one = run_scene(s, NULL, 0);
+        for (int order = 1; order < COUNT_OF(names); order++) {
+            numbers other = run_scene(s, &runners[order], order);
+            assert_same(&one, &other, names[order]);
+            free(other.at);
+        }
+        free(one.at);
+    }
 }
 
 /* A step that fails: two grains in different blocks fly off the numbers, or the time step is too
@@ -515,13 +653,15 @@ static void test_calls(void **state) {
 }
 
 int main(void) {
-    struct CMUnitTest tests[COUNT_OF(scenes) + 2] = {{0}};
+    struct CMUnitTest tests[COUNT_OF(scenes) + 3] = {{0}};
     int count = 0;
     for (int i = 0; i < COUNT_OF(scenes); i++) {
         tests[count].name = scenes[i].name;
         tests[count].test_func = test_scene;
         tests[count++].initial_state = &scenes[i];
     }
+    tests[count].name = "any order in memory";
+    tests[count++].test_func = test_storage;
     tests[count].name = "a step that fails";
     tests[count++].test_func = test_failure;
     tests[count].name = "all phases are handed out in pieces";
