@@ -29,7 +29,7 @@ static const char *const scene_names[SCENE_COUNT] = {
 enum { GOLDEN_GRAINS = 20, GOLDEN_STEPS = 500 };
 static const uint64_t golden_hashes[SCENE_COUNT] = {
     0x621b516151175caau, 0xd34904dce5b4a7e6u, 0x184fc17fb9a156ebu, 0x381389f663ca2962u,
-    0x7492d567aafa5123u, 0x44a26f37880e0469u, 0xcf2f52352202734du, 0xb7be4c15518e453bu,
+    0x7492d567aafa5123u, 0x44a26f37880e0469u, 0x5922c82ba7b053eeu, 0xb7be4c15518e453bu,
     0xb3617a255fefad82u, 0x75d4cc2d085f253bu};
 
 enum { SCENE_SHAPES = 8, SCENE_WALLS = 4, SCENE_LINKS = 3, SCENE_TAG = -7, SCENE_LAW_TAG = 12 };
