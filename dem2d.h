@@ -6621,7 +6621,11 @@ static bool dem2di_edges_solve(dem2di_pair *pair, const dem2di_feature *last, de
         dem2di_cores_apart(pair, core, k[0], k[1], u, search);
         return true;
     }
-    edge[0].h = HUGE_VAL;
+    edge[0].h = HUGE_VAL; /* the answer as it is when all the others overflow */
+    edge[0].own = edge[0].k[0] = edge[0].k[1] = 0;
+    edge[0].side = 1;
+    for (int i = 0; i < 2; i++) edge[0].p[i] = dem2di_vec(0, 0);
+    edge[0].to = edge[0].tangent = dem2di_vec(0, 0);
     int all = core[0].count + core[1].count;
     for (int i = 0; i <= DEM2DI_MANY_EDGES; i++) {
         bool open = false;
