@@ -12248,7 +12248,7 @@ static double dem2di_kinetic_ratio(const dem2d_world *world) {
     dem2d_energy energy;
     (void)dem2d_world_energy(world, &energy);
     double kinetic = energy.translational + energy.rotational;
-    double springs = energy.normal + energy.tangential;
+    double springs = energy.normal + energy.tangential + energy.rolling;
     if (!(kinetic > 0)) return 0;
     return springs > 0 ? kinetic / springs : HUGE_VAL;
 }

@@ -195,6 +195,14 @@ static void test_rolling(void **state) {
         assert_ok(dem2d_world_contacts(s.world, &c, 1, &count));
         assert_int_equal(count, 1);
         if (i == 1) assert_near(fabs(c.moment), mu_r * radius * c.normal_force, 1e-9);
+        dem2d_energy e;
+        dem2d_equilibrium rest;
+        assert_ok(dem2d_world_energy(s.world, &e));
+        assert_ok(dem2d_world_equilibrium(s.world, &rest));
+        assert_true(e.rolling > 1e-3 * e.normal);
+        assert_near(rest.kinetic_ratio,
+                    (e.translational + e.rotational) / (e.normal + e.tangential + e.rolling),
+                    1e-14);
         dem2d_ledger ledger = book(&s);
         assert_within(ledger.closure, 0, 1e-3 * fmax(ledger.gravity, ledger.tangential));
         if (i == 1) assert_true(ledger.friction > 0.2 * ledger.gravity);
