@@ -74,7 +74,8 @@ LIMITS
       That is looked for when the list of pairs is renewed: dem2d_stats.fast_motion, one message.
     * A custom support function that is not convex can't be detected; contacts are then wrong.
     * Two points carry a contact of faces. A box on a wall then conserves its energy; between two
-      free polygons, where the reference edge changes, no rule of points does exactly.
+      free polygons, where the reference edge changes, no rule of points does: dense packings of
+      sharp polygons with hardly any damping gain energy. Damp them, or use CONTACT_AREA.
     * Where the support value hardly changes with the direction (bodies of constant width, one
       concentric with the other), a search may reach its cap: the answer is then UNRESOLVED, with
       bounds a few 1e-4 of the size apart.
