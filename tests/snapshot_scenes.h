@@ -7,6 +7,13 @@
 #include <stdlib.h>
 #include <string.h>
 
+/* Not every user of this file calls all of it. */
+#if defined(__GNUC__)
+#define SCENE_HELPER static __attribute__((unused))
+#else
+#define SCENE_HELPER static
+#endif
+
 enum {
     SCENE_CIRCLES,  /* no friction: nothing turns */
     SCENE_RUBBING,  /* circles of two materials with friction, local damping */
@@ -214,7 +221,7 @@ static dem2d_particle_id scene_add_grain(snapshot_scene *s, int shape, double x,
     return id;
 }
 
-static dem2d_world_desc scene_desc(int kind) {
+SCENE_HELPER dem2d_world_desc scene_desc(int kind) {
     dem2d_world_desc desc;
     memset(&desc, 0, sizeof desc);
     desc.time_step = 1e-4;
@@ -235,7 +242,7 @@ static dem2d_world_desc scene_desc(int kind) {
 }
 
 /* A falling heap of `count` grains; env, skin and threads as in desc. */
-static void scene_make(snapshot_scene *s, int kind, int count, const dem2d_world_desc *desc) {
+SCENE_HELPER void scene_make(snapshot_scene *s, int kind, int count, const dem2d_world_desc *desc) {
     dem2d_material_desc stone = {2700, 1e6, 1e6, 0.5, 0, 0}, rubber = {1000, 2e5, 1e5, 0.8, 0, 0};
     int columns = 3;
     memset(s, 0, sizeof *s);
