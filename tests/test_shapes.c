@@ -574,17 +574,17 @@ static void customs_are_checked(void **state) {
         const char *word;
     } bad[] = {
         {{0}, DEM2D_NULL_ARGUMENT, "support"},
-        {{bad_callback, &one, -1, 0, {0, {0, 0}, 0}, 0}, DEM2D_OUT_OF_RANGE, "rho_min"},
-        {{bad_callback, &one, NAN, 0, {0, {0, 0}, 0}, 0}, DEM2D_NOT_FINITE, "rho_min"},
-        {{bad_callback, &one, 0, -1, {0, {0, 0}, 0}, 0}, DEM2D_OUT_OF_RANGE, "inscribed"},
-        {{bad_callback, &one, 0, HUGE_VAL, {0, {0, 0}, 0}, 0}, DEM2D_NOT_FINITE, "inscribed"},
-        {{bad_callback, &one, 0, 0, {0, {0, 0}, 0}, 2}, DEM2D_OUT_OF_RANGE, "outline_points"},
-        {{bad_callback, &one, 0, 0, {0, {0, 0}, 0}, -1}, DEM2D_OUT_OF_RANGE, "outline_points"},
-        {{bad_callback, &one, 0, 0, {NAN, {0, 0}, 1}, 0}, DEM2D_NOT_FINITE, NULL},
-        {{bad_callback, &one, 0, 0, {1, {0, NAN}, 1}, 0}, DEM2D_NOT_FINITE, NULL},
-        {{bad_callback, &one, 0, 0, {1, {0, 0}, -1}, 0}, DEM2D_OUT_OF_RANGE, NULL},
-        {{bad_callback, &zero, 0, 0, {0, {0, 0}, 0}, 0}, DEM2D_ZERO_AREA, NULL},
-        {{bad_callback, &nan_size, 0, 0, {0, {0, 0}, 0}, 0}, DEM2D_NOT_FINITE, NULL},
+        {{bad_callback, &one, -1, 0, {0, {0, 0}, 0}, 0, 0}, DEM2D_OUT_OF_RANGE, "rho_min"},
+        {{bad_callback, &one, NAN, 0, {0, {0, 0}, 0}, 0, 0}, DEM2D_NOT_FINITE, "rho_min"},
+        {{bad_callback, &one, 0, -1, {0, {0, 0}, 0}, 0, 0}, DEM2D_OUT_OF_RANGE, "inscribed"},
+        {{bad_callback, &one, 0, HUGE_VAL, {0, {0, 0}, 0}, 0, 0}, DEM2D_NOT_FINITE, "inscribed"},
+        {{bad_callback, &one, 0, 0, {0, {0, 0}, 0}, 2, 0}, DEM2D_OUT_OF_RANGE, "outline_points"},
+        {{bad_callback, &one, 0, 0, {0, {0, 0}, 0}, -1, 0}, DEM2D_OUT_OF_RANGE, "outline_points"},
+        {{bad_callback, &one, 0, 0, {NAN, {0, 0}, 1}, 0, 0}, DEM2D_NOT_FINITE, NULL},
+        {{bad_callback, &one, 0, 0, {1, {0, NAN}, 1}, 0, 0}, DEM2D_NOT_FINITE, NULL},
+        {{bad_callback, &one, 0, 0, {1, {0, 0}, -1}, 0, 0}, DEM2D_OUT_OF_RANGE, NULL},
+        {{bad_callback, &zero, 0, 0, {0, {0, 0}, 0}, 0, 0}, DEM2D_ZERO_AREA, NULL},
+        {{bad_callback, &nan_size, 0, 0, {0, {0, 0}, 0}, 0, 0}, DEM2D_NOT_FINITE, NULL},
     };
     for (int i = 0; i < COUNT_OF(bad); i++) {
         test_env env;
