@@ -46,6 +46,7 @@ CONTENTS (search for the anchor, ">>" and the word)
                     the ledger of energies                                  >>ledger
                     contacts, sums, motion; the stable time step            >>step
                     energy, stress, fabric, packing, distance from rest     >>measures
+                    bytes to a callback or a file                           >>output
                     state hash, snapshots                                   >>snapshot
                     pictures, files for ParaView, histories                 >>writers
     Changes, licence                                                        >>licence
@@ -1438,8 +1439,9 @@ DEM2D_API dem2d_result dem2d_world_save(const dem2d_world *world, const dem2d_sa
                                         const char *path);
 /// The world of a snapshot: all ids hold, and its steps are those of the world that was saved, to
 /// the bit, with all statistics but bytes. read must have no byte after the snapshot. Memory beside
-/// the world's: the snapshot's size. Errors: NULL_ARGUMENT (also a tag that custom does not know, a
-/// law that is not given), OUT_OF_RANGE (path and read), OUT_OF_MEMORY, IO, FORMAT, FORMAT_VERSION.
+/// the world's: at most one and a half times the snapshot's size. Errors: NULL_ARGUMENT (also a tag
+/// that custom does not know, a law that is not given), OUT_OF_RANGE (path and read),
+/// OUT_OF_MEMORY, IO, FORMAT, FORMAT_VERSION.
 DEM2D_API dem2d_result dem2d_world_load(const dem2d_load_desc *desc, const char *path,
                                         dem2d_world **world);
 
@@ -1501,7 +1503,8 @@ DEM2D_API dem2d_result dem2d_world_write_svg(const dem2d_world *world, const dem
 /// Write one part of a world for VTK and ParaView. Cell data of particles: id (index), type,
 /// material, motion, contacts (walls not counted), velocity (mean of the half steps),
 /// angular_velocity, angle, mass, radius (equivalent), stress (3 x 3); of contacts: a, b, wall
-/// (indices, or -1), points, normal, force (on B), position, normal_force, tangential_force, depth;
+/// (indices, or -1), points, normal, force (on B), position, normal_force, tangential_force,
+/// moment, depth;
 /// of walls: id, mode, velocity (mean of the half steps), force, stress.
 DEM2D_API dem2d_result dem2d_world_write_vtp(const dem2d_world *world, const dem2d_vtp_desc *desc,
                                              const char *path);
@@ -1509,9 +1512,9 @@ DEM2D_API dem2d_result dem2d_world_write_vtp(const dem2d_world *world, const dem
 DEM2D_API dem2d_result dem2d_pvd_write(const dem2d_env *env, const dem2d_pvd_desc *desc,
                                        const char *path);
 /// Write a row: step, time (steps done times the present time step), translational, rotational,
-/// normal, tangential, potential (dem2d_energy), kinetic_ratio, mean_speed, max_speed, unbalanced
-/// (dem2d_equilibrium), coordination, coordination_loaded, rattlers (dem2d_packing), contacts,
-/// wall_contacts, max_overlap, then the caller's columns.
+/// normal, tangential, rolling, potential (dem2d_energy), kinetic_ratio, mean_speed, max_speed,
+/// unbalanced (dem2d_equilibrium), coordination, coordination_loaded, rattlers (dem2d_packing),
+/// contacts, wall_contacts, max_overlap, then the caller's columns.
 DEM2D_API dem2d_result dem2d_world_write_csv(const dem2d_world *world, const dem2d_csv_desc *desc,
                                              const char *path);
 
@@ -6622,11 +6625,7 @@ static bool dem2di_edges_solve(dem2di_pair *pair, const dem2di_feature *last, de
         dem2di_cores_apart(pair, core, k[0], k[1], u, search);
         return true;
     }
-    edge[0].h = HUGE_VAL; /* the answer as it is when all the others overflow */
-    edge[0].own = edge[0].k[0] = edge[0].k[1] = 0;
-    edge[0].side = 1;
-    for (int i = 0; i < 2; i++) edge[0].p[i] = dem2di_vec(0, 0);
-    edge[0].to = edge[0].tangent = dem2di_vec(0, 0);
+    edge[0].h = HUGE_VAL;
     int all = core[0].count + core[1].count;
     for (int i = 0; i <= DEM2DI_MANY_EDGES; i++) {
         bool open = false;
@@ -6649,6 +6648,7 @@ static bool dem2di_edges_solve(dem2di_pair *pair, const dem2di_feature *last, de
         dem2d_vec w[2] = {{walk[0].w.x, walk[0].w.y}, {walk[1].w.x, walk[1].w.y}};
         if (!open || i == all || beside ||
             (i == 0 && dem2di_ends_outweigh(pair, w, n, edge[best].h, depth))) {
+            if (!(edge[best].h < HUGE_VAL)) return false; /* all overflow: none was kept */
             dem2di_edge_report(pair, core, &edge[best], search);
             return true;
         }
@@ -7975,10 +7975,9 @@ static void dem2di_ends_set(const dem2d_contact_point points[2], dem2di_ends *en
 /* --- dashpot, rolling --------------------------------------------------------------------------
  */
 
-/* How two that touch move against each other, and what they are together. */
+/* How two that touch move against each other. */
 typedef struct dem2di_meeting {
-    double closing, slip, turning; /* as in dem2d_law_input */
-    double mass, radius;           /* reduced */
+    double closing, slip, turning, mass; /* as in dem2d_law_input */
 } dem2di_meeting;
 
 /* Coefficient of the dashpot, N s/m. */
@@ -8013,11 +8012,10 @@ static double dem2di_rolling_stiffness(const dem2d_pair_desc *law, double radius
 
 /* Moment of the spring against rolling, held within its limit (Ai et al. 2011, model C without the
    dashpot). */
-static double dem2di_rolling(const dem2d_pair_desc *law, const dem2di_meeting *meeting,
+static double dem2di_rolling(const dem2d_pair_desc *law, double radius, double turning,
                              double time_step, double normal_force, double last) {
-    double limit = law->rolling_friction * meeting->radius * normal_force;
-    double stiffness = dem2di_rolling_stiffness(law, meeting->radius);
-    double moment = last - stiffness * meeting->turning * time_step;
+    double limit = law->rolling_friction * radius * normal_force;
+    double moment = last - dem2di_rolling_stiffness(law, radius) * turning * time_step;
     return dem2di_max(-limit, dem2di_min(limit, moment));
 }
 
@@ -8372,7 +8370,7 @@ struct dem2d_world {
     double *lever; /* a support value changes by at most this times the angle of a turn */
     int body_capacity, travel_capacity;
 
-    dem2d_shape *line; /* a polygon of two corners, half a metre from 0: what segments are */
+    dem2d_shape *line; /* a polygon of two corners, of length 1: what segments are, scaled */
     dem2di_wall *walls;
     dem2di_wall_state *wall_before, *wall_now, *wall_next;
     int wall_count, wall_capacity;
@@ -9158,8 +9156,10 @@ static dem2di_stored dem2di_stored_in(const dem2d_world *world, int contact, boo
     if (extra != NULL) {
         stored.normal = extra->energy;
         if (world->law != NULL) return stored;
-        double kr = dem2di_rolling_stiffness(law, dem2di_reduced_radius(world, contact));
-        if (kr > 0) stored.rolling = extra->moment * (extra->moment / kr) / 2;
+        if (extra->moment != 0) {
+            double kr = dem2di_rolling_stiffness(law, dem2di_reduced_radius(world, contact));
+            stored.rolling = extra->moment * (extra->moment / kr) / 2;
+        }
         spring -= extra->viscous;
     }
     if (ends == NULL) {
@@ -9790,6 +9790,10 @@ typedef struct dem2di_build {
     int incident;                  /* entries that the particles have together */
 } dem2di_build;
 
+/* Ends this near are a joint, of the shorter segment; and a contact point is at one, of the radius:
+   a gap that no grain can tell, far above the rounding of walls that move together. */
+#define DEM2DI_JOINT 1e-6
+
 /* The ends of two segments that are a joint: numbers of 0 (start) and 1 (end) in `which`; false
    when there is none. */
 static bool dem2di_segments_meet(const dem2d_world *world, int a, int b, int which[2],
@@ -9802,7 +9806,7 @@ static bool dem2di_segments_meet(const dem2d_world *world, int a, int b, int whi
         end[k][0] = world->wall_now[slot[k]].point;
         end[k][1] = dem2di_segment_end(w[k], end[k][0]);
     }
-    double near = 1e-6 * dem2di_min(w[0]->extent, w[1]->extent);
+    double near = DEM2DI_JOINT * dem2di_min(w[0]->extent, w[1]->extent);
     for (which[0] = 0; which[0] < 2; which[0]++)
         for (which[1] = 0; which[1] < 2; which[1]++) {
             *at = end[0][which[0]];
@@ -10551,7 +10555,7 @@ static int dem2di_shapes_look(const dem2d_world *world, dem2di_pair *pair, const
     return 1;
 }
 
-/* Two circles that overlap, among the others for the sake of the full law. */
+/* Two circles that overlap, among the others for the full law or the contact-area rule. */
 static int dem2di_round_geometry(const dem2di_state *a, const dem2di_state *b, dem2di_link *link,
                                  dem2d_contact_point points[2], dem2di_count *count) {
     dem2di_round round = dem2di_round_make(dem2di_disc_line(a, b), a->radius, b->radius, 1);
@@ -10615,17 +10619,15 @@ static inline void dem2di_link_load(const dem2d_world *world, int at, int from,
     dem2di_law_apply(law, slip, world->time_step, list->links[from].shear, link);
 }
 
-/* How the two of contact i meet; wb is 0 for a wall. */
-static dem2di_meeting dem2di_meeting_make(const dem2d_world *world, int i, dem2d_vec approach,
-                                          double wb) {
+/* How the two of contact i meet, whose point is arm_b from B's centre. */
+static dem2di_meeting dem2di_meeting_make(const dem2d_world *world, int i, dem2d_vec arm_b) {
     const dem2di_link *link = &world->list.next_links[i - world->list.discs];
     double inverse = dem2di_reduced_inverse(world, i);
     dem2di_meeting meeting;
+    dem2d_vec approach = dem2di_contact_motion(world, i, link, arm_b, &meeting.turning);
     meeting.closing = -dem2di_dot(link->normal, approach);
     meeting.slip = dem2di_cross(link->normal, approach);
-    meeting.turning = wb - world->now[world->list.keys[i].a].w;
     meeting.mass = inverse > 0 ? 1 / inverse : 0;
-    meeting.radius = dem2di_reduced_radius(world, i);
     return meeting;
 }
 
@@ -10654,7 +10656,7 @@ static void dem2di_call_law(const dem2d_world *world, int i, int from,
     input.slip = meeting->slip;
     input.turning = meeting->turning;
     input.mass = meeting->mass;
-    input.radius = meeting->radius;
+    input.radius = dem2di_reduced_radius(world, i);
     input.tangential_force = list->links[from].shear;
     input.moment = last->moment;
     memcpy(input.state, last->state, sizeof input.state);
@@ -10669,34 +10671,36 @@ static void dem2di_call_law(const dem2d_world *world, int i, int from,
 }
 
 /* The full law: dashpot and rolling as well, or the caller's. Two points may get another centre. */
-static void dem2di_full_load(const dem2d_world *world, int i, int from,
-                             const dem2di_meeting *meeting, bool two) {
+static void dem2di_full_load(const dem2d_world *world, int i, int from, dem2d_vec arm_b, bool two) {
     const dem2di_list *list = &world->list;
     const dem2d_pair_desc *law = dem2di_law_of(world, i);
     int at = i - list->discs;
     dem2di_link *link = &list->next_links[at];
     dem2di_extra *extra = &list->next_extras[at];
     const double dt = world->time_step;
+    dem2di_meeting meeting = dem2di_meeting_make(world, i, arm_b);
     if (world->law != NULL) {
-        dem2di_call_law(world, i, from, meeting);
+        dem2di_call_law(world, i, from, &meeting);
         return;
     }
     if (two) {
         double force[2];
         dem2di_ends_press(law, &list->next_ends[at], force);
         double spring = force[0] + force[1];
-        dem2di_ends_damp(law, meeting, force, &list->next_ends[at], link);
-        dem2di_law_apply_ends(law, meeting->slip, dt, force, &list->links[from], &list->ends[from],
+        dem2di_ends_damp(law, &meeting, force, &list->next_ends[at], link);
+        dem2di_law_apply_ends(law, meeting.slip, dt, force, &list->links[from], &list->ends[from],
                               &list->next_ends[at], link);
         extra->viscous = link->force - spring;
     } else {
         double spring =
             world->faces == DEM2D_CONTACT_AREA ? link->force : law->normal_stiffness * link->depth;
-        link->force = dem2di_damped(spring, dem2di_dashpot(law, meeting->mass), meeting->closing);
-        dem2di_law_apply(law, meeting->slip, dt, list->links[from].shear, link);
+        link->force = dem2di_damped(spring, dem2di_dashpot(law, meeting.mass), meeting.closing);
+        dem2di_law_apply(law, meeting.slip, dt, list->links[from].shear, link);
         extra->viscous = link->force - spring;
     }
-    extra->moment = dem2di_rolling(law, meeting, dt, link->force, list->extras[from].moment);
+    if (law->rolling_friction > 0 && law->tangential_stiffness > 0)
+        extra->moment = dem2di_rolling(law, dem2di_reduced_radius(world, i), meeting.turning, dt,
+                                       link->force, list->extras[from].moment);
 }
 
 static dem2d_vec dem2di_outline_corner(const dem2d_world *world, int body, int i) {
@@ -10866,12 +10870,11 @@ static void dem2di_pair_look(const dem2d_world *world, int i, dem2di_overlap *sc
         if (!(link->depth > 0)) return;
     }
     dem2d_vec arm_b = dem2di_sub(link->point, d);
-    dem2d_vec approach = dem2di_approach(link, arm_b, sa->v, sa->w, sb->v, sb->w);
     if (world->plan.full) {
-        dem2di_meeting meeting = dem2di_meeting_make(world, i, approach, sb->w);
-        dem2di_full_load(world, i, at, &meeting, found == 2);
+        dem2di_full_load(world, i, at, arm_b, found == 2);
         arm_b = dem2di_sub(link->point, d);
     } else {
+        dem2d_vec approach = dem2di_approach(link, arm_b, sa->v, sa->w, sb->v, sb->w);
         dem2di_link_load(world, at, at, law, approach, found == 2);
     }
     dem2di_set_loads(world, i, arm_b, count);
@@ -10953,11 +10956,10 @@ static void dem2di_touch_force(const dem2d_world *world, int i, int from, dem2di
         dem2di_area_apply(world, i, -1, dem2di_sub(wall->point, state->x), law, scratch);
     if (!(link->depth > 0)) return;
     dem2d_vec foot = dem2di_vec(0, 0); /* walls do not turn */
-    dem2d_vec approach = dem2di_approach(link, foot, state->v, state->w, wall->velocity, 0);
     if (world->plan.full) {
-        dem2di_meeting meeting = dem2di_meeting_make(world, i, approach, 0);
-        dem2di_full_load(world, i, from, &meeting, two);
+        dem2di_full_load(world, i, from, foot, two);
     } else {
+        dem2d_vec approach = dem2di_approach(link, foot, state->v, state->w, wall->velocity, 0);
         dem2di_link_load(world, at, from, law, approach, two);
     }
     dem2di_set_loads(world, i, foot, count);
@@ -11006,7 +11008,7 @@ static int dem2di_point_near(const dem2d_world *world, int contact, dem2d_vec pl
     for (int k = 0; k < (ends != NULL ? 2 : 1); k++) {
         double offset = ends != NULL ? ends->offset[k] : 0;
         dem2d_vec left = dem2di_along(from, -offset, dem2di_perp(link->normal));
-        if (dem2di_length(left) <= 1e-6 * a->radius) return k; /* as near as ends of a joint */
+        if (dem2di_length(left) <= DEM2DI_JOINT * a->radius) return k;
     }
     return -1;
 }
@@ -11075,6 +11077,7 @@ static void dem2di_settle_joints(const dem2d_world *world, dem2di_count *count) 
     const dem2di_list *list = &world->list;
     for (int i = list->pairs; i < list->count; i++) {
         int a = list->keys[i].a;
+        if (!dem2di_segment_touched(world, i, true)) continue;
         for (int k = list->first[a]; k < list->first[a + 1]; k++) {
             int other = list->incident[k] / 2;
             if (other > i && dem2di_segment_touched(world, i, true) &&
@@ -12301,8 +12304,50 @@ DEM2D_API dem2d_result dem2d_world_inertial_number(const dem2d_world *world, dou
 }
 
 /* ============================================================================================
+   >>output  Bytes to a callback or a file
+   uses: config, memory
+   ============================================================================================ */
+
+/* Bytes on their way to a callback or a file, and whether all went well. */
+typedef struct dem2di_writer {
+    dem2d_write_fn *write;
+    void *user;
+    FILE *file;
+    bool good;
+} dem2di_writer;
+
+static void dem2di_put_bytes(dem2di_writer *writer, const char *bytes, size_t count) {
+    if (!writer->good || count == 0) return;
+    if (writer->file != NULL)
+        writer->good = fwrite(bytes, 1, count, writer->file) == count;
+    else
+        writer->good = writer->write(writer->user, bytes, count);
+}
+
+/* Ready to write to a callback or a file, of which one must be given. */
+static dem2d_result dem2di_writer_open(const dem2d_env *env, dem2d_write_fn *write, void *user,
+                                       const char *path, bool append, dem2di_writer *writer) {
+    if (path == NULL && write == NULL) return dem2di_fail_null(env, "path and write");
+    if (path != NULL && write != NULL)
+        return dem2di_fail(env, DEM2D_OUT_OF_RANGE, -1, "both path and write are given");
+    writer->write = write;
+    writer->user = user;
+    writer->file = path != NULL ? fopen(path, append ? "ab" : "wb") : NULL;
+    writer->good = path == NULL || writer->file != NULL;
+    return writer->good ? DEM2D_OK : dem2di_fail(env, DEM2D_IO, -1, "could not open %s", path);
+}
+
+static dem2d_result dem2di_writer_close(const dem2d_env *env, const char *path,
+                                        dem2di_writer *writer) {
+    if (writer->file != NULL && fclose(writer->file) != 0) writer->good = false;
+    if (writer->good) return DEM2D_OK;
+    if (path == NULL) return dem2di_fail(env, DEM2D_IO, -1, "the write callback failed");
+    return dem2di_fail(env, DEM2D_IO, -1, "could not write %s", path);
+}
+
+/* ============================================================================================
    >>snapshot  State hash, snapshots: one list of fields for all that is done with them
-   uses: config, math, memory, support, shapes, law, motion, world, list, measures
+   uses: config, math, memory, support, shapes, law, motion, world, list, measures, output
    ============================================================================================ */
 
 /* A snapshot is a mark, a version, its size in bytes, what dem2di_archive_world lists, and a
@@ -12336,9 +12381,7 @@ typedef struct dem2di_archive {
     const dem2d_load_desc *load;
     unsigned char chunk[DEM2DI_CHUNK]; /* saving: on their way */
     size_t used;
-    dem2d_write_fn *write;
-    void *user;
-    FILE *file; /* or NULL: to write */
+    dem2di_writer writer;
 } dem2di_archive;
 
 /* One to one in either argument, so that no change of a single word can be lost. */
@@ -12394,11 +12437,10 @@ static bool dem2di_archive_room(dem2di_archive *ar, bool reserved) {
 
 static void dem2di_archive_flush(dem2di_archive *ar) {
     if (!dem2di_archive_good(ar) || ar->used == 0) return;
-    bool good = ar->file != NULL ? fwrite(ar->chunk, 1, ar->used, ar->file) == ar->used
-                                 : ar->write(ar->user, (const char *)ar->chunk, ar->used);
+    dem2di_put_bytes(&ar->writer, (const char *)ar->chunk, ar->used);
     ar->hash = dem2di_hash_bytes(ar->hash, ar->chunk, ar->used);
     ar->used = 0;
-    if (!good) ar->result = dem2di_fail(ar->env, DEM2D_IO, -1, "could not write the snapshot");
+    if (!ar->writer.good) ar->result = DEM2D_IO; /* the log is told at the end */
 }
 
 /* --- numbers -----------------------------------------------------------------------------------
@@ -13105,8 +13147,8 @@ static void dem2di_archive_world(dem2di_archive *ar, dem2d_world *w) {
     dem2di_archive_relist(ar, w);
 }
 
-/* To where the archive writes. */
-static dem2d_result dem2di_save(const dem2d_world *world, dem2di_archive *ar) {
+/* To where the archive writes, which is closed. */
+static dem2d_result dem2di_save(const dem2d_world *world, const char *path, dem2di_archive *ar) {
     dem2di_archive sizing;
     dem2d_world own = *world; /* its arrays are only read: nothing is loaded */
     dem2di_archive_start(&world->env, DEM2DI_SIZING, &sizing);
@@ -13119,18 +13161,16 @@ static dem2d_result dem2di_save(const dem2d_world *world, dem2di_archive *ar) {
     uint64_t checksum = ar->hash;
     dem2di_archive_word(ar, &checksum, 8);
     dem2di_archive_flush(ar);
-    return ar->result;
+    return dem2di_writer_close(&world->env, path, &ar->writer);
 }
 
 /* Aside first: whatever happens, the path holds the old file or all of the new one. */
 static dem2d_result dem2di_save_aside(const dem2d_world *world, const char *path, const char *aside,
                                       dem2di_archive *ar) {
     const dem2d_env *env = &world->env;
-    ar->file = fopen(aside, "wb");
-    if (ar->file == NULL) return dem2di_fail(env, DEM2D_IO, -1, "could not open %s", aside);
-    dem2d_result result = dem2di_save(world, ar);
-    if (fclose(ar->file) != 0 && result == DEM2D_OK)
-        result = dem2di_fail(env, DEM2D_IO, -1, "could not write %s", aside);
+    dem2d_result result = dem2di_writer_open(env, NULL, NULL, aside, false, &ar->writer);
+    if (result != DEM2D_OK) return result;
+    result = dem2di_save(world, aside, ar);
 #if defined(_WIN32)
     if (result == DEM2D_OK) (void)remove(path); /* rename does not replace there */
 #endif
@@ -13144,14 +13184,13 @@ DEM2D_API dem2d_result dem2d_world_save(const dem2d_world *world, const dem2d_sa
                                         const char *path) {
     if (world == NULL || desc == NULL) return DEM2D_NULL_ARGUMENT;
     const dem2d_env *env = &world->env;
-    if (path == NULL && desc->write == NULL) return dem2di_fail_null(env, "path and write");
-    if (path != NULL && desc->write != NULL)
-        return dem2di_fail(env, DEM2D_OUT_OF_RANGE, -1, "both path and write are given");
     dem2di_archive ar;
     dem2di_archive_start(env, DEM2DI_SAVING, &ar);
-    ar.write = desc->write;
-    ar.user = desc->user;
-    if (path == NULL) return dem2di_save(world, &ar);
+    if (path == NULL || desc->write != NULL) { /* or neither, or both: that is told there */
+        dem2d_result result =
+            dem2di_writer_open(env, desc->write, desc->user, path, false, &ar.writer);
+        return result == DEM2D_OK ? dem2di_save(world, path, &ar) : result;
+    }
     static const char part[] = ".part";
     size_t length = strlen(path), room = length + sizeof part;
     char *aside = (char *)dem2di_allocate(&world->user_env, room, 1);
@@ -13280,24 +13319,8 @@ DEM2D_API dem2d_result dem2d_world_load(const dem2d_load_desc *desc, const char 
 
 /* ============================================================================================
    >>writers  Pictures, files for ParaView, histories
-   uses: config, math, memory, mass, shapes, law, motion, world, measures
+   uses: config, math, memory, mass, shapes, law, motion, world, measures, output
    ============================================================================================ */
-
-/* Bytes on their way to a callback or a file, and whether all went well. */
-typedef struct dem2di_writer {
-    dem2d_write_fn *write;
-    void *user;
-    FILE *file;
-    bool good;
-} dem2di_writer;
-
-static void dem2di_put_bytes(dem2di_writer *writer, const char *bytes, size_t count) {
-    if (!writer->good || count == 0) return;
-    if (writer->file != NULL)
-        writer->good = fwrite(bytes, 1, count, writer->file) == count;
-    else
-        writer->good = writer->write(writer->user, bytes, count);
-}
 
 /* Text as it is, of any length. */
 static void dem2di_put(dem2di_writer *writer, const char *text) {
@@ -13326,27 +13349,6 @@ static void dem2di_print(dem2di_writer *writer, const char *format, ...) {
 /* All digits of a number: it reads back as the same bits. */
 static void dem2di_put_number(dem2di_writer *writer, double value) {
     dem2di_print(writer, "%.17g", value);
-}
-
-/* Ready to write to a callback or a file, of which one must be given. */
-static dem2d_result dem2di_writer_open(const dem2d_env *env, dem2d_write_fn *write, void *user,
-                                       const char *path, bool append, dem2di_writer *writer) {
-    if (path == NULL && write == NULL) return dem2di_fail_null(env, "path and write");
-    if (path != NULL && write != NULL)
-        return dem2di_fail(env, DEM2D_OUT_OF_RANGE, -1, "both path and write are given");
-    writer->write = write;
-    writer->user = user;
-    writer->file = path != NULL ? fopen(path, append ? "ab" : "wb") : NULL;
-    writer->good = path == NULL || writer->file != NULL;
-    return writer->good ? DEM2D_OK : dem2di_fail(env, DEM2D_IO, -1, "could not open %s", path);
-}
-
-static dem2d_result dem2di_writer_close(const dem2d_env *env, const char *path,
-                                        dem2di_writer *writer) {
-    if (writer->file != NULL && fclose(writer->file) != 0) writer->good = false;
-    if (writer->good) return DEM2D_OK;
-    if (path == NULL) return dem2di_fail(env, DEM2D_IO, -1, "the write callback failed");
-    return dem2di_fail(env, DEM2D_IO, -1, "could not write %s", path);
 }
 
 /* Points of an outline: 3 at least, 0 for the default. */
@@ -13670,6 +13672,7 @@ static const dem2di_array *dem2di_arrays_of(dem2d_vtp_part part) {
                                             {"position", 3, false},
                                             {"normal_force", 1, false},
                                             {"tangential_force", 1, false},
+                                            {"moment", 1, false},
                                             {"depth", 1, false},
                                             {NULL, 0, false}};
     static const dem2di_array walls[] = {{"id", 1, true},        {"mode", 1, true},
@@ -13726,16 +13729,14 @@ static void dem2di_contact_numbers(const dem2d_world *world, const dem2di_tour *
                           0,
                           info.normal_force,
                           info.tangential_force,
+                          info.moment,
                           info.depth};
     memcpy(numbers, all, sizeof all);
 }
 
 static void dem2di_wall_numbers(const dem2d_world *world, int j, double *numbers) {
-    dem2d_wall_id id;
     dem2d_wall_info info;
-    id.index = (uint32_t)j;
-    id.generation = world->walls[j].generation;
-    (void)dem2d_world_get_wall(world, id, &info);
+    (void)dem2d_world_get_wall(world, dem2di_wall_id(world, j), &info);
     dem2d_vec v = dem2di_add(world->wall_before[j].velocity, world->wall_now[j].velocity);
     const double all[] = {(double)j,    (double)info.mode, v.x / 2, v.y / 2,    0,
                           info.force.x, info.force.y,      0,       info.stress};
@@ -13935,7 +13936,7 @@ DEM2D_API dem2d_result dem2d_pvd_write(const dem2d_env *env, const dem2d_pvd_des
 /* --- histories ----------------------------------------------------------------------------------
  */
 
-#define DEM2DI_CSV_COLUMNS 17
+#define DEM2DI_CSV_COLUMNS 18
 
 static void dem2di_csv_values(const dem2d_world *world, double values[DEM2DI_CSV_COLUMNS]) {
     dem2d_energy energy;
@@ -13952,6 +13953,7 @@ static void dem2di_csv_values(const dem2d_world *world, double values[DEM2DI_CSV
                                             energy.rotational,
                                             energy.normal,
                                             energy.tangential,
+                                            energy.rolling,
                                             energy.potential,
                                             rest.kinetic_ratio,
                                             rest.mean_speed,
@@ -13982,7 +13984,7 @@ static int dem2di_csv_ledger(const dem2d_world *world, double values[DEM2DI_CSV_
 
 static void dem2di_csv_header(const dem2d_world *world, const dem2d_csv_desc *desc,
                               dem2di_writer *writer) {
-    dem2di_put(writer, "step,time,translational,rotational,normal,tangential,potential,"
+    dem2di_put(writer, "step,time,translational,rotational,normal,tangential,rolling,potential,"
                        "kinetic_ratio,mean_speed,max_speed,unbalanced,coordination,"
                        "coordination_loaded,rattlers,contacts,wall_contacts,max_overlap");
     if (world->ledger.kept)

@@ -78,46 +78,46 @@ static void put_line(page *p, const char *mark, const char *word, const char *cl
 #define PAGE_PRINTF(text, first)
 #endif
 
-static void put_outcome(page *p, bool holds, const char *claim, const char *got) {
-    if (!holds) fprintf(p->failures.file, "<li class=\"no\">%s: <b>%s</b></li>\n", claim, got);
-    put_line(p, holds ? "yes" : "no", holds ? "agrees" : "DIFFERS", claim, got);
+/* A claim, what was got, and whether they agree: 1, 0, or -1 where nobody says. */
+static void put_outcome(page *p, int agrees, const char *claim, const char *format,
+                        va_list arguments) {
+    static const char *const marks[] = {"note", "no", "yes"};
+    static const char *const words[] = {"not judged", "DIFFERS", "agrees"};
+    char got[400];
+    vsnprintf(got, sizeof got, format, arguments);
+    if (agrees == 0) fprintf(p->failures.file, "<li class=\"no\">%s: <b>%s</b></li>\n", claim, got);
+    put_line(p, marks[agrees + 1], words[agrees + 1], claim, got);
 }
 
 /* What must hold: the exit status is 1 if it does not. */
 PAGE_PRINTF(4, 5)
 static void check(page *p, bool holds, const char *claim, const char *format, ...) {
-    char got[400];
     va_list arguments;
     va_start(arguments, format);
-    vsnprintf(got, sizeof got, format, arguments);
+    put_outcome(p, holds, claim, format, arguments);
     va_end(arguments);
     p->checks++;
-    if (!holds) p->failed++;
-    put_outcome(p, holds, claim, got);
+    p->failed += !holds;
 }
 
 /* What the papers found with grains or by a method that are not ours: shown, and no more. */
 PAGE_PRINTF(4, 5)
 static void compare(page *p, bool holds, const char *claim, const char *format, ...) {
-    char got[400];
     va_list arguments;
     va_start(arguments, format);
-    vsnprintf(got, sizeof got, format, arguments);
+    put_outcome(p, holds, claim, format, arguments);
     va_end(arguments);
     p->compared++;
-    if (!holds) p->differ++;
-    put_outcome(p, holds, claim, got);
+    p->differ += !holds;
 }
 
 /* A number beside the paper's that nothing is decided by. */
 PAGE_PRINTF(3, 4)
 static void note(page *p, const char *claim, const char *format, ...) {
-    char got[400];
     va_list arguments;
     va_start(arguments, format);
-    vsnprintf(got, sizeof got, format, arguments);
+    put_outcome(p, -1, claim, format, arguments);
     va_end(arguments);
-    put_line(p, "note", "not judged", claim, got);
 }
 
 /* Files: names with a space between. */

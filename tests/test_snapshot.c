@@ -852,7 +852,7 @@ static void check_writes_fail(int kind) {
         part.size = 0;
         test_log_clear(&env);
         assert_result(dem2d_world_save(s.world, &save, NULL), DEM2D_IO);
-        assert_logged(&env, DEM2D_IO, -1, "snapshot");
+        assert_logged(&env, DEM2D_IO, -1, "callback");
         assert_memory_equal(part.bytes, whole.bytes, part.size);
     }
     part.limit++, part.size = 0;

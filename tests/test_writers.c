@@ -456,8 +456,9 @@ static void test_decimal_comma(void **state) {
 /* --- histories ------------------------------------------------------------------------------- */
 
 static const char csv_header[] =
-    "step,time,translational,rotational,normal,tangential,potential,kinetic_ratio,mean_speed,"
-    "max_speed,unbalanced,coordination,coordination_loaded,rattlers,contacts,wall_contacts,"
+    "step,time,translational,rotational,normal,tangential,rolling,potential,kinetic_ratio,"
+    "mean_speed,max_speed,unbalanced,coordination,coordination_loaded,rattlers,contacts,wall_"
+    "contacts,"
     "max_overlap";
 
 static void check_row(const scene *s, const char *row) {
@@ -475,6 +476,7 @@ static void check_row(const scene *s, const char *row) {
                                energy.rotational,
                                energy.normal,
                                energy.tangential,
+                               energy.rolling,
                                energy.potential,
                                rest.kinetic_ratio,
                                rest.mean_speed,
@@ -720,9 +722,11 @@ static void test_vtp_contacts(void **state) {
     static char text[SINK_ROOM];
     static dem2d_contact_info contacts[400];
     scene s;
-    int count, two = 0, walls = 0;
+    int count, two = 0, walls = 0, rolls = 0;
+    const dem2d_pair_desc rough = {1e7, 1e7, 0.4, 0, 0.05};
     make_scene(&s, NULL);
     fill_scene(&s, GRAINS);
+    assert_ok(dem2d_world_set_pair(s.world, s.materials[0], s.materials[1], &rough));
     step(&s, 8000);
     assert_ok(dem2d_world_contacts(s.world, contacts, 400, &count));
     strcpy(text, text_of(put_contacts, s.world));
@@ -738,6 +742,7 @@ static void test_vtp_contacts(void **state) {
         CHECK_CELL("position", c->point.x, c->point.y, 0);
         CHECK_CELL("normal_force", c->normal_force);
         CHECK_CELL("tangential_force", c->tangential_force);
+        CHECK_CELL("moment", c->moment);
         CHECK_CELL("depth", c->depth);
         assert_int_equal(read_array(text, "force", numbers, NUMBERS), 3 * count);
         const double size = fabs(c->normal_force) + fabs(c->tangential_force);
@@ -749,9 +754,9 @@ static void test_vtp_contacts(void **state) {
         assert_near(numbers[6 * i + 3] - numbers[6 * i], c->branch.x, 1e-9);
         assert_near(numbers[6 * i + 4] - numbers[6 * i + 1], c->branch.y, 1e-9);
         if (wall) assert_within(numbers[6 * i + 3], c->point.x, 1e-15);
-        two += c->points == 2, walls += wall;
+        two += c->points == 2, walls += wall, rolls += c->moment != 0;
     }
-    assert_true(count > 20 && two > 0 && walls > 0);
+    assert_true(count > 20 && two > 0 && walls > 0 && rolls > 0);
     dem2d_world_destroy(s.world);
 }
 
