@@ -726,8 +726,9 @@ static void test_vtp_contacts(void **state) {
     const dem2d_pair_desc rough = {1e7, 1e7, 0.4, 0, 0.05};
     make_scene(&s, NULL);
     fill_scene(&s, GRAINS);
+    step(&s, 7900); /* rolling friction earlier would keep faces from meeting */
     assert_ok(dem2d_world_set_pair(s.world, s.materials[0], s.materials[1], &rough));
-    step(&s, 8000);
+    step(&s, 100);
     assert_ok(dem2d_world_contacts(s.world, contacts, 400, &count));
     strcpy(text, text_of(put_contacts, s.world));
     for (int i = 0; i < count; i++) {
