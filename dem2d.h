@@ -375,7 +375,7 @@ THREADS
 
 COSTS (instructions per circle and step of a settled bed with 2.2 contacts each, gcc -O2, by
 `make -C tests bench-cost`; what is not there is decided when the list is renewed and costs nothing)
-    circles under gravity, no friction, no damping      290    53 without a contact
+    circles under gravity, no friction, no damping      297    53 without a contact
     the list renewed once in 100 steps                  +30
     friction and its history                           +100
     spinning without friction                           +24
@@ -383,10 +383,10 @@ COSTS (instructions per circle and step of a settled bed with 2.2 contacts each,
     global damping                                      +26
     gravity                                              +2
     fixed particles, walls, segments, parallel_for       +1    when there are but touch nothing
-    polygons for circles                                +530
-    energy and stress asked for in every step          +1600   else nothing
-    the ledger of energies                             +1600   else nothing
-    a dashpot, rolling friction, a law of your own     +1150   circles are then as other shapes
+    polygons for a tenth of the circles                 +570
+    energy and stress asked for in every step          +1800   else nothing
+    the ledger of energies                             +1670   else nothing
+    a dashpot, rolling friction, a law of your own     +1070   circles are then as other shapes
     a pair of circles listed but apart                   75    as much as one in contact: no branch
     another pair listed but apart, surely so             70    of the 700 to 2000 that a look costs
     a region without particles, a pair of fixed ones      0
