@@ -63,25 +63,6 @@ static int contacts(const scene *s, dem2d_contact_info *first) {
     return count;
 }
 
-static dem2d_shape *disc(double radius) {
-    dem2d_shape *shape;
-    assert_ok(dem2d_shape_create_circle(NULL, radius, &shape));
-    return shape;
-}
-
-static dem2d_shape *ellipse(double a, double b) {
-    dem2d_shape *shape;
-    assert_ok(dem2d_shape_create_ellipse(NULL, a, b, &shape));
-    return shape;
-}
-
-static dem2d_shape *box(double width, double height) {
-    const dem2d_vec points[4] = {{0, 0}, {width, 0}, {width, height}, {0, height}};
-    dem2d_shape *shape;
-    assert_ok(dem2d_shape_create_polygon(NULL, points, 4, 0, &shape));
-    return shape;
-}
-
 /* Mass and inertia of a disc of the material. */
 static double disc_mass(double radius) {
     return 2700 * (double)TEST_PI * radius * radius;
@@ -111,9 +92,9 @@ static head_on make_head_on(int kind, double steps_per_contact) {
     if (wall)
         add_floor(&h.s);
     else
-        h.target = add(&h.s, is_disc ? disc(radius) : ellipse(a, b),
+        h.target = add(&h.s, is_disc ? test_disc(radius) : test_ellipse(a, b),
                        kind == DISC_FIXED ? DEM2D_FIXED : DEM2D_FREE, vec(0, 0), vec(0, 0), 0);
-    h.mover = add(&h.s, is_disc ? disc(radius) : ellipse(a, b), DEM2D_FREE,
+    h.mover = add(&h.s, is_disc ? test_disc(radius) : test_ellipse(a, b), DEM2D_FREE,
                   vec(0, h.touch + 1.003e-4), vec(0, -1), 0);
     return h;
 }
@@ -181,7 +162,7 @@ static dem2d_particle_info bounce(double kt, double mu, double vt, double vn, do
     const scene s = make_scene(kt, mu, contact_time / steps);
     add_floor(&s);
     const dem2d_particle_id id =
-        add(&s, disc(radius), DEM2D_FREE, vec(0, radius + 1e-6), vec(vt, -vn), 0);
+        add(&s, test_disc(radius), DEM2D_FREE, vec(0, radius + 1e-6), vec(vt, -vn), 0);
     dem2d_particle_info info = look(&s, id);
     for (int i = 0; i < 1000000 && info.velocity.y <= 0; i++) step(&s, 1), info = look(&s, id);
     step(&s, (int)(2 * steps)); /* until it has left */
@@ -236,7 +217,7 @@ static void test_slide_to_roll(void **state) {
         assert_ok(dem2d_world_set_gravity(s.world, vec(0, -G)));
         add_floor(&s);
         const dem2d_particle_id id =
-            add(&s, disc(radius), DEM2D_FREE, vec(0, radius - rest), vec(v0, 0), 0);
+            add(&s, test_disc(radius), DEM2D_FREE, vec(0, radius - rest), vec(v0, 0), 0);
         double slip = v0, last = v0, v = v0, v_last = v0;
         int n = 0;
         for (; n < 1000000 && slip > 0; n++) {
@@ -266,7 +247,7 @@ static void test_disc_on_incline(void **state) {
         add_floor(&s);
         const double rest = disc_mass(radius) * G * cos(b) / KN;
         const dem2d_particle_id id =
-            add(&s, disc(radius), DEM2D_FREE, vec(0, radius - rest), vec(0, 0), 0);
+            add(&s, test_disc(radius), DEM2D_FREE, vec(0, radius - rest), vec(0, 0), 0);
         step(&s, 20000);
         const dem2d_particle_info info = look(&s, id);
         const bool rolls = mu >= tan(b) / 3;
@@ -294,7 +275,7 @@ static void test_block_on_incline(void **state) {
         add_floor(&s);
         const double rest = 2700 * width * height * G * cos(b) / KN;
         const dem2d_particle_id id =
-            add(&s, box(width, height), DEM2D_FREE, vec(0, height / 2 - rest), vec(0, 0), 0);
+            add(&s, test_box(width, height), DEM2D_FREE, vec(0, height / 2 - rest), vec(0, 0), 0);
         step(&s, (int)(time / dt));
         const double x = look(&s, id).pose.position.x;
         const double slide = 0.5 * G * (sin(b) - mu * cos(b)) * time * time;
@@ -314,9 +295,9 @@ static void test_opposite_spin(void **state) {
     const double radius = 0.05, spin = 10;
     const double dt = (double)TEST_PI * sqrt(disc_mass(radius) / 2 / KN) / 100;
     const scene s = make_scene(KN, 0.5, dt);
-    const dem2d_particle_id a = add(&s, disc(radius), DEM2D_FREE, vec(0, 0), vec(1, 0), spin);
+    const dem2d_particle_id a = add(&s, test_disc(radius), DEM2D_FREE, vec(0, 0), vec(1, 0), spin);
     const dem2d_particle_id b =
-        add(&s, disc(radius), DEM2D_FREE, vec(0.1001, 0), vec(-1, 0), -spin);
+        add(&s, test_disc(radius), DEM2D_FREE, vec(0.1001, 0), vec(-1, 0), -spin);
     step(&s, 400);
     const dem2d_particle_info ia = look(&s, a), ib = look(&s, b);
     assert_near(ia.velocity.x, -1, 1e-3); /* they did meet */
@@ -338,7 +319,7 @@ static void test_cradle(void **state) {
         const scene s = make_scene(0, 0, contact_time / 1000);
         dem2d_particle_id ids[5];
         for (int i = 0; i < n; i++)
-            ids[i] = add(&s, disc(radius), DEM2D_FREE, vec(i, 0), vec(i ? 0 : v0, 0), 0);
+            ids[i] = add(&s, test_disc(radius), DEM2D_FREE, vec(i, 0), vec(i ? 0 : v0, 0), 0);
         step(&s, 1000 * 3 * n);
         for (int i = 0; i < n; i++)
             assert_within(look(&s, ids[i]).velocity.x / v0, expected[row][i], 1e-3);
@@ -355,10 +336,10 @@ static dem2d_shape *random_shape(test_random *random) {
     double length;
     switch (test_below(random, 4)) {
     case 0:
-        return disc(test_uniform(random, 0.03, 0.06));
+        return test_disc(test_uniform(random, 0.03, 0.06));
     case 1:
         length = test_uniform(random, 0.03, 0.06);
-        return ellipse(length, test_uniform(random, 0.02, 0.06));
+        return test_ellipse(length, test_uniform(random, 0.02, 0.06));
     case 2:
         assert_ok(dem2d_shape_create_fourier(NULL, a, b, 3, &shape));
         return shape;
@@ -439,7 +420,7 @@ static dem2d_shape *rocker(int kind) {
     }
     switch (kind) {
     case ROCK_ELLIPSE:
-        return ellipse(0.03, 0.015);
+        return test_ellipse(0.03, 0.015);
     case ROCK_FOURIER:
         assert_ok(dem2d_shape_create_fourier(NULL, a, b, 4, &shape));
         break;

@@ -61,25 +61,6 @@ static dem2d_ledger book(const scene *s) {
     return ledger;
 }
 
-static dem2d_shape *disc(double radius) {
-    dem2d_shape *shape;
-    assert_ok(dem2d_shape_create_circle(NULL, radius, &shape));
-    return shape;
-}
-
-static dem2d_shape *box(double width, double height) {
-    const dem2d_vec points[4] = {{0, 0}, {width, 0}, {width, height}, {0, height}};
-    dem2d_shape *shape;
-    assert_ok(dem2d_shape_create_polygon(NULL, points, 4, 0, &shape));
-    return shape;
-}
-
-static dem2d_shape *ellipse(double a, double b) {
-    dem2d_shape *shape;
-    assert_ok(dem2d_shape_create_ellipse(NULL, a, b, &shape));
-    return shape;
-}
-
 /* --- dashpot --------------------------------------------------------------------------------- */
 
 /* The motion of a mass with a clipped spring and dashpot, integrated in steps of 1e-5 of its time
@@ -138,13 +119,13 @@ static double bounce(int kind, double restitution, double steps) {
     if (wall)
         add_wall(&s, 0, 0, 0, 1);
     else
-        b = add(&s, kind == DISCS ? disc(half) : ellipse(0.08, half), vec(0, -half), 0, vec(0, 0),
-                0);
+        b = add(&s, kind == DISCS ? test_disc(half) : test_ellipse(0.08, half), vec(0, -half), 0,
+                vec(0, 0), 0);
     if (kind == OVALS)
-        a = add(&s, ellipse(0.08, half), vec(0, half + 1e-4), 0, vec(0, -1), 0);
+        a = add(&s, test_ellipse(0.08, half), vec(0, half + 1e-4), 0, vec(0, -1), 0);
     else
-        a = add(&s, kind == BOX_WALL ? box(2 * half, 2 * half) : disc(half), vec(0, half + 1e-4), 0,
-                vec(0, -1), 0);
+        a = add(&s, kind == BOX_WALL ? test_box(2 * half, 2 * half) : test_disc(half),
+                vec(0, half + 1e-4), 0, vec(0, -1), 0);
     assert_ok(dem2d_world_step(s.world, (int)(4 * steps), NULL));
     double parting = look(&s, a).velocity.y;
     if (!wall) parting -= look(&s, b).velocity.y;
@@ -180,8 +161,9 @@ static void test_rolling(void **state) {
         scene s = make_scene(desc, material);
         const double mass = 2700 * (double)TEST_PI * radius * radius;
         add_wall(&s, 0, 0, 0, 1);
-        dem2d_particle_id id = add(
-            &s, disc(radius), vec(0, radius - mass * 9.81 * cos(slopes[i]) / KN), 0, vec(0, 0), 0);
+        dem2d_particle_id id =
+            add(&s, test_disc(radius), vec(0, radius - mass * 9.81 * cos(slopes[i]) / KN), 0,
+                vec(0, 0), 0);
         const double time = 1.5; /* long against the swing of the tangential spring */
         assert_ok(dem2d_world_step(s.world, (int)(time / desc.time_step), NULL));
         const double way = look(&s, id).pose.position.x;
@@ -245,7 +227,9 @@ static void fill(const scene *s, int count, double speed) {
         const dem2d_vec at = vec(0.06 + 0.12 * (i % 4), 0.06 + 0.12 * (i / 4));
         const dem2d_vec v =
             vec(test_uniform(&random, -speed, speed), test_uniform(&random, -speed, speed));
-        dem2d_shape *shape = i % 3 == 0 ? disc(0.04) : i % 3 == 1 ? ellipse(0.055, 0.03) : NULL;
+        dem2d_shape *shape = i % 3 == 0   ? test_disc(0.04)
+                             : i % 3 == 1 ? test_ellipse(0.055, 0.03)
+                                          : NULL;
         if (shape == NULL) {
             const double a[4] = {0.09, 0, 0, 0.003}, b[4] = {0, 0, 0, 0};
             assert_ok(dem2d_shape_create_fourier(NULL, a, b, 3, &shape));
@@ -296,7 +280,7 @@ static void test_tension(void **state) {
     desc.time_step = (double)TEST_PI / w0 / 1000, desc.law = same_law, desc.law_user = &seen;
     scene s = make_scene(desc, stone(0, 0));
     add_wall(&s, 0, 0, 0, 1);
-    dem2d_particle_id id = add(&s, disc(half), vec(0, half + 1e-4), 0, vec(0, -1), 0);
+    dem2d_particle_id id = add(&s, test_disc(half), vec(0, half + 1e-4), 0, vec(0, -1), 0);
     assert_ok(dem2d_world_step(s.world, 3000, NULL));
     const double expected = exp(-(double)TEST_PI * zeta / sqrt(1 - zeta * zeta));
     assert_within(look(&s, id).velocity.y, expected, 1e-3);
@@ -386,7 +370,7 @@ static void test_ledger_edits(void **state) {
     dem2d_world_desc desc = {0};
     desc.time_step = 1e-5, desc.ledger = true;
     scene s = make_scene(desc, stone(0, 0));
-    dem2d_particle_id id = add(&s, disc(0.05), vec(0, 0), 0, vec(1, 0), 0);
+    dem2d_particle_id id = add(&s, test_disc(0.05), vec(0, 0), 0, vec(1, 0), 0);
     assert_ok(dem2d_world_step(s.world, 10, NULL));
     const double mass = look(&s, id).mass;
     assert_near(book(&s).given, mass / 2, 1e-12);
@@ -394,7 +378,7 @@ static void test_ledger_edits(void **state) {
     assert_ok(dem2d_world_step(s.world, 2, NULL));
     assert_near(book(&s).given, 9 * mass / 2, 1e-12);
     assert_within(book(&s).closure, 0, 1e-12 * mass);
-    dem2d_particle_id other = add(&s, disc(0.05), vec(5, 5), 0, vec(2, 0), 0);
+    dem2d_particle_id other = add(&s, test_disc(0.05), vec(5, 5), 0, vec(2, 0), 0);
     assert_ok(dem2d_world_step(s.world, 2, NULL));
     assert_near(book(&s).given, (9 + 4) * mass / 2, 1e-12);
     assert_ok(dem2d_world_remove_particle(s.world, other));
@@ -403,7 +387,7 @@ static void test_ledger_edits(void **state) {
     /* a driven disc pushes another: what it does is work */
     assert_ok(dem2d_world_drive_particle(s.world, id, DEM2D_DRIVEN, vec(1, 0), 0));
     const double x = look(&s, id).pose.position.x;
-    add(&s, disc(0.05), vec(x + 0.1001, 0), 0, vec(0, 0), 0);
+    add(&s, test_disc(0.05), vec(x + 0.1001, 0), 0, vec(0, 0), 0);
     assert_ok(dem2d_world_step(s.world, 2000, NULL));
     dem2d_ledger l = book(&s);
     assert_near(l.kinetic, 4 * mass / 2, 1e-3); /* thrown off at twice the speed */
@@ -426,9 +410,9 @@ static void test_law_changes(void **state) {
     desc.time_step = 2e-5, desc.gravity = vec(1, -9.81), desc.local_damping = 0.5;
     scene s = make_scene(desc, stone(KN / 2, 0.6));
     add_wall(&s, 0, 0, 0, 1);
-    dem2d_particle_id low = add(&s, disc(0.05), vec(0, 0.05), 0, vec(0, 0), 0);
-    add(&s, disc(0.05), vec(0.1, 0.05), 0, vec(0, 0), 0);
-    add(&s, disc(0.05), vec(0.05, 0.05 + 0.0866), 0, vec(0, 0), 0);
+    dem2d_particle_id low = add(&s, test_disc(0.05), vec(0, 0.05), 0, vec(0, 0), 0);
+    add(&s, test_disc(0.05), vec(0.1, 0.05), 0, vec(0, 0), 0);
+    add(&s, test_disc(0.05), vec(0.05, 0.05 + 0.0866), 0, vec(0, 0), 0);
     dem2d_wall_desc side = {0};
     side.material = s.material, side.point = vec(0.15, 0), side.normal = vec(-1, 0);
     dem2d_wall_id id;
@@ -459,7 +443,7 @@ static void test_damped_time_step(void **state) {
         double safe, limit;
         scene s = make_scene(desc, material);
         add_wall(&s, 0, 0, 0, 1);
-        dem2d_particle_id id = add(&s, disc(0.05), vec(0, 0.05 - 1e-6), 0, vec(0, 0), 0);
+        dem2d_particle_id id = add(&s, test_disc(0.05), vec(0, 0.05 - 1e-6), 0, vec(0, 0), 0);
         assert_ok(dem2d_world_step(s.world, 1, NULL));
         assert_ok(dem2d_world_time_step_bounds(s.world, &safe, &limit, NULL));
         const double w0 = sqrt(KN / look(&s, id).mass);

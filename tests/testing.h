@@ -113,6 +113,27 @@ TEST_HELPER dem2d_pose still(void) {
     return (dem2d_pose){{0, 0}, {1, 0}, 1};
 }
 
+/* --- shapes ---------------------------------------------------------------------------------- */
+
+TEST_HELPER dem2d_shape *test_disc(double radius) {
+    dem2d_shape *shape;
+    assert_ok(dem2d_shape_create_circle(NULL, radius, &shape));
+    return shape;
+}
+
+TEST_HELPER dem2d_shape *test_ellipse(double a, double b) {
+    dem2d_shape *shape;
+    assert_ok(dem2d_shape_create_ellipse(NULL, a, b, &shape));
+    return shape;
+}
+
+TEST_HELPER dem2d_shape *test_box(double width, double height) {
+    const dem2d_vec points[4] = {{0, 0}, {width, 0}, {width, height}, {0, height}};
+    dem2d_shape *shape;
+    assert_ok(dem2d_shape_create_polygon(NULL, points, 4, 0, &shape));
+    return shape;
+}
+
 /* --- log ------------------------------------------------------------------------------------- */
 
 typedef struct test_log {
