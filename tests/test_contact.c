@@ -2,7 +2,6 @@
    inverse construction (choose normal and depth, then place B), a search in long double built on
    the shapes' formulas, closed forms, integer Minkowski sums, and what must not change when the
    same pair is swapped, turned, scaled or moved. */
-#define DEM2D_IMPLEMENTATION
 #include "dem2d.h"
 #include "testing.h"
 

@@ -5,7 +5,6 @@
    Jumps of the normal at true ties of the least depth (a corner that can leave by two sides) are no
    fault of the contact points. They are excluded where a sweep says so, and only after the depths
    along both normals were found equal at that place. */
-#define DEM2D_IMPLEMENTATION
 #include "dem2d.h"
 #include "testing.h"
 

@@ -2,7 +2,6 @@
    changed and stepped, and every write. The result says so, the log what for; nothing
    leaks, inputs, outputs and world are as before the call, and what follows is what would have
    followed without the failure, to the bit. */
-#define DEM2D_IMPLEMENTATION
 #include "dem2d.h"
 #include "testing.h"
 #include "fingerprint.h"

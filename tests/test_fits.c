@@ -2,7 +2,6 @@
    lines, convexity from a long double series, optimality from a dual bound: none of them shares
    code with the header. */
 #define _POSIX_C_SOURCE 200809L /* opendir, for the outlines of DATA */
-#define DEM2D_IMPLEMENTATION
 #include "dem2d.h"
 
 #include "testing.h"

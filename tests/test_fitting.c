@@ -1,7 +1,6 @@
 /* Templates from outlines: hulls, Fourier series and their convexity, polybeziers. The areas come
    from an exact count along scan lines that shares no code with the header. */
 #define _POSIX_C_SOURCE 200809L /* opendir, for the outlines of DATA */
-#define DEM2D_IMPLEMENTATION
 #include "dem2d.h"
 
 #include "testing.h"

@@ -1,7 +1,6 @@
 /* Collisions, rolling, sliding and rocking against closed forms: linear springs, Coulomb friction,
    incremental tangential springs. Each row of a table is one case; tolerances are those stated for
    steps of a hundredth of the contact time, unless a row takes a finer step. */
-#define DEM2D_IMPLEMENTATION
 #include "dem2d.h"
 #include "testing.h"
 

@@ -1,6 +1,5 @@
 /* The full law against closed forms: dashpots by restitution, rolling friction, a caller's law; and
    the ledger of energies, which has to close. */
-#define DEM2D_IMPLEMENTATION
 #include "dem2d.h"
 #include "testing.h"
 

@@ -1,5 +1,4 @@
 /* Area, centroid and polar moment: closed forms, and dense polygons in long double for the rest. */
-#define DEM2D_IMPLEMENTATION
 #include "dem2d.h"
 
 #include "testing.h"

@@ -1,6 +1,5 @@
 /* Measures of a world: stresses, strain, regions, fabric, histograms, distance from rest; the axis
    of a shape. Expected values are closed forms, or sums by other means in long double. */
-#define DEM2D_IMPLEMENTATION
 #include "dem2d.h"
 #include "testing.h"
 

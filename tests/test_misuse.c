@@ -1,7 +1,6 @@
 /* Wrong use of the whole public API: every pointer NULL, every number not finite or out of its
    range, every id stale, calls in the wrong order. Each is answered by the result that the table of
    api_calls.h names; outputs, inputs and the world stay as they were, to the bit. */
-#define DEM2D_IMPLEMENTATION
 #include "dem2d.h"
 #include "testing.h"
 #include "fingerprint.h"

@@ -1,6 +1,5 @@
 /* Outlines from pixels and their measures. What they should be comes from flood fills, brute force
    over all pairs, scan lines and closed forms that share no code with the header. */
-#define DEM2D_IMPLEMENTATION
 #include "dem2d.h"
 
 #include "testing.h"

@@ -1,7 +1,6 @@
 /* Contacts of every ordered pair of shape models, with both solvers, against a search in long
    double that proves what it finds (contact_cases.h), exact integer arithmetic for polygons, and
    what must not change when the same pair is swapped, turned, scaled, moved or asked again. */
-#define DEM2D_IMPLEMENTATION
 #include "dem2d.h"
 #include "testing.h"
 #include "contact_cases.h"

@@ -1,7 +1,6 @@
 /* test_readers.c - the files that the examples read: Netpbm images and CSV outlines, good and bad.
  */
 #define _POSIX_C_SOURCE 200809L
-#define DEM2D_IMPLEMENTATION
 #include "dem2d.h"
 #include "../examples/common.h" /* first: its fail() is a function, cmocka's a macro */
 #include "testing.h"

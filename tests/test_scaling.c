@@ -1,7 +1,6 @@
 /* No length, area or force is built in: a scene whose lengths are multiplied by a power of two,
    with all else in the same units, gives the same bits times a power of two. With the full law, a
    caller's law, chains of segments and the ledger; test_world.c has plain scenes. */
-#define DEM2D_IMPLEMENTATION
 #include "dem2d.h"
 #include "testing.h"
 

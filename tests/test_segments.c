@@ -1,6 +1,5 @@
 /* Segment walls: depth and normal against a scan of their points, joints that count once, sliding
    over them, boxes across them, hoppers. */
-#define DEM2D_IMPLEMENTATION
 #include "dem2d.h"
 #include "testing.h"
 

@@ -1,6 +1,5 @@
 /* Shapes: creation and its errors, support against oracles in long double that share no code with
    the header, boxes, outlines, facts, containment. */
-#define DEM2D_IMPLEMENTATION
 #include "dem2d.h"
 
 #include "testing.h"

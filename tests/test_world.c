@@ -1,6 +1,5 @@
 /* The world: what it refuses, what its objects do, balances of force, stress and energy, runs that
    repeat bit for bit, and failures in the middle of a step. */
-#define DEM2D_IMPLEMENTATION
 #include "dem2d.h"
 #include "testing.h"
 
@@ -664,7 +663,8 @@ static void test_results(void **state) {
 /* A disc of one material driven along a heavy disc of another: stiffnesses and friction are read
    off the contact. */
 static void check_meeting(const dem2d_pair_desc *given, double kn, double kt, double mu) {
-    const dem2d_material_desc first = {2700, 1e6, 4e5, 0.5, 0, 0}, second = {1e9, 3e6, 1.2e6, 0.2, 0, 0};
+    const dem2d_material_desc first = {2700, 1e6, 4e5, 0.5, 0, 0},
+                              second = {1e9, 3e6, 1.2e6, 0.2, 0, 0};
     dem2d_world_desc desc = basic_desc();
     desc.time_step = 1e-5;
     scene s = make_scene(&desc, &first);
