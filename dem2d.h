@@ -1,4 +1,4 @@
-/* dem2d.h - two-dimensional discrete element method for smooth and irregular grains, version 0.4.0
+/* dem2d.h - two-dimensional discrete element method for smooth and irregular grains, version 0.5.0
 
    One C99 header, no dependency but the C standard library. MIT licence (end of file).
 
@@ -59,9 +59,10 @@ WHAT IT IS
     chains of cubic Bezier arcs ("polybeziers"), Fourier series of the support function (FS), or
     your own support function. They push each other with linear springs and Coulomb friction, or by
     your own law, and move by Newton's laws. The methods are those of two papers on irregular
-grains: [P] polybezier grains: closed-form support, GJK and EPA, biaxial compression [F] Fourier
-series of the support function: convexity, reduction, fitting The stateless layer (shapes, mass,
-fitting, contact of two shapes) works without a world.
+    grains:
+      [P] polybezier grains: closed-form support, GJK and EPA, biaxial compression
+      [F] Fourier series of the support function: convexity, reduction, fitting
+    The stateless layer (shapes, mass, fitting, contact of two shapes) works without a world.
 
 WHAT IT DOES NOT DO
     3D; concave grains (a later version joins convex parts); bonded or breaking grains; fluids;
@@ -74,9 +75,10 @@ LIMITS
     * One that moves or turns by more than its inscribed radius in a step may pass through others.
       That is looked for when the list of pairs is renewed: dem2d_stats.fast_motion, one message.
     * A custom support function that is not convex can't be detected; contacts are then wrong.
-    * Two points carry a contact of faces. A box on a wall then conserves its energy; between two
-      free polygons, where the reference edge changes, no rule of points does: dense packings of
-      sharp polygons with hardly any damping gain energy. Damp them, or use CONTACT_AREA.
+    * Two points carry a contact of faces, by forces that come from an energy. Their moment jumps
+      where the deeper end changes sides while less than an eighth of the shorter face is common, or
+      the overlap is deeper than half of that face times the angle to its neighbour (a 64-gon's: at
+      0.5 % of its radius). Sharp corners jump anyway: their steps are of first order.
     * Where the support value hardly changes with the direction (bodies of constant width, one
       concentric with the other), a search may reach its cap: the answer is then UNRESOLVED, with
       bounds a few 1e-4 of the size apart.
@@ -165,8 +167,9 @@ CONCEPTS
                 By form: circles, and edges and corners of two polygons. By polytope: branch and
                 bound over arcs of directions, for what is left.
     Face        Where two edges meet (polygons, straight arcs, walls) two points carry the
-                contact, the ends of the common part, each with its own depth and the whole kn.
-                They come and go without a jump of force or moment.
+                contact, the ends of the common part, each with its own depth and the whole kn;
+                the second with less where little is common. Their forces are the slope of an
+                energy, and come and go steadily: so energy is conserved, and piles come to rest.
     Wall        A half-plane: its normal points into the grains. Or a segment, which has two sides;
                 a chain of them counts once at its joints. A wall stands still, moves at a velocity,
                 or is servo-controlled to a stress.
@@ -430,10 +433,10 @@ DETERMINISM
    ============================================================================================ */
 
 #define DEM2D_VERSION_MAJOR 0
-#define DEM2D_VERSION_MINOR 4
+#define DEM2D_VERSION_MINOR 5
 #define DEM2D_VERSION_PATCH 0
-#define DEM2D_VERSION 400 /* major * 10000 + minor * 100 + patch */
-#define DEM2D_VERSION_STRING "0.4.0"
+#define DEM2D_VERSION 500 /* major * 10000 + minor * 100 + patch */
+#define DEM2D_VERSION_STRING "0.5.0"
 
 #if defined(DEM2D_STATIC)
 #if defined(__GNUC__)
@@ -889,8 +892,10 @@ typedef struct dem2d_contact_desc {
 /// One of the points that carry a contact.
 typedef struct dem2d_contact_point {
     dem2d_vec position; ///< m
-    double depth;       ///< m, overlap there along the contact's normal (of corners' roundings)
-    double weight;      ///< part of the normal stiffness that acts there, in [0, 1]
+    dem2d_vec normal;   ///< unit, of the force on B; of the deepest point the contact's
+    double depth;       ///< m, overlap there, at a right angle to the face that is met
+    double weight;      ///< force there over kn depth: 1, but for short common parts
+    double energy;      ///< m2, energy stored there over kn; the sum is the contact's
 } dem2d_contact_point;
 
 /// Answer to a contact query, in the coordinates of the poses.
@@ -1146,7 +1151,7 @@ typedef struct dem2d_contact_info {
     dem2d_particle_id a;     ///< particle A
     dem2d_particle_id b;     ///< particle B; generation 0 when B is a wall
     dem2d_wall_id wall;      ///< wall B; generation 0 when B is a particle
-    dem2d_vec normal;        ///< unit, from A to B
+    dem2d_vec normal;        ///< unit, from A to B; of two points that of their force
     dem2d_vec point;         ///< m, contact point; of two the centre of normal force
     dem2d_vec branch;        ///< m, centre of A to centre of B (wall: to the contact point)
     int points;              ///< that carry the force: 1, or 2 where two faces meet
@@ -7156,167 +7161,301 @@ static void dem2di_certified(dem2di_pair *pair, const dem2di_feature *last, dem2
    uses: config, math, support, gjk, edges
    ============================================================================================ */
 
-/* The face of a shape that a contact along u is at or near: heights along u over places along
-   perp(u). The face on the other side of the support point is farther from the contact. */
+/* A face of a shape beside a contact along u, without its rounding: places are along perp(u),
+   heights along u. */
 typedef struct dem2di_face {
-    double x0, x1;    /* extent, x0 < x1 */
-    double y0, rise;  /* height at x0; per place */
-    double more, sum; /* difference and sum of the sines of both faces to the contact */
+    double x0, x1;       /* from here to there, x0 < x1 */
+    double near;         /* the contact: on the face, or on a round end beyond */
+    double top;          /* height of the shape, rounding included */
+    double height, rise; /* of its line at place 0; for each place */
+    double square;       /* of its length */
+    double rounding;
 } dem2di_face;
-
-/* 1 for a face along the contact, up to a third of the other's angle, and 0 when they are equal. */
-static double dem2di_face_weight(const dem2di_face *face) {
-    return dem2di_min(1, 2 * face->more / face->sum);
-}
 
 /* A straight arc whose end is round counts up to this angle (sine): a tenth of a radian is tilt, a
    third is another contact. */
 #define DEM2DI_FLAT_ANGLE 0.3
 
-/* Ends of the face counter-clockwise, in the shape's coordinates, of the face beside
-   corner k that is nearer to the contact. */
-static void dem2di_polygon_face(const dem2d_shape *shape, dem2d_vec v, int k, dem2di_face *face,
-                                dem2d_vec *from, dem2d_vec *to) {
-    if (k < 0) k = dem2di_polygon_corner(shape, v);
-    int before = dem2di_around(shape->count, k, -1);
-    dem2d_vec out = shape->ends[k], in = shape->ends[before];
-    double ahead = dem2di_max(0, -dem2di_dot(out, v)), back = dem2di_max(0, dem2di_dot(in, v));
-    /* beyond a right angle sines fall again */
-    ahead = dem2di_either(dem2di_cross(v, out) < 0, 2 - ahead, ahead);
-    back = dem2di_either(dem2di_cross(v, in) < 0, 2 - back, back);
-    face->more = fabs(ahead - back);
-    face->sum = ahead + back;
-    k -= (k - before) * !(ahead < back);
-    *from = shape->corners[k];
-    *to = shape->corners[dem2di_around(shape->count, k, 1)];
-}
+/* An edge so near to the contact (sine) is on both sides of its support point: it is the one that
+   the contact is along, or an expanding polytope found it but for its tolerance. */
+#define DEM2DI_ALONG 1e-4
 
-static void dem2di_arc_face(const dem2d_shape *shape, dem2d_vec v, dem2di_face *face,
-                            dem2d_vec *from, dem2d_vec *to) {
-    int n = shape->count, k = dem2di_sector_find(shape, v);
-    dem2d_vec near = dem2di_bezier_support(shape, v, NULL);
-    double least = DEM2DI_FLAT_ANGLE;
-    *from = *to = near;
-    for (int i = -1; i <= 1; i++) {
-        const dem2di_arc *arc = &shape->arcs[(k + n + i) % n];
-        if (!dem2di_arc_straight(shape, arc)) continue;
-        dem2d_vec chord = dem2di_add(dem2di_add(arc->d0, arc->d1), arc->d2), along;
-        if (!dem2di_unit(chord, &along) || dem2di_cross(v, along) <= 0) continue;
-        double sine = dem2di_dot(along, v);
-        if (!(fabs(sine) < least)) continue;
-        least = fabs(sine);
-        *from = sine > 0 ? arc->start : near;
-        *to = sine > 0 ? near : dem2di_add(arc->start, chord);
+/* Of the edges beside corner k the one on a side, 1 is counter-clockwise; -1 when it is more than
+   45 degrees off v: no face of the contact. */
+static inline int dem2di_polygon_face(const dem2d_shape *shape, dem2d_vec v, int k, int side) {
+    int edge[2] = {k, dem2di_around(shape->count, k, -1)}, other = side < 0;
+    double sine[2];
+    for (int i = 0; i < 2; i++) {
+        dem2d_vec along = shape->ends[edge[i]];
+        sine[i] = dem2di_cross(v, along) > 0.7071 ? fabs(dem2di_dot(v, along)) : 1;
     }
-    face->more = DEM2DI_FLAT_ANGLE - least;
-    face->sum = DEM2DI_FLAT_ANGLE + least;
+    if (dem2di_min(sine[0], sine[1]) < DEM2DI_ALONG) other = sine[1] < sine[0];
+    return sine[other] < 1 ? edge[other] : -1;
 }
 
-/* Where a face from one point to another, counter-clockwise, is along v; false when nowhere. */
-static inline bool dem2di_face_set(const dem2d_shape *shape, double scale, dem2d_vec v,
-                                   dem2d_vec from, dem2d_vec to, dem2di_face *face) {
-    double x0 = dem2di_cross(v, from), x1 = dem2di_cross(v, to), width = x1 - x0;
-    double y0 = dem2di_dot(v, from), y1 = dem2di_dot(v, to);
+/* The straight arc nearest to v, or -1. */
+static int dem2di_arc_face(const dem2d_shape *shape, dem2d_vec v) {
+    int n = shape->count, k = dem2di_sector_find(shape, v), nearest = -1;
+    double least = DEM2DI_FLAT_ANGLE;
+    for (int i = n - 1; i <= n + 1; i++) {
+        const dem2di_arc *arc = &shape->arcs[(k + i) % n];
+        dem2d_vec way = dem2di_add(dem2di_add(arc->d0, arc->d1), arc->d2), along;
+        if (!dem2di_arc_straight(shape, arc)) continue;
+        if (!dem2di_unit(way, &along) || dem2di_cross(v, along) <= 0) continue;
+        if (!(fabs(dem2di_dot(along, v)) < least)) continue;
+        least = fabs(dem2di_dot(along, v));
+        nearest = (k + i) % n;
+    }
+    return nearest;
+}
+
+/* The edge or arc of a shape that is its face towards v on a side, or -1; of a polygon, beside a
+   corner that is known or -1. */
+static inline int dem2di_face_find(const dem2d_shape *shape, dem2d_vec v, int corner, int side) {
+    if (shape->type != DEM2D_POLYGON) return dem2di_arc_face(shape, v);
+    return dem2di_polygon_face(shape, v, corner < 0 ? dem2di_polygon_corner(shape, v) : corner,
+                               side);
+}
+
+/* A face that was found, of a shape of a scale, seen from its centre. */
+static void dem2di_face_set(const dem2d_shape *shape, double scale, dem2d_vec v, int found,
+                            dem2di_face *face) {
+    dem2d_vec from, way, support;
+    if (shape->type == DEM2D_POLYGON) {
+        from = shape->corners[found];
+        way = dem2di_sub(shape->corners[dem2di_around(shape->count, found, 1)], from);
+        support = dem2di_along(from, dem2di_dot(v, way) > 0, way);
+    } else {
+        const dem2di_arc *arc = &shape->arcs[found];
+        from = arc->start;
+        way = dem2di_add(dem2di_add(arc->d0, arc->d1), arc->d2);
+        support = dem2di_bezier_support(shape, v, NULL);
+    }
+    double x0 = dem2di_cross(v, from), width = dem2di_cross(v, way);
+    face->rise = dem2di_dot(v, way) / width;
     face->x0 = x0 * scale;
-    face->x1 = x1 * scale;
-    face->y0 = (y0 + shape->rounding) * scale;
-    face->rise = (y1 - y0) / width;
-    return width > 0;
-}
-
-/* The face of a shape of a scale and rotation towards u, seen from its centre; false when there is
-   none. */
-static bool dem2di_face_of(const dem2d_shape *shape, dem2d_rot q, double scale, dem2d_vec u,
-                           int corner, dem2di_face *face) {
-    if (!shape->flat) return false;
-    dem2d_vec v = dem2di_turn_back(q, u), from, to;
-    if (shape->type == DEM2D_POLYGON)
-        dem2di_polygon_face(shape, v, corner, face, &from, &to);
-    else
-        dem2di_arc_face(shape, v, face, &from, &to);
-    return dem2di_face_set(shape, scale, v, from, to, face) && face->more > 0;
-}
-
-/* The same of a polygon whose edge the contact is along. */
-static bool dem2di_face_edge(const dem2d_shape *shape, dem2d_rot q, double scale, dem2d_vec u,
-                             int edge, dem2di_face *face) {
-    face->more = face->sum = 1;
-    return dem2di_face_set(shape, scale, dem2di_turn_back(q, u), shape->corners[edge],
-                           shape->corners[dem2di_around(shape->count, edge, 1)], face);
+    face->x1 = (x0 + width) * scale;
+    face->near = dem2di_cross(v, support) * scale;
+    face->top = (dem2di_dot(v, support) + shape->rounding) * scale;
+    face->height = (dem2di_dot(v, from) - face->rise * x0) * scale;
+    face->square = dem2di_dot(way, way) * (scale * scale);
+    face->rounding = shape->rounding * scale;
 }
 
 /* B's face towards -u, seen along u from A's centre. */
 static void dem2di_face_turn(dem2d_vec d, dem2d_vec u, dem2di_face *face) {
     double place = dem2di_cross(u, d), left = place - face->x1;
-    face->y0 = dem2di_dot(u, d) - (face->y0 + face->rise * (face->x1 - face->x0));
+    face->height = dem2di_dot(u, d) - (face->height + face->rise * place);
     face->x1 = place - face->x0;
     face->x0 = left;
+    face->near = place - face->near;
 }
 
-/* A common part of up to so many depths is one of two corners, not of faces: it could slide apart
-   almost as soon as be pressed apart, and one point alone conserves energy there. */
-#define DEM2DI_SHORT_FACE 16.0
-
-/* The middle of two faces at a place. */
-static dem2d_vec dem2di_face_middle(const dem2di_face *a, const dem2di_face *b, double x,
-                                    dem2d_vec u) {
-    double ya = a->y0 + a->rise * (x - a->x0), yb = b->y0 + b->rise * (x - b->x0);
-    return dem2di_along(dem2di_scale(u, (ya + yb) / 2), x, dem2di_perp(u));
+static double dem2di_face_height(const dem2di_face *face, double x) {
+    return face->height + face->rise * x;
 }
 
-/* The two points of a contact along u: ends of the common part of both faces. The deeper one is as
-   deep as the contact, and has weight 1; the other is less deep by the faces' tilt and comes in
-   with their weight. As the common part becomes short, and the depths equal, both go to a half:
-   one point is left and nothing lost. Force and moment change steadily all the way. False when
-   only one point touches. */
-static bool dem2di_face_points(const dem2di_face *a, const dem2di_face *b, double depth,
-                               dem2d_vec u, dem2d_contact_point points[2]) {
-    double x0 = dem2di_max(a->x0, b->x0), x1 = dem2di_min(a->x1, b->x1), width = x1 - x0;
-    double tilt = a->rise - b->rise, shallow = depth - fabs(tilt) * width;
-    if (!(width > 0) || !(shallow > 0)) return false;
-    double weight = dem2di_face_weight(a) * dem2di_face_weight(b);
-    double common = (width / depth - DEM2DI_SHORT_FACE) / (3 * DEM2DI_SHORT_FACE);
-    common = dem2di_max(0, dem2di_min(1, common));
-    int deeper = tilt > 0;
-    points[0].position = dem2di_face_middle(a, b, x0, u);
-    points[1].position = dem2di_face_middle(a, b, x1, u);
-    points[deeper].depth = depth;
-    points[deeper].weight = 1 - weight * (1 - common) / 2 * (shallow / depth);
-    points[1 - deeper].depth = shallow;
-    points[1 - deeper].weight = weight * (1 + common) / 2;
-    return true;
+/* The shallower end of the common part of two faces: a corner of one meets the other, the base, at
+   a right angle. */
+typedef struct dem2di_second {
+    int side;                  /* 1 or -1: beyond or before the deeper end */
+    int base;                  /* whose face is met: 0 for A's, 1 for B's */
+    double x_deep, level;      /* the deeper end: place, middle between both surfaces there */
+    double x, core;            /* the corner, which may be rounded: place, height */
+    double place, y;           /* the point, in the middle between both surfaces there */
+    double rise;               /* of the base */
+    double slope;              /* length of the base for each place */
+    double depth;              /* at a right angle to the base */
+    double width;              /* along the base, from below the deeper end to below the corner */
+    double energy;             /* over kn, beside that of the deeper end, depth^2/2 */
+    double deep, press, slide; /* forces over kn: deeper end, along and across the base's normal */
+} dem2di_second;
+
+/* The end on a side of two faces that meet in a contact of a depth; false when they do not touch
+   there: tilted by more than 45 degrees, or to the other side. Whose corner it is changes where
+   both are on the line that halves the angle between the normals: they are then as deep in each
+   other. */
+static bool dem2di_second_place(const dem2di_face *a, const dem2di_face *b, double depth,
+                                double size, int side, dem2di_second *end) {
+    double tilt = side * (b->rise - a->rise);
+    if (tilt > 1) return false;
+    double xa = side > 0 ? a->x1 : a->x0, xb = side > 0 ? b->x1 : b->x0;
+    double from = side > 0 ? dem2di_max(a->x0, b->x0) : dem2di_min(a->x1, b->x1);
+    double apart = dem2di_face_height(b, xb) - dem2di_face_height(a, xa);
+    end->base = side * ((xb - xa) + apart * (a->rise + b->rise) / 2) > 0;
+    end->x = end->base ? xa : xb;
+    double way = side * (end->x - from);
+    if (!(way > 0) || -tilt * way > DEM2DI_ROUNDING * size) return false;
+    end->rise = end->base ? b->rise : a->rise;
+    double on_a = dem2di_face_height(a, end->x), gap = dem2di_face_height(b, end->x) - on_a;
+    double radii = a->rounding + b->rounding, square = 1 + end->rise * end->rise;
+    if (gap >= 0 && gap * gap >= radii * radii * square) return false;
+    end->side = side;
+    end->slope = sqrt(square);
+    end->depth = dem2di_min(depth, radii - gap / end->slope);
+    end->core = end->base ? on_a : on_a + gap;
+    end->y = on_a + a->rounding + (gap - radii) / 2;
+    end->place = end->x - (end->y - end->core) * end->rise;
+    if (side > 0)
+        end->x_deep = dem2di_max(dem2di_min(a->x0, a->near), dem2di_min(b->x0, b->near));
+    else
+        end->x_deep = dem2di_min(dem2di_max(a->x1, a->near), dem2di_max(b->x1, b->near));
+    end->level = a->top - depth / 2;
+    double lean = side * (end->base ? -gap : gap) * end->rise;
+    end->width = way * end->slope + lean / end->slope;
+    return end->depth > 0 && end->width > 0;
 }
 
-/* The faces of both shapes, each seen from its own centre. */
-static bool dem2di_pair_faces(const dem2di_pair *pair, const dem2di_feature *feature, dem2d_vec u,
-                              dem2di_face face[2]) {
-    int own = feature->own, other = own == 0;
-    const dem2d_shape *shape[2] = {pair->a, pair->b};
-    const dem2d_rot *q[2] = {&pair->ra, &pair->rb};
-    const double scale[2] = {pair->scale_a, pair->scale_b}, sign[2] = {1, -1};
-    dem2d_vec out = dem2di_scale(u, sign[other]), back = dem2di_negate(out);
-    if (!dem2di_face_of(shape[other], *q[other], scale[other], out, feature->corner[other],
-                        &face[other]))
-        return false;
-    int i = 1 - other;
-    if (own >= 0)
-        return dem2di_face_edge(shape[i], *q[i], scale[i], back, feature->corner[i], &face[i]);
-    return dem2di_face_of(shape[i], *q[i], scale[i], back, feature->corner[i], &face[i]);
+/* Up from 0 to 1 for x in [0, 1]: value and slope. */
+static double dem2di_ramp(double x, double *slope) {
+    *slope = 6 * x * (1 - x);
+    return x * x * (3 - 2 * x);
+}
+
+/* The second point is all there where the common part is at least this part of the shorter face:
+   bricks that overlap by half have room to slide. */
+#define DEM2DI_FULL_WIDTH 0.25
+
+/* The share of the second point that a depth leaves. Half of it goes while the depth grows from a
+   16th of the shorter face to all of it, as faces shorter than that make a round shape, and the
+   rest up to four of it: over narrower ranges the force would fall on the way. */
+static double dem2di_share_left(double length, double depth, double *slope) {
+    const double log16 = 2.7725887222397811, log4 = log16 / 2;
+    double share = 1;
+    *slope = 0;
+    if (depth >= 4 * length) return 0;
+    if (depth > length) {
+        share = (1 - dem2di_ramp(dem2di_log_ratio(depth, length) / log4, slope)) / 2;
+        *slope /= -2 * log4 * depth;
+    } else if (16 * depth > length) {
+        share = (1 + dem2di_ramp(dem2di_log_ratio(length, depth) / log16, slope)) / 2;
+        *slope /= -2 * log16 * depth;
+    }
+    return share;
+}
+
+/* How far the second point is there: 1 where two faces meet, 0 where two corners do, with its
+   slopes for each metre of width and of depth. */
+static double dem2di_second_share(double square, double width, double depth, double *by_width,
+                                  double *by_depth) {
+    *by_width = *by_depth = 0;
+    const double part = DEM2DI_FULL_WIDTH;
+    if (width * width >= part * part * square && 256 * depth * depth <= square) return 1;
+    double length = sqrt(square), left = dem2di_share_left(length, depth, by_depth), slope;
+    if (width >= part * length) return left;
+    double there = dem2di_ramp(width / (part * length), &slope);
+    *by_width = left * slope / (part * length);
+    *by_depth *= there;
+    return left * there;
+}
+
+/* Forces of a contact of two points, by the energy kn/2 (d^2 + a s^2 + b s^4/d^2) of both depths,
+   so that none is won or lost. For faces a = 1, b = 0: two springs. As the share c of the second
+   point falls, b = 4/3 c (1 - c) and a = max(0, 2c - 1)^2: down to c = 1/2 then a + 2b = 1 - b, so
+   that both forces are the same where the depths are, and the moment is steady where faces that
+   are parallel tilt to either side. Below, where little is common, it cannot be without one of the
+   forces being attractive. */
+static void dem2di_second_forces(double square, double depth, dem2di_second *end) {
+    double by_width, by_depth, s = end->depth, mean = (depth + s) / 2;
+    double share = dem2di_second_share(square, end->width, mean, &by_width, &by_depth);
+    double more = dem2di_max(0, 2 * share - 1), ratio = (s / depth) * (s / depth);
+    double a = more * more, b = 4 * share * (1 - share) / 3;
+    double by_share = s * s * (2 * more + 2 * (1 - 2 * share) / 3 * ratio);
+    double by_mean = by_share * by_depth / 2;
+    end->energy = s * s * (a + b * ratio) / 2;
+    end->deep = depth * (1 - b * ratio * ratio) + by_mean;
+    end->press = dem2di_max(0, s * (a + 2 * b * ratio) + by_mean);
+    /* the width falls as the corner is pushed along the base, towards the deeper end */
+    end->slide = by_share * by_width * end->side * (end->base ? 1 : -1);
+}
+
+/* The second point of two faces on a side, if it takes more energy than the one known so far: of
+   three corners that touch two count, and the energy is steady where the third takes over. */
+static void dem2di_second_try(const dem2di_face *a, const dem2di_face *b, double depth, double size,
+                              int side, dem2di_second *best) {
+    dem2di_second end;
+    if (!dem2di_second_place(a, b, depth, size, side, &end)) return;
+    dem2di_second_forces(dem2di_min(a->square, b->square), depth, &end);
+    if (end.energy > best->energy) *best = end;
+}
+
+/* The two points of a contact along u, by its second one. */
+static void dem2di_two_points(const dem2di_second *end, double depth, dem2d_vec u,
+                              dem2d_contact_point points[2]) {
+    dem2d_vec across = dem2di_perp(u), force; /* on B, along perp(u) and u */
+    force.x = (end->slide - end->press * end->rise) / end->slope;
+    force.y = (end->press + end->slide * end->rise) / end->slope;
+    double size = dem2di_length(force), up = end->y - end->core;
+    /* of what slides, which acts on the corner, the moment goes into the place of the deeper end */
+    double place = end->x_deep + up * end->slope * end->slide / end->deep;
+    dem2d_contact_point *one = &points[place > end->place];
+    dem2d_contact_point *other = &points[!(place > end->place)];
+    one->position = dem2di_along(dem2di_scale(u, end->level), place, across);
+    one->normal = u;
+    one->depth = depth;
+    one->weight = end->deep / depth;
+    one->energy = depth * depth / 2;
+    other->position = dem2di_along(dem2di_scale(u, end->y), end->place, across);
+    other->normal = u;
+    if (size > 0)
+        other->normal = dem2di_along(dem2di_scale(u, force.y / size), force.x / size, across);
+    other->depth = end->depth;
+    other->weight = size / end->depth;
+    other->energy = end->energy;
+}
+
+/* The one point of a contact. */
+static void dem2di_one_point(dem2d_vec position, double depth, dem2d_vec u,
+                             dem2d_contact_point *point) {
+    point->position.x = position.x;
+    point->position.y = position.y;
+    point->normal.x = u.x;
+    point->normal.y = u.y;
+    point->depth = depth;
+    point->weight = 1;
+    point->energy = depth * depth / 2;
+}
+
+/* The second point of an overlapping pair, on either side; its energy is 0 when there is none. */
+static void dem2di_pair_second(const dem2di_pair *pair, const dem2di_search *search,
+                               dem2di_second *best) {
+    const int *corner = search->feature.corner;
+    dem2d_vec u = search->normal;
+    dem2d_vec va = dem2di_turn_back(pair->ra, u), vb = dem2di_turn_back(pair->rb, dem2di_negate(u));
+    best->energy = 0;
+    for (int side = -1; side <= 1; side += 2) {
+        int found_a = dem2di_face_find(pair->a, va, corner[0], side), found_b = -1;
+        if (found_a >= 0) found_b = dem2di_face_find(pair->b, vb, corner[1], -side);
+        if (found_b < 0) continue;
+        dem2di_face a, b;
+        dem2di_face_set(pair->a, pair->scale_a, va, found_a, &a);
+        dem2di_face_set(pair->b, pair->scale_b, vb, found_b, &b);
+        dem2di_face_turn(pair->d, u, &b);
+        dem2di_second_try(&a, &b, search->upper, pair->size, side, best);
+    }
+    if (best->energy > 0 && pair->b->type == DEM2D_POLYGON && pair->b->count == 2) {
+        best->slide = 0; /* the end of a segment may be a joint, which pushes nothing aside */
+        if (best->base == 0) {
+            best->place = best->x; /* and is told by its place */
+            best->y = best->core + best->depth / 2;
+        }
+    }
 }
 
 /* Contact points of an overlapping pair, from A's centre: how many. */
 static int dem2di_pair_points(const dem2di_pair *pair, const dem2di_search *search,
                               dem2d_contact_point points[2]) {
-    dem2di_face face[2];
+    dem2di_second second;
     dem2d_vec u = search->normal;
-    if (pair->a->flat && pair->b->flat && dem2di_pair_faces(pair, &search->feature, u, face)) {
-        dem2di_face_turn(pair->d, u, &face[1]);
-        if (dem2di_face_points(&face[0], &face[1], search->upper, u, points)) return 2;
+    if (pair->a->flat && pair->b->flat) {
+        dem2di_pair_second(pair, search, &second);
+        if (second.energy > 0) {
+            dem2di_two_points(&second, search->upper, u, points);
+            return 2;
+        }
     }
-    points[0].depth = search->upper;
-    points[0].weight = 1;
-    points[0].position.x = (search->a.x + (search->b.x + pair->d.x)) * 0.5;
-    points[0].position.y = (search->a.y + (search->b.y + pair->d.y)) * 0.5;
+    dem2d_vec middle = dem2di_add(search->a, dem2di_add(search->b, pair->d));
+    dem2di_one_point(dem2di_scale(middle, 0.5), search->upper, u, points);
     return 1;
 }
 
@@ -7325,21 +7464,24 @@ static int dem2di_pair_points(const dem2di_pair *pair, const dem2di_search *sear
 static int dem2di_wall_points(const dem2d_shape *shape, dem2d_rot q, double scale, dem2d_vec u,
                               double surface, dem2d_vec support, double depth,
                               dem2d_contact_point points[2]) {
-    dem2di_face face;
-    if (dem2di_face_of(shape, q, scale, u, -1, &face)) {
-        dem2di_face wall = face;
-        wall.y0 = surface;
-        wall.rise = 0;
-        wall.more = wall.sum = 1;
-        if (dem2di_face_points(&face, &wall, depth, u, points)) {
-            for (int i = 0; i < 2; i++)
-                points[i].position = dem2di_along(points[i].position, -points[i].depth / 2, u);
-            return 2;
-        }
+    double size = 2 * shape->circumscribed * scale;
+    dem2d_vec v = dem2di_turn_back(q, u);
+    dem2di_face face, wall = {-size, size, 0, surface, surface, 0, size * size, 0};
+    dem2di_second second;
+    second.energy = 0;
+    for (int side = -1; side <= 1 && shape->flat; side += 2) {
+        int found = dem2di_face_find(shape, v, -1, side);
+        if (found < 0) continue;
+        dem2di_face_set(shape, scale, v, found, &face);
+        dem2di_second_try(&face, &wall, depth, size, side, &second);
     }
-    points[0].depth = depth;
-    points[0].weight = 1;
-    points[0].position = dem2di_along(support, -depth, u);
+    if (second.energy > 0) {
+        dem2di_two_points(&second, depth, u, points);
+        for (int i = 0; i < 2; i++)
+            points[i].position = dem2di_along(points[i].position, -points[i].depth / 2, u);
+        return 2;
+    }
+    dem2di_one_point(dem2di_along(support, -depth, u), depth, u, points);
     return 1;
 }
 
@@ -7867,12 +8009,13 @@ typedef struct dem2di_link {
     dem2di_feature feature; /* of two polygons, that carried it: tried first in the next step */
 } dem2di_link;
 
-/* What a contact of two points has beside its link, which holds the sums, and as its point the
-   centre of the normal force. All zero for a contact of one point. */
+/* What a contact of two points has beside its link, which holds the sums, as its normal that of the
+   sum of the normal forces, and as its point their centre. All zero for a contact of one point. */
 typedef struct dem2di_ends {
     double weight[2], depth[2];
     double offset[2]; /* along perp(normal) from the link's point */
     double shear[2];
+    double energy; /* m2: that in the normal springs over kn */
 } dem2di_ends;
 
 /* What the full law keeps beside a contact's link: dashpot, rolling, the caller's law. All zero for
@@ -7883,11 +8026,17 @@ typedef struct dem2di_extra {
     double energy, state[2]; /* of the caller's law */
 } dem2di_extra;
 
+/* Velocities of a contact's A and B, half a step before its force. */
+typedef struct dem2di_twist {
+    dem2d_vec va, vb;
+    double wa, wb;
+} dem2di_twist;
+
 /* Velocity of B against A at the contact point; arm_b is the point seen from B's centre. */
-static inline dem2d_vec dem2di_approach(const dem2di_link *link, dem2d_vec arm_b, dem2d_vec va,
-                                        double wa, dem2d_vec vb, double wb) {
-    dem2d_vec a = dem2di_along(va, wa, dem2di_perp(link->point));
-    dem2d_vec b = dem2di_along(vb, wb, dem2di_perp(arm_b));
+static inline dem2d_vec dem2di_approach(const dem2di_link *link, dem2d_vec arm_b,
+                                        const dem2di_twist *twist) {
+    dem2d_vec a = dem2di_along(twist->va, twist->wa, dem2di_perp(link->point));
+    dem2d_vec b = dem2di_along(twist->vb, twist->wb, dem2di_perp(arm_b));
     return dem2di_sub(b, a);
 }
 
@@ -7955,21 +8104,32 @@ static void dem2di_law_apply_ends(const dem2d_pair_desc *law, double slip, doubl
     }
 }
 
-/* Point and depths of a contact of two points into its link: the centre of the normal force. */
+/* Normal, point and depths of a contact of two points into its link: those of the normal springs'
+   resultant, whose moment is theirs. The normals are nearly parallel: as springs along the
+   resultant both keep their parts of it. */
 static void dem2di_ends_set(const dem2d_contact_point points[2], dem2di_ends *ends,
                             dem2di_link *link) {
-    double part[2], sum;
-    dem2d_vec t = dem2di_perp(link->normal);
+    dem2d_vec force[2], sum, u;
+    double part[2], moment = 0;
     for (int i = 0; i < 2; i++) {
-        ends->weight[i] = points[i].weight;
-        ends->depth[i] = points[i].depth;
         part[i] = points[i].weight * points[i].depth;
+        force[i] = dem2di_scale(points[i].normal, part[i]);
     }
-    sum = part[0] + part[1];
-    link->point = dem2di_along(points[0].position, part[1] / sum,
+    sum = dem2di_add(force[0], force[1]);
+    if (dem2di_unit(sum, &u)) link->normal = u;
+    double total = dem2di_dot(sum, link->normal), both = part[0] + part[1];
+    link->point = dem2di_along(points[0].position, part[1] / both,
                                dem2di_sub(points[1].position, points[0].position));
     for (int i = 0; i < 2; i++)
+        moment += dem2di_cross(dem2di_sub(points[i].position, link->point), force[i]);
+    dem2d_vec t = dem2di_perp(link->normal);
+    link->point = dem2di_along(link->point, -moment / total, t);
+    for (int i = 0; i < 2; i++) {
+        ends->weight[i] = points[i].weight * (total / both);
+        ends->depth[i] = points[i].depth;
         ends->offset[i] = dem2di_dot(dem2di_sub(points[i].position, link->point), t);
+    }
+    ends->energy = points[0].energy + points[1].energy;
 }
 
 /* --- dashpot, rolling --------------------------------------------------------------------------
@@ -9167,11 +9327,10 @@ static dem2di_stored dem2di_stored_in(const dem2d_world *world, int contact, boo
         if (kt > 0) stored.tangential = link->shear * (link->shear / kt) / 2;
         return stored;
     }
-    for (int k = 0; k < 2; k++) {
+    stored.normal = kn * ends->energy;
+    for (int k = 0; k < 2 && kt > 0; k++) {
         double weight = ends->weight[k], shear = ends->shear[k];
-        if (!(weight > 0)) continue;
-        stored.normal += weight * kn * ends->depth[k] * ends->depth[k] / 2;
-        if (kt > 0) stored.tangential += shear * (shear / (weight * kt)) / 2;
+        stored.tangential += shear * (shear / (weight * kt)) / 2;
     }
     return stored;
 }
@@ -10274,17 +10433,32 @@ static dem2d_result dem2di_build_list(dem2d_world *world) {
    uses: config, math, law, motion, world, list
    ============================================================================================ */
 
-/* The velocity of B against A at a closed contact of the force pass that is being made, and how
-   fast B turns against A. */
-static dem2d_vec dem2di_contact_motion(const dem2d_world *world, int contact,
-                                       const dem2di_link *link, dem2d_vec arm_b, double *turning) {
+/* How the two of a contact move. */
+static dem2di_twist dem2di_twist_of(const dem2d_world *world, int contact) {
     const dem2di_key *key = &world->list.keys[contact];
     const dem2di_state *a = &world->now[key->a];
     bool wall = contact >= world->list.pairs;
-    dem2d_vec v = wall ? world->wall_now[key->b].velocity : world->now[key->b].v;
-    double w = wall ? 0 : world->now[key->b].w;
-    *turning = w - a->w;
-    return dem2di_approach(link, arm_b, a->v, a->w, v, w);
+    dem2di_twist twist;
+    twist.va = a->v;
+    twist.wa = a->w;
+    twist.vb = wall ? world->wall_now[key->b].velocity : world->now[key->b].v;
+    twist.wb = wall ? 0 : world->now[key->b].w;
+    return twist;
+}
+
+/* Velocity of B against A along the tangent of a contact not of circles: its mean over the step, of
+   what the arms and the normal were at its beginning and are at its end, as those of the end alone
+   leave an error of first order in the step. Of a new contact that of its end. */
+static double dem2di_slip_of(const dem2d_world *world, int contact, const dem2di_link *last,
+                             dem2d_vec arm_b) {
+    const dem2di_link *link = &world->list.next_links[contact - world->list.discs];
+    dem2di_twist twist = dem2di_twist_of(world, contact);
+    double slip = dem2di_cross(link->normal, dem2di_approach(link, arm_b, &twist));
+    if (!(last->depth > 0)) return slip;
+    dem2d_vec to_a = dem2di_sub(arm_b, link->point); /* from B's centre, now and before */
+    to_a = dem2di_along(to_a, world->time_step, dem2di_sub(twist.vb, twist.va));
+    dem2d_vec before = dem2di_approach(last, dem2di_add(last->point, to_a), &twist);
+    return (slip + dem2di_cross(last->normal, before)) / 2;
 }
 
 /* One contact between the last force pass and this: forces act half at each, so that the energy
@@ -10302,10 +10476,14 @@ static void dem2di_book_contact(const dem2d_world *world, int contact, dem2di_le
     for (int k = 0; k < 2; k++) extra[k] = dem2di_extra_at(world, contact, k == 1);
     double way = was ? -last.depth : 0, turn = 0, slide = 0; /* that opened: the spring's way out */
     if (is) {
-        dem2d_vec approach = dem2di_contact_motion(world, contact, &link, arm, &turn);
-        way = -dem2di_dot(link.normal, approach) * world->time_step;
-        slide = dem2di_cross(link.normal, approach) * world->time_step;
-        turn *= world->time_step;
+        const double dt = world->time_step;
+        dem2di_twist twist = dem2di_twist_of(world, contact);
+        dem2d_vec approach = dem2di_approach(&link, arm, &twist);
+        way = -dem2di_dot(link.normal, approach) * dt;
+        slide = contact < world->list.discs ? dem2di_cross(link.normal, approach)
+                                            : dem2di_slip_of(world, contact, &last, arm);
+        slide *= dt;
+        turn = (twist.wb - twist.wa) * dt;
     }
     double shear = (was ? last.shear : 0) + (is ? link.shear : 0), moment = 0, viscous = 0;
     if (extra[0] != NULL) {
@@ -10600,14 +10778,13 @@ static int dem2di_pair_geometry(const dem2d_world *world, int a, int b, const de
     return found;
 }
 
-/* Force of a contact whose geometry is known, from its springs before and the velocity of B against
-   A. `at` is its place among those that are not of circles, `from` where its springs are: there,
-   but for one that has come across a joint. */
+/* Force of a contact whose geometry is known, from its springs before and its slip. `at` is its
+   place among those that are not of circles, `from` where its springs are: there, but for one that
+   has come across a joint. */
 static inline void dem2di_link_load(const dem2d_world *world, int at, int from,
-                                    const dem2d_pair_desc *law, dem2d_vec approach, bool two) {
+                                    const dem2d_pair_desc *law, double slip, bool two) {
     const dem2di_list *list = &world->list;
     dem2di_link *link = &list->next_links[at];
-    double slip = dem2di_cross(link->normal, approach);
     if (two) {
         double force[2];
         dem2di_ends_press(law, &list->next_ends[at], force);
@@ -10620,13 +10797,16 @@ static inline void dem2di_link_load(const dem2d_world *world, int at, int from,
 }
 
 /* How the two of contact i meet, whose point is arm_b from B's centre. */
-static dem2di_meeting dem2di_meeting_make(const dem2d_world *world, int i, dem2d_vec arm_b) {
-    const dem2di_link *link = &world->list.next_links[i - world->list.discs];
+static dem2di_meeting dem2di_meeting_make(const dem2d_world *world, int i, int from,
+                                          dem2d_vec arm_b) {
+    const dem2di_list *list = &world->list;
+    const dem2di_link *link = &list->next_links[i - list->discs];
     double inverse = dem2di_reduced_inverse(world, i);
+    dem2di_twist twist = dem2di_twist_of(world, i);
     dem2di_meeting meeting;
-    dem2d_vec approach = dem2di_contact_motion(world, i, link, arm_b, &meeting.turning);
-    meeting.closing = -dem2di_dot(link->normal, approach);
-    meeting.slip = dem2di_cross(link->normal, approach);
+    meeting.turning = twist.wb - twist.wa;
+    meeting.closing = -dem2di_dot(link->normal, dem2di_approach(link, arm_b, &twist));
+    meeting.slip = dem2di_slip_of(world, i, &list->links[from], arm_b);
     meeting.mass = inverse > 0 ? 1 / inverse : 0;
     return meeting;
 }
@@ -10678,7 +10858,7 @@ static void dem2di_full_load(const dem2d_world *world, int i, int from, dem2d_ve
     dem2di_link *link = &list->next_links[at];
     dem2di_extra *extra = &list->next_extras[at];
     const double dt = world->time_step;
-    dem2di_meeting meeting = dem2di_meeting_make(world, i, arm_b);
+    dem2di_meeting meeting = dem2di_meeting_make(world, i, from, arm_b);
     if (world->law != NULL) {
         dem2di_call_law(world, i, from, &meeting);
         return;
@@ -10874,8 +11054,8 @@ static void dem2di_pair_look(const dem2d_world *world, int i, dem2di_overlap *sc
         dem2di_full_load(world, i, at, arm_b, found == 2);
         arm_b = dem2di_sub(link->point, d);
     } else {
-        dem2d_vec approach = dem2di_approach(link, arm_b, sa->v, sa->w, sb->v, sb->w);
-        dem2di_link_load(world, at, at, law, approach, found == 2);
+        double slip = law->friction > 0 ? dem2di_slip_of(world, i, last, arm_b) : 0;
+        dem2di_link_load(world, at, at, law, slip, found == 2);
     }
     dem2di_set_loads(world, i, arm_b, count);
 }
@@ -10938,6 +11118,7 @@ static int dem2di_segment_geometry(const dem2d_world *world, int a, int wall,
     for (int k = 0; k < found; k++) {
         double depth = found == 2 ? points[k].depth : link->depth;
         points[k].position = dem2di_along(points[k].position, -depth / 2, link->normal);
+        points[k].normal = link->normal; /* joints go by it */
     }
     return found;
 }
@@ -10959,8 +11140,9 @@ static void dem2di_touch_force(const dem2d_world *world, int i, int from, dem2di
     if (world->plan.full) {
         dem2di_full_load(world, i, from, foot, two);
     } else {
-        dem2d_vec approach = dem2di_approach(link, foot, state->v, state->w, wall->velocity, 0);
-        dem2di_link_load(world, at, from, law, approach, two);
+        const dem2di_link *last = &list->links[from];
+        double slip = law->friction > 0 ? dem2di_slip_of(world, i, last, foot) : 0;
+        dem2di_link_load(world, at, from, law, slip, two);
     }
     dem2di_set_loads(world, i, foot, count);
 }
@@ -11032,27 +11214,33 @@ static void dem2di_drop_point(const dem2d_world *world, int contact, int point) 
 
 /* Two contacts of a particle with segments a < b: the one at the end of its segment yields to one
    along the side of the other, of two at the ends the second, of two points where faces meet on
-   both sides of the joint both. */
+   both sides of the joint both. Segments in line are one face, which has no point at the joint. */
 static void dem2di_joint_yield(const dem2d_world *world, int a, int b) {
     const dem2di_list *list = &world->list;
-    dem2di_link *link[2] = {&list->next_links[a - list->discs], &list->next_links[b - list->discs]};
-    int which[2];
+    const int contact[2] = {a, b}, wall[2] = {list->keys[a].b, list->keys[b].b};
+    dem2di_link *link[2];
+    int which[2], near[2];
+    bool two[2], ends[2], side[2];
     dem2d_vec at;
-    if (!dem2di_segments_meet(world, list->keys[a].b, list->keys[b].b, which, &at)) return;
-    int corner[2] = {dem2di_segment_corner(world, a), dem2di_segment_corner(world, b)};
-    bool ends[2] = {corner[0] == which[0], corner[1] == which[1]};
-    if (ends[0] || ends[1]) {
-        link[ends[1] ? 1 : 0]->depth = -1;
-        return;
+    if (!dem2di_segments_meet(world, wall[0], wall[1], which, &at)) return;
+    for (int k = 0; k < 2; k++) {
+        int corner = dem2di_segment_corner(world, contact[k]);
+        link[k] = &list->next_links[contact[k] - list->discs];
+        near[k] = dem2di_point_near(world, contact[k], at);
+        two[k] = dem2di_ends_at(world, contact[k], true) != NULL;
+        ends[k] = corner == which[k];
+        side[k] = corner < 0;
     }
-    if (corner[0] >= 0 || corner[1] >= 0) return;
-    int near[2] = {dem2di_point_near(world, a, at), dem2di_point_near(world, b, at)};
-    bool two[2] = {dem2di_ends_at(world, a, true) != NULL, dem2di_ends_at(world, b, true) != NULL};
-    bool flat = fabs(dem2di_cross(link[0]->normal, link[1]->normal)) <= DEM2DI_CORNER;
-    bool both = near[0] >= 0 && near[1] >= 0;
-    if (both && !two[0] && !two[1]) link[1]->depth = -1;
-    if (near[0] >= 0 && two[0] && flat) dem2di_drop_point(world, a, near[0]);
-    if (near[1] >= 0 && two[1] && (flat || both)) dem2di_drop_point(world, b, near[1]);
+    dem2d_rot one = world->walls[wall[0]].along, other = world->walls[wall[1]].along;
+    bool flat = fabs(one.c * other.s - one.s * other.c) <= DEM2DI_CORNER;
+    bool both = side[0] && side[1] && near[0] >= 0 && near[1] >= 0;
+    if (ends[0] || ends[1])
+        link[ends[1] ? 1 : 0]->depth = -1;
+    else if (both && !two[0] && !two[1])
+        link[1]->depth = -1;
+    for (int k = 0; k < 2; k++)
+        if (side[k] && two[k] && near[k] >= 0 && (flat || (k == 1 && both)))
+            dem2di_drop_point(world, contact[k], near[k]);
 }
 
 /* Where the springs of a contact are: of a new one, those of a contact that it took over from. */
@@ -12355,7 +12543,7 @@ static dem2d_result dem2di_writer_close(const dem2d_env *env, const char *path,
    on different systems, so that a copy as text is noticed. Whoever changes the list of fields
    changes the version. */
 #define DEM2DI_SNAPSHOT_MARK 0x0A0D64326D65648Du /* 8D "dem2d" 0D 0A */
-#define DEM2DI_SNAPSHOT_VERSION 1u
+#define DEM2DI_SNAPSHOT_VERSION 2u
 #define DEM2DI_SNAPSHOT_HEAD 24 /* bytes: mark, version, size */
 #define DEM2DI_SNAPSHOT_TAIL 8  /* the checksum */
 
@@ -12758,6 +12946,7 @@ static void dem2di_archive_ends(dem2di_archive *ar, dem2di_ends *ends) {
         dem2di_archive_finite(ar, "offset", &ends->offset[k]);
         dem2di_archive_finite(ar, "shear", &ends->shear[k]);
     }
+    dem2di_archive_finite(ar, "energy", &ends->energy);
 }
 
 /* What the full law keeps beside it. */
@@ -14046,6 +14235,8 @@ DEM2D_API dem2d_result dem2d_world_write_csv(const dem2d_world *world, const dem
    >>licence  Changes and licence
 
    CHANGES
+     0.5.0  The two points of faces conserve energy between free polygons as well: each has a
+            normal of its own and tells its energy. Snapshots of version 2.
      0.4.0  Dashpots by restitution, rolling friction, a caller's law, segment walls. Measures of
             fabric, anisotropy, orientation, stress of particles, porosity of a region (no longer of
             an area), rest; the ledger of energies. VTK files and CSV histories, scale bars.

@@ -16,9 +16,8 @@
 
    The leapfrog is of second order wherever forces are continuous: springs that close and open too.
    A dashpot begins with a jump; a tangential spring begins to count with the first step in contact,
-   not with the touch, and takes velocities in the middle of a step with the contact point at its
-   end, which matters where that moves within the grain: those are of first order. An observed order
-   below 1.8 where 2 is promised (below 0.8 where 1 is) makes this program fail.
+   not with the touch: those are of first order. An observed order below 1.8 where 2 is promised
+   (below 0.8 where 1 is) makes this program fail.
 
    Writes accuracy.csv, accuracy.gp and, where gnuplot is installed, accuracy.png to OUTDIR,
    build/bench_accuracy.out by default. Exit status: 0, 1 if an order is too low, 2 for bad usage.
@@ -328,7 +327,7 @@ int main(int argc, char **argv) {
         {"damped impact", 1, run_damped, exact_damped, depth},
         {"sticking impact", 1, run_stick, NULL, 0.3 * SPEED},
         {"rocking ellipse", 2, run_rocking, NULL, 0.5},
-        {"rolling ellipse", 1, run_rolling, NULL, 0.5},
+        {"rolling ellipse", 2, run_rolling, NULL, 0.5},
         {"lattice of discs", 2, run_lattice, NULL, SHAKING * RADIUS},
         {"falling grains", 2, run_grains, NULL, 1},
     };

@@ -178,11 +178,11 @@ typedef struct load {
     dem2d_contact c;
     dem2d_pose a, b;
     dem2d_vec force;
-    double size, moment;
+    double size, moment, energy;
 } load;
 
 static const double frame = 0.3; /* all is turned by this: no edge along an axis */
-static int sweep_faults, point_faults, ties_met, events_met;
+static int sweep_faults, point_faults, ties_met, ridges_met, events_met;
 
 /* Poses at t. A's centre is the origin, a wall's surface goes through it. */
 static void place(const sweep *s, double t, dem2d_pose *a, dem2d_pose *b) {
@@ -224,7 +224,9 @@ static const char *fault_of_points(const load *l) {
     if (c->state == DEM2D_PENETRATING && (c->count < 1 || c->count > 2)) return "count";
     for (int i = 0; i < c->count; i++) {
         const dem2d_contact_point *p = &c->points[i];
-        if (!(p->weight >= 0 && p->weight <= 1)) return "weight outside [0, 1]";
+        if (!(p->weight >= 0 && p->weight <= 1 + 4 * DBL_EPSILON) && c->depth < 0.02)
+            return "weight outside [0, 1]";
+        if (!(p->energy >= 0 && p->energy <= p->depth * p->depth)) return "energy";
         if (!(p->depth >= -rounding)) return "a point without depth";
         deepest = fmax(deepest, p->depth);
     }
@@ -253,9 +255,11 @@ static load look(const sweep *s, double t) {
     l.size = facts(shapes[s->b]).circumscribed + (s->a < 0 ? 0 : facts(shapes[s->a]).circumscribed);
     for (int i = 0; i < l.c.count; i++) {
         /* never attractive; that no point is without depth is asked for elsewhere */
-        const double force = l.c.points[i].weight * fmax(0, l.c.points[i].depth);
-        l.force.x += force * l.c.normal.x, l.force.y += force * l.c.normal.y;
-        l.moment += force * cross(sub(l.c.points[i].position, l.a.position), l.c.normal);
+        const dem2d_contact_point *p = &l.c.points[i];
+        const double force = p->weight * fmax(0, p->depth);
+        l.force.x += force * p->normal.x, l.force.y += force * p->normal.y;
+        l.moment += force * cross(sub(p->position, l.a.position), p->normal);
+        l.energy += p->energy;
     }
     const char *fault = fault_of_points(&l);
     if (fault && point_faults++ < 2) name(s, t, fault);
@@ -303,6 +307,30 @@ static bool true_tie(const sweep *s, const load *x, const load *y, double step) 
     return fabs(h - y->c.depth) <= 4 * way + x->c.error + y->c.error + 1e-13 * x->size;
 }
 
+/* Length of the shortest face. */
+static double shortest(int shape) {
+    static const double lengths[SHAPES] = {
+        [BOX] = 1,       [SMALL] = 0.3,   [LARGE] = 1,     [SLAB] = 0.1,
+        [HEXAGON] = 0.5, [GON64] = 0.049, [ROUNDED] = 0.8, [ROUNDED_SMALL] = 0.3,
+        [TRIANGLE] = 1,  [QUAD] = 0.5,    [STADIUM] = 1.2};
+    return shape < 0 || !(lengths[shape] > 0) ? HUGE_VAL : lengths[shape];
+}
+
+/* A ridge of the energy, which itself is steady: where faces are short, against the depth or
+   because little of them is common, no rule of two points that never attract can do without; nor
+   where two corners change places that bear next to nothing. The energy itself is not steady where
+   the second corner is less than the depth times the tilt from the first, by the square of that
+   over the face. */
+static bool ridge(const sweep *s, const load *x, const load *y, double step) {
+    const double face = fmin(shortest(s->a), shortest(s->b)), way = way_of(s, x->size, step);
+    const double depth = fmax(x->c.depth, y->c.depth);
+    const dem2d_vec across = sub(x->c.points[1].position, x->c.points[0].position);
+    const bool narrow = x->c.count == 2 && length(across) < face / 4;
+    const double least = depth * depth / 2, more = fmax(x->energy, y->energy) - least;
+    return (20 * depth > face || narrow || more < 1e-3 * least) &&
+           fabs(y->energy - x->energy) <= 4 * depth * way + 1e-4 * least;
+}
+
 /* Halve an interval, always going on with the steeper half, down to steps of 1e-9: a jump gets
    steeper all the way, anything else does not. */
 static void zoom(const sweep *s, double from, double to) {
@@ -320,12 +348,16 @@ static void zoom(const sweep *s, double from, double to) {
         ties_met++;
         return;
     }
+    if (ridge(s, &x, &y, to - from)) {
+        ridges_met++;
+        return;
+    }
     if (sweep_faults < 12)
-        print_error(
-            "  force (%.9g, %.9g) to (%.9g, %.9g), moment %.9g to %.9g, points %d to %d, %.3g "
-            "times the bound\n",
-            x.force.x, x.force.y, y.force.x, y.force.y, x.moment, y.moment, x.c.count, y.c.count,
-            steepness(s, &x, &y, to - from));
+        print_error("  force (%.9g, %.9g) to (%.9g, %.9g), moment %.9g to %.9g, points %d to %d, "
+                    "energy %.17g "
+                    "to %.17g, %.3g times the bound\n",
+                    x.force.x, x.force.y, y.force.x, y.force.y, x.moment, y.moment, x.c.count,
+                    y.c.count, x.energy, y.energy, steepness(s, &x, &y, to - from));
     blame(s, from, "a jump");
 }
 
@@ -337,6 +369,8 @@ static void fine(const sweep *s, double t) {
         const double off = steepness(s, &last, &next, 1e-9);
         if (off > 1 && s->ties && true_tie(s, &last, &next, 1e-9))
             ties_met++;
+        else if (off > 1 && ridge(s, &last, &next, 1e-9))
+            ridges_met++;
         else if (off > 1)
             blame(s, t + i * 1e-9, "not steady in steps of 1e-9");
         last = next;
@@ -388,7 +422,7 @@ static void run_both(sweep s) {
 static const double depths[] = {1e-4, 3e-3, 0.03};
 
 static void start_sweeps(void) {
-    sweep_faults = point_faults = ties_met = events_met = 0;
+    sweep_faults = point_faults = ties_met = ridges_met = events_met = 0;
 }
 
 static void end_sweeps(int events) {
@@ -538,7 +572,7 @@ static void assert_point(const dem2d_contact_point *p, double x, double depth, d
     assert_within(p->weight, weight, 1e-9);
 }
 
-/* A box on a wall: both corners at full weight, also tilted; a narrow one at (1 + wl) / 2 each;
+/* A box on a wall: both corners at full weight, also tilted; down to 16 depths the narrow one, too;
    one that stands on a corner has one point, or another of no weight. perp(normal) is +x. */
 static void test_points_on_a_wall(void **state) {
     (void)state;
@@ -555,13 +589,20 @@ static void test_points_on_a_wall(void **state) {
         assert_point(&c.points[both && way < 0], low, d, 1);
         if (both) assert_point(&c.points[way > 0], high, d - rise, 1);
     }
-    /* 32 depths long: a third of the way from 16 to 64, where all of the second point is there */
+    /* 32 depths long; 4, half of the way from 16 to 1 where half of the second point is gone: c =
+       3/4, a = 1/4, b = 1/4, less what the share changes with the depth */
     dem2d_shape *narrow = box(0.08, 1, 0);
-    const dem2d_pose low = dem2d_pose_make(0, 0.4975, 0, 1);
-    assert_ok(dem2d_wall_contact(narrow, low, vec(0, 0), vec(0, 1), &c));
+    assert_ok(
+        dem2d_wall_contact(narrow, dem2d_pose_make(0, 0.4975, 0, 1), vec(0, 0), vec(0, 1), &c));
+    assert_int_equal(c.count, 2);
+    for (int i = 0; i < 2; i++) assert_point(&c.points[i], i ? 0.04 : -0.04, 0.0025, 1);
+    const double by_share = 2 * 0.5 - 2.0 / 3 * 0.5, by_depth = -1.5 / (2 * log(16));
+    assert_ok(dem2d_wall_contact(narrow, dem2d_pose_make(0, 0.48, 0, 1), vec(0, 0), vec(0, 1), &c));
     dem2d_shape_destroy(narrow);
     assert_int_equal(c.count, 2);
-    for (int i = 0; i < 2; i++) assert_point(&c.points[i], i ? 0.04 : -0.04, 0.0025, 2.0 / 3);
+    for (int i = 0; i < 2; i++)
+        assert_point(&c.points[i], i ? 0.04 : -0.04, 0.02, 0.75 + by_share * by_depth / 2);
+    assert_within(c.points[0].energy + c.points[1].energy, 0.02 * 0.02 * 0.75, 1e-15);
     const double corner = sqrt(0.5) - 0.01;
     assert_ok(dem2d_wall_contact(shapes[BOX], dem2d_pose_make(0, corner, 45 * DEGREE, 1), vec(0, 0),
                                  vec(0, 1), &c));
@@ -582,7 +623,7 @@ static void test_points_of_a_pair(void **state) {
         double x, left, right;
     } rows[] = {
         {BOX, BOX, 0, -0.5, 0.5},           {BOX, BOX, 0.5, 0, 0.5},
-        {BOX, BOX, -0.8, -0.5, -0.3},       {LARGE, SMALL, 0.3, 0.15, 0.45},
+        {BOX, BOX, -0.7, -0.5, -0.2},       {LARGE, SMALL, 0.3, 0.15, 0.45},
         {SMALL, LARGE, 0.3, -0.15, 0.15},   {ROUNDED, BOX, 0.3, -0.2, 0.4},
         {ROUNDED, ROUNDED, 0.3, -0.1, 0.4}, {LARGE, STADIUM, 0.2, -0.4, 0.8},
         {STADIUM, STADIUM, 0.4, -0.2, 0.6},
@@ -605,6 +646,73 @@ static void test_points_of_a_pair(void **state) {
                 assert_within(c.points[k].weight, 1, 1e-3);
             }
         }
+}
+
+/* Where B is, and how both are turned. */
+enum { X, Y, TURN_A, TURN_B, WAYS };
+
+/* The energy of two shapes, and the force of their contact along all ways; false when one point
+   carries it. */
+static bool energy_of(const dem2d_shape *a, const dem2d_shape *b, const double q[WAYS],
+                      double *energy, double force[WAYS]) {
+    dem2d_contact_desc desc = {0};
+    dem2d_contact c;
+    desc.tolerance = 1e-14;
+    assert_ok(dem2d_pair_contact(a, dem2d_pose_make(0, 0, q[TURN_A], 1), b,
+                                 dem2d_pose_make(q[X], q[Y], q[TURN_B], 1), &desc, &c));
+    *energy = 0;
+    memset(force, 0, WAYS * sizeof *force);
+    for (int i = 0; i < c.count; i++) {
+        const dem2d_contact_point *p = &c.points[i];
+        const double push = p->weight * p->depth;
+        const dem2d_vec f = vec(push * p->normal.x, push * p->normal.y);
+        *energy += p->energy;
+        force[X] += f.x, force[Y] += f.y;
+        force[TURN_A] -= cross(p->position, f);
+        force[TURN_B] += cross(sub(p->position, vec(q[X], q[Y])), f);
+    }
+    return c.count == 2;
+}
+
+/* Two points' forces are the slope of their energy, so that none is won or lost on any way: full
+   and short common parts, tilted, deep, of many corners, with rounding. Where the slope itself
+   jumps (a ridge), differences straddle it now and then. */
+static void test_points_conserve(void **state) {
+    (void)state;
+    static const int kinds[] = {BOX, SMALL, HEXAGON, GON64, ROUNDED, ROUNDED_SMALL, TRIANGLE, QUAD};
+    enum { PAIRS = 8000 };
+    test_random random = {71};
+    int looked = 0, twos = 0, off = 0;
+    while (looked < PAIRS) {
+        const int kind_a = kinds[test_below(&random, COUNT_OF(kinds))];
+        const int kind_b = kinds[test_below(&random, COUNT_OF(kinds))];
+        const dem2d_shape *a = shapes[kind_a], *b = shapes[kind_b];
+        const double depth = pow(10, test_uniform(&random, -4, -1.3));
+        const double face = fmin(shortest(kind_a), shortest(kind_b)), step = 1e-5 * depth;
+        double q[WAYS], energy, force[WAYS], unused[WAYS], worst = 0, ways[2];
+        q[TURN_A] = kind_a == TRIANGLE ? (double)TEST_PI : 0;
+        q[TURN_B] = test_uniform(&random, -1, 1) * fmin(2 * depth / face, 0.3);
+        q[X] = test_uniform(&random, -1, 1);
+        const dem2d_vec up = vec(0, 1), down = vec(0, -1);
+        q[Y] = reach(a, dem2d_pose_make(0, 0, q[TURN_A], 1), up) - depth +
+               reach(b, dem2d_pose_make(0, 0, q[TURN_B], 1), down);
+        if (!energy_of(a, b, q, &energy, force)) continue;
+        looked++;
+        bool two = true;
+        for (int i = 0; i < WAYS; i++) {
+            const double at = q[i];
+            for (int k = 0; k < 2; k++) {
+                q[i] = at + (k ? -step : step);
+                two = energy_of(a, b, q, &ways[k], unused) && two;
+            }
+            q[i] = at;
+            worst = fmax(worst, fabs(force[i] + (ways[0] - ways[1]) / (2 * step)));
+        }
+        twos += two;
+        off += two && worst > 1e-5 * hypot(force[X], force[Y]);
+    }
+    assert_true(twos > PAIRS * 0.95);
+    assert_true(off < twos / 500);
 }
 
 /* --- scenes ---------------------------------------------------------------------------------- */
@@ -1312,26 +1420,36 @@ static void test_shear_of_a_roller(void **state) {
 
 /* --- what the world reports ------------------------------------------------------------------ */
 
-/* Sum of weight depth, and the mean of the points by it. */
-static double sum_points(const dem2d_contact *c, dem2d_vec *mean) {
-    double sum = 0;
+/* Force of all points over kn, and a point on its line. */
+static dem2d_vec sum_points(const dem2d_contact *c, dem2d_vec *mean) {
+    dem2d_vec force = vec(0, 0);
+    double sum = 0, moment = 0;
     *mean = vec(0, 0);
     for (int i = 0; i < c->count; i++) {
-        const double part = c->points[i].weight * c->points[i].depth;
+        const dem2d_contact_point *p = &c->points[i];
+        const double part = p->weight * p->depth;
         sum += part;
-        mean->x += part * c->points[i].position.x, mean->y += part * c->points[i].position.y;
+        force.x += part * p->normal.x, force.y += part * p->normal.y;
+        mean->x += part * p->position.x, mean->y += part * p->position.y;
     }
     mean->x /= sum, mean->y /= sum;
-    return sum;
+    for (int i = 0; i < c->count; i++) {
+        const dem2d_contact_point *p = &c->points[i];
+        moment += p->weight * p->depth * cross(sub(p->position, *mean), p->normal);
+    }
+    const double square = dot(force, force);
+    mean->x += moment * force.y / square, mean->y -= moment * force.x / square;
+    return force;
 }
 
 static void check_report(const dem2d_contact_info *c, const dem2d_contact *expected) {
     dem2d_vec mean;
-    const double sum = sum_points(expected, &mean);
+    const dem2d_vec force = sum_points(expected, &mean);
+    const double sum = length(force);
     assert_int_equal(c->points, expected->count);
     assert_within(c->normal_force, KN * sum, 1e-9 * KN);
     assert_within(c->depth, expected->depth, 1e-9);
-    assert_within(length(sub(c->normal, expected->normal)), 0, 1e-5);
+    assert_within(length(sub(c->normal, vec(force.x / sum, force.y / sum))), 0, 1e-5);
     assert_within(length(sub(c->point, mean)), 0, 1e-5);
 }
 
@@ -1600,6 +1718,7 @@ int main(void) {
         cmocka_unit_test(test_turns_by_epa),
         cmocka_unit_test(test_points_on_a_wall),
         cmocka_unit_test(test_points_of_a_pair),
+        cmocka_unit_test(test_points_conserve),
         cmocka_unit_test(test_box_at_rest),
         cmocka_unit_test(test_box_on_box),
         cmocka_unit_test(test_stack_at_rest),

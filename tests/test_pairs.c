@@ -809,10 +809,10 @@ static const char *wall_points_flaw(const model *m, const dem2d_pose *pose, dem2
         const real off = place + (c->count < 2 ? 0 : c->depth - q->depth + round_slack(m, pose, u));
         if (!(fabsl(depth_in(m, pose, x + q->depth * u.x, y + q->depth * u.y)) <= off))
             return "a contact point is not its depth from the shape's surface";
-        if (!(q->weight >= 0 && q->weight <= 1)) return "a weight outside [0, 1]";
+        if (!(q->weight >= 0 && q->weight <= WEIGHT_MOST)) return "a weight out of range";
         sum += q->weight, deepest = fmax(deepest, q->depth);
     }
-    if (!(sum >= 1 - 4 * DBL_EPSILON && sum <= 2)) return "weights that sum outside [1, 2]";
+    if (!(sum >= WEIGHTS_LEAST && sum <= 1 + WEIGHT_MOST)) return "a sum of weights out of range";
     return fabs(deepest - c->depth) <= place ? NULL : "no contact point as deep as the contact";
 }
 

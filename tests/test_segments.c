@@ -160,7 +160,9 @@ static void test_flat_joints(void **state) {
             assert_within(info[1].pose.position.x, info[0].pose.position.x, far);
             assert_within(info[1].velocity.x, info[0].velocity.x, 10 * far);
             if (!rough) assert_within(info[0].pose.position.x, 0.4, 1e-6);
-            assert_within(info[1].pose.position.y, info[0].pose.position.y, 2e-5);
+            /* rough boxes rock on, each at its own time: by some 5e-5 up and down */
+            assert_within(info[1].pose.position.y, info[0].pose.position.y,
+                          rough && two ? 1e-4 : 2e-5);
             if (kind == DISC || (two && !rough)) /* the others rock for long */
                 assert_within(info[1].velocity.y, info[0].velocity.y, 1e-3);
         }

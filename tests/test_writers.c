@@ -728,8 +728,11 @@ static void test_vtp_contacts(void **state) {
     fill_scene(&s, GRAINS);
     step(&s, 7900); /* rolling friction earlier would keep faces from meeting */
     assert_ok(dem2d_world_set_pair(s.world, s.materials[0], s.materials[1], &rough));
-    step(&s, 100);
-    assert_ok(dem2d_world_contacts(s.world, contacts, 400, &count));
+    for (int tries = 0; two == 0 && tries < 200; tries++) { /* until some meet */
+        step(&s, 100);
+        assert_ok(dem2d_world_contacts(s.world, contacts, 400, &count));
+        for (int i = 0; i < count; i++) two += contacts[i].points == 2;
+    }
     strcpy(text, text_of(put_contacts, s.world));
     for (int i = 0; i < count; i++) {
         const dem2d_contact_info *c = &contacts[i];
@@ -755,7 +758,7 @@ static void test_vtp_contacts(void **state) {
         assert_near(numbers[6 * i + 3] - numbers[6 * i], c->branch.x, 1e-9);
         assert_near(numbers[6 * i + 4] - numbers[6 * i + 1], c->branch.y, 1e-9);
         if (wall) assert_within(numbers[6 * i + 3], c->point.x, 1e-15);
-        two += c->points == 2, walls += wall, rolls += c->moment != 0;
+        walls += wall, rolls += c->moment != 0;
     }
     assert_true(count > 20 && two > 0 && walls > 0 && rolls > 0);
     dem2d_world_destroy(s.world);
