@@ -322,6 +322,7 @@ static void every_model_fits_every_outline(void **state) {
         for (int k = 0; k < COUNT_OF(kinds); k++) {
             dem2d_fit_report report;
             if (is_swarm(&kinds[k]) && i != BOX && i != STEPS) continue; /* slow */
+            if (!test_long() && i != STEPS && (i + k) % 3 > 0) continue;
             dem2d_shape *shape = fit(&given[i], &kinds[k].desc, &report);
             check_report(&given[i], &kinds[k].desc, shape, &report);
             if (i == STEPS && kinds[k].iterates) assert_true(report.iterations > 0);
@@ -654,7 +655,7 @@ static void no_polygon_is_better(void **state) {
         const double covered = coverage(o->p, o->count, p, n), size = size_of(o);
         const int m = extreme_points(o, desc.count, other);
         assert_true(covered >= coverage(o->p, o->count, other, m) - 1e-5);
-        for (int k = 0; k < 40; k++) {
+        for (int k = 0; k < (test_long() ? 40 : 12); k++) {
             const double reach = size * pow(10, -1 - k % 3);
             for (int i = 0; i < n; i++) {
                 const bool moves = k % 2 == 0 || i == k / 2 % n; /* all of them, or one */
@@ -944,7 +945,8 @@ static void every_allocation_can_fail(void **state) {
     for (int k = -1; k < COUNT_OF(kinds); k++) {
         test_env env;
         assert_ok(with_memory(k, &env, 0));
-        const int calls = env.calls, step = calls < 60 ? 1 : 1 + calls / 60; /* all, or many */
+        const int many = test_long() ? 60 : 20;
+        const int calls = env.calls, step = calls < many ? 1 : 1 + calls / many; /* all, or many */
         if (k >= 0) assert_true(calls > 0);
         for (int at = 1; at <= calls; at += step)
             assert_result(with_memory(k, &env, at), DEM2D_OUT_OF_MEMORY);

@@ -74,6 +74,15 @@ TEST_HELPER void test_result(dem2d_result actual, dem2d_result expected, const c
         }                                                                  \
     } while (0)
 
+/* --- how much ----------------------------------------------------------------------------------
+ */
+
+/* LONG=1 in the environment: all of the sweeps that are known to take long, else a part of them. */
+TEST_HELPER bool test_long(void) {
+    const char *value = getenv("LONG");
+    return value != NULL && value[0] != 0;
+}
+
 /* --- numbers that repeat --------------------------------------------------------------------- */
 
 typedef struct test_random {

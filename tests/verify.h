@@ -447,9 +447,10 @@ HELPER void gas(int model, int runs) {
     const char *name = model_names[model];
     row_small(label("%s: energy drift in 1e6 steps of t_c/200", name), drift[1],
               model == K_POLYGON ? 1e-2 : 1e-4);
-    if (model == K_POLYGON) {
-        double one = gas_drifts(model, runs, 200, DEM2D_ONE_POINT, &overlap);
-        row_small(label("%s: no more than by the deepest vertex", name), drift[1], one);
+    if (model == K_POLYGON) { /* of few runs the hardest hit decides */
+        double two = gas_drifts(model, 4 * runs, 200, DEM2D_TWO_POINTS, &overlap);
+        double one = gas_drifts(model, 4 * runs, 200, DEM2D_ONE_POINT, &overlap);
+        row_small(label("%s: no more than by the deepest vertex", name), two, one);
     } else {
         row_above(label("%s: order of the drift in dt", name), 1,
                   log(drift[0] / drift[2]) / log(4));
