@@ -688,7 +688,8 @@ static double ledger_closure(const job *j) {
 
 /* Prints the figures and returns whether each lies in its band. The plateau: the mean stress ratio
    of the last fifth of the compression over the peak; a ratio that falls back or never stops
-   jumping is below the band. It rises because it is about 0 at the end of consolidation. */
+   jumping is below the band (of eight packings of circles: 0.66 to 0.92). It rises because it is
+   about 0 at the end of consolidation. */
 static bool report(const job *j, const options *o, double strain) {
     const double steps = j->steps, particles = j->plan.particles;
     const double lateral = j->lateral_sum / j->lateral_steps; // NaN without steps
@@ -726,7 +727,7 @@ static bool report(const job *j, const options *o, double strain) {
          {0, worst},
          {0, 15}},
         {"peak_stress_ratio", peak, "-", {0.1, 0.7}, {0.1, 0.7}},
-        {"plateau_over_peak", plateau / peak, "-", {0.7, 1.01}, {0.6, 1.01}},
+        {"plateau_over_peak", plateau / peak, "-", {0.6, 1.01}, {0.6, 1.01}},
         {"axial_strain_final", strain, "-", {0.001, 2}, {0.001, 2}},
         {"final_stress_ratio", end.ratio, "-", FINITE, FINITE},
         {"final_stress_ratio_foretold", f->stress_ratio, "-", FINITE, FINITE},
