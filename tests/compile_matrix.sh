@@ -210,21 +210,22 @@ for compiler in gcc clang g++ clang++; do
     done
 done
 
-# --- workers: each takes every JOBS-th line -----------------------------------------------------
+# --- workers: each takes the next line that no other has taken ----------------------------------
 
 jobs=${JOBS:-$(getconf _NPROCESSORS_ONLN 2> /dev/null || echo 2)}
 [ "$jobs" -le 4 ] 2> /dev/null || jobs=4
 
 worker() {
-    awk -v me="$1" -v jobs="$jobs" 'NR % jobs == me' "$list" | while read -r k c s l; do
+    while read -r k c s l; do
         log=$out/$(echo "$k.$c.$s.$l" | tr '+' 'p').log
+        mkdir "${log%.log}.taken" 2> /dev/null || continue
         if (combination "$k" "$c" "$s" "$l") > "$log" 2>&1; then
             echo "ok    $c -std=$s $l $k"
         else
             echo "FAIL  $c -std=$s $l $k"
             echo "$log" >> "$out/failed.$1"
         fi
-    done
+    done < "$list"
 }
 
 i=0
