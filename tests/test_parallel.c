@@ -2,8 +2,8 @@
    a world must come out the same to the last bit as on one thread; and so it must in whatever order
    its particles are in memory. */
 #define _POSIX_C_SOURCE 200809L
-#define DEM2D_IMPLEMENTATION
 #include "dem2d.h"
+#include "inside.h"
 #include "testing.h"
 
 #include <pthread.h>
@@ -304,7 +304,7 @@ static void add_in_order(run *r, const scene *s, uint64_t seed) {
     for (int i = 0; i < GRAINS; i++)
         assert_int_equal(add_grain(r, s, order[i]).index, ids[order[i]].index);
     for (int i = 1; i < GRAINS; i++)
-        assert_true(r->world->names[order[i - 1]].slot < r->world->names[order[i]].slot);
+        assert_true(inside_slot(r->world, order[i - 1]) < inside_slot(r->world, order[i]));
 }
 
 /* Flat in its middle, by turns from the left and from the right; the ends are beyond the walls. */
@@ -497,8 +497,8 @@ static void put_stats(numbers *n, const dem2d_world *world) {
     assert_ok(dem2d_world_stats(world, &s));
     for (int i = 0; i < DEM2D_PROOF_COUNT; i++) PUT(n, (double)s.proofs[i]);
     PUT(n, (double)s.steps, (double)s.list_rebuilds, (double)s.support_calls, (double)s.looks,
-        (double)s.gaps, (double)s.not_converged, (double)s.slow_time_step, (double)s.fast_motion, s.particles, s.walls,
-        s.pairs, s.contacts, s.wall_contacts);
+        (double)s.gaps, (double)s.not_converged, (double)s.slow_time_step, (double)s.fast_motion,
+        s.particles, s.walls, s.pairs, s.contacts, s.wall_contacts);
 }
 
 static void put_state(numbers *n, const run *r) {
@@ -536,7 +536,8 @@ static numbers run_scene(scene *s, const runner *runner, int order) {
     else
         make_empty(&r, s, runner, &s->calls), add_in_order(&r, s, (uint64_t)order);
     for (int i = 0; i < s->rounds; i++) {
-        if (order >= 0) r.world->scattered = order == 2; /* sorted by place, or left as they are */
+        /* sorted by place, or left as they are */
+        if (order >= 0) inside_scatter(r.world, order == 2);
         take_round(&r, s, i);
         put_state(&n, &r);
     }
