@@ -78,7 +78,8 @@ LIMITS
     * Two points carry a contact of faces, by forces that come from an energy. Their moment jumps
       where the deeper end changes sides while less than an eighth of the shorter face is common, or
       the overlap is deeper than half of that face times the angle to its neighbour (a 64-gon's: at
-      0.5 % of its radius). Sharp corners jump anyway: their steps are of first order.
+      0.5 % of its radius). Sharp corners jump anyway: their steps are of first order. Off the free
+      end of a segment a face loses a little energy, or wins it.
     * Where the support value hardly changes with the direction (bodies of constant width, one
       concentric with the other), a search may reach its cap: the answer is then UNRESOLVED, with
       bounds a few 1e-4 of the size apart.
