@@ -379,18 +379,18 @@ THREADS
 
 COSTS (instructions per circle and step of a settled bed with 2.2 contacts each, gcc -O2, by
 `make -C tests bench-cost`; what is not there is decided when the list is renewed and costs nothing)
-    circles under gravity, no friction, no damping      297    53 without a contact
+    circles under gravity, no friction, no damping      296    53 without a contact
     the list renewed once in 100 steps                  +30
-    friction and its history                           +100
+    friction and its history                           +115
     spinning without friction                           +24
     local damping                                       +26
     global damping                                      +26
     gravity                                              +2
     fixed particles, walls, segments, parallel_for       +1    when there are but touch nothing
-    polygons for a tenth of the circles                 +570
+    polygons for a tenth of the circles                 +600
     energy and stress asked for in every step          +1800   else nothing
     the ledger of energies                             +1670   else nothing
-    a dashpot, rolling friction, a law of your own     +1070   circles are then as other shapes
+    a dashpot, rolling friction, a law of your own     +1080   circles are then as other shapes
     a pair of circles listed but apart                   75    as much as one in contact: no branch
     another pair listed but apart, surely so             70    of the 700 to 2000 that a look costs
     a region without particles, a pair of fixed ones      0
@@ -7434,6 +7434,7 @@ static void dem2di_pair_second(const dem2di_pair *pair, const dem2di_search *sea
         dem2di_face_turn(pair->d, u, &b);
         dem2di_second_try(&a, &b, search->upper, pair->size, side, best);
     }
+    /* of polygons only a segment has two corners */
     if (best->energy > 0 && pair->b->type == DEM2D_POLYGON && pair->b->count == 2) {
         best->slide = 0; /* the end of a segment may be a joint, which pushes nothing aside */
         if (best->base == 0) {
@@ -8039,6 +8040,19 @@ static inline dem2d_vec dem2di_approach(const dem2di_link *link, dem2d_vec arm_b
     dem2d_vec a = dem2di_along(twist->va, twist->wa, dem2di_perp(link->point));
     dem2d_vec b = dem2di_along(twist->vb, twist->wb, dem2di_perp(arm_b));
     return dem2di_sub(b, a);
+}
+
+/* The part of an approach along the tangent, as its mean over the step, of what the arms and the
+   normal were at its beginning and are at its end: those of the end alone leave an error of first
+   order in the step. Of a new contact that of its end. */
+static double dem2di_slip(const dem2di_link *last, const dem2di_link *link, dem2d_vec arm_b,
+                          dem2d_vec approach, const dem2di_twist *twist, double time_step) {
+    double slip = dem2di_cross(link->normal, approach);
+    if (!(last->depth > 0)) return slip;
+    dem2d_vec to_a = dem2di_sub(arm_b, link->point); /* from B's centre, now and before */
+    to_a = dem2di_along(to_a, time_step, dem2di_sub(twist->vb, twist->va));
+    dem2d_vec before = dem2di_approach(last, dem2di_add(last->point, to_a), twist);
+    return (slip + dem2di_cross(last->normal, before)) / 2;
 }
 
 /* [F] eq. 8-10 for a given normal force, with the tangential one held within both limits. The
@@ -10447,21 +10461,6 @@ static dem2di_twist dem2di_twist_of(const dem2d_world *world, int contact) {
     return twist;
 }
 
-/* Velocity of B against A along the tangent of a contact not of circles: its mean over the step, of
-   what the arms and the normal were at its beginning and are at its end, as those of the end alone
-   leave an error of first order in the step. Of a new contact that of its end. */
-static double dem2di_slip_of(const dem2d_world *world, int contact, const dem2di_link *last,
-                             dem2d_vec arm_b) {
-    const dem2di_link *link = &world->list.next_links[contact - world->list.discs];
-    dem2di_twist twist = dem2di_twist_of(world, contact);
-    double slip = dem2di_cross(link->normal, dem2di_approach(link, arm_b, &twist));
-    if (!(last->depth > 0)) return slip;
-    dem2d_vec to_a = dem2di_sub(arm_b, link->point); /* from B's centre, now and before */
-    to_a = dem2di_along(to_a, world->time_step, dem2di_sub(twist.vb, twist.va));
-    dem2d_vec before = dem2di_approach(last, dem2di_add(last->point, to_a), &twist);
-    return (slip + dem2di_cross(last->normal, before)) / 2;
-}
-
 /* One contact between the last force pass and this: forces act half at each, so that the energy
    they take is their mean times the way. What sliding and rolling take is that less what the
    springs gained. */
@@ -10482,7 +10481,7 @@ static void dem2di_book_contact(const dem2d_world *world, int contact, dem2di_le
         dem2d_vec approach = dem2di_approach(&link, arm, &twist);
         way = -dem2di_dot(link.normal, approach) * dt;
         slide = contact < world->list.discs ? dem2di_cross(link.normal, approach)
-                                            : dem2di_slip_of(world, contact, &last, arm);
+                                            : dem2di_slip(&last, &link, arm, approach, &twist, dt);
         slide *= dt;
         turn = (twist.wb - twist.wa) * dt;
     }
@@ -10779,13 +10778,20 @@ static int dem2di_pair_geometry(const dem2d_world *world, int a, int b, const de
     return found;
 }
 
-/* Force of a contact whose geometry is known, from its springs before and its slip. `at` is its
-   place among those that are not of circles, `from` where its springs are: there, but for one that
-   has come across a joint. */
-static inline void dem2di_link_load(const dem2d_world *world, int at, int from,
-                                    const dem2d_pair_desc *law, double slip, bool two) {
+/* Force of contact i, whose geometry is known, from its springs before and its slip. `from` is
+   where its springs are: its place among those that are not of circles, but for one that has come
+   across a joint. */
+static inline void dem2di_link_load(const dem2d_world *world, int i, int from,
+                                    const dem2d_pair_desc *law, dem2d_vec arm_b, bool two) {
     const dem2di_list *list = &world->list;
+    int at = i - list->discs;
     dem2di_link *link = &list->next_links[at];
+    double slip = 0;
+    if (law->friction > 0) {
+        dem2di_twist twist = dem2di_twist_of(world, i);
+        dem2d_vec approach = dem2di_approach(link, arm_b, &twist);
+        slip = dem2di_slip(&list->links[from], link, arm_b, approach, &twist, world->time_step);
+    }
     if (two) {
         double force[2];
         dem2di_ends_press(law, &list->next_ends[at], force);
@@ -10806,8 +10812,12 @@ static dem2di_meeting dem2di_meeting_make(const dem2d_world *world, int i, int f
     dem2di_twist twist = dem2di_twist_of(world, i);
     dem2di_meeting meeting;
     meeting.turning = twist.wb - twist.wa;
-    meeting.closing = -dem2di_dot(link->normal, dem2di_approach(link, arm_b, &twist));
-    meeting.slip = dem2di_slip_of(world, i, &list->links[from], arm_b);
+    dem2d_vec approach = dem2di_approach(link, arm_b, &twist);
+    meeting.closing = -dem2di_dot(link->normal, approach);
+    meeting.slip = 0;
+    if (dem2di_law_of(world, i)->friction > 0 || world->law != NULL)
+        meeting.slip =
+            dem2di_slip(&list->links[from], link, arm_b, approach, &twist, world->time_step);
     meeting.mass = inverse > 0 ? 1 / inverse : 0;
     return meeting;
 }
@@ -11055,8 +11065,7 @@ static void dem2di_pair_look(const dem2d_world *world, int i, dem2di_overlap *sc
         dem2di_full_load(world, i, at, arm_b, found == 2);
         arm_b = dem2di_sub(link->point, d);
     } else {
-        double slip = law->friction > 0 ? dem2di_slip_of(world, i, last, arm_b) : 0;
-        dem2di_link_load(world, at, at, law, slip, found == 2);
+        dem2di_link_load(world, i, at, law, arm_b, found == 2);
     }
     dem2di_set_loads(world, i, arm_b, count);
 }
@@ -11138,13 +11147,10 @@ static void dem2di_touch_force(const dem2d_world *world, int i, int from, dem2di
         dem2di_area_apply(world, i, -1, dem2di_sub(wall->point, state->x), law, scratch);
     if (!(link->depth > 0)) return;
     dem2d_vec foot = dem2di_vec(0, 0); /* walls do not turn */
-    if (world->plan.full) {
+    if (world->plan.full)
         dem2di_full_load(world, i, from, foot, two);
-    } else {
-        const dem2di_link *last = &list->links[from];
-        double slip = law->friction > 0 ? dem2di_slip_of(world, i, last, foot) : 0;
-        dem2di_link_load(world, at, from, law, slip, two);
-    }
+    else
+        dem2di_link_load(world, i, from, law, foot, two);
     dem2di_set_loads(world, i, foot, count);
 }
 
