@@ -9345,7 +9345,7 @@ static dem2di_stored dem2di_stored_in(const dem2d_world *world, int contact, boo
     stored.normal = kn * ends->energy;
     for (int k = 0; k < 2 && kt > 0; k++) {
         double weight = ends->weight[k], shear = ends->shear[k];
-        stored.tangential += shear * (shear / (weight * kt)) / 2;
+        if (weight > 0) stored.tangential += shear * (shear / (weight * kt)) / 2;
     }
     return stored;
 }
