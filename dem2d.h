@@ -867,7 +867,9 @@ typedef enum dem2d_contact_state {
 /// How depth and distance are found.
 typedef enum dem2d_solver {
     DEM2D_CERTIFIED, ///< minimum of the support value by Newton's steps, proved global
-    DEM2D_GJK_EPA,   ///< the papers' way: GJK, then EPA when the shapes overlap
+    /// The papers' way: GJK, then EPA when the shapes overlap. A world then takes every pair whose
+    /// bounding circles overlap anew in every step: circles too, from the line of centres.
+    DEM2D_GJK_EPA,
     DEM2D_SOLVER_COUNT
 } dem2d_solver;
 
@@ -908,9 +910,10 @@ typedef struct dem2d_contact {
     dem2d_vec normal;              ///< unit, from A to B
     double depth;                  ///< m, overlap along the normal; negative: minus the gap
     double error;                  ///< m, the true depth is within this of the depth
+    double residual;               ///< m, EPA's at its end: |W| less least edge distance; else 0
     dem2d_vec point_a;             ///< m, witness point on A
     dem2d_vec point_b;             ///< m, witness point on B
-    dem2d_vec point;               ///< m, the middle of the two; with a wall the one on the wall
+    dem2d_vec point;               ///< m, the middle of the two; with a wall point_b, the foot
     int count;                     ///< of contact points: 0 when separated, 2 where two faces meet
     dem2d_contact_point points[2]; ///< by their place along the normal turned by +90 degrees
 } dem2d_contact;
@@ -971,8 +974,10 @@ typedef struct dem2d_wall_id {
 
 /// Where the force of a contact acts.
 typedef enum dem2d_face_rule {
-    DEM2D_TWO_POINTS,   ///< both ends of the common part where two faces meet, else one point
-    DEM2D_ONE_POINT,    ///< the papers' rule: always the middle of the witness points
+    DEM2D_TWO_POINTS, ///< both ends of the common part where two faces meet, else one point
+    /// The papers' rule: one point, the middle of both witness points ([P] fig. 4a); at a wall, the
+    /// middle of support point and foot point (fig. 4b). The other rules take the foot point there.
+    DEM2D_ONE_POINT,
     DEM2D_CONTACT_AREA, ///< energy kn area^2 / (2 length^2): conservative, slow, no closed form
     DEM2D_FACE_RULE_COUNT
 } dem2d_face_rule;
@@ -5919,6 +5924,7 @@ typedef struct dem2di_search {
     dem2di_vertex simplex[3]; /* GJK's last; it holds the origin when they overlap */
     dem2d_vec normal;
     double upper, lower;
+    double residual; /* of EPA */
     dem2d_vec a, b;
     dem2d_proof proof;
     dem2di_feature feature;
@@ -6272,12 +6278,14 @@ static void dem2di_epa(dem2di_pair *pair, dem2di_polytope *polytope, double tole
         search->iterations++;
         dem2di_vertex v = dem2di_look(pair, search, edge.normal);
         double h = dem2di_dot(v.w, edge.normal);
-        if (!polytope->arcs &&
-            h - edge.distance <= tolerance) { /* normal and witness points of this edge */
-            search->upper = h;
-            search->normal = edge.normal;
-            dem2di_witness(search, &polytope->vertex[edge.from], &polytope->vertex[edge.to]);
-            break;
+        if (!polytope->arcs) {
+            search->residual = dem2di_length(v.w) - edge.distance; /* [P] sec. 3.2 */
+            if (h - edge.distance <= tolerance) { /* normal and witness points of this edge */
+                search->upper = h;
+                search->normal = edge.normal;
+                dem2di_witness(search, &polytope->vertex[edge.from], &polytope->vertex[edge.to]);
+                break;
+            }
         }
         int added = polytope->vertices++, last = polytope->edges;
         polytope->vertex[added] = v;
@@ -7608,6 +7616,7 @@ static void dem2di_contact_report(const dem2di_pair *pair, const dem2di_search *
     contact->normal.y = search->normal.y;
     contact->depth = search->upper;
     contact->error = dem2di_max(0, search->upper - search->lower) + DEM2DI_ROUNDING * pair->size;
+    contact->residual = search->residual;
     contact->point_a.x = pose_a->position.x + search->a.x;
     contact->point_a.y = pose_a->position.y + search->a.y;
     contact->point_b.x = pose_b->position.x + search->b.x;
@@ -7684,6 +7693,7 @@ static dem2d_result dem2di_query_gjk(const dem2d_shape *a, dem2d_pose pose_a, co
     dem2di_pair pair = dem2di_pair_make(a, &pose_a, b, &pose_b);
     if (!dem2di_pair_sound(&pair)) return DEM2D_OUT_OF_RANGE;
     dem2di_search search;
+    search.residual = 0;
     dem2di_gjk(&pair, dem2di_start(&pair, used.start), used.tolerance * pair.size,
                used.max_iterations, detect, &search);
     if (search.state == DEM2D_PENETRATING && search.upper <= DEM2DI_ROUNDING * pair.size)
@@ -7713,6 +7723,7 @@ DEM2D_API dem2d_result dem2d_pair_contact(const dem2d_shape *a, dem2d_pose pose_
     dem2di_pair pair = dem2di_pair_make(a, &pose_a, b, &pose_b);
     if (!dem2di_pair_sound(&pair)) return DEM2D_OUT_OF_RANGE;
     dem2di_search search;
+    search.residual = 0;
     if (a->type == DEM2D_CIRCLE && b->type == DEM2D_CIRCLE && used.solver == DEM2D_CERTIFIED) {
         double ra = a->a * pair.scale_a, rb = b->a * pair.scale_b;
         search.iterations = 0;
@@ -7759,6 +7770,7 @@ DEM2D_API dem2d_result dem2d_wall_contact(const dem2d_shape *shape, dem2d_pose p
     contact->normal = u;
     contact->depth = depth;
     contact->error = rounding;
+    contact->residual = 0;
     contact->point_a = dem2di_add(pose.position, support);
     contact->point = contact->point_b = dem2di_along(contact->point_a, -depth, u);
     contact->proof = DEM2D_BY_FORM;
@@ -9998,6 +10010,11 @@ static bool dem2di_has_joints(const dem2d_world *world) {
     return false;
 }
 
+/* Do two circles take the kernel of circles? It knows friction and the closed form, and no more. */
+static bool dem2di_has_disc_kernel(const dem2d_world *world, const dem2di_plan *plan) {
+    return world->solver == DEM2D_CERTIFIED && world->faces != DEM2D_CONTACT_AREA && !plan->full;
+}
+
 /* What the scene makes use of. */
 static dem2di_plan dem2di_plan_make(const dem2d_world *world) {
     dem2di_plan plan;
@@ -10031,7 +10048,7 @@ static dem2di_plan dem2di_plan_make(const dem2d_world *world) {
     bool outlasted = world->plan.again && world->steps > world->listed_at;
     plan.again = !plan.friction && world->plan.friction && !outlasted;
     plan.friction = plan.friction || plan.again;
-    plan.turns = plan.turns || plan.full || world->faces == DEM2D_CONTACT_AREA;
+    plan.turns = plan.turns || !dem2di_has_disc_kernel(world, &plan);
     plan.turns = plan.turns || (world->plan.turns && world->body_count > 0);
     plan.spin = plan.spin || plan.turns || plan.friction;
     return plan;
@@ -10097,7 +10114,7 @@ static void dem2di_disc_task(void *context, int begin, int end) {
             disc->reach = world->now[i].radius + skin;
             disc->fixed = body->motion == DEM2D_FIXED;
             disc->round = dem2di_shape_of(world, body)->type == DEM2D_CIRCLE &&
-                          world->faces != DEM2D_CONTACT_AREA && !build->plan.full;
+                          dem2di_has_disc_kernel(world, &build->plan);
             largest = dem2di_max(largest, disc->reach);
             if (dem2di_outruns(world, i)) fast = dem2di_first_of(world, fast, i);
         }
@@ -10293,7 +10310,7 @@ static bool dem2di_bounded(dem2d_world *world) {
     speed += 2 * time * (fabs(world->gravity.x) + fabs(world->gravity.y) + force * light);
     spin += 2 * time * (force * 2 * size * slender);
     return far + time * speed < 1e300 && spin * world->time_step < 1e50 && /* its cube is finite */
-           world->faces != DEM2D_CONTACT_AREA && !world->plan.full;
+           dem2di_has_disc_kernel(world, &world->plan);
 }
 
 /* Of the loads on the partners of so many contacts, x, y and torque, and a 0 behind. */
@@ -10698,11 +10715,14 @@ static inline void dem2di_link_keep(const dem2di_link *last, dem2di_link *link) 
     link->feature = last->feature;
 }
 
-/* A pair found apart by a gap (m) stays so until its particles have travelled as far together. */
+/* A pair found apart by a gap (m) stays so until its particles have travelled as far together.
+   GJK and EPA take every pair anew, as in the papers. */
 static void dem2di_link_apart(const dem2d_world *world, int a, int b, double gap, double size,
                               dem2di_link *link) {
     link->depth = -1;
-    link->budget = world->travel[a] + world->travel[b] + (gap - DEM2DI_ROUNDING * size);
+    link->budget = world->solver == DEM2D_GJK_EPA
+                       ? 0
+                       : world->travel[a] + world->travel[b] + (gap - DEM2DI_ROUNDING * size);
 }
 
 /* A look at two shapes: the contact's normal, depth and points, or their gap. Returns the number of
@@ -10713,7 +10733,7 @@ static int dem2di_shapes_look(const dem2d_world *world, dem2di_pair *pair, const
     dem2di_search search;
     count->looks++;
     pair->calls = 0;
-    bool warm = last->normal.x != 0 || last->normal.y != 0;
+    bool warm = world->solver != DEM2D_GJK_EPA && (last->normal.x != 0 || last->normal.y != 0);
     dem2di_contact_again(pair, world->solver, &last->feature,
                          warm ? last->normal : dem2di_centres(pair), world->tolerance,
                          world->max_iterations, true, &search);
@@ -10763,7 +10783,8 @@ static int dem2di_pair_geometry(const dem2d_world *world, int a, int b, const de
     dem2di_pair pair;
     pair.a = dem2di_shape_of(world, body_a);
     pair.b = dem2di_shape_of(world, body_b);
-    if (pair.a->type == DEM2D_CIRCLE && pair.b->type == DEM2D_CIRCLE)
+    if (pair.a->type == DEM2D_CIRCLE && pair.b->type == DEM2D_CIRCLE &&
+        world->solver != DEM2D_GJK_EPA)
         return dem2di_round_geometry(state_a, state_b, link, points, count);
     pair.ra = state_a->q;
     pair.rb = state_b->q;
@@ -11146,6 +11167,8 @@ static void dem2di_touch_force(const dem2d_world *world, int i, int from, dem2di
     if (world->faces == DEM2D_CONTACT_AREA)
         dem2di_area_apply(world, i, -1, dem2di_sub(wall->point, state->x), law, scratch);
     if (!(link->depth > 0)) return;
+    if (world->faces == DEM2D_ONE_POINT) /* [P] fig. 4b: from the foot point to the middle */
+        link->point = dem2di_along(link->point, link->depth / 2, link->normal);
     dem2d_vec foot = dem2di_vec(0, 0); /* walls do not turn */
     if (world->plan.full)
         dem2di_full_load(world, i, from, foot, two);
@@ -13248,8 +13271,7 @@ static bool dem2di_key_sound(const dem2d_world *w, int contact) {
     const dem2di_body *b = &w->bodies[key->b];
     if (b->shape_index < 0 || key->a == key->b) return false;
     bool round = dem2di_shape_of(w, a)->type == DEM2D_CIRCLE &&
-                 dem2di_shape_of(w, b)->type == DEM2D_CIRCLE && w->faces != DEM2D_CONTACT_AREA &&
-                 !w->plan.full;
+                 dem2di_shape_of(w, b)->type == DEM2D_CIRCLE && dem2di_has_disc_kernel(w, &w->plan);
     return round == (contact < w->list.discs) && (round || w->plan.turns);
 }
 
@@ -14242,6 +14264,9 @@ DEM2D_API dem2d_result dem2d_world_write_csv(const dem2d_world *world, const dem
    >>licence  Changes and licence
 
    CHANGES
+     0.6.0  DEM2D_GJK_EPA in a world is the papers' way, whole: every pair anew in every step,
+            circles too, from the line of centres. DEM2D_ONE_POINT takes the middle at walls, too.
+            dem2d_contact tells EPA's residual.
      0.5.0  The two points of faces conserve energy between free polygons as well: each has a
             normal of its own and tells its energy. Snapshots of version 2.
      0.4.0  Dashpots by restitution, rolling friction, a caller's law, segment walls. Measures of
