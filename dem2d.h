@@ -1,4 +1,4 @@
-/* dem2d.h - two-dimensional discrete element method for smooth and irregular grains, version 0.5.0
+/* dem2d.h - two-dimensional discrete element method for smooth and irregular grains, version 0.6.0
 
    One C99 header, no dependency but the C standard library. MIT licence (end of file).
 
@@ -434,10 +434,10 @@ DETERMINISM
    ============================================================================================ */
 
 #define DEM2D_VERSION_MAJOR 0
-#define DEM2D_VERSION_MINOR 5
+#define DEM2D_VERSION_MINOR 6
 #define DEM2D_VERSION_PATCH 0
-#define DEM2D_VERSION 500 /* major * 10000 + minor * 100 + patch */
-#define DEM2D_VERSION_STRING "0.5.0"
+#define DEM2D_VERSION 600 /* major * 10000 + minor * 100 + patch */
+#define DEM2D_VERSION_STRING "0.6.0"
 
 #if defined(DEM2D_STATIC)
 #if defined(__GNUC__)
