@@ -635,7 +635,8 @@ DEM2D_API dem2d_result dem2d_shape_outline(const dem2d_shape *shape, dem2d_pose 
                                            dem2d_vec *points);
 /// Direction of the long axis of a template (rad, in (-pi/2, pi/2], from x) and the ratio >= 1 of
 /// its greater to its smaller radius of gyration; 0 and 1 when it has no axis (circles, regular
-/// polygons). By the outline polygon: exact for sharp polygons, else to 1e-4.
+/// polygons). Exact to rounding, of custom shapes to 1e-4. (A needle that lies askew has its width
+/// only to the rounding of its length: 1e-15 times the ratio, relative.)
 DEM2D_API dem2d_result dem2d_shape_axis(const dem2d_shape *shape, double *angle, double *ratio);
 
 /* ============================================================================================
@@ -2623,19 +2624,24 @@ static dem2d_mass dem2di_fourier_mass(const double *a, const double *b, int orde
     return dem2di_mass_of(&m);
 }
 
-/* Of Bezier arcs by Gauss-Legendre with 6 points, exact to degree 11: the polar moment
-   1/4 int |B|^2 B x B' has degree 6 + 5. */
-static dem2d_mass dem2di_bezier_mass(const dem2di_arc *arcs, int count) {
+/* Point i of six in [0, 1] and its weight, of sum 2: Gauss-Legendre, exact to degree 11. */
+static double dem2di_gauss_point(int i, double *weight) {
     static const double node[3] = {0.2386191860831969086, 0.6612093864662645136,
                                    0.9324695142031520278};
-    static const double weight[3] = {0.4679139345726910473, 0.3607615730481386076,
-                                     0.1713244923791703450};
+    static const double weights[3] = {0.4679139345726910473, 0.3607615730481386076,
+                                      0.1713244923791703450};
+    *weight = weights[i % 3];
+    return 0.5 + (i < 3 ? 0.5 : -0.5) * node[i % 3];
+}
+
+/* Of Bezier arcs: the polar moment 1/4 int |B|^2 B x B' has degree 6 + 5. */
+static dem2d_mass dem2di_bezier_mass(const dem2di_arc *arcs, int count) {
     dem2di_moments m = {0, {0, 0}, 0};
     for (int k = 0; k < count; k++)
         for (int i = 0; i < 6; i++) {
-            double t = 0.5 + (i < 3 ? 0.5 : -0.5) * node[i % 3];
+            double weight, t = dem2di_gauss_point(i, &weight);
             dem2d_vec point = dem2di_arc_point(&arcs[k], t);
-            double sweep = 1.5 * weight[i % 3] * dem2di_cross(point, dem2di_arc_speed(&arcs[k], t));
+            double sweep = 1.5 * weight * dem2di_cross(point, dem2di_arc_speed(&arcs[k], t));
             m.area += sweep / 2;
             m.first = dem2di_along(m.first, sweep / 3, point);
             m.polar += sweep / 4 * dem2di_dot(point, point);
@@ -3434,33 +3440,128 @@ static int dem2di_fine_count(const dem2d_shape *shape) {
     return points;
 }
 
-/* Second moments of area of an outline polygon about the centroid, along axes turned by q. */
-static dem2di_tensor dem2di_second_moments(const dem2d_shape *shape, int points, dem2d_rot q) {
+/* Second moments of area about the centroid, along axes turned by q. In these axes a needle keeps
+   its width: the sums of the two directions never meet. Of a triangle with the centroid's corner:
+   area / 12 ((a + b)(a + b) + aa + bb). */
+static void dem2di_second_triangle(dem2di_tensor *sum, dem2d_vec a, dem2d_vec b) {
+    double sixth = dem2di_cross(a, b) / 12; /* of the triangle's area */
+    dem2di_tensor_add(sum, sixth, a, a);
+    dem2di_tensor_add(sum, sixth, a, b);
+    dem2di_tensor_add(sum, sixth, b, b);
+}
+
+/* Of a polygon; of a custom shape, as for its mass, the polygon through outline points. */
+static dem2di_tensor dem2di_second_polygon(const dem2d_shape *shape, int points, dem2d_rot q) {
     dem2di_tensor sum = {0, 0, 0};
     dem2d_vec a = dem2di_turn_back(q, dem2di_outline_point(shape, 0, points));
     for (int i = 1; i <= points; i++) {
         dem2d_vec b = dem2di_turn_back(q, dem2di_outline_point(shape, i % points, points));
-        double sixth = dem2di_cross(a, b) / 12; /* of the triangle's area */
-        dem2di_tensor_add(&sum, sixth, a, a);
-        dem2di_tensor_add(&sum, sixth, a, b);
-        dem2di_tensor_add(&sum, sixth, b, b);
+        dem2di_second_triangle(&sum, a, b);
         a = b;
     }
     return sum;
 }
 
+/* The rounding at a corner: a sector of radius r about c, from direction `in` on by an angle. About
+   its apex it has, along its middle w, r^4/8 (angle + sin angle), across r^4/8 (angle - sin angle),
+   and the first moment 2/3 r^3 sin(angle/2) w. */
+static void dem2di_second_sector(dem2di_tensor *sum, dem2d_vec c, double r, dem2d_vec in,
+                                 double angle) {
+    dem2d_rot half = dem2d_rot_make(angle / 2);
+    dem2d_vec w = dem2di_turn(half, in), across = dem2di_perp(w);
+    double fourth = r * r * r * r / 8, sine = 2 * half.s * half.c;
+    dem2di_tensor_add(sum, r * r * angle / 2, c, c);
+    dem2di_tensor_add(sum, 4 * r * r * r * half.s / 3, c, w);
+    dem2di_tensor_add(sum, fourth * (angle + sine), w, w);
+    dem2di_tensor_add(sum, fourth * (angle - sine), across, across);
+}
+
+/* A rounded polygon: the polygon of its corners, a rectangle on each edge, a sector at each
+   corner. */
+static dem2di_tensor dem2di_second_rounded(const dem2d_shape *shape, dem2d_rot q) {
+    dem2di_tensor sum = {0, 0, 0};
+    double r = shape->rounding;
+    int n = shape->count;
+    for (int k = 0; k < n; k++) {
+        dem2d_vec a = dem2di_turn_back(q, shape->corners[k]);
+        dem2d_vec b = dem2di_turn_back(q, shape->corners[(k + 1) % n]);
+        dem2d_vec last = dem2di_turn_back(q, shape->corners[(k + n - 1) % n]);
+        dem2d_vec edge = dem2di_sub(b, a), before = dem2di_sub(a, last), normal, in;
+        (void)dem2di_unit(dem2di_negate(dem2di_perp(edge)), &normal);
+        (void)dem2di_unit(dem2di_negate(dem2di_perp(before)), &in);
+        dem2d_vec middle = dem2di_along(dem2di_along(a, 0.5, edge), r / 2, normal);
+        double area = dem2di_length(edge) * r;
+        dem2di_second_triangle(&sum, a, b);
+        dem2di_tensor_add(&sum, area, middle, middle);
+        dem2di_tensor_add(&sum, area / 12, edge, edge);
+        dem2di_tensor_add(&sum, area * r * r / 12, normal, normal);
+        dem2d_rot turn;
+        turn.c = dem2di_dot(before, edge);
+        turn.s = dem2di_cross(before, edge);
+        dem2di_second_sector(&sum, a, r, in, dem2d_rot_angle(turn));
+    }
+    return sum;
+}
+
+/* 1/4 int ss (s x ds), degree 11 in an arc's parameter: six points are exact (>>mass). */
+static dem2di_tensor dem2di_second_bezier(const dem2d_shape *shape, dem2d_rot q) {
+    dem2di_tensor sum = {0, 0, 0};
+    for (int k = 0; k < shape->count; k++)
+        for (int i = 0; i < 6; i++) {
+            double weight, t = dem2di_gauss_point(i, &weight);
+            dem2d_vec p = dem2di_turn_back(q, dem2di_arc_point(&shape->arcs[k], t));
+            dem2d_vec v = dem2di_turn_back(q, dem2di_arc_speed(&shape->arcs[k], t));
+            dem2di_tensor_add(&sum, 1.5 * weight * dem2di_cross(p, v) / 4, p, p);
+        }
+    return sum;
+}
+
+/* 1/4 int ss h rho dt, degree 4N + 2: more points than that are exact. */
+static dem2di_tensor dem2di_second_fourier(const dem2d_shape *shape, dem2d_rot q) {
+    dem2di_tensor sum = {0, 0, 0};
+    int points = 4 * shape->count + 8;
+    for (int i = 0; i < points; i++) {
+        dem2d_rot z = dem2d_rot_make(2 * DEM2DI_PI * i / points);
+        dem2d_vec u = dem2di_vec(z.c, z.s);
+        double rho, weight = 2 * DEM2DI_PI / points / 4;
+        dem2d_vec s = dem2di_support(shape, u, &rho), turned = dem2di_turn_back(q, s);
+        dem2di_tensor_add(&sum, weight * dem2di_dot(s, u) * rho, turned, turned);
+    }
+    return sum;
+}
+
+/* terms: how many are summed, for the rounding. */
+static dem2di_tensor dem2di_second_moments(const dem2d_shape *shape, dem2d_rot q, int *terms) {
+    *terms = shape->count;
+    if (shape->type == DEM2D_BEZIER) return dem2di_second_bezier(shape, q);
+    if (shape->type == DEM2D_FOURIER) return dem2di_second_fourier(shape, q);
+    if (shape->rounding > 0) return dem2di_second_rounded(shape, q);
+    *terms = dem2di_fine_count(shape);
+    return dem2di_second_polygon(shape, *terms, q);
+}
+
 /* The long axis, in (-pi/2, pi/2], and the ratio of the radii of gyration; 0 and 1 if the moments
-   differ by no more than their rounding. The second sum along the axis keeps a needle's width. */
+   differ by no more than their rounding. The second sum, along the axis found, is nearly diagonal:
+   its own axis is a small correction, and a needle's width does not drown in its length. */
 static double dem2di_axis(const dem2d_shape *shape, double *ratio) {
-    int points = dem2di_fine_count(shape);
-    double rounding = (points + 256) * DBL_EPSILON;
-    dem2di_tensor sum = dem2di_second_moments(shape, points, dem2d_rot_make(0));
-    dem2d_principal principal = dem2di_tensor_principal(sum);
+    int terms;
     *ratio = 1;
-    if (!(principal.q > rounding * principal.p)) return 0;
-    sum = dem2di_second_moments(shape, points, dem2d_rot_make(principal.angle));
-    *ratio = sqrt(sum.xx / sum.yy);
-    return principal.angle;
+    if (shape->type == DEM2D_CIRCLE) return 0;
+    if (shape->type == DEM2D_ELLIPSE) { /* a and b are squares */
+        bool wide = shape->a >= shape->b;
+        *ratio = sqrt(wide ? shape->a / shape->b : shape->b / shape->a);
+        return wide ? 0 : DEM2DI_PI / 2;
+    }
+    dem2di_tensor sum = dem2di_second_moments(shape, dem2d_rot_make(0), &terms);
+    dem2d_principal principal = dem2di_tensor_principal(sum);
+    if (!(principal.q > (terms + 256) * DBL_EPSILON * principal.p)) return 0;
+    sum = dem2di_second_moments(shape, dem2d_rot_make(principal.angle), &terms);
+    dem2d_principal rest = dem2di_tensor_principal(sum);
+    double least = sum.yy - sum.xy * (sum.xy / (sum.xx - sum.yy)); /* to the fourth order in xy */
+    *ratio = sqrt((rest.p + rest.q) / least);
+    double angle = principal.angle + rest.angle;
+    if (angle > DEM2DI_PI / 2) angle -= DEM2DI_PI;
+    return angle > -DEM2DI_PI / 2 ? angle : angle + DEM2DI_PI;
 }
 
 DEM2D_API dem2d_result dem2d_shape_axis(const dem2d_shape *shape, double *angle, double *ratio) {
@@ -14267,6 +14368,7 @@ DEM2D_API dem2d_result dem2d_world_write_csv(const dem2d_world *world, const dem
      0.6.0  DEM2D_GJK_EPA in a world is the papers' way, whole: every pair anew in every step,
             circles too, from the line of centres. DEM2D_ONE_POINT takes the middle at walls, too.
             dem2d_contact tells EPA's residual.
+            The long axis of a template (dem2d_shape_axis) is exact for every model.
      0.5.0  The two points of faces conserve energy between free polygons as well: each has a
             normal of its own and tells its energy. Snapshots of version 2.
      0.4.0  Dashpots by restitution, rolling friction, a caller's law, segment walls. Measures of
