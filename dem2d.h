@@ -247,11 +247,18 @@ OPTIONS (zero means: physical zero for physical fields; "library default" where 
     dem2d_reduction_desc    test                  -      SUFFICIENT
     dem2d_reduction_desc    factor                -      0.9        0 or inside (0, 1)
     dem2d_reduction_desc    tolerance             -      1e-6       >= 0, relative to a0
-    dem2d_image_desc        pixels                -      none       required
+    dem2d_image_desc        pixels                -      none       required, or pixels16
+    dem2d_image_desc        pixels16              -      none       not with pixels
     dem2d_image_desc        width                 px     none       1 to 2^15
     dem2d_image_desc        height                px     none       1 to 2^15
     dem2d_image_desc        stride                -      width      0 or >= width
-    dem2d_image_desc        threshold             -      Otsu       0 to 255
+    dem2d_image_desc        crop_left             px     0          0 to width - 1
+    dem2d_image_desc        crop_top              px     0          0 to height - 1
+    dem2d_image_desc        crop_width            px     the rest   0 to width - crop_left
+    dem2d_image_desc        crop_height           px     the rest   0 to height - crop_top
+    dem2d_image_desc        labels                -      false      without the next three
+    dem2d_image_desc        threshold             -      Otsu       0 to 255 (pixels16: 65535)
+    dem2d_image_desc        ignore_frame          -      false      without a threshold
     dem2d_image_desc        bright                -      false
     dem2d_image_desc        min_pixels            -      16         >= 0
     dem2d_image_desc        max_pixels            -      no limit   >= 0
@@ -362,8 +369,9 @@ OPTIONS (zero means: physical zero for physical fields; "library default" where 
 ERRORS
     Functions that can fail return a dem2d_result; dem2d_result_text gives its text. Outputs are
     written only on success, and a failing call leaves everything as it was. The log callback of
-    the environment gets the particulars: which field, which value, which index. A step that fails
-    (non-finite state, no memory, time step too long) leaves the world before that step.
+    the environment gets the particulars: which field, which value, which index; also warnings, as
+    DEM2D_WARNING, though the call succeeds. A step that fails (non-finite state, no memory, time
+    step too long) leaves the world before that step.
     Contact queries return a state and never a guess: DEM2D_UNRESOLVED comes with the bounds that
     were reached.
 
@@ -473,7 +481,9 @@ extern "C" {
     X(NOT_REACHED, "the coverage asked for was not reached")               \
     X(IO, "reading or writing failed")                                     \
     X(FORMAT, "not a snapshot, or damaged")                                \
-    X(FORMAT_VERSION, "a snapshot of another version")
+    X(FORMAT_VERSION, "a snapshot of another version")                     \
+    X(CROSSING, "the outline crosses itself")                              \
+    X(WARNING, "a warning: the call goes on")
 
 /// Result of a function that can fail: DEM2D_OK (0) or the reason.
 typedef enum dem2d_result {
@@ -508,7 +518,8 @@ typedef struct dem2d_env {
     void *(*allocate)(void *user, size_t size); ///< as malloc; used if release is there too
     /// As free, with the size that was asked for; without both, malloc and free are used.
     void (*release)(void *user, void *memory, size_t size);
-    /// Particulars of an error or a warning; index is the offending point, arc or object, or -1.
+    /// Particulars of an error, or of a warning (DEM2D_WARNING, which no function returns); index
+    /// is the offending point, arc or object, or -1.
     void (*log)(void *user, dem2d_result result, int index, const char *text);
 } dem2d_env;
 
@@ -657,18 +668,26 @@ DEM2D_API dem2d_result dem2d_shape_mass_interpolated(const dem2d_shape *shape, i
    >>api-outlines  Outlines of grains: from pixels, and what can be measured of them
    ============================================================================================ */
 
-/// Grains in a picture of one byte per pixel, row 0 on top.
+/// Grains in a picture of one or two bytes per pixel, row 0 on top: what is darker (or brighter)
+/// than a threshold, or what has a label.
 typedef struct dem2d_image_desc {
-    const uint8_t *pixels; ///< height rows of width bytes; required
-    int width;             ///< px, 1 to 2^15
-    int height;            ///< px, 1 to 2^15
-    int stride;            ///< bytes from row to row; 0 for width
-    int threshold;         ///< grains are darker than this, 1 to 255; 0 finds it (Otsu)
-    bool bright;           ///< grains are not darker than the threshold instead
-    int min_pixels;        ///< smaller grains are dropped; 0 for 16
-    int max_pixels;        ///< larger ones too; 0 for no limit
-    bool keep_border;      ///< keep grains that touch the picture's border
-    double scale;          ///< m per pixel, > 0
+    const uint8_t *pixels;    ///< height rows of width values; required, or
+    const uint16_t *pixels16; ///< the same of two bytes each; not both
+    int width;                ///< px, 1 to 2^15
+    int height;               ///< px, 1 to 2^15
+    int stride;               ///< px from row to row; 0 for width
+    int crop_left;            ///< px, columns left out; the region of interest begins there
+    int crop_top;             ///< px, rows left out
+    int crop_width;           ///< px, of the region; 0 for all that is right of crop_left
+    int crop_height;          ///< px, of the region; 0 for all that is below crop_top
+    bool labels;              ///< values name grains, 0 is ground: what segmentation tools write
+    int threshold;            ///< grains are darker than this, from 1; 0 finds it (Otsu)
+    bool ignore_frame;        ///< a frame along the region's border has no say in the threshold
+    bool bright;              ///< grains are not darker than the threshold instead
+    int min_pixels;           ///< smaller grains are dropped; 0 for 16
+    int max_pixels;           ///< larger ones too; 0 for no limit
+    bool keep_border;         ///< keep grains that touch the region's border
+    double scale;             ///< m per pixel, > 0
 } dem2d_image_desc;
 
 /// One outline of a set; points belong to the set.
@@ -707,13 +726,28 @@ typedef struct dem2d_difference {
     double hausdorff; ///< m, greatest distance of a corner of one from the other's boundary
 } dem2d_difference;
 
-/// Otsu's threshold of a picture: grains (or ground) are the values below it; 0 for a picture of
-/// one value. Errors: NULL_ARGUMENT, OUT_OF_RANGE.
+/// Otsu's threshold of a picture's region: grains (or ground) are the values below it; 0 for a
+/// region of one value. With ignore_frame the region's border is taken to be a frame: of three
+/// classes of values (Otsu's, too) the one that most of the border has, as far as it is connected
+/// with the border, is left out. Errors: NULL_ARGUMENT, OUT_OF_RANGE (also labels), OUT_OF_MEMORY.
 DEM2D_API dem2d_result dem2d_image_threshold(const dem2d_image_desc *desc, int *threshold);
 /// Outlines of the grains in a picture: threshold, 4-connected components, holes filled, boundary
 /// by linear interpolation between pixel centres. The centre of the pixel in row r, column c is at
-/// ((c + 0.5) scale, (height - r - 0.5) scale). A set may be empty, as that of a picture of one
-/// value is. Errors: NULL_ARGUMENT, OUT_OF_RANGE, NOT_FINITE, OUT_OF_MEMORY.
+/// ((c + 0.5) scale, (height - r - 0.5) scale), with or without a crop. A set may be empty, as that
+/// of a picture of one value is.
+///
+/// What lies in a hole of a grain belongs to it. What lies in a hole of a component that is dropped
+/// (border, max_pixels) is looked at as if that were not there. So is what lies in a frame: a
+/// component that fills 9/10 of its box if its holes are filled and less than a quarter of that by
+/// itself, encloses more than a quarter of the region, and has other grains inside.
+///
+/// Labels: grains with different labels may touch; a grain in a hole of another is a grain of its
+/// own, and counts for the other as well. A label in two places is two grains (segmentation
+/// tools count on from 0 when a byte is full).
+///
+/// The log is warned (DEM2D_WARNING) of frames, of a grain that fills the region like the ground
+/// inside a frame, of labels in two places, and told why an empty set is empty. Errors:
+/// NULL_ARGUMENT, OUT_OF_RANGE, NOT_FINITE, OUT_OF_MEMORY.
 DEM2D_API dem2d_result dem2d_image_outlines(const dem2d_env *env, const dem2d_image_desc *desc,
                                             dem2d_outline_set **set);
 /// Number of outlines in a set; 0 for NULL.
@@ -3503,7 +3537,7 @@ static dem2di_tensor dem2di_second_rounded(const dem2d_shape *shape, dem2d_rot q
     return sum;
 }
 
-/* 1/4 int ss (s x ds), degree 11 in an arc's parameter: six points are exact (>>mass). */
+/* 1/4 int ss (s x ds), degree 11 in an arc's parameter: six points are exact, as for the mass. */
 static dem2di_tensor dem2di_second_bezier(const dem2d_shape *shape, dem2d_rot q) {
     dem2di_tensor sum = {0, 0, 0};
     for (int k = 0; k < shape->count; k++)
@@ -3578,9 +3612,11 @@ DEM2D_API dem2d_result dem2d_shape_axis(const dem2d_shape *shape, double *angle,
 #define DEM2DI_PICTURE_SIDE 32768 /* 2^15 squared pixels: their number stays an int */
 #define DEM2DI_MIN_PIXELS 16      /* four by four: below, the outline is all staircase */
 
-/* Marks of a pixel whose left or right side is part of a grain's outer boundary. */
+/* Marks of a pixel: its left or right side is part of a kept grain's outer boundary; it belongs to
+   a component that was met before. */
 #define DEM2DI_ENTRY 1
 #define DEM2DI_EXIT 2
+#define DEM2DI_SEEN 4
 
 struct dem2d_outline_set {
     dem2d_env env;
@@ -3590,8 +3626,38 @@ struct dem2d_outline_set {
     size_t point_count;
 };
 
+/* A region of a picture, valid, defaults filled in. The pixels in question are those with values
+   from low to high: a grain's, all grains', a frame's. */
+typedef struct dem2di_picture {
+    dem2d_image_desc desc; /* pixels, width and height are the region's */
+    int low, high;
+    dem2d_vec corner; /* px, of the region's lower left corner in the whole picture */
+    uint8_t *marks;   /* of each pixel, or NULL */
+    int *stack;       /* capacity, of a fill */
+    int capacity;
+} dem2di_picture;
+
+static int dem2di_picture_levels(const dem2d_image_desc *desc) {
+    return desc->pixels16 != NULL ? 65536 : 256;
+}
+
+/* A side of the region of interest: its start, and its length, 0 for all that is left. */
+static dem2d_result dem2di_check_crop(const dem2d_env *env, const char *name, int size, int start,
+                                      int length) {
+    if (start < 0 || start >= size)
+        return dem2di_fail(env, DEM2D_OUT_OF_RANGE, -1, "crop_%s = %d, from 0 to %d",
+                           name[0] == 'w' ? "left" : "top", start, size - 1);
+    if (length < 0 || length > size - start)
+        return dem2di_fail(env, DEM2D_OUT_OF_RANGE, -1, "crop_%s = %d, from 0 to %d", name, length,
+                           size - start);
+    return DEM2D_OK;
+}
+
 static dem2d_result dem2di_check_picture(const dem2d_env *env, const dem2d_image_desc *desc) {
-    if (desc == NULL || desc->pixels == NULL) return dem2di_fail_null(env, "desc or pixels");
+    if (desc == NULL || (desc->pixels == NULL && desc->pixels16 == NULL))
+        return dem2di_fail_null(env, "desc or pixels");
+    if (desc->pixels != NULL && desc->pixels16 != NULL)
+        return dem2di_fail(env, DEM2D_OUT_OF_RANGE, -1, "pixels and pixels16: one of the two");
     if (desc->width < 1 || desc->width > DEM2DI_PICTURE_SIDE)
         return dem2di_fail(env, DEM2D_OUT_OF_RANGE, -1, "width = %d, from 1 to %d", desc->width,
                            DEM2DI_PICTURE_SIDE);
@@ -3601,30 +3667,96 @@ static dem2d_result dem2di_check_picture(const dem2d_env *env, const dem2d_image
     if (desc->stride != 0 && desc->stride < desc->width)
         return dem2di_fail(env, DEM2D_OUT_OF_RANGE, -1, "stride = %d, 0 or at least width = %d",
                            desc->stride, desc->width);
-    return DEM2D_OK;
+    dem2d_result result =
+        dem2di_check_crop(env, "width", desc->width, desc->crop_left, desc->crop_width);
+    if (result != DEM2D_OK) return result;
+    return dem2di_check_crop(env, "height", desc->height, desc->crop_top, desc->crop_height);
 }
 
-static const uint8_t *dem2di_picture_row(const dem2d_image_desc *desc, int row) {
-    size_t stride = (size_t)(desc->stride > 0 ? desc->stride : desc->width);
-    return desc->pixels + (size_t)row * stride;
+/* The region of a valid picture. */
+static dem2di_picture dem2di_picture_crop(const dem2d_image_desc *desc) {
+    dem2di_picture p;
+    memset(&p, 0, sizeof p);
+    p.desc = *desc;
+    p.desc.stride = desc->stride > 0 ? desc->stride : desc->width;
+    p.desc.width = desc->crop_width > 0 ? desc->crop_width : desc->width - desc->crop_left;
+    p.desc.height = desc->crop_height > 0 ? desc->crop_height : desc->height - desc->crop_top;
+    size_t skip = (size_t)desc->crop_top * (size_t)p.desc.stride + (size_t)desc->crop_left;
+    if (desc->pixels != NULL) p.desc.pixels = desc->pixels + skip;
+    if (desc->pixels16 != NULL) p.desc.pixels16 = desc->pixels16 + skip;
+    p.corner.x = desc->crop_left;
+    p.corner.y = desc->height - desc->crop_top - p.desc.height;
+    return p;
 }
+
+static int dem2di_picture_value(const dem2di_picture *p, int row, int column) {
+    size_t at = (size_t)row * (size_t)p->desc.stride + (size_t)column;
+    return p->desc.pixels16 != NULL ? p->desc.pixels16[at] : p->desc.pixels[at];
+}
+
+static size_t dem2di_picture_index(const dem2di_picture *p, int row, int column) {
+    return (size_t)row * (size_t)p->desc.width + (size_t)column;
+}
+
+/* A pixel in question? Beyond the border there is none. */
+static bool dem2di_is_grain(const dem2di_picture *p, int row, int column) {
+    if (row < 0 || column < 0 || row >= p->desc.height || column >= p->desc.width) return false;
+    int value = dem2di_picture_value(p, row, column);
+    return value >= p->low && value <= p->high;
+}
+
+static bool dem2di_is_new(const dem2di_picture *p, int row, int column) {
+    return dem2di_is_grain(p, row, column) &&
+           (p->marks[dem2di_picture_index(p, row, column)] & DEM2DI_SEEN) == 0;
+}
+
+/* Put the first pixel of each run of new ones in a row on the stack. */
+static bool dem2di_fill_push(const dem2d_env *env, dem2di_picture *p, int *depth, int row, int from,
+                             int to) {
+    for (int column = from; column <= to; column++) {
+        if (!dem2di_is_new(p, row, column)) continue;
+        if (column > from && dem2di_is_new(p, row, column - 1)) continue;
+        void *stack = p->stack;
+        bool room = dem2di_reserve(env, &stack, &p->capacity, *depth + 1, sizeof *p->stack);
+        p->stack = (int *)stack;
+        if (!room) return false;
+        p->stack[(*depth)++] = (int)dem2di_picture_index(p, row, column);
+    }
+    return true;
+}
+
+/* Mark the component of a pixel in question, run by run; *count pixels. */
+static bool dem2di_fill(const dem2d_env *env, dem2di_picture *p, int row, int column, int *count) {
+    int depth = 0;
+    *count = 0;
+    if (!dem2di_fill_push(env, p, &depth, row, column, column)) return false;
+    while (depth > 0) {
+        int at = p->stack[--depth];
+        int r = at / p->desc.width, from = at % p->desc.width, to = from;
+        if (!dem2di_is_new(p, r, from)) continue;
+        while (dem2di_is_new(p, r, from - 1)) from--;
+        while (dem2di_is_new(p, r, to + 1)) to++;
+        for (int c = from; c <= to; c++) p->marks[dem2di_picture_index(p, r, c)] |= DEM2DI_SEEN;
+        *count += to - from + 1;
+        if (!dem2di_fill_push(env, p, &depth, r - 1, from, to)) return false;
+        if (!dem2di_fill_push(env, p, &depth, r + 1, from, to)) return false;
+    }
+    return true;
+}
+
+/* --- thresholds ------------------------------------------------------------------------------- */
 
 /* The threshold (values below against the rest) with the greatest variance between the two
    classes. Empty grey values give a range of equally good ones: its middle, so that the boundary
    of a binary picture is halfway between pixels. 0 when there is but one grey value. */
-static int dem2di_otsu(const dem2d_image_desc *desc) {
-    uint32_t histogram[256] = {0};
+static int dem2di_otsu(const uint32_t *histogram, int levels) {
     double all = 0, total = 0, below = 0, sum = 0, best = -1;
     int first = 0, last = -1;
-    for (int row = 0; row < desc->height; row++) {
-        const uint8_t *line = dem2di_picture_row(desc, row);
-        for (int column = 0; column < desc->width; column++) histogram[line[column]]++;
-    }
-    for (int grey = 0; grey < 256; grey++) {
+    for (int grey = 0; grey < levels; grey++) {
         all += histogram[grey];
         total += (double)grey * histogram[grey];
     }
-    for (int t = 1; t < 256; t++) {
+    for (int t = 1; t < levels; t++) {
         below += histogram[t - 1];
         sum += (double)(t - 1) * histogram[t - 1];
         if (!(below > 0) || !(below < all)) continue;
@@ -3640,67 +3772,202 @@ static int dem2di_otsu(const dem2d_image_desc *desc) {
     return (first + last + 1) / 2;
 }
 
+/* Of the pixels that are not marked. */
+static void dem2di_histogram(const dem2di_picture *p, uint32_t *histogram) {
+    memset(histogram, 0, (size_t)dem2di_picture_levels(&p->desc) * sizeof *histogram);
+    for (int row = 0; row < p->desc.height; row++)
+        for (int column = 0; column < p->desc.width; column++)
+            if (p->marks == NULL || p->marks[dem2di_picture_index(p, row, column)] == 0)
+                histogram[dem2di_picture_value(p, row, column)]++;
+}
+
+/* Three classes by Otsu: below one edge, below the other, the rest, so that the sum of
+   w m^2 is greatest. In 256 steps of the values that occur: enough to tell a frame. */
+static void dem2di_three_classes(const uint32_t *histogram, int levels, int edge[2]) {
+    double below[257] = {0}, sum[257] = {0}, best = -1;
+    int low = 0, high = levels - 1, steps = 256;
+    while (low < high && histogram[low] == 0) low++;
+    while (low < high && histogram[high] == 0) high--;
+    int span = high - low + 1, step = (span + steps - 1) / steps;
+    steps = (span + step - 1) / step;
+    for (int k = 0; k < steps; k++) {
+        below[k + 1] = below[k];
+        sum[k + 1] = sum[k];
+        for (int i = 0; i < step && low + k * step + i <= high; i++) {
+            below[k + 1] += histogram[low + k * step + i];
+            sum[k + 1] += (double)(k * step + i) * histogram[low + k * step + i];
+        }
+    }
+    edge[0] = edge[1] = high + 1;
+    for (int i = 1; i < steps; i++)
+        for (int j = i + 1; j < steps; j++) {
+            double w[3], m[3], value = 0;
+            w[0] = below[i], w[1] = below[j] - below[i], w[2] = below[steps] - below[j];
+            m[0] = sum[i], m[1] = sum[j] - sum[i], m[2] = sum[steps] - sum[j];
+            for (int k = 0; k < 3; k++) value += w[k] > 0 ? m[k] / w[k] * m[k] : 0;
+            if (!(value > best)) continue;
+            best = value;
+            edge[0] = low + i * step;
+            edge[1] = low + j * step;
+        }
+}
+
+/* The pixels of the border, around: i of 2 (width + height) of them, corners twice. */
+static void dem2di_border_pixel(const dem2di_picture *p, int i, int *row, int *column) {
+    int w = p->desc.width, h = p->desc.height;
+    *row = i < 2 * w ? (i < w ? 0 : h - 1) : (i - 2 * w) % h;
+    *column = i < 2 * w ? i % w : (i < 2 * w + h ? 0 : w - 1);
+}
+
+/* Mark the frame: what is connected with the border in the class that most of the border has. */
+static bool dem2di_mark_frame(const dem2d_env *env, dem2di_picture *p, const uint32_t *histogram) {
+    int edge[2], votes[3] = {0, 0, 0}, levels = dem2di_picture_levels(&p->desc), most = 0;
+    int around = 2 * (p->desc.width + p->desc.height), row, column, unused;
+    dem2di_three_classes(histogram, levels, edge);
+    for (int i = 0; i < around; i++) {
+        dem2di_border_pixel(p, i, &row, &column);
+        int value = dem2di_picture_value(p, row, column);
+        votes[(value >= edge[0]) + (value >= edge[1])]++;
+    }
+    for (int k = 1; k < 3; k++)
+        if (votes[k] > votes[most]) most = k;
+    p->low = most == 0 ? 0 : edge[most - 1];
+    p->high = most == 2 ? levels - 1 : edge[most] - 1;
+    for (int i = 0; i < around; i++) {
+        dem2di_border_pixel(p, i, &row, &column);
+        if (dem2di_is_new(p, row, column) && !dem2di_fill(env, p, row, column, &unused))
+            return false;
+    }
+    return true;
+}
+
+/* Marks of all pixels, none set. */
+static bool dem2di_marks_make(const dem2d_env *env, dem2di_picture *p) {
+    size_t size = dem2di_picture_index(p, p->desc.height, 0);
+    p->marks = (uint8_t *)dem2di_allocate(env, size, 1);
+    if (p->marks != NULL) memset(p->marks, 0, size);
+    return p->marks != NULL;
+}
+
+static void dem2di_marks_release(const dem2d_env *env, dem2di_picture *p) {
+    dem2di_release(env, p->marks, dem2di_picture_index(p, p->desc.height, 0), 1);
+    dem2di_release(env, p->stack, (size_t)p->capacity, sizeof *p->stack);
+    p->marks = NULL;
+    p->stack = NULL;
+    p->capacity = 0;
+}
+
+/* Otsu's threshold, without the frame if that is asked for and anything else is there. */
+static bool dem2di_find_threshold(const dem2d_env *env, dem2di_picture *p, int *threshold) {
+    int levels = dem2di_picture_levels(&p->desc);
+    size_t room = (size_t)levels;
+    uint32_t *histogram = (uint32_t *)dem2di_allocate(env, room, sizeof *histogram);
+    bool good = histogram != NULL;
+    if (good) {
+        dem2di_histogram(p, histogram);
+        *threshold = dem2di_otsu(histogram, levels);
+    }
+    if (good && p->desc.ignore_frame) {
+        good = dem2di_marks_make(env, p) && dem2di_mark_frame(env, p, histogram);
+        if (good) {
+            dem2di_histogram(p, histogram);
+            int inner = dem2di_otsu(histogram, levels);
+            if (inner > 0) *threshold = inner;
+        }
+        dem2di_marks_release(env, p);
+    }
+    dem2di_release(env, histogram, room, sizeof *histogram);
+    return good;
+}
+
 DEM2D_API dem2d_result dem2d_image_threshold(const dem2d_image_desc *desc, int *threshold) {
     dem2d_result result = dem2di_check_picture(NULL, desc);
     if (result != DEM2D_OK) return result;
     if (threshold == NULL) return DEM2D_NULL_ARGUMENT;
-    *threshold = dem2di_otsu(desc);
+    if (desc->labels) return DEM2D_OUT_OF_RANGE;
+    dem2di_picture p = dem2di_picture_crop(desc);
+    int found;
+    if (!dem2di_find_threshold(NULL, &p, &found)) return DEM2D_OUT_OF_MEMORY;
+    *threshold = found;
     return DEM2D_OK;
 }
 
-/* A pixel of some grain? Beyond the border is ground. */
-static bool dem2di_is_grain(const dem2d_image_desc *desc, int row, int column) {
-    if (row < 0 || column < 0 || row >= desc->height || column >= desc->width) return false;
-    return (dem2di_picture_row(desc, row)[column] < desc->threshold) != desc->bright;
-}
+/* --- components ------------------------------------------------------------------------------- */
+
+/* A component of pixels in question, and what decides whether it is a grain. */
+typedef struct dem2di_component {
+    dem2d_outline grain;
+    int left, right, bottom; /* of its box; its top is the grain's row */
+    int own;                 /* pixels, holes not filled */
+    bool border;             /* touches the region's border */
+} dem2di_component;
+
+/* Why components were dropped, and what was found suspicious. */
+typedef struct dem2di_findings {
+    int border, small, large, frames; /* dropped */
+    int frame_row, frame_column;      /* of the first frame */
+    int repeated, label;              /* grains whose label was there before, the first such */
+    uint8_t labels[65536 / 8];        /* a bit for each label that a grain has */
+} dem2di_findings;
 
 /* How far from a grain's pixel towards a ground pixel beside it the boundary is, of the distance
    of their centres: where the grey value, interpolated linearly, is threshold - 1/2. No pixel has
-   that value, so the result is inside (0, 1). At the picture's border it is the pixel's side. */
-static double dem2di_crack_place(const dem2d_image_desc *desc, int row, int column, int next_row,
+   that value, so the result is inside (0, 1). At the region's border it is the pixel's side, and
+   of labels as well: they are names. */
+static double dem2di_crack_place(const dem2di_picture *p, int row, int column, int next_row,
                                  int next_column) {
-    if (next_row < 0 || next_column < 0 || next_row >= desc->height || next_column >= desc->width)
+    if (p->desc.labels || next_row < 0 || next_column < 0 || next_row >= p->desc.height ||
+        next_column >= p->desc.width)
         return 0.5;
-    int grey = dem2di_picture_row(desc, row)[column];
-    int next = dem2di_picture_row(desc, next_row)[next_column];
-    return (grey - (desc->threshold - 0.5)) / (grey - next);
+    int grey = dem2di_picture_value(p, row, column);
+    int next = dem2di_picture_value(p, next_row, next_column);
+    return (grey - (p->desc.threshold - 0.5)) / (grey - next);
 }
 
-/* Once around the outer boundary of a grain from the left side of its topmost, then leftmost
-   pixel, the grain on the left hand: one step per crack, a side between a pixel of the grain and
-   ground. Marks the pixels (marks may be NULL), counts grain->count cracks and grain->pixels
-   inside, and writes a point per crack (points may be NULL). Returns whether it met the border.
+/* A pixel beside the boundary. */
+static void dem2di_component_widen(dem2di_component *part, int row, int column) {
+    if (column < part->left) part->left = column;
+    if (column > part->right) part->right = column;
+    if (row > part->bottom) part->bottom = row;
+}
+
+/* Once around the outer boundary of a component from the left side of its topmost, then leftmost
+   pixel, the component on the left hand: one step per crack, a side between one of its pixels and
+   ground. Marks the pixels (if `mark`), counts grain.count cracks and grain.pixels inside, finds
+   the box and whether the border is met, and writes a point per crack (points may be NULL).
 
    The points are those of marching squares: each lies inside a segment between two neighbouring
    pixel centres, two that follow each other in one square of four centres. Where a square has two
    pieces of boundary, each cuts off its own grain corner. So no points coincide and no pieces
    cross. */
-static bool dem2di_trace(const dem2d_image_desc *desc, dem2d_outline *grain, uint8_t *marks,
+static void dem2di_trace(const dem2di_picture *p, dem2di_component *part, bool mark,
                          dem2d_vec *points) {
     static const int down[4] = {1, 0, -1, 0}, right[4] = {0, 1, 0, -1}; /* counter-clockwise */
-    int row = grain->row, column = grain->column, heading = 0, count = 0;
+    int row = part->grain.row, column = part->grain.column, heading = 0, count = 0;
+    int width = p->desc.width, height = p->desc.height;
     int64_t pixels = 0;
-    bool border = false;
+    part->left = part->right = column;
+    part->bottom = row;
     do {
         int side = (heading + 3) % 4; /* what is on the right hand is ground */
         int out_row = row + down[side], out_column = column + right[side];
         if (points != NULL) {
-            double t = dem2di_crack_place(desc, row, column, out_row, out_column);
-            points[count] = dem2di_vec((column + 0.5 + t * right[side]) * desc->scale,
-                                       (desc->height - row - 0.5 - t * down[side]) * desc->scale);
+            double t = dem2di_crack_place(p, row, column, out_row, out_column);
+            points[count] =
+                dem2di_vec((p->corner.x + column + 0.5 + t * right[side]) * p->desc.scale,
+                           (p->corner.y + height - row - 0.5 - t * down[side]) * p->desc.scale);
         }
         count++;
-        if (out_row < 0 || out_column < 0 || out_row == desc->height || out_column == desc->width)
-            border = true;
+        dem2di_component_widen(part, row, column);
         if (heading == 0) pixels -= column; /* rows from left sides to right sides: holes count */
         if (heading == 2) pixels += column + 1;
-        if (marks != NULL && heading % 2 == 0)
-            marks[(size_t)row * (size_t)desc->width + (size_t)column] |=
+        if (mark && heading % 2 == 0)
+            p->marks[dem2di_picture_index(p, row, column)] |=
                 (uint8_t)(heading == 0 ? DEM2DI_ENTRY : DEM2DI_EXIT);
         int ahead_row = row + down[heading], ahead_column = column + right[heading];
-        if (!dem2di_is_grain(desc, ahead_row, ahead_column)) {
+        if (!dem2di_is_grain(p, ahead_row, ahead_column)) {
             heading = (heading + 1) % 4; /* also where two grain pixels touch by a corner */
-        } else if (!dem2di_is_grain(desc, ahead_row + down[side], ahead_column + right[side])) {
+        } else if (!dem2di_is_grain(p, ahead_row + down[side], ahead_column + right[side])) {
             row = ahead_row;
             column = ahead_column;
         } else {
@@ -3708,97 +3975,223 @@ static bool dem2di_trace(const dem2d_image_desc *desc, dem2d_outline *grain, uin
             column = ahead_column + right[side];
             heading = side;
         }
-    } while (row != grain->row || column != grain->column || heading != 0);
-    grain->count = count;
-    grain->pixels = (int)pixels;
-    return border;
+    } while (row != part->grain.row || column != part->grain.column || heading != 0);
+    part->grain.count = count;
+    part->grain.pixels = (int)pixels;
+    part->border = part->grain.row == 0 || part->left == 0 || part->bottom == height - 1 ||
+                   part->right == width - 1;
 }
 
-/* The grains of one row that begin there. Along a row outer boundaries are entered and left by
-   turns; what is between, holes and grains in holes too, belongs to the grain. */
-static bool dem2di_scan_row(dem2d_outline_set *set, const dem2d_image_desc *desc, int row,
-                            uint8_t *marks) {
-    const uint8_t *line = dem2di_picture_row(desc, row);
-    const uint8_t *mark = marks + (size_t)row * (size_t)desc->width;
+/* Rectangular, hollow, around much of the region, and not empty. No grain known is all of these: a
+   disc fills 0.79 of its box. A quarter: a square frame is up to 1/15 of its side thick. A
+   component that is met is above and left of what it encloses: that is still new. */
+static bool dem2di_is_frame(const dem2di_picture *p, const dem2di_component *part) {
+    double filled = part->grain.pixels, region = (double)p->desc.width * p->desc.height;
+    double box = (double)(part->right - part->left + 1) * (part->bottom - part->grain.row + 1);
+    int inside = 0;
+    if (p->desc.labels || filled <= region / 4 || filled <= 0.9 * box || part->own >= filled / 4)
+        return false;
+    for (int row = part->grain.row; row <= part->bottom; row++)
+        for (int column = part->left; column <= part->right; column++)
+            inside += dem2di_is_new(p, row, column);
+    return inside >= p->desc.min_pixels;
+}
+
+/* Whether a component is a grain; if not, why. */
+static bool dem2di_is_kept(const dem2di_picture *p, const dem2di_component *part,
+                           dem2di_findings *found) {
+    bool frame = dem2di_is_frame(p, part);
+    bool border = part->border && !p->desc.keep_border;
+    bool small = part->grain.pixels < p->desc.min_pixels;
+    bool large = part->grain.pixels > p->desc.max_pixels;
+    if (frame && found->frames == 0) {
+        found->frame_row = part->grain.row;
+        found->frame_column = part->grain.column;
+    }
+    found->frames += frame;
+    found->border += border && !frame;
+    found->small += small && !border;
+    found->large += large && !border && !frame;
+    return !frame && !border && !small && !large;
+}
+
+/* A label for the second time? */
+static void dem2di_note_label(dem2di_findings *found, int label) {
+    uint8_t bit = (uint8_t)(1 << label % 8);
+    if ((found->labels[label / 8] & bit) != 0 && found->repeated++ == 0) found->label = label;
+    found->labels[label / 8] |= bit;
+}
+
+/* The values in question: of all grains, or of the one that has a pixel. */
+static void dem2di_picture_seek(dem2di_picture *p, int label) {
+    p->low = p->desc.labels ? label : p->desc.bright ? p->desc.threshold : 0;
+    p->high = p->desc.labels ? label : p->desc.bright ? INT_MAX : p->desc.threshold - 1;
+}
+
+/* The component of a new pixel goes into the set if it is a grain. */
+static bool dem2di_take_component(dem2d_outline_set *set, dem2di_picture *p, int row, int column,
+                                  dem2di_findings *found) {
+    dem2di_component part;
+    memset(&part, 0, sizeof part);
+    part.grain.row = row;
+    part.grain.column = column;
+    dem2di_trace(p, &part, false, NULL);
+    if (!dem2di_fill(&set->env, p, row, column, &part.own)) return false;
+    if (!dem2di_is_kept(p, &part, found)) return true;
+    void *grains = set->grains;
+    bool room =
+        dem2di_reserve(&set->env, &grains, &set->capacity, set->count + 1, sizeof *set->grains);
+    set->grains = (dem2d_outline *)grains;
+    if (!room) return false;
+    set->grains[set->count++] = part.grain;
+    set->point_count += (size_t)part.grain.count;
+    if (p->desc.labels)
+        dem2di_note_label(found, p->low);
+    else
+        dem2di_trace(p, &part, true, NULL); /* what is inside belongs to it */
+    return true;
+}
+
+/* The grains of one row that begin there. Along a row the outer boundaries of kept grains are
+   entered and left by turns; what is between, holes and grains in holes too, belongs to the grain.
+   Labels mark no boundaries: a grain inside another is found like any. */
+static bool dem2di_scan_row(dem2d_outline_set *set, dem2di_picture *p, int row,
+                            dem2di_findings *found) {
+    const uint8_t *mark = p->marks + dem2di_picture_index(p, row, 0);
     bool inside = false;
-    for (int column = 0; column < desc->width; column++) {
-        if (!inside && (line[column] < desc->threshold) == desc->bright) continue;
+    for (int column = 0; column < p->desc.width; column++) {
         if (!inside && (mark[column] & DEM2DI_ENTRY) == 0) {
-            dem2d_outline grain;
-            memset(&grain, 0, sizeof grain);
-            grain.row = row;
-            grain.column = column;
-            bool border = dem2di_trace(desc, &grain, marks, NULL);
-            if ((!border || desc->keep_border) && grain.pixels >= desc->min_pixels &&
-                grain.pixels <= desc->max_pixels) {
-                void *grains = set->grains;
-                bool room = dem2di_reserve(&set->env, &grains, &set->capacity, set->count + 1,
-                                           sizeof *set->grains);
-                set->grains = (dem2d_outline *)grains;
-                if (!room) return false;
-                set->grains[set->count++] = grain;
-                set->point_count += (size_t)grain.count;
-            }
+            int value = p->desc.labels ? dem2di_picture_value(p, row, column) : 0;
+            if (p->desc.labels && value == 0) continue;
+            dem2di_picture_seek(p, value);
+            if (!dem2di_is_new(p, row, column)) continue;
+            if (!dem2di_take_component(set, p, row, column, found)) return false;
+            if ((mark[column] & DEM2DI_ENTRY) == 0) continue;
         }
         inside = (mark[column] & DEM2DI_EXIT) == 0;
     }
     return true;
 }
 
-/* Find the grains, then, knowing how many points there are, trace those that stay once more. */
-static bool dem2di_scan_picture(dem2d_outline_set *set, const dem2d_image_desc *desc) {
-    size_t size = (size_t)desc->width * (size_t)desc->height, next = 0;
-    uint8_t *marks = (uint8_t *)dem2di_allocate(&set->env, size, 1);
-    bool room = marks != NULL;
-    if (room) memset(marks, 0, size);
-    for (int row = 0; room && row < desc->height; row++)
-        room = dem2di_scan_row(set, desc, row, marks);
-    dem2di_release(&set->env, marks, size, 1);
+/* Find the grains, then, knowing how many points there are, trace those that stay once more. Rows
+   and columns are the whole picture's at last. */
+static bool dem2di_scan_picture(dem2d_outline_set *set, dem2di_picture *p, dem2di_findings *found) {
+    size_t next = 0;
+    bool room = dem2di_marks_make(&set->env, p);
+    for (int row = 0; room && row < p->desc.height; row++)
+        room = dem2di_scan_row(set, p, row, found);
+    dem2di_marks_release(&set->env, p);
     if (!room || set->count == 0) return room;
     set->points = (dem2d_vec *)dem2di_allocate(&set->env, set->point_count, sizeof *set->points);
     if (set->points == NULL) return false;
     for (int i = 0; i < set->count; i++) {
+        dem2di_component part;
+        memset(&part, 0, sizeof part);
+        part.grain = set->grains[i];
+        dem2di_picture_seek(p, dem2di_picture_value(p, part.grain.row, part.grain.column));
+        dem2di_trace(p, &part, false, set->points + next);
         set->grains[i].points = set->points + next;
-        (void)dem2di_trace(desc, &set->grains[i], NULL, set->points + next);
+        set->grains[i].row += p->desc.crop_top;
+        set->grains[i].column += p->desc.crop_left;
         next += (size_t)set->grains[i].count;
     }
     return true;
 }
 
-/* A valid picture with its defaults filled in. */
-static dem2d_result dem2di_picture_make(const dem2d_env *env, const dem2d_image_desc *desc,
-                                        dem2d_image_desc *picture) {
-    dem2d_result result = dem2di_check_picture(env, desc);
+/* Does an outline fill its box and much of the region, as the ground in a frame does? */
+static bool dem2di_is_like_ground(const dem2di_picture *p, const dem2d_outline *grain) {
+    dem2d_vec low = grain->points[0], high = low;
+    for (int i = 1; i < grain->count; i++) {
+        dem2d_vec q = grain->points[i];
+        low = dem2di_vec(dem2di_min(low.x, q.x), dem2di_min(low.y, q.y));
+        high = dem2di_vec(dem2di_max(high.x, q.x), dem2di_max(high.y, q.y));
+    }
+    double box = (high.x - low.x) / p->desc.scale * ((high.y - low.y) / p->desc.scale);
+    double region = (double)p->desc.width * p->desc.height;
+    return !p->desc.labels && grain->pixels > region / 4 && grain->pixels > 0.9 * box;
+}
+
+/* Tell the log what was found suspicious, and why nothing was found. */
+static void dem2di_tell_findings(const dem2d_outline_set *set, const dem2di_picture *p,
+                                 const dem2di_findings *found) {
+    const dem2d_env *env = &set->env;
+    if (found->frames > 0)
+        (void)dem2di_fail(env, DEM2D_WARNING, -1,
+                          "%d frame%s left out, the first from row %d, column %d: what is inside "
+                          "counts by itself",
+                          found->frames, found->frames > 1 ? "s" : "",
+                          found->frame_row + p->desc.crop_top,
+                          found->frame_column + p->desc.crop_left);
+    for (int i = 0; i < set->count; i++)
+        if (dem2di_is_like_ground(p, &set->grains[i]))
+            (void)dem2di_fail(env, DEM2D_WARNING, i,
+                              "outline %d has %d of %d by %d pixels, nearly all of its box: the "
+                              "ground in a frame? (threshold %d; crop, ignore_frame, bright)",
+                              i, set->grains[i].pixels, p->desc.width, p->desc.height,
+                              p->desc.threshold);
+    if (found->repeated > 0)
+        (void)dem2di_fail(env, DEM2D_WARNING, -1,
+                          "%d grain%s with a label that another has, the first %d", found->repeated,
+                          found->repeated > 1 ? "s" : "", found->label);
+    if (set->count == 0 && found->border + found->small + found->large > 0)
+        (void)dem2di_fail(
+            env, DEM2D_WARNING, -1,
+            "no grain: %d touch the border, %d have less than %d pixels, %d more than "
+            "%d (threshold %d)",
+            found->border, found->small, p->desc.min_pixels, found->large, p->desc.max_pixels,
+            p->desc.threshold);
+}
+
+static dem2d_result dem2di_check_search(const dem2d_env *env, const dem2d_image_desc *desc) {
+    int most = dem2di_picture_levels(desc) - 1;
+    dem2d_result result = dem2di_check_positive(env, "scale", desc->scale);
     if (result != DEM2D_OK) return result;
-    result = dem2di_check_positive(env, "scale", desc->scale);
-    if (result != DEM2D_OK) return result;
-    if (desc->threshold < 0 || desc->threshold > 255)
-        return dem2di_fail(env, DEM2D_OUT_OF_RANGE, -1, "threshold = %d, from 0 to 255",
+    if (desc->threshold < 0 || desc->threshold > most)
+        return dem2di_fail(env, DEM2D_OUT_OF_RANGE, -1, "threshold = %d, from 0 to %d",
+                           desc->threshold, most);
+    if (desc->ignore_frame && desc->threshold > 0)
+        return dem2di_fail(env, DEM2D_OUT_OF_RANGE, -1,
+                           "ignore_frame is for a threshold that is found, threshold = %d",
                            desc->threshold);
+    if (desc->labels && (desc->threshold > 0 || desc->ignore_frame || desc->bright))
+        return dem2di_fail(env, DEM2D_OUT_OF_RANGE, -1,
+                           "labels have no threshold = %d, ignore_frame = %d, bright = %d",
+                           desc->threshold, desc->ignore_frame, desc->bright);
     if (desc->min_pixels < 0 || desc->max_pixels < 0)
         return dem2di_fail(env, DEM2D_OUT_OF_RANGE, -1,
                            "min_pixels = %d, max_pixels = %d must not be negative",
                            desc->min_pixels, desc->max_pixels);
-    *picture = *desc;
-    if (picture->threshold == 0) picture->threshold = dem2di_otsu(desc);
-    if (picture->min_pixels == 0) picture->min_pixels = DEM2DI_MIN_PIXELS;
-    if (picture->max_pixels == 0) picture->max_pixels = INT_MAX;
     return DEM2D_OK;
+}
+
+/* All outlines of a valid picture. */
+static bool dem2di_outline_picture(dem2d_outline_set *set, const dem2d_image_desc *desc) {
+    dem2di_picture p = dem2di_picture_crop(desc);
+    dem2di_findings found;
+    memset(&found, 0, sizeof found);
+    if (p.desc.min_pixels == 0) p.desc.min_pixels = DEM2DI_MIN_PIXELS;
+    if (p.desc.max_pixels == 0) p.desc.max_pixels = INT_MAX;
+    bool search = p.desc.threshold == 0 && !p.desc.labels;
+    if (search && !dem2di_find_threshold(&set->env, &p, &p.desc.threshold)) return false;
+    /* a picture of one grey value has no grain, dark or bright */
+    if (search && p.desc.threshold == 0) return true;
+    if (!dem2di_scan_picture(set, &p, &found)) return false;
+    dem2di_tell_findings(set, &p, &found);
+    return true;
 }
 
 DEM2D_API dem2d_result dem2d_image_outlines(const dem2d_env *env, const dem2d_image_desc *desc,
                                             dem2d_outline_set **set) {
-    dem2d_image_desc picture;
     if (set == NULL) return dem2di_fail_null(env, "set");
-    dem2d_result result = dem2di_picture_make(env, desc, &picture);
+    dem2d_result result = dem2di_check_picture(env, desc);
+    if (result == DEM2D_OK) result = dem2di_check_search(env, desc);
     if (result != DEM2D_OK) return result;
     dem2d_outline_set *made = (dem2d_outline_set *)dem2di_allocate(env, 1, sizeof *made);
     bool room = made != NULL;
     if (room) {
         memset(made, 0, sizeof *made);
         if (env != NULL) made->env = *env;
-        /* a picture of one grey value has no grain, dark or bright */
-        if (picture.threshold > 0) room = dem2di_scan_picture(made, &picture);
+        room = dem2di_outline_picture(made, desc);
     }
     if (!room) {
         dem2d_outline_set_destroy(made);
@@ -11851,7 +12244,7 @@ static dem2d_result dem2di_check_step(dem2d_world *world, bool *slow) {
                            2 / sqrt(all.value[0]), particle[0]);
     *slow = dt * dt * all.value[1] > 4;
     if (*slow && world->slow_time_step == 0)
-        (void)dem2di_fail(&world->env, DEM2D_OK, particle[1],
+        (void)dem2di_fail(&world->env, DEM2D_WARNING, particle[1],
                           "time_step = %g may be unstable: %g is safe (particle %d)", dt,
                           2 / sqrt(all.value[1]), particle[1]);
     return DEM2D_OK;
@@ -11864,7 +12257,7 @@ static bool dem2di_check_motions(const dem2d_world *world) {
     for (int k = 0; k < dem2di_blocks(world->body_count, DEM2DI_BLOCK); k++)
         fast = dem2di_first_of(world, fast, world->tallies[k].fast);
     if (fast >= 0 && world->fast_motion == 0)
-        (void)dem2di_fail(&world->env, DEM2D_OK, world->bodies[fast].index,
+        (void)dem2di_fail(&world->env, DEM2D_WARNING, world->bodies[fast].index,
                           "particle %d moves by more than its inscribed radius in a step: it may "
                           "pass through others",
                           world->bodies[fast].index);
@@ -14368,7 +14761,9 @@ DEM2D_API dem2d_result dem2d_world_write_csv(const dem2d_world *world, const dem
      0.6.0  DEM2D_GJK_EPA in a world is the papers' way, whole: every pair anew in every step,
             circles too, from the line of centres. DEM2D_ONE_POINT takes the middle at walls, too.
             dem2d_contact tells EPA's residual.
-            The long axis of a template (dem2d_shape_axis) is exact for every model.
+            The long axis of a template (dem2d_shape_axis) is exact for every model. Pictures of two
+            bytes per pixel, label masks, a region of interest, thresholds and grains in spite of
+            frames. Warnings reach the log as DEM2D_WARNING.
      0.5.0  The two points of faces conserve energy between free polygons as well: each has a
             normal of its own and tells its energy. Snapshots of version 2.
      0.4.0  Dashpots by restitution, rolling friction, a caller's law, segment walls. Measures of

@@ -85,10 +85,17 @@ static const row reduction_rows[] = {
 };
 static const row image_rows[] = {
     FIELD(image_desc, pixels, POINTER),
+    FIELD(image_desc, pixels16, ANY_POINTER), /* NULL: pixels are there */
     FIELD_INT(image_desc, width, INTEGER, 1, 1 << 15),
     FIELD_INT(image_desc, height, INTEGER, 1, 1 << 15),
-    FIELD_INT(image_desc, stride, INTEGER_OR_0, 8, INT_MAX), /* the picture is 8 wide */
+    FIELD_INT(image_desc, stride, INTEGER_OR_0, 8, INT_MAX), /* the picture is 8 by 8 */
+    FIELD_INT(image_desc, crop_left, INTEGER, 0, 7),
+    FIELD_INT(image_desc, crop_top, INTEGER, 0, 7),
+    FIELD_INT(image_desc, crop_width, INTEGER, 0, 8),
+    FIELD_INT(image_desc, crop_height, INTEGER, 0, 8),
+    FIELD(image_desc, labels, ANY_BOOL),
     FIELD_INT(image_desc, threshold, INTEGER, 0, 255),
+    FIELD(image_desc, ignore_frame, ANY_BOOL),
     FIELD(image_desc, bright, ANY_BOOL),
     FIELD_INT(image_desc, min_pixels, INTEGER, 0, INT_MAX),
     FIELD_INT(image_desc, max_pixels, INTEGER, 0, INT_MAX),
@@ -868,6 +875,10 @@ static const row rows_image_threshold[] = {
     ARG_INT(d.image.width, "width", INTEGER, 1, 1 << 15, OUT_OF_RANGE),
     ARG_INT(d.image.height, "height", INTEGER, 1, 1 << 15, OUT_OF_RANGE),
     ARG_INT(d.image.stride, "stride", INTEGER_OR_0, 8, INT_MAX, OUT_OF_RANGE),
+    ARG_INT(d.image.crop_left, "crop_left", INTEGER, 0, 7, OUT_OF_RANGE),
+    ARG_INT(d.image.crop_top, "crop_top", INTEGER, 0, 7, OUT_OF_RANGE),
+    ARG_INT(d.image.crop_width, "crop_width", INTEGER, 0, 8, OUT_OF_RANGE),
+    ARG_INT(d.image.crop_height, "crop_height", INTEGER, 0, 8, OUT_OF_RANGE),
     ARG(d.image.scale, "scale", UNREAD),
     OUT};
 static const row rows_image_outlines[] = {ENV, THE_DESC, OUT};

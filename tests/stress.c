@@ -591,7 +591,7 @@ static void meet(double part, bool *met, int64_t *fast, bool *named) {
         *met = *met || stats_of(&s).contacts > 0;
     }
     *fast = stats_of(&s).fast_motion;
-    *named = log_of_world.count == 1 && log_of_world.result == DEM2D_OK && log_of_world.index == 0;
+    *named = log_of_world.count == 1 && log_of_world.result == DEM2D_WARNING && log_of_world.index == 0;
     end_scene(&s);
 }
 

@@ -224,23 +224,79 @@ static void relax(const picture *p, int *label) {
     }
 }
 
+/* The dark pixels connected with one become ground; how many they were. */
+static int erase(picture *p, int from) {
+    const int w = p->desc.width, h = p->desc.height;
+    static bool reached[SIDE * SIDE];
+    int count = 0;
+    memset(reached, 0, sizeof reached);
+    reached[from] = true;
+    for (bool moved = true; moved;) {
+        moved = false;
+        for (int i = 0; i < w * h; i++) {
+            const bool dark = p->pixels[i] < p->desc.threshold;
+            if (reached[i] || dark == p->desc.bright) continue;
+            if ((i % w > 0 && reached[i - 1]) || (i % w < w - 1 && reached[i + 1]) ||
+                (i >= w && reached[i - w]) || (i + w < w * h && reached[i + w]))
+                reached[i] = moved = true;
+        }
+    }
+    for (int i = 0; i < w * h; i++)
+        if (reached[i]) p->pixels[i] = p->desc.bright ? 0 : 255, count++;
+    return count;
+}
+
+/* Whether the filled grain of a label is to be dropped so that others come to light. `rest` is the
+   picture without its own pixels, `own` of them. */
+static bool is_dropped(const picture *p, const picture *rest, const int *label, int of, int own) {
+    const int w = p->desc.width, h = p->desc.height;
+    int filled = 0, inside = 0, left = w, right = 0, bottom = 0;
+    bool border = false;
+    for (int i = 0; i < w * h; i++) {
+        if (label[i] != of) continue;
+        filled++;
+        left = i % w < left ? i % w : left, right = i % w > right ? i % w : right, bottom = i / w;
+        border = border || i % w == 0 || i % w == w - 1 || i < w || i >= w * (h - 1);
+    }
+    const int box = (right - left + 1) * (bottom - of / w + 1);
+    for (int i = 0; i < w * h; i++)
+        if (i % w >= left && i % w <= right && i / w >= of / w && i / w <= bottom)
+            inside += (rest->pixels[i] < p->desc.threshold) != p->desc.bright;
+    if (border && !p->desc.keep_border) return true;
+    if (p->desc.max_pixels && filled > p->desc.max_pixels) return true;
+    const int least = p->desc.min_pixels ? p->desc.min_pixels : 16;
+    return 4 * filled > w * h && 10 * filled > 9 * box && 4 * own < filled && inside >= least;
+}
+
+/* Erases what is to be dropped, from outside inwards, until nothing is. Where boxes overlap, what
+   is inside must not depend on which goes first: only frames look, and they are alone. */
+static void relax_dropped(picture *p, int *label) {
+    const int n = p->desc.width * p->desc.height;
+    for (bool dropped = true; dropped;) {
+        dropped = false;
+        relax(p, label);
+        for (int i = 0; i < n && !dropped; i++) {
+            if (label[i] != i) continue;
+            picture rest = *p;
+            const int own = erase(&rest, i);
+            if (!is_dropped(p, &rest, label, i, own)) continue;
+            memcpy(p->pixels, rest.pixels, sizeof p->pixels);
+            dropped = true;
+        }
+    }
+}
+
 /* The set against labels: who is there, in which order, with how many pixels. */
-static void check_against_labels(const picture *p, const dem2d_outline_set *set) {
+static void check_against_labels(const picture *original, const dem2d_outline_set *set) {
+    picture copy = *original, *p = &copy;
     const int w = p->desc.width, h = p->desc.height;
     int label[SIDE * SIDE], found = 0;
-    relax(p, label);
+    relax_dropped(p, label);
     for (int i = 0; i < w * h; i++) {
         if (label[i] != i) continue;
         int pixels = 0;
-        bool border = false;
-        for (int k = 0; k < w * h; k++) {
-            if (label[k] != i) continue;
-            pixels++;
-            border = border || k % w == 0 || k % w == w - 1 || k < w || k >= w * (h - 1);
-        }
-        const int least = p->desc.min_pixels ? p->desc.min_pixels : 16;
-        if (pixels < least || (p->desc.max_pixels && pixels > p->desc.max_pixels)) continue;
-        if (border && !p->desc.keep_border) continue;
+        for (int k = 0; k < w * h; k++) pixels += label[k] == i;
+        if (pixels < (p->desc.min_pixels ? p->desc.min_pixels : 16)) continue;
         assert_true(found < dem2d_outline_set_count(set));
         check_outline(set, found, i / w, i % w, pixels);
         const dem2d_outline outline = outline_of(set, found++);
@@ -302,6 +358,341 @@ static void random_pictures(void **state) {
             assert_memory_equal(a.points, b.points, (size_t)a.count * sizeof(dem2d_vec));
         }
         dem2d_outline_set_destroy(turned);
+        dem2d_outline_set_destroy(set);
+    }
+}
+
+/* --- frames, regions, depths, labels ---------------------------------------------------------- */
+
+#define WIDE 120
+#define HIGH 90
+
+/* A sheet of ground with three grains: discs of radius 8 or so, edges of one pixel's width. */
+typedef struct sheet {
+    uint8_t pixels[WIDE * HIGH];
+    dem2d_image_desc desc;
+} sheet;
+
+static void sheet_init(sheet *s, uint8_t ground, uint8_t grain) {
+    static const double place[3][3] = {{30.3, 28.1, 8.2}, {77.6, 33.4, 10.1}, {51.2, 63.7, 9.4}};
+    memset(s, 0, sizeof *s);
+    for (int i = 0; i < WIDE * HIGH; i++) {
+        double part = 0; /* of the pixel that a grain covers, nearly */
+        for (int k = 0; k < 3; k++) {
+            const double x = i % WIDE + 0.5, y = i / WIDE + 0.5;
+            part = fmax(part, place[k][2] + 0.5 - hypot(x - place[k][0], y - place[k][1]));
+        }
+        s->pixels[i] = (uint8_t)lround(ground + fmin(part, 1) * (grain - ground));
+    }
+    s->desc.pixels = s->pixels, s->desc.scale = 1;
+    s->desc.width = WIDE, s->desc.height = HIGH;
+}
+
+/* A frame of a thickness, so far from the border; the last `open` of its columns are left open at
+   the lower side. */
+static void sheet_frame(sheet *s, uint8_t grey, int margin, int thick, int open) {
+    for (int r = margin; r < HIGH - margin; r++)
+        for (int c = margin; c < WIDE - margin; c++) {
+            const bool inside = r >= margin + thick && r < HIGH - margin - thick &&
+                                c >= margin + thick && c < WIDE - margin - thick;
+            const bool gap = r >= HIGH - margin - thick && c >= WIDE - margin - thick - open &&
+                             c < WIDE - margin - thick;
+            if (!inside && !gap) s->pixels[r * WIDE + c] = grey;
+        }
+}
+
+static void sheet_bar(sheet *s, uint8_t grey, int row, int column, int length) {
+    for (int r = row; r < row + 3; r++) memset(s->pixels + r * WIDE + column, grey, (size_t)length);
+}
+
+/* The outlines of two sets, the same bits. */
+static void check_same_outlines(const dem2d_outline_set *set, const dem2d_outline_set *other) {
+    assert_int_equal(dem2d_outline_set_count(set), dem2d_outline_set_count(other));
+    for (int i = 0; i < dem2d_outline_set_count(set); i++) {
+        const dem2d_outline a = outline_of(set, i), b = outline_of(other, i);
+        assert_int_equal(a.row, b.row);
+        assert_int_equal(a.column, b.column);
+        assert_int_equal(a.pixels, b.pixels);
+        assert_int_equal(a.count, b.count);
+        assert_memory_equal(a.points, b.points, (size_t)a.count * sizeof(dem2d_vec));
+    }
+}
+
+/* What a picture gives is what another gives, and the log has so many messages, the last one with
+   a word. Releases the set. */
+static void check_sheet(const dem2d_image_desc *desc, const dem2d_outline_set *expected,
+                        int messages, const char *word) {
+    test_env env;
+    dem2d_outline_set *set;
+    test_env_init(&env);
+    assert_ok(dem2d_image_outlines(&env.env, desc, &set));
+    check_same_outlines(set, expected);
+    assert_int_equal(env.log.count, messages);
+    if (messages > 0) {
+        assert_result(env.log.result, DEM2D_WARNING);
+        assert_non_null(strstr(env.log.text, word));
+    }
+    dem2d_outline_set_destroy(set);
+    assert_clean(&env);
+}
+
+/* Whatever is drawn around them, the grains are found, as without it. */
+static void frames(void **state) {
+    (void)state;
+    static const struct {
+        int margin, thick, open, second,
+            warnings; /* second: margin of another frame inside, or 0 */
+    } drawn[] = {{0, 1, 0, 0, 1},  {0, 5, 0, 0, 1}, {0, 2, 60, 0, 0},
+                 {0, 2, 0, 6, 1},  {0, 1, 0, 2, 1}, {3, 1, 0, 0, 1},
+                 {1, 3, 0, 10, 1}, {0, 1, 1, 5, 1}, {0, 3, 110, 0, 0}};
+    for (int bright = 0; bright < 2; bright++)
+        for (int i = 0; i < COUNT_OF(drawn); i++) {
+            const uint8_t ground = bright ? 60 : 200, grain = bright ? 230 : 30;
+            sheet s, framed;
+            sheet_init(&s, ground, grain);
+            s.desc.threshold = 128, s.desc.bright = bright;
+            framed = s;
+            framed.desc.pixels = framed.pixels;
+            sheet_frame(&framed, grain, drawn[i].margin, drawn[i].thick, drawn[i].open);
+            if (drawn[i].second) sheet_frame(&framed, grain, drawn[i].second, 1, 0);
+            dem2d_outline_set *set = outlines(&s.desc);
+            assert_int_equal(dem2d_outline_set_count(set), 3);
+            check_sheet(&framed.desc, set, drawn[i].warnings, "frame");
+            framed.desc.keep_border = true; /* which keeps grains, not frames */
+            if (drawn[i].open == 0) check_sheet(&framed.desc, set, 1, "frame");
+            framed.desc.keep_border = false;
+            sheet_bar(&framed, grain, drawn[i].margin + 4, drawn[i].margin, 30);
+            if (!drawn[i].second) /* a scale bar at the frame */
+                check_sheet(&framed.desc, set, drawn[i].warnings, "frame");
+            dem2d_outline_set_destroy(set);
+        }
+    sheet s; /* a hollow box with nothing inside is a grain, as any grain with a hole */
+    sheet_init(&s, 200, 200);
+    s.desc.threshold = 128;
+    sheet_frame(&s, 30, 5, 2, 0);
+    dem2d_outline_set *set = outlines(&s.desc);
+    assert_int_equal(dem2d_outline_set_count(set), 1);
+    check_outline(set, 0, 5, 5, (WIDE - 10) * (HIGH - 10));
+    dem2d_outline_set_destroy(set);
+    sheet_frame(&s, 30, 0, 90, 0); /* all dark: it touches the border, and the log says so */
+    set = outlines(&s.desc);
+    check_sheet(&s.desc, set, 1, "1 touch the border");
+    dem2d_outline_set_destroy(set);
+}
+
+/* A white frame around grey ground: Otsu parts the frame from the rest. */
+static void light_frame(void **state) {
+    (void)state;
+    sheet s, framed;
+    sheet_init(&s, 140, 90);
+    for (int thick = 4; thick <= 16; thick += 4) {
+        int plain = 0, misled = 0, right = 0;
+        framed = s;
+        framed.desc.pixels = framed.pixels;
+        sheet_frame(&framed, 255, 0, thick, 0);
+        framed.desc.crop_left = framed.desc.crop_top = thick;
+        framed.desc.crop_width = WIDE - 2 * thick, framed.desc.crop_height = HIGH - 2 * thick;
+        assert_ok(dem2d_image_threshold(&framed.desc, &plain));
+        framed.desc.crop_left = framed.desc.crop_top = 0;
+        framed.desc.crop_width = framed.desc.crop_height = 0;
+        assert_ok(dem2d_image_threshold(&framed.desc, &misled));
+        assert_between(misled, 141, 255);
+        test_env env;
+        dem2d_outline_set *set;
+        test_env_init(&env);
+        assert_ok(dem2d_image_outlines(&env.env, &framed.desc, &set));
+        assert_int_equal(dem2d_outline_set_count(set), 1); /* the ground */
+        assert_logged(&env, DEM2D_WARNING, 0, "ignore_frame");
+        dem2d_outline_set_destroy(set);
+        framed.desc.ignore_frame = true;
+        assert_ok(dem2d_image_threshold(&framed.desc, &right));
+        assert_int_equal(right, plain);
+        s.desc.threshold = plain;
+        set = outlines(&s.desc);
+        assert_int_equal(dem2d_outline_set_count(set), 3);
+        check_sheet(&framed.desc, set, 0, NULL);
+        dem2d_outline_set_destroy(set);
+        s.desc.threshold = 0;
+    }
+    /* without a frame the option does little harm; with nothing but one grey value, none */
+    s.desc.ignore_frame = true;
+    dem2d_outline_set *set = outlines(&s.desc);
+    assert_int_equal(dem2d_outline_set_count(set), 3);
+    dem2d_outline_set_destroy(set);
+    sheet_init(&s, 77, 77);
+    int threshold = 5;
+    s.desc.ignore_frame = true;
+    assert_ok(dem2d_image_threshold(&s.desc, &threshold));
+    assert_int_equal(threshold, 0);
+}
+
+/* A region is a picture of its own, in the place it has in the whole. */
+static void crops(void **state) {
+    (void)state;
+    test_random random = {5};
+    sheet s;
+    sheet_init(&s, 200, 30);
+    for (int i = 0; i < WIDE * HIGH; i++) s.pixels[i] ^= (uint8_t)test_below(&random, 16);
+    for (int run = 0; run < 100; run++) {
+        const int left = test_below(&random, WIDE), top = test_below(&random, HIGH);
+        const int width = 1 + test_below(&random, WIDE - left);
+        const int height = 1 + test_below(&random, HIGH - top);
+        dem2d_image_desc crop = s.desc, cut = s.desc;
+        crop.min_pixels = cut.min_pixels = 1;
+        crop.keep_border = cut.keep_border = run % 2;
+        crop.crop_left = left, crop.crop_top = top;
+        crop.crop_width = width == WIDE - left ? 0 : width;
+        crop.crop_height = height == HIGH - top ? 0 : height;
+        cut.pixels += top * WIDE + left, cut.stride = WIDE, cut.width = width, cut.height = height;
+        dem2d_outline_set *set = outlines(&crop), *other = outlines(&cut);
+        assert_int_equal(dem2d_outline_set_count(set), dem2d_outline_set_count(other));
+        for (int i = 0; i < dem2d_outline_set_count(set); i++) {
+            const dem2d_outline a = outline_of(set, i), b = outline_of(other, i);
+            assert_int_equal(a.row, b.row + top);
+            assert_int_equal(a.column, b.column + left);
+            assert_int_equal(a.count, b.count);
+            for (int k = 0; k < a.count; k++) {
+                assert_within(a.points[k].x, b.points[k].x + left, 1e-12);
+                assert_within(a.points[k].y, b.points[k].y + HIGH - top - height, 1e-12);
+            }
+        }
+        dem2d_outline_set_destroy(set);
+        dem2d_outline_set_destroy(other);
+    }
+}
+
+/* Values of two bytes: any range of them will do, none is lost. */
+static void two_bytes(void **state) {
+    (void)state;
+    static uint16_t deep[WIDE * HIGH];
+    sheet s;
+    sheet_init(&s, 200, 30);
+    dem2d_outline_set *set = outlines(&s.desc);
+    for (int times = 1; times <= 257; times *= times == 16 ? 257 : 2) { /* 16: of 12 bits */
+        dem2d_image_desc desc = s.desc;
+        int threshold, of_two;
+        for (int i = 0; i < WIDE * HIGH; i++)
+            deep[i] = (uint16_t)(s.pixels[i] * (times % 257 ? times : 257));
+        desc.pixels = NULL, desc.pixels16 = deep;
+        assert_ok(dem2d_image_threshold(&s.desc, &threshold));
+        assert_ok(dem2d_image_threshold(&desc, &of_two));
+        assert_between(of_two, times * (threshold - 1), times * (threshold + 1));
+        dem2d_outline_set *other = outlines(&desc);
+        assert_int_equal(dem2d_outline_set_count(other), 3);
+        for (int i = 0; i < 3; i++) {
+            dem2d_outline_info a, b;
+            const dem2d_outline one = outline_of(set, i), two = outline_of(other, i);
+            assert_int_equal(one.pixels, two.pixels);
+            assert_ok(dem2d_outline_measure(NULL, one.points, one.count, &a));
+            assert_ok(dem2d_outline_measure(NULL, two.points, two.count, &b));
+            assert_near(b.mass.area, a.mass.area, 0.002L); /* half a grey value of 170 */
+            assert_near(b.roundness, a.roundness, 0.01L);
+        }
+        dem2d_outline_set_destroy(other);
+    }
+    dem2d_outline_set_destroy(set);
+    test_env env;
+    test_env_init(&env);
+    dem2d_image_desc desc = s.desc;
+    desc.pixels16 = deep;
+    assert_result(dem2d_image_outlines(&env.env, &desc, &set), DEM2D_OUT_OF_RANGE);
+    assert_logged(&env, DEM2D_OUT_OF_RANGE, -1, "pixels16");
+    desc.pixels = NULL, desc.threshold = 65536;
+    assert_result(dem2d_image_outlines(&env.env, &desc, &set), DEM2D_OUT_OF_RANGE);
+    assert_logged(&env, DEM2D_OUT_OF_RANGE, -1, "threshold");
+    desc.threshold = 65535;
+    assert_ok(dem2d_image_outlines(&env.env, &desc, &set));
+    dem2d_outline_set_destroy(set);
+    desc.ignore_frame = true;
+    assert_result(dem2d_image_outlines(&env.env, &desc, &set), DEM2D_OUT_OF_RANGE);
+    assert_logged(&env, DEM2D_OUT_OF_RANGE, -1, "ignore_frame");
+}
+
+static void label_masks(void **state) {
+    (void)state;
+    /* 2 and 7 touch; 5 lies in a hole of 2, 9 in two places; 3 touches the border */
+    static const char *const rows[] = {"................", ".2222777...9..33", ".2002777...9..33",
+                                       ".2052777........", ".2002777...99...", ".2222777...99...",
+                                       "................"};
+    static const int expected[][3] = {{1, 1, 20}, {1, 5, 15}, {1, 11, 2}, {3, 3, 1}, {4, 11, 4}};
+    picture p;
+    uint16_t deep[SIDE * SIDE];
+    test_env env;
+    dem2d_outline_set *set;
+    picture_init(&p, 16, 7, 0);
+    for (int i = 0; i < 16 * 7; i++) {
+        const char label = rows[i / 16][i % 16];
+        p.pixels[i] = (uint8_t)(label == '.' ? 0 : label - '0');
+        deep[i] = (uint16_t)(p.pixels[i] * 7001);
+    }
+    p.desc.labels = true;
+    for (int bytes = 1; bytes <= 2; bytes++) {
+        if (bytes == 2) p.desc.pixels = NULL, p.desc.pixels16 = deep;
+        test_env_init(&env);
+        assert_ok(dem2d_image_outlines(&env.env, &p.desc, &set));
+        assert_int_equal(dem2d_outline_set_count(set), COUNT_OF(expected));
+        for (int i = 0; i < COUNT_OF(expected); i++) {
+            check_outline(set, i, expected[i][0], expected[i][1], expected[i][2]);
+            check_simple(outline_of(set, i).points, outline_of(set, i).count);
+        }
+        assert_int_equal(env.log.count, 1);
+        assert_logged(&env, DEM2D_WARNING, -1, bytes == 1 ? "the first 9" : "the first 63009");
+        dem2d_outline_set_destroy(set);
+        assert_clean(&env);
+    }
+    int threshold = 3;
+    assert_result(dem2d_image_threshold(&p.desc, &threshold), DEM2D_OUT_OF_RANGE);
+    assert_int_equal(threshold, 3);
+    for (int i = 0; i < 3; i++) {
+        dem2d_image_desc bad = p.desc;
+        if (i == 0) bad.threshold = 1;
+        if (i == 1) bad.ignore_frame = true;
+        if (i == 2) bad.bright = true;
+        test_env_init(&env);
+        assert_result(dem2d_image_outlines(&env.env, &bad, &set), DEM2D_OUT_OF_RANGE);
+        assert_logged(&env, DEM2D_OUT_OF_RANGE, -1, "labels");
+    }
+}
+
+/* Every connected piece of a label has the outline that it has alone in a binary picture. */
+static void random_labels(void **state) {
+    (void)state;
+    test_random random = {23};
+    for (int run = 0; run < 100; run++) {
+        const int w = 1 + test_below(&random, SIDE), h = 1 + test_below(&random, SIDE);
+        const int kinds = 1 + test_below(&random, 4);
+        picture p, alone;
+        int found = 0;
+        picture_init(&p, w, h, 0);
+        for (int i = 0; i < w * h; i++) p.pixels[i] = (uint8_t)test_below(&random, kinds + 1);
+        p.desc.labels = p.desc.keep_border = true;
+        dem2d_outline_set *set = outlines(&p.desc);
+        picture rest = p;
+        rest.desc.labels = false, rest.desc.threshold = 1;
+        for (int i = 0; i < w * h; i++) {
+            if (rest.pixels[i] == 0) continue;
+            picture_init(&alone, w, h, 255);
+            for (int k = 0; k < w * h; k++)
+                alone.pixels[k] = rest.pixels[k] == rest.pixels[i] ? 1 : 255;
+            alone.desc.threshold = 128;
+            picture without = alone;
+            (void)erase(&without, i);
+            for (int k = 0; k < w * h; k++) {
+                const bool own = alone.pixels[k] == 1 && without.pixels[k] == 255;
+                if (own) rest.pixels[k] = 0;
+                alone.pixels[k] = own ? 0 : 255;
+            }
+            alone.desc.keep_border = true;
+            dem2d_outline_set *one = outlines(&alone.desc);
+            assert_int_equal(dem2d_outline_set_count(one), 1);
+            assert_true(found < dem2d_outline_set_count(set));
+            const dem2d_outline a = outline_of(set, found++), b = outline_of(one, 0);
+            check_outline(set, found - 1, i / w, i % w, b.pixels);
+            assert_int_equal(a.count, b.count);
+            assert_memory_equal(a.points, b.points, (size_t)a.count * sizeof(dem2d_vec));
+            dem2d_outline_set_destroy(one);
+        }
+        assert_int_equal(found, dem2d_outline_set_count(set));
         dem2d_outline_set_destroy(set);
     }
 }
@@ -791,6 +1182,12 @@ int main(void) {
         cmocka_unit_test(thresholds),
         cmocka_unit_test(small_pictures),
         cmocka_unit_test(random_pictures),
+        cmocka_unit_test(frames),
+        cmocka_unit_test(light_frame),
+        cmocka_unit_test(crops),
+        cmocka_unit_test(two_bytes),
+        cmocka_unit_test(label_masks),
+        cmocka_unit_test(random_labels),
         cmocka_unit_test(disc_in_grey),
         cmocka_unit_test(picture_errors),
         cmocka_unit_test(measures_of_stars),
