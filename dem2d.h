@@ -272,6 +272,9 @@ OPTIONS (zero means: physical zero for physical fields; "library default" where 
     dem2d_fit_desc          min_radius            -      0.1        [0, 1), of a0/2
     dem2d_fit_desc          corners               -      false
     dem2d_fit_desc          seed                  -      0
+    dem2d_fit_desc          birds                 -      30         0 or 2 to 256
+    dem2d_fit_desc          moves                 -      60         0 to 100000
+    dem2d_fit_desc          pixels                px     256        0 or 8 to 4096
     dem2d_virtual_desc      radius                m      none       > 0
     dem2d_virtual_desc      elongation            -      0          >= 0
     dem2d_virtual_desc      roundness             -      0          >= 0
@@ -827,7 +830,10 @@ typedef enum dem2d_fit_method {
     DEM2D_FIT_FEJER,           ///< FOURIER: (1 - n/(N+1)) p_n of the hull
     DEM2D_FIT_CONSTRAINED,     ///< FOURIER: least squares with rho >= min_radius
     DEM2D_FIT_AREA,            ///< BEZIER: least exact area to the outline
-    DEM2D_FIT_SWARM            ///< BEZIER: [P] sec. 4, particle swarm with pixel overlap
+    /// BEZIER: [P] sec. 4, particle swarm with pixel overlap. [P] leaves its settings open: here
+    /// inertia .7298 and pulls 1.4962 (Clerc and Kennedy's constriction), birds, moves and pixels
+    /// as in the desc. Joints that share a corner of the hull are moved off it along both edges.
+    DEM2D_FIT_SWARM
 } dem2d_fit_method;
 
 /// What the size of a fit is matched to ([F] fits that are constrained or Fejer's).
@@ -846,7 +852,10 @@ typedef struct dem2d_fit_desc {
     dem2d_fit_scale scale;   ///< FOURIER
     double min_radius;       ///< CONSTRAINED: least radius of curvature, of a0/2; 0 for 0.1
     bool corners;            ///< CONSTRAINED: min_radius 0 is meant
-    uint64_t seed;           ///< SWARM
+    uint64_t seed;           ///< SWARM: of its random numbers
+    int birds;               ///< SWARM: how many search each arc; 0 for 30
+    int moves;               ///< SWARM: of each bird; 0 for 60
+    int pixels;              ///< SWARM: across the circle of the outline's area; 0 for 256
 } dem2d_fit_desc;
 
 /// What came out.
@@ -1378,7 +1387,8 @@ typedef enum dem2d_histogram {
     DEM2D_HISTOGRAM_COORDINATION, ///< particles with 0, 1, .. bins - 1 or more contacts, no walls
     DEM2D_HISTOGRAM_ORIENTATION,  ///< particles by their long axis, in [0, pi); without one: none
     DEM2D_HISTOGRAM_NORMAL,       ///< contacts by the direction of their normal
-    DEM2D_HISTOGRAM_BRANCH,       ///< m, mean branch along the normal, by its direction
+    DEM2D_HISTOGRAM_ALONG_BRANCH, ///< contacts by contact branch orientation: from centre to centre
+    DEM2D_HISTOGRAM_BRANCH,       ///< m, mean branch along the normal, by the normal's direction
     DEM2D_HISTOGRAM_NORMAL_FORCE, ///< N/m, mean by the direction of the normal
     DEM2D_HISTOGRAM_TANGENTIAL_FORCE, ///< N/m, signed (see dem2d_contact_info), likewise
     DEM2D_HISTOGRAM_COUNT
@@ -5498,6 +5508,12 @@ static double dem2di_random(uint64_t *state) {
     return (double)((x ^ (x >> 31)) >> 11) / 9007199254740992.0; /* 2^53 */
 }
 
+/* Settings of the swarm. */
+typedef struct dem2di_swarm {
+    int birds, moves, pixels;
+    uint64_t seed;
+} dem2di_swarm;
+
 /* The picture of one section: pixels inside its outline closed by the chord. */
 typedef struct dem2di_raster {
     dem2d_vec lower;     /* corner of pixel (0, 0) */
@@ -5507,8 +5523,8 @@ typedef struct dem2di_raster {
     unsigned char *row;  /* width + 1, scratch */
 } dem2di_raster;
 
-#define DEM2DI_SWARM_PIXELS 256 /* across the circle of the grain's size, as in a photograph */
-#define DEM2DI_SWARM_POINTS 48  /* chords of an arc: flatter than a pixel at that size */
+#define DEM2DI_SWARM_BIRDS 256 /* at most */
+#define DEM2DI_SWARM_POINTS 48 /* chords of an arc: flatter than a pixel of the default size */
 
 /* One row of the closed polygon's picture into raster->row. */
 static void dem2di_raster_row(const dem2di_raster *raster, const dem2d_vec *points, int count,
@@ -5543,20 +5559,19 @@ static int dem2di_raster_cost(const dem2di_raster *raster, const dem2di_arc *arc
     return cost;
 }
 
-/* Swarm of thirty that share their best place, sixty moves; inertia and attractions by M. Clerc
-   and J. Kennedy's constriction for 2.05 + 2.05. */
+/* The birds share their best place; inertia and attractions by M. Clerc and J. Kennedy's
+   constriction for 2.05 + 2.05. */
 static void dem2di_swarm_search(const dem2di_section *section, const dem2di_raster *raster,
-                                uint64_t *random, double f[2]) {
-    enum { SWARM = 30, MOVES = 60 };
+                                const dem2di_swarm *swarm, uint64_t *random, double f[2]) {
     const double inertia = 0.7298437881283576, pull = 1.4961797656631331;
     struct {
         double x[2], v[2], best[2];
         int cost;
-    } bird[SWARM];
+    } bird[DEM2DI_SWARM_BIRDS];
     int least = INT_MAX;
     memset(bird, 0, sizeof bird);
-    for (int move = 0; move <= MOVES; move++)
-        for (int i = 0; i < SWARM; i++) {
+    for (int move = 0; move <= swarm->moves; move++)
+        for (int i = 0; i < swarm->birds; i++) {
             for (int j = 0; j < 2; j++) {
                 double r1 = dem2di_random(random), r2 = dem2di_random(random), *x = bird[i].x;
                 bird[i].v[j] = inertia * bird[i].v[j] + pull * r1 * (bird[i].best[j] - x[j]) +
@@ -5579,7 +5594,8 @@ static void dem2di_swarm_search(const dem2di_section *section, const dem2di_rast
 
 /* [P] sec. 4 step 4 for one section. iterations counts moves of the swarm. */
 static dem2d_result dem2di_swarm_section(const dem2d_env *env, const dem2di_section *section,
-                                         uint64_t *random, double f[2], int *iterations) {
+                                         const dem2di_swarm *swarm, uint64_t *random, double f[2],
+                                         int *iterations) {
     const dem2di_outline *outline = section->outline;
     int place = section->from->place;
     int inner = (section->to->place - place + outline->count) % outline->count + 1;
@@ -5600,10 +5616,10 @@ static dem2d_result dem2di_swarm_section(const dem2d_env *env, const dem2di_sect
     }
     dem2di_raster raster;
     raster.lower = lower;
-    raster.pixel = 2 * outline->radius / DEM2DI_SWARM_PIXELS;
+    raster.pixel = 2 * outline->radius / swarm->pixels;
     /* a needle may be much longer than the circle of its size */
-    raster.pixel =
-        dem2di_max(raster.pixel, dem2di_max(upper.x - lower.x, upper.y - lower.y) / 2048);
+    raster.pixel = dem2di_max(raster.pixel, dem2di_max(upper.x - lower.x, upper.y - lower.y) /
+                                                (8.0 * swarm->pixels));
     raster.width = (int)ceil((upper.x - lower.x) / raster.pixel) + 1;
     raster.height = (int)ceil((upper.y - lower.y) / raster.pixel) + 1;
     size_t width = (size_t)raster.width, pixels = width * (size_t)raster.height + width + 1;
@@ -5614,8 +5630,8 @@ static dem2d_result dem2di_swarm_section(const dem2d_env *env, const dem2di_sect
             dem2di_raster_row(&raster, points, (int)count, y);
             memcpy(raster.mask + (size_t)y * width, raster.row, width);
         }
-        dem2di_swarm_search(section, &raster, random, f);
-        *iterations += 60;
+        dem2di_swarm_search(section, &raster, swarm, random, f);
+        *iterations += swarm->moves;
     }
     dem2di_release(env, points, count, sizeof *points);
     if (raster.mask == NULL)
@@ -5624,10 +5640,11 @@ static dem2d_result dem2di_swarm_section(const dem2d_env *env, const dem2di_sect
     return DEM2D_OK;
 }
 
-/* [P] sec. 4 on an outline made ready, relative to its centre. With a seed by the particle swarm,
- * else by exact area. */
+/* [P] sec. 4 on an outline made ready, relative to its centre. With a swarm by that, else (NULL) by
+ * exact area. */
 static dem2d_result dem2di_bezier_fit(const dem2d_env *env, const dem2di_outline *outline, int arcs,
-                                      const uint64_t *seed, dem2d_vec *control, int *iterations) {
+                                      const dem2di_swarm *swarm, dem2d_vec *control,
+                                      int *iterations) {
     size_t count = (size_t)arcs;
     dem2di_joint *joints = (dem2di_joint *)dem2di_allocate(env, count, sizeof *joints);
     if (joints == NULL) return dem2di_fail(env, DEM2D_OUT_OF_MEMORY, -1, "%d joints", arcs);
@@ -5638,7 +5655,7 @@ static dem2d_result dem2di_bezier_fit(const dem2d_env *env, const dem2di_outline
     half = dem2d_rot_make(DEM2DI_PI / arcs);
     double circle = 4.0 / 3 * (quarter.s / quarter.c) * (half.c / half.s);
     dem2d_result result = DEM2D_OK;
-    uint64_t random = seed != NULL ? *seed : 0;
+    uint64_t random = swarm != NULL ? swarm->seed : 0;
     for (int i = 0; i < arcs && result == DEM2D_OK; i++) {
         double f[2] = {circle, circle};
         dem2di_section section;
@@ -5646,8 +5663,8 @@ static dem2d_result dem2di_bezier_fit(const dem2d_env *env, const dem2di_outline
         section.from = &joints[i];
         section.to = &joints[(i + 1) % arcs];
         dem2di_tangent_lengths(section.from, section.to, &section.l1, &section.l2);
-        if (seed != NULL)
-            result = dem2di_swarm_section(env, &section, &random, f, iterations);
+        if (swarm != NULL)
+            result = dem2di_swarm_section(env, &section, swarm, &random, f, iterations);
         else
             *iterations += dem2di_fit_section(&section, f);
         dem2di_arc arc = dem2di_section_arc(&section, f[0], f[1]);
@@ -6040,9 +6057,15 @@ static dem2d_result dem2di_fit_bezier(dem2di_fit *fit) {
     dem2d_vec *control = (dem2d_vec *)dem2di_allocate(fit->env, count, sizeof *control);
     if (control == NULL)
         return dem2di_fail(fit->env, DEM2D_OUT_OF_MEMORY, -1, "%d arcs", fit->count);
-    const uint64_t *seed = fit->desc->method == DEM2D_FIT_SWARM ? &fit->desc->seed : NULL;
-    dem2d_result result = dem2di_bezier_fit(fit->env, &fit->outline, fit->count, seed, control,
-                                            &fit->report.iterations);
+    const dem2d_fit_desc *desc = fit->desc;
+    dem2di_swarm swarm;
+    swarm.birds = desc->birds > 0 ? desc->birds : 30;
+    swarm.moves = desc->moves > 0 ? desc->moves : 60;
+    swarm.pixels = desc->pixels > 0 ? desc->pixels : 256;
+    swarm.seed = desc->seed;
+    dem2d_result result = dem2di_bezier_fit(fit->env, &fit->outline, fit->count,
+                                            desc->method == DEM2D_FIT_SWARM ? &swarm : NULL,
+                                            control, &fit->report.iterations);
     if (result == DEM2D_OK)
         result = dem2d_shape_create_bezier(fit->env, control, fit->count, &fit->shape);
     dem2di_release(fit->env, control, count, sizeof *control);
@@ -6191,6 +6214,20 @@ static dem2d_result dem2di_fit_once(dem2di_fit *fit) {
 
 #define DEM2DI_FIT_COUNT 64 /* the largest that is tried for a coverage, as declared */
 
+/* A count that is 0 for its default, or from least to most. */
+static dem2d_result dem2di_check_setting(const dem2d_env *env, const char *field, int value,
+                                         int least, int most) {
+    if (value == 0 || (value >= least && value <= most)) return DEM2D_OK;
+    return dem2di_fail(env, DEM2D_OUT_OF_RANGE, -1, "%s = %d is not 0 or %d to %d", field, value,
+                       least, most);
+}
+
+static dem2d_result dem2di_check_swarm(const dem2d_env *env, const dem2d_fit_desc *desc) {
+    dem2d_result result = dem2di_check_setting(env, "birds", desc->birds, 2, DEM2DI_SWARM_BIRDS);
+    if (result == DEM2D_OK) result = dem2di_check_setting(env, "moves", desc->moves, 1, 100000);
+    return result == DEM2D_OK ? dem2di_check_setting(env, "pixels", desc->pixels, 8, 4096) : result;
+}
+
 static dem2d_result dem2di_check_fit(const dem2d_env *env, const dem2d_fit_desc *desc) {
     static const int least[DEM2D_SHAPE_TYPE_COUNT] = {0, 0, 3, 3, 0, 0};
     dem2d_fit_method method = desc->method;
@@ -6207,6 +6244,7 @@ static dem2d_result dem2di_check_fit(const dem2d_env *env, const dem2d_fit_desc 
         return dem2di_fail(env, DEM2D_OUT_OF_RANGE, -1, "scale = %d", (int)desc->scale);
     dem2d_result result = dem2di_check_not_negative(env, "min_radius", desc->min_radius);
     if (result == DEM2D_OK) result = dem2di_check_not_negative(env, "coverage", desc->coverage);
+    if (result == DEM2D_OK) result = dem2di_check_swarm(env, desc);
     if (result != DEM2D_OK) return result;
     if (desc->min_radius >= 1)
         return dem2di_fail(env, DEM2D_OUT_OF_RANGE, -1, "min_radius = %g must be below 1",
@@ -12901,11 +12939,12 @@ static void dem2di_bin_contacts(const dem2d_world *world, dem2d_histogram kind, 
                                 int *counts, double *sums) {
     dem2di_tour walk = dem2di_tour_start(false);
     while (dem2di_tour_next(world, &walk)) {
-        const dem2d_vec normals[2] = {walk.link.normal, dem2di_negate(walk.link.normal)};
+        dem2d_vec along = kind == DEM2D_HISTOGRAM_ALONG_BRANCH ? walk.branch : walk.link.normal;
+        const dem2d_vec ways[2] = {along, dem2di_negate(along)};
         for (int i = 0; i < 2; i++) {
-            int bin = dem2di_bin(normals[i], 2 * DEM2DI_PI, bins);
+            int bin = dem2di_bin(ways[i], 2 * DEM2DI_PI, bins);
             counts[bin]++;
-            if (kind != DEM2D_HISTOGRAM_NORMAL) sums[bin] += dem2di_binned(&walk, kind);
+            if (kind > DEM2D_HISTOGRAM_ALONG_BRANCH) sums[bin] += dem2di_binned(&walk, kind);
         }
     }
 }
@@ -12931,9 +12970,9 @@ DEM2D_API dem2d_result dem2d_world_histogram(const dem2d_world *world, dem2d_his
         else
             dem2di_bin_contacts(world, kind, bins, counts, values);
         for (int i = 0; i < bins; i++)
-            values[i] = kind <= DEM2D_HISTOGRAM_NORMAL ? counts[i]
-                        : counts[i] > 0                ? values[i] / counts[i]
-                                                       : 0;
+            values[i] = kind <= DEM2D_HISTOGRAM_ALONG_BRANCH ? counts[i]
+                        : counts[i] > 0                      ? values[i] / counts[i]
+                                                             : 0;
     }
     dem2di_release(env, axes, templates, sizeof *axes);
     dem2di_release(env, counts, room, sizeof *counts);

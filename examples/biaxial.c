@@ -303,7 +303,8 @@ static void write_out(const job *j, const char *name, draft *d) {
 static void write_histograms(const job *j, const char *name) {
     enum { BINS = 36 };
     static const char *const names[DEM2D_HISTOGRAM_COUNT] = {
-        "coordination", "orientation", "normal", "branch", "normal_force", "tangential_force"};
+        "coordination", "orientation",  "normal",          "branch_direction",
+        "branch",       "normal_force", "tangential_force"};
     double values[DEM2D_HISTOGRAM_COUNT][BINS];
     draft d;
     draft_open(&d);

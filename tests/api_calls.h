@@ -112,6 +112,9 @@ static const row fit_rows[] = {
     FIELD(fit_desc, min_radius, FRACTION),
     FIELD(fit_desc, corners, ANY_BOOL),
     FIELD(fit_desc, seed, ANY_SEED),
+    FIELD_INT(fit_desc, birds, INTEGER_OR_0, 2, 256),
+    FIELD_INT(fit_desc, moves, INTEGER, 0, 100000),
+    FIELD_INT(fit_desc, pixels, INTEGER_OR_0, 8, 4096),
 };
 static const row virtual_rows[] = {
     FIELD(virtual_desc, radius, POSITIVE),        FIELD(virtual_desc, elongation, NOT_NEGATIVE),

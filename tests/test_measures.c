@@ -834,10 +834,12 @@ static void test_contact_histograms(void **state) {
             sums[k][bin_of(-c->normal.x, -c->normal.y)] += add_to[k];
         }
     }
+    static const dem2d_histogram kinds[4] = {DEM2D_HISTOGRAM_NORMAL, DEM2D_HISTOGRAM_BRANCH,
+                                             DEM2D_HISTOGRAM_NORMAL_FORCE,
+                                             DEM2D_HISTOGRAM_TANGENTIAL_FORCE};
     for (int k = 0; k < 4; k++) {
         double values[BINS];
-        const dem2d_histogram kind = (dem2d_histogram)(DEM2D_HISTOGRAM_NORMAL + k);
-        assert_ok(dem2d_world_histogram(h.world, kind, BINS, values));
+        assert_ok(dem2d_world_histogram(h.world, kinds[k], BINS, values));
         for (int i = 0; i < BINS; i++) {
             assert_true(sums[0][i] > 0);
             const long double expected = k == 0 ? sums[0][i] : sums[k][i] / sums[0][i];

@@ -212,11 +212,67 @@ static void test_residual(void **state) {
     assert_true(rises > 0);
 }
 
+/* [P] sec. 5.3: contacts by the direction of their branch, which of grains that are no circles is
+   not their normal's. */
+static void test_branch_directions(void **state) {
+    (void)state;
+    enum { BINS = 9, MOST = 4 * GRAINS };
+    scene s = make_heap(DEM2D_CERTIFIED, DEM2D_TWO_POINTS);
+    dem2d_contact_info contacts[MOST];
+    double values[BINS], expected[BINS] = {0}, normals[BINS];
+    int count, others = 0;
+    assert_ok(dem2d_world_step(s.world, 4000, NULL));
+    assert_ok(dem2d_world_contacts(s.world, contacts, MOST, &count));
+    assert_in_range(count, GRAINS, MOST);
+    for (int i = 0; i < count; i++) {
+        if (contacts[i].b.generation == 0) continue;
+        const double angle =
+            atan2(contacts[i].branch.y, contacts[i].branch.x) / (2 * (double)TEST_PI);
+        expected[(int)(BINS * (angle < 0 ? angle + 1 : angle))]++;
+        expected[(int)(BINS * (angle + 0.5))]++;
+    }
+    assert_ok(dem2d_world_histogram(s.world, DEM2D_HISTOGRAM_ALONG_BRANCH, BINS, values));
+    assert_ok(dem2d_world_histogram(s.world, DEM2D_HISTOGRAM_NORMAL, BINS, normals));
+    for (int i = 0; i < BINS; i++) {
+        assert_true(values[i] == expected[i]);
+        others += values[i] != normals[i];
+    }
+    assert_true(others > 0);
+    dem2d_world_destroy(s.world);
+}
+
+/* The settings are what is used: the defaults given give the same bits, others not. */
+static void test_swarm_settings(void **state) {
+    (void)state;
+    enum { POINTS = 40, ARCS = 5, WAYS = 5 };
+    static const int settings[WAYS][3] = {
+        {0, 0, 0}, {30, 60, 256}, {12, 60, 256}, {30, 20, 256}, {30, 60, 64}};
+    dem2d_vec points[POINTS];
+    dem2d_fit_report report[WAYS];
+    for (int i = 0; i < POINTS; i++) {
+        const double t = 2 * (double)TEST_PI * i / POINTS,
+                     r = 1 + 0.2 * sin(2 * t) + 0.05 * cos(5 * t);
+        points[i] = vec(r * cos(t), r * sin(t));
+    }
+    for (int i = 0; i < WAYS; i++) {
+        dem2d_fit_desc desc = {0};
+        dem2d_shape *shape;
+        desc.model = DEM2D_BEZIER, desc.method = DEM2D_FIT_SWARM, desc.count = ARCS;
+        desc.birds = settings[i][0], desc.moves = settings[i][1], desc.pixels = settings[i][2];
+        assert_ok(dem2d_outline_fit(NULL, points, POINTS, &desc, &shape, &report[i]));
+        dem2d_shape_destroy(shape);
+        assert_int_equal(report[i].iterations, ARCS * (desc.moves > 0 ? desc.moves : 60));
+        if (i == 1) assert_same_bits(report[1].coverage, report[0].coverage);
+        if (i > 1) assert_true(report[i].coverage != report[0].coverage);
+        assert_within(report[i].coverage, report[0].coverage, 0.02);
+    }
+}
+
 int main(void) {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(test_every_pair_anew),
-        cmocka_unit_test(test_wall_point),
-        cmocka_unit_test(test_residual),
+        cmocka_unit_test(test_every_pair_anew), cmocka_unit_test(test_wall_point),
+        cmocka_unit_test(test_residual),        cmocka_unit_test(test_branch_directions),
+        cmocka_unit_test(test_swarm_settings),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }
