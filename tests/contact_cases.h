@@ -145,7 +145,7 @@ static lattice lattice_turned(lattice p, int turns) {
 
 /* CUSTOM stores its radius of curvature and knows a lower bound of it, BLIND does neither. */
 enum { CIRCLE, ELLIPSE, POLYGON, ROUNDED, BEZIER, FOURIER, CUSTOM, BLIND, KINDS };
-enum { MODEL_POINTS = 64, MODEL_LATTICE = 14 };
+enum { MODEL_POINTS = 192, MODEL_LATTICE = 14 };
 
 CASE_HELPER const char *const kind_names[KINDS] = {"circle", "ellipse", "polygon", "rounded",
                                                    "bezier", "fourier", "custom",  "blind"};
@@ -162,6 +162,7 @@ typedef struct model {
     int corners; /* of the integer polygon; 0 if it is none */
     lattice corner[MODEL_LATTICE];
     double rho_min; /* no radius of curvature is below */
+    spot beyond;    /* polybeziers: the centroid from the rounded offset; mostly 0 is as good */
 } model;
 
 /* The support function of custom shapes, in double. */
@@ -383,11 +384,10 @@ static spot corners_support(const dem2d_vec *points, int count, spot u) {
     return spot_from(points[best]);
 }
 
-/* The ends of an arc and the two places where it runs along the line across u. */
-static spot arc_support(const dem2d_vec *const q[4], spot u, real *value) {
-    real p[4], ts[4] = {0, 1, -1, -1};
-    spot best = spot_from(*q[0]);
-    for (int i = 0; i < 4; i++) p[i] = q[i]->x * u.x + q[i]->y * u.y;
+/* Of one arc the place that is farthest along u, given the four control points' places p along u:
+   its ends, and the two where it runs along the line across u. Stores how far in *value. */
+static real arc_farthest(const real p[4], real *value) {
+    real best = 0, ts[4] = {0, 1, -1, -1};
     const real c = p[1] - p[0], b = p[2] - 2 * p[1] + p[0], a = p[3] - 3 * p[2] + 3 * p[1] - p[0];
     if (b * b >= a * c) {
         const real sum = -b - copysignl(sqrtl(b * b - a * c), b);
@@ -397,27 +397,50 @@ static spot arc_support(const dem2d_vec *const q[4], spot u, real *value) {
     for (int i = 0; i < 4; i++) {
         const real t = ts[i], s = 1 - t;
         if (!(t >= 0 && t <= 1)) continue;
-        const real w[4] = {s * s * s, 3 * s * s * t, 3 * s * t * t, t * t * t};
-        const real h = w[0] * p[0] + w[1] * p[1] + w[2] * p[2] + w[3] * p[3];
-        if (!(h > *value)) continue;
-        *value = h;
-        best = spot_make(w[0] * q[0]->x + w[1] * q[1]->x + w[2] * q[2]->x + w[3] * q[3]->x,
-                         w[0] * q[0]->y + w[1] * q[1]->y + w[2] * q[2]->y + w[3] * q[3]->y);
+        const real h = s * s * (s * p[0] + 3 * t * p[1]) + t * t * (3 * s * p[2] + t * p[3]);
+        if (h > *value) *value = h, best = t;
+    }
+    return best;
+}
+
+/* A control point of a polybezier, from the centroid; indices go round. */
+static spot control_point(const model *m, int i) {
+    const dem2d_vec q = m->points[i % m->count], offset = m->info.offset;
+    return spot_make((real)q.x - offset.x - m->beyond.x, (real)q.y - offset.y - m->beyond.y);
+}
+
+/* On the arc from control point `first` on. */
+static spot arc_point(const model *m, int first, real t) {
+    const spot q0 = control_point(m, first), q1 = control_point(m, first + 1);
+    const spot q2 = control_point(m, first + 2), q3 = control_point(m, first + 3);
+    const real s = 1 - t, w[4] = {s * s * s, 3 * s * s * t, 3 * s * t * t, t * t * t};
+    return spot_make(w[0] * q0.x + w[1] * q1.x + w[2] * q2.x + w[3] * q3.x,
+                     w[0] * q0.y + w[1] * q1.y + w[2] * q2.y + w[3] * q3.y);
+}
+
+/* Which arc of a polybezier is farthest along u, by its first control point, and where on it: of
+   all arcs, whether they join smoothly or not. An arc is inside the hull of its control points:
+   most are ruled out by that. */
+static int arcs_farthest(const model *m, spot u, real *place) {
+    real p[MODEL_POINTS + 1], most = -HUGE_VALL, value;
+    int best = 0;
+    for (int i = 0; i < m->count; i++) {
+        p[i] = spot_dot(control_point(m, i), u);
+        if (i % 3 == 0 && p[i] > most) most = p[i], best = i;
+    }
+    p[m->count] = p[0], *place = 0;
+    for (int i = 0; i < m->count; i += 3) {
+        if (!(fmaxl(p[i + 1], p[i + 2]) > most)) continue;
+        const real t = arc_farthest(&p[i], &value);
+        if (value > most) most = value, best = i, *place = t;
     }
     return best;
 }
 
 static spot arcs_support(const model *m, spot u) {
-    spot best = {0, 0};
-    real most = -HUGE_VALL;
-    for (int i = 0; i < m->count; i += 3) {
-        const dem2d_vec *const q[4] = {&m->points[i], &m->points[i + 1], &m->points[i + 2],
-                                       &m->points[(i + 3) % m->count]};
-        real value;
-        const spot s = arc_support(q, u, &value);
-        if (value > most) most = value, best = s;
-    }
-    return best;
+    real place;
+    const int first = arcs_farthest(m, u, &place);
+    return arc_point(m, first, place);
 }
 
 static spot series_support(const model *m, spot u) {
@@ -434,8 +457,9 @@ static spot series_support(const model *m, spot u) {
 /* Support point of a template about its centroid. u is a unit vector. */
 static spot model_support(const model *m, spot u) {
     spot s = {m->r * u.x, m->r * u.y};
-    if (m->kind == BEZIER || m->kind == FOURIER) {
-        s = m->kind == BEZIER ? arcs_support(m, u) : series_support(m, u);
+    if (m->kind == BEZIER) return arcs_support(m, u);
+    if (m->kind == FOURIER) {
+        s = series_support(m, u);
     } else {
         if (m->a > 0) {
             const real a = m->a, b = m->b, h = hypotl(a * u.x, b * u.y);
@@ -827,16 +851,19 @@ static void draw_concentric(scene *s, dice *d) {
     if (dice_below(d, 2)) s->p.pose_b.scale = s->p.pose_a.scale;
 }
 
-static void draw_parallel(scene *s, dice *d) {
-    pair *p = &s->p;
-    const spot u = draw_normal(p->a, &p->pose_a, d), v = draw_normal(p->b, &p->pose_b, d);
-    /* turns v, a normal of B, to a hair from -u */
-    const real c = -spot_dot(u, v), t = -spot_cross(v, u);
-    const real hair = dice_scale(d, 1e-15, 1e-3) * (dice_below(d, 2) ? 1 : -1);
-    const spot q = spot_turned(spot_make(c, t), dice_below(d, 5) ? hair : 0);
+/* Turns B until a direction v of it is to a hair from -u, in radians; 0 is as near as doubles. */
+CASE_HELPER void turn_against(pair *p, spot u, spot v, real hair) {
+    const spot q = spot_turned(spot_make(-spot_dot(u, v), -spot_cross(v, u)), hair);
     const real bc = p->pose_b.rotation.c, bs = p->pose_b.rotation.s;
     const spot r = spot_unit(spot_make(q.x * bc - q.y * bs, q.x * bs + q.y * bc));
     p->pose_b.rotation = (dem2d_rot){(double)r.x, (double)r.y};
+}
+
+static void draw_parallel(scene *s, dice *d) {
+    pair *p = &s->p;
+    const spot u = draw_normal(p->a, &p->pose_a, d), v = draw_normal(p->b, &p->pose_b, d);
+    const real hair = dice_scale(d, 1e-15, 1e-3) * (dice_below(d, 2) ? 1 : -1);
+    turn_against(p, u, v, dice_below(d, 5) ? hair : 0);
     scene_place(s, u, draw_delta(p, d));
     /* along the faces by any part of a size: u stays a bound where the faces still meet */
     const double slide = dice_uniform(d, -1, 1) * p->pose_a.scale;
