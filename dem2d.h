@@ -11,7 +11,8 @@
 CONTENTS (search for the anchor, ">>" and the word)
 
     Manual          what it is, limits, quick start, concepts, how-to,
-                    options, errors, memory, determinism, changes           >>manual
+                    differences from the papers, options, errors, memory,
+                    determinism                                             >>manual
     Declarations    version, results, vectors, poses, environment           >>api-types
                     shapes                                                  >>api-shapes
                     mass                                                    >>api-mass
@@ -59,9 +60,14 @@ WHAT IT IS
     chains of cubic Bezier arcs ("polybeziers"), Fourier series of the support function (FS), or
     your own support function. They push each other with linear springs and Coulomb friction, or by
     your own law, and move by Newton's laws. The methods are those of two papers on irregular
-    grains:
-      [P] polybezier grains: closed-form support, GJK and EPA, biaxial compression
-      [F] Fourier series of the support function: convexity, reduction, fitting
+    grains; DIFFERENCES FROM THE PAPERS, below, lists their equations and steps one by one:
+      [P] Z. Lai, L. Huang, "A polybezier-based particle model for the DEM modeling of granular
+          media", Computers and Geotechnics 134 (2021) 104052, doi 10.1016/j.compgeo.2021.104052
+      [F] S. Huang, L. Huang, Z. Lai, "An extension of the Fourier series-based particle model to
+          the GJK-based contact detection and resolution framework for DEM", Computational Particle
+          Mechanics 9 (2022) 381-391, doi 10.1007/s40571-021-00446-6
+    The older model that [F] extends describes the radius, not the support function: Z. Lai,
+    Q. Chen, L. Huang, Computer Methods in Applied Mechanics and Engineering 362 (2020) 112873.
     The stateless layer (shapes, mass, fitting, contact of two shapes) works without a world.
 
 WHAT IT DOES NOT DO
@@ -205,7 +211,9 @@ HOW TO
                          points), dem2d_pair_contact (gap or depth, normal, contact point).
                          Pass the last normal as desc.start when the pair has moved little, and
                          skip_points if the contact points are not needed.
-    repeat the papers    dem2d_world_desc.solver = DEM2D_GJK_EPA, faces = DEM2D_ONE_POINT.
+    repeat the papers    dem2d_world_desc.solver = DEM2D_GJK_EPA, faces = DEM2D_ONE_POINT; templates
+                         by DEM2D_FIT_REDUCTION and DEM2D_FIT_SWARM; local_damping = 0.7 ([P]) or
+                         global_damping = 0.7 ([F]). examples/biaxial.c --papers is their test.
     choose a time step   dem2d_world_time_step_bounds on a settled scene. The world checks it
                          whenever it renews its list of pairs.
     lose energy          damping_ratio of the materials, from dem2d_damping_ratio(restitution);
@@ -230,6 +238,68 @@ HOW TO
     look in ParaView     dem2d_world_write_vtp, a file for each part and time; dem2d_pvd_write
                          makes a series of them. Colour grains by any of their arrays.
     keep a history       dem2d_world_write_csv after every so many steps, append but the first.
+
+DIFFERENCES FROM THE PAPERS (same: as printed; corrected: the print has a slip; improved: the
+default does better, and the paper's way is there too if it is named; chosen: the paper leaves it
+open)
+    [P] fig. 1, eq. 1-2: cubic arcs with common tangents   dem2d_shape_create_bezier
+        same. Neighbours have to share a tangent, each arc has to be convex.
+    [P] eq. 3-8: support point and its parameter           dem2d_shape_support
+        same, in Bernstein form.
+    [P] eq. 9: the parameter's closed form                 dem2d_shape_support
+        corrected: the discriminant is 4 M3^2 - 12 M4 M2, printed with M2^2; the formula divides by
+        M4, which is 0 for straight arcs and arcs of lower degree. Here the root is taken with like
+        signs in its denominator: no such case, no cancellation.
+    [P] eq. 10-11: mass, moment of inertia                 dem2d_shape_mass_interpolated
+        corrected: eq. 11 is about the origin; about the centroid m |c|^2 has to be taken off.
+        Improved: dem2d_shape_mass is exact for every model.
+    [P] sec. 3: broad phase by bounding volumes            dem2d_world_step
+        chosen: bounding circles on a grid; a list of the pairs within a skin.
+    [P] eq. 12, sec. 3.1 steps 1-7, fig. 2-3: GJK          dem2d_pair_overlap, dem2d_pair_distance
+        same. Chosen: the first direction is the line of centres, or the caller's.
+    [P] eq. 13, sec. 3.2, fig. 5: depth by EPA             dem2d_pair_contact, DEM2D_GJK_EPA
+        corrected: v has to be a unit vector. Corrected: the printed residual, |W| less the least
+        distance of an edge, is told (dem2d_contact.residual), but does not stop EPA: where an edge
+        of two polygons is met it does not vanish. W.v less that distance does. Chosen: tolerances
+        are relative to the sizes. Improved: DEM2D_CERTIFIED proves the least depth by Newton's
+        steps, in two to four support calls.
+    [P] sec. 3.2, fig. 4a, 4b: contact point               DEM2D_ONE_POINT
+        same. Improved: DEM2D_TWO_POINTS where faces meet; the middle of two faces jumps with the
+        last bit of the angle and does not conserve energy. At a wall it takes the foot point.
+    [P] sec. 4 steps 1-5: templates by particle swarm      DEM2D_FIT_SWARM
+        same steps. Chosen: birds, moves, constriction, pixels; joints that share a corner of the
+        hull are moved off it. Improved: dem2d_bezier_fit and DEM2D_FIT_AREA take the same joints
+        and tangents and minimise the exact area of the symmetric difference.
+    [P] sec. 5.1: accuracy score; [F] sec. 3.1: percent coverage     dem2d_outline_compare
+        same (coverage, a fraction), by exact areas instead of pixels.
+    [P] sec. 5.2: equivalent size                          dem2d_shape_info.equivalent
+        half of it: the radius, not the diameter, of the circle of equal area.
+    [P] fig. 11, [F] fig. 6: relative kinetic energy       dem2d_equilibrium.kinetic_ratio
+        same. Alignment, [P] fig. 12: DEM2D_HISTOGRAM_ORIENTATION, of the axis of greatest inertia.
+    [P] sec. 5.3: p, q, strains                            dem2d_stress_principal, dem2d_strain
+        corrected: p and q are printed without the halves (q/p is the same), eps_a and eps_v are
+        exchanged, and compression is positive only with a minus before the logarithms.
+    [P] sec. 5.3: anisotropy of normals, forces, contact branch orientation  dem2d_world_fabric
+        same, and DEM2D_HISTOGRAM_NORMAL, _ALONG_BRANCH, _NORMAL_FORCE, _TANGENTIAL_FORCE.
+    [P] sec. 5.3: servo control                            DEM2D_WALL_SERVO
+        chosen: see dem2d_wall_desc.
+    [P] damping 0.7: dem2d_world_desc.local_damping (PFC's, Cundall's). [F] damping 0.7, velocity
+        based: dem2d_world_desc.global_damping, 1/s (Andrade and others 2012). Same.
+    [F] eq. 1-4: support function, support point           dem2d_shape_create_fourier
+        same. Improved: the centroid is the origin; a1 = b1 = 0 puts the Steiner point there.
+    [F] eq. 5: p'' + p >= 0                                dem2d_fourier_convexity
+        same, by a rigorous bound of the least value.
+    [F] eq. 6: phases                                      not needed
+        corrected: with beta = atan2(b, a) it is cos(n t - beta), printed sin(n t + beta).
+    [F] eq. 7: sufficient condition                        DEM2D_SUFFICIENT
+        same. Improved: DEM2D_EXACT; the condition is far too strict.
+    [F] sec. 2.3: fit by least squares, reduction          dem2d_fourier_fit, dem2d_fourier_reduce
+        corrected: the tolerance 1e-6 is a length; here it is relative to a0. Chosen: the factor
+0.9. Improved: DEM2D_FIT_CONSTRAINED, the constrained minimum that [F] leaves to the future. [F]
+sec. 3.1: the radius as a Fourier series           dem2d_radial_compare for comparison only. [F] eq.
+8-10: contact law                              dem2d_material_desc corrected: eq. 9 caps one sign;
+here -mu F_n <= F_t <= mu F_n. Beyond: dashpots, rolling friction (eq. 10: none), laws of the
+caller.
 
 OPTIONS (zero means: physical zero for physical fields; "library default" where one is given)
     struct                  field                 unit   default    range
@@ -587,8 +657,8 @@ typedef struct dem2d_shape_info {
     double circumscribed;  ///< m, radius of the bounding circle about the centroid
     double inscribed;      ///< m, radius of the inscribed circle about the centroid
     double rho_min;        ///< m, lower bound of the radius of curvature; 0 with corners
-    double equivalent;     ///< m, radius of the circle of equal area
-    size_t bytes;          ///< memory of the template
+    double equivalent; ///< m, radius of the circle of equal area ([P] equivalent size: twice it)
+    size_t bytes;      ///< memory of the template
 } dem2d_shape_info;
 
 /// Axis-aligned box.
@@ -724,7 +794,8 @@ typedef struct dem2d_outline_info {
 
 /// How two outlines differ.
 typedef struct dem2d_difference {
-    double coverage;  ///< 1 - area / area of the reference; negative for strangers
+    double coverage;  ///< 1 - area / area of the reference ([F] percent coverage, [P] accuracy
+                      ///< score, as a fraction); negative for strangers
     double area;      ///< m2, of the symmetric difference
     double hausdorff; ///< m, greatest distance of a corner of one from the other's boundary
 } dem2d_difference;
@@ -817,7 +888,8 @@ DEM2D_API dem2d_result dem2d_fourier_reduce(double *a, double *b, int order,
                                             const dem2d_reduction_desc *desc, int *reductions);
 /// Polybezier of an outline ([P] sec. 4): joints are support points of the hull in `arcs` >= 3
 /// uniform directions, tangents are perpendicular to them, and the two lengths of each arc
-/// minimise the exact area between arc and outline. control gets 3 * arcs points. Errors:
+/// minimise the exact area between arc and outline (not [P]'s step 4, which is the swarm:
+/// DEM2D_FIT_SWARM). control gets 3 * arcs points. Errors:
 /// TOO_FEW_POINTS, NOT_FINITE, OUT_OF_RANGE, ZERO_AREA, OUT_OF_MEMORY.
 DEM2D_API dem2d_result dem2d_bezier_fit(const dem2d_env *env, const dem2d_vec *points, int count,
                                         int arcs, dem2d_vec *control);
@@ -966,7 +1038,7 @@ typedef struct dem2d_contact {
 DEM2D_API dem2d_result dem2d_shape_contains(const dem2d_shape *shape, dem2d_pose pose,
                                             dem2d_vec point, bool *inside);
 /// Do two shapes overlap? GJK stopped at the first direction that separates them or the first
-/// simplex that holds the origin ([P], [F] sec. 3). Only state, counts, and bounds are
+/// simplex that holds the origin ([P] sec. 3.1). Only state, counts, and bounds are
 /// meaningful: depth is the least support value met and error its distance to a lower bound.
 DEM2D_API dem2d_result dem2d_pair_overlap(const dem2d_shape *a, dem2d_pose pose_a,
                                           const dem2d_shape *b, dem2d_pose pose_b,
@@ -1385,7 +1457,8 @@ typedef struct dem2d_fabric {
 /// between particles counts for both, with opposite normals.
 typedef enum dem2d_histogram {
     DEM2D_HISTOGRAM_COORDINATION, ///< particles with 0, 1, .. bins - 1 or more contacts, no walls
-    DEM2D_HISTOGRAM_ORIENTATION,  ///< particles by their long axis, in [0, pi); without one: none
+    DEM2D_HISTOGRAM_ORIENTATION,  ///< particles by their long axis ([P] alignment), in [0, pi);
+                                  ///< without one: none
     DEM2D_HISTOGRAM_NORMAL,       ///< contacts by the direction of their normal
     DEM2D_HISTOGRAM_ALONG_BRANCH, ///< contacts by contact branch orientation: from centre to centre
     DEM2D_HISTOGRAM_BRANCH,       ///< m, mean branch along the normal, by the normal's direction
@@ -1398,7 +1471,8 @@ typedef enum dem2d_histogram {
 typedef struct dem2d_equilibrium {
     double mean_speed;    ///< m/s, of the centroids of particles that are not fixed
     double max_speed;     ///< m/s
-    double kinetic_ratio; ///< kinetic over spring energy; 0 at rest, HUGE_VAL without contacts
+    double kinetic_ratio; ///< the papers' relative kinetic energy: kinetic over spring energy; 0 at
+                          ///< rest, HUGE_VAL without contacts
     double unbalanced;    ///< mean |contact forces + weight| of the free over mean contact force
 } dem2d_equilibrium;
 
@@ -2448,8 +2522,8 @@ static double dem2di_arc_rho(const dem2di_arc *arc, double t) {
     return turn > 0 ? 1.5 * speed * (speed / turn * speed) : HUGE_VAL;
 }
 
-/* [P] sec. 3 without its slips: the root of q0 (1-t)^2 + 2 q1 t(1-t) + q2 t^2 with the sum of
-   like signs in the denominator, so that nothing cancels and t is in [0, 1]. */
+/* [P] sec. 2.2, eq. 9 without its slips: the root of q0 (1-t)^2 + 2 q1 t(1-t) + q2 t^2 with the sum
+   of like signs in the denominator, so that nothing cancels and t is in [0, 1]. */
 static double dem2di_arc_parameter(double q0, double q1, double q2) {
     if (q2 > 0) return 1;
     if (q0 < 0) return 0;
@@ -6606,7 +6680,7 @@ static dem2d_contact_state dem2di_judge(const dem2di_pair *pair, const dem2di_se
     return search->upper > rounding ? DEM2D_PENETRATING : DEM2D_TOUCHING;
 }
 
-/* GJK ([P] and [F] sec. 3) in the plane. With `detect` it stops at the first direction that
+/* GJK ([P] sec. 3.1, steps 1-7) in the plane. With `detect` it stops at the first direction that
    separates; otherwise it goes on until distance and separation agree to the tolerance (m).
    Overlap (origin in the simplex, or within rounding of it) is reported as PENETRATING with
    lower = 0: EPA finds the depth. */
@@ -8098,7 +8172,7 @@ static bool dem2di_overlap_contact(const dem2di_overlap *corners, int count, dou
    uses: config, math, memory, support, shapes, gjk, epa, edges, minimum, faces
    ============================================================================================ */
 
-/* [P] and [F] sec. 3: GJK, then EPA when the shapes overlap. */
+/* [P] sec. 3: GJK, then EPA when the shapes overlap. */
 static void dem2di_gjk_epa(dem2di_pair *pair, dem2d_vec start, double tolerance, int cap,
                            bool detect, dem2di_search *search) {
     double absolute = dem2di_max(tolerance, DEM2DI_ROUNDING) * pair->size;
@@ -14799,7 +14873,8 @@ DEM2D_API dem2d_result dem2d_world_write_csv(const dem2d_world *world, const dem
    CHANGES
      0.6.0  DEM2D_GJK_EPA in a world is the papers' way, whole: every pair anew in every step,
             circles too, from the line of centres. DEM2D_ONE_POINT takes the middle at walls, too.
-            dem2d_contact tells EPA's residual.
+            dem2d_contact tells EPA's residual. The manual lists what differs from the papers;
+            the swarm's settings are fields of dem2d_fit_desc; a histogram of branch directions.
             The long axis of a template (dem2d_shape_axis) is exact for every model. Pictures of two
             bytes per pixel, label masks, a region of interest, thresholds and grains in spite of
             frames. Warnings reach the log as DEM2D_WARNING.

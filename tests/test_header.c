@@ -408,6 +408,36 @@ static int check_goto(const doc *d, const doc *hello) {
     return errors;
 }
 
+// The names of the library on a line of the manual that stand nowhere below it. "dem2d_shape_*" is
+// any that begins so.
+static int names_faults(const doc *d, int line, int below) {
+    int errors = 0;
+    for (const char *at = d->line[line]; *at;) {
+        char name[NAME] = {0};
+        const size_t length = strspn(at, word_characters);
+        const bool ours = starts(at, "dem2d_") || starts(at, "DEM2D_");
+        if (ours && length < NAME) {
+            memcpy(name, at, length);
+            const bool family = name[length - 1] == '_';
+            bool found = false;
+            for (int i = below; i < d->count && !found; i++)
+                found = family ? strstr(d->line[i], name) != NULL : has_word(d->line[i], name);
+            if (!found) errors += fault(d, line, "no such name below: ", name);
+        }
+        at += length ? length : 1;
+    }
+    return errors;
+}
+
+static int check_names(const doc *d, const doc *hello) {
+    (void)hello;
+    const int first = line_starting(d, 0, ">>manual"), end = line_starting(d, first, "*/");
+    if (first < 0 || end < 0) return fault(d, -1, "no manual", "");
+    int errors = 0;
+    for (int i = first; i < end; i++) errors += names_faults(d, i, end);
+    return errors;
+}
+
 // The words after "uses:" are anchors above this one, or "nothing".
 static int uses_faults(const doc *d, int line, const list *contents, int self) {
     const char *at = strstr(d->line[line], "uses:") + 5;
@@ -563,6 +593,7 @@ static rule rules[] = {
     {"ASCII, no tabs, 100 columns", check_text},
     {"no goto", check_goto},
     {"sections use those above", check_uses},
+    {"the manual names what is there", check_names},
 };
 
 // The check must reject the sample once `from` (its first occurrence) has become `to`.
@@ -635,6 +666,11 @@ static mutation mutations[] = {
     {"rejects: uses after the heading", check_uses, "   uses: config\n   ========== */\n",
      "   ========== */\n   uses: config\n"},
     {"rejects: no sections", check_uses, "CONTENTS", "WHAT IS IN IT"},
+    {"rejects: a function that is not there", check_names, "QUICK START (the same bytes)\n",
+     "QUICK START: dem2d_versions()\n"},
+    {"rejects: a value that is not there", check_names, "\nERRORS\n", "\nERRORS DEM2D_KINDS.\n"},
+    {"rejects: a family that is not there", check_names, "\nERRORS\n", "\nERRORS dem2d_such_*\n"},
+    {"rejects: no manual", check_names, ">>manual\nQUICK", "manual\nQUICK"},
 };
 
 enum { RULES = sizeof rules / sizeof *rules, MUTATIONS = sizeof mutations / sizeof *mutations };
