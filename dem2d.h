@@ -1168,7 +1168,9 @@ typedef struct dem2d_law_output {
     double state[2];         ///< for the next step
 } dem2d_law_output;
 
-/// A contact law: forces of a contact that is closed. Called by the threads of parallel_for.
+/// A contact law: forces of a contact that is closed. Called by the threads of parallel_for. Of a
+/// contact with a servo wall it is asked once more in a step, by the caller's thread, for a little
+/// more depth and closing speed: the wall learns how the force will rise, and drops that answer.
 typedef void dem2d_law_fn(void *user, const dem2d_law_input *input, dem2d_law_output *output);
 
 /// A world. Only time_step has no default.
@@ -1234,11 +1236,28 @@ typedef struct dem2d_particle_info {
 typedef enum dem2d_wall_mode {
     DEM2D_WALL_STILL,  ///< not at all
     DEM2D_WALL_MOVING, ///< at a given velocity
-    DEM2D_WALL_SERVO   ///< along its normal, so that force = stress * length
+    DEM2D_WALL_SERVO   ///< along its normal, so that force = stress * length: see dem2d_wall_desc
 } dem2d_wall_mode;
 
 /// A half-plane, or a segment. Segments push to both sides and at their ends. Ends of two that are
 /// nearer than a millionth of the shorter one are a joint: a particle there has one contact.
+///
+/// A servo wall moves along its normal so that particles press on it with F = stress * length. In
+/// each step it takes the speed V at which the springs and dashpots of its contacts add up, in the
+/// next force pass, to
+///     F - b (V - D),   b = the greater of 0.2 sqrt(K M) and K dt/4,
+/// with K the stiffness of its contacts and M the mass of their particles, whose own next step is
+/// taken into account. b takes energy from the vibration of the contacts; D is the mean of V over
+/// the last 10 sqrt(M/K), so that the mean force is right while the particles yield steadily (it
+/// gives in where all between servo walls that face each other slides along). This is stable for
+/// every damping ratio and max_speed as long as the time step is for the particles.
+/// V is at most max_speed either way. So fast goes a wall that has touched nothing yet: its first
+/// contact presses with up to (kn dt + c) max_speed in one step, c of the dashpot. A wall that has
+/// lost contact comes back slower, so that this is F at most, and in about 10 sqrt(M/K) faster and
+/// faster. max_speed must be above the speed at which the particles yield, or F is not reached.
+/// The normal of a segment is to the left of the way from point to end: a stress above 0 presses
+/// particles there, those on the other side press against it. With a stress of 0 a wall yields to
+/// what presses it and stands where nothing does; below 0 it leaves, if no law of yours pulls.
 typedef struct dem2d_wall_desc {
     double length;              ///< m, for stress; ignored when spans are given, and by segments
     dem2d_wall_mode mode;       ///< still, moving, servo
@@ -1249,7 +1268,7 @@ typedef struct dem2d_wall_desc {
     dem2d_vec end;              ///< m, of a segment
     dem2d_vec velocity;         ///< m/s, for MOVING
     double stress;              ///< Pa, for SERVO, compression positive
-    double max_speed;           ///< m/s, for SERVO, > 0
+    double max_speed;           ///< m/s, for SERVO, > 0: the greatest, and that without a contact
     dem2d_wall_id spans[2];     ///< the length is the distance between these walls; or both zero
 } dem2d_wall_desc;
 
@@ -9021,12 +9040,25 @@ typedef struct dem2di_wall {
     bool alive;
 } dem2di_wall;
 
+/* What a servo wall pushes against: sums over its closed contacts. */
+typedef struct dem2di_backing {
+    double stiffness; /* N/m, of the springs */
+    double impedance; /* N s/m: how the forces of the next pass rise with the wall's speed */
+    double mass;      /* kg/m, of the free particles */
+} dem2di_backing;
+
 typedef struct dem2di_wall_state {
     dem2d_vec point, velocity;
-    dem2d_vec force;  /* of the particles on it */
-    double stiffness; /* of its contacts */
-    double drift;     /* servo: mean speed along the normal that holds the force */
+    dem2d_vec force;        /* of the particles on it */
+    double drift;           /* servo: mean speed along the normal that holds the force, */
+    dem2di_backing backing; /* and what there was at the last contact */
 } dem2di_wall_state;
+
+/* A contact of a servo wall in the next force pass: it presses with force + rise V, not below 0,
+   when the wall's speed is V; the part `along` of this is against the wall's normal. */
+typedef struct dem2di_push {
+    double force, rise, along;
+} dem2di_push;
 
 /* The listed contacts: of two circles, of two other particles, of particles and walls (in the order
    of the wall, then of the particle's id). Each at the last force pass and in the one being made.
@@ -9171,6 +9203,7 @@ struct dem2d_world {
     dem2di_list list;
     double *load_x, *load_y, *load_turn; /* force and torque of contact i on its A at 2 i, on its B
                                             at 2 i + 1, and 0 behind the last; in scratch */
+    dem2di_push *pushes; /* room for the contacts of a servo wall; in scratch */
     char *scratch; /* what only a step or only the building of the list needs */
     dem2di_tally *tallies;
     dem2di_overlap *overlap; /* contact-area rule: for each block twice what one overlap may have */
@@ -10122,7 +10155,10 @@ static void dem2di_wall_place(dem2d_world *world, int slot, const dem2d_wall_des
     dem2di_wall_state *now = &world->wall_now[slot];
     now->point = desc->point;
     now->velocity = desc->mode == DEM2D_WALL_MOVING ? desc->velocity : dem2di_vec(0, 0);
-    if (desc->mode != DEM2D_WALL_SERVO) now->drift = 0;
+    if (desc->mode != DEM2D_WALL_SERVO) {
+        now->drift = 0;
+        memset(&now->backing, 0, sizeof now->backing);
+    }
     world->wall_before[slot] = *now;
     world->list_stale = true;
     world->ledger.edited = true;
@@ -10919,9 +10955,10 @@ static bool dem2di_bounded(dem2d_world *world) {
            dem2di_has_disc_kernel(world, &world->plan);
 }
 
-/* Of the loads on the partners of so many contacts, x, y and torque, and a 0 behind. */
-static size_t dem2di_loads_bytes(const dem2d_world *world, size_t count) {
-    return 3 * (2 * count + 1) * sizeof *world->load_x;
+/* Of the loads on the partners of so many contacts, x, y and torque, and a 0 behind; then of the
+   pushes of those with walls. */
+static size_t dem2di_loads_bytes(const dem2d_world *world, size_t count, size_t walls) {
+    return 3 * (2 * count + 1) * sizeof *world->load_x + walls * sizeof *world->pushes;
 }
 
 /* No loads yet on the partners of the listed contacts, in scratch memory that has room. */
@@ -10930,7 +10967,8 @@ static void dem2di_loads_clear(dem2d_world *world) {
     world->load_x = (double *)(void *)world->scratch;
     world->load_y = world->load_x + loads;
     world->load_turn = world->load_y + loads;
-    memset(world->load_x, 0, dem2di_loads_bytes(world, (size_t)world->list.count));
+    world->pushes = (dem2di_push *)(void *)(world->load_turn + loads);
+    memset(world->load_x, 0, dem2di_loads_bytes(world, (size_t)world->list.count, 0));
 }
 
 /* Scratch memory for the search, and then for what it found. */
@@ -10951,7 +10989,7 @@ static bool dem2di_build_cut(dem2di_build *build) {
         build->keys = (dem2di_key *)dem2di_cut(&cutter, total, sizeof *build->keys);
         build->touches = (dem2di_order *)dem2di_cut(&cutter, walls, sizeof *build->touches);
         build->spare = (dem2di_order *)dem2di_cut(&cutter, walls, sizeof *build->spare);
-        size_t step = dem2di_loads_bytes(world, total);
+        size_t step = dem2di_loads_bytes(world, total, walls);
         if (pass == 0 && !dem2di_scratch_reserve(world, cutter.used > step ? cutter.used : step))
             return false;
     }
@@ -11449,27 +11487,24 @@ static dem2di_meeting dem2di_meeting_make(const dem2d_world *world, int i, int f
     return meeting;
 }
 
-/* The caller's law for contact i. */
-static void dem2di_call_law(const dem2d_world *world, int i, int from,
-                            const dem2di_meeting *meeting) {
+/* What the caller's law says of contact i at a depth. */
+static void dem2di_ask_law(const dem2d_world *world, int i, int from,
+                           const dem2di_meeting *meeting, double depth, dem2d_law_output *output) {
     const dem2di_list *list = &world->list;
     const dem2di_key *key = &list->keys[i];
-    int at = i - list->discs;
-    dem2di_link *link = &list->next_links[at];
     const dem2di_extra *last = &list->extras[from];
     dem2d_law_input input;
-    dem2d_law_output output;
     memset(&input, 0, sizeof input);
-    memset(&output, 0, sizeof output);
+    memset(output, 0, sizeof *output);
     input.pair = *dem2di_law_of(world, i);
     input.a = dem2di_particle_id(world, key->a);
     if (i < list->pairs)
         input.b = dem2di_particle_id(world, key->b);
     else
         input.wall = dem2di_wall_id(world, key->b);
-    input.normal = link->normal;
+    input.normal = list->next_links[i - list->discs].normal;
     input.time_step = world->time_step;
-    input.depth = link->depth;
+    input.depth = depth;
     input.closing = meeting->closing;
     input.slip = meeting->slip;
     input.turning = meeting->turning;
@@ -11478,11 +11513,20 @@ static void dem2di_call_law(const dem2d_world *world, int i, int from,
     input.tangential_force = list->links[from].shear;
     input.moment = last->moment;
     memcpy(input.state, last->state, sizeof input.state);
-    memcpy(output.state, last->state, sizeof output.state);
-    world->law(world->law_user, &input, &output);
+    memcpy(output->state, last->state, sizeof output->state);
+    world->law(world->law_user, &input, output);
+}
+
+/* The caller's law for contact i. */
+static void dem2di_call_law(const dem2d_world *world, int i, int from,
+                            const dem2di_meeting *meeting) {
+    int at = i - world->list.discs;
+    dem2di_link *link = &world->list.next_links[at];
+    dem2di_extra *extra = &world->list.next_extras[at];
+    dem2d_law_output output;
+    dem2di_ask_law(world, i, from, meeting, link->depth, &output);
     link->force = output.normal_force;
     link->shear = output.tangential_force;
-    dem2di_extra *extra = &list->next_extras[at];
     extra->moment = output.moment;
     extra->energy = output.energy;
     memcpy(extra->state, output.state, sizeof extra->state);
@@ -11974,66 +12018,19 @@ static double dem2di_ends_weight(const dem2di_ends *ends) {
     return ends->weight[0] + ends->weight[1];
 }
 
-/* Forces on the walls and stiffnesses behind them, in the order of the particles' ids. */
+/* Forces on the walls, in the order of the particles' ids. */
 static void dem2di_wall_sums(dem2d_world *world) {
     const dem2di_list *list = &world->list;
     for (int j = 0; j < world->wall_count; j++) {
         world->wall_next[j] = world->wall_now[j];
         world->wall_next[j].force = dem2di_vec(0, 0);
-        world->wall_next[j].stiffness = 0;
     }
     for (int i = list->pairs; i < list->count; i++) {
-        const dem2di_link *link = &list->next_links[i - list->discs];
-        if (!(link->depth > 0)) continue;
+        if (!(list->next_links[i - list->discs].depth > 0)) continue;
         dem2di_wall_state *wall = &world->wall_next[list->keys[i].b];
         wall->force.x += world->load_x[2 * i + 1];
         wall->force.y += world->load_y[2 * i + 1];
-        double stiffness = dem2di_stiffness_of(world, dem2di_law_of(world, i), link);
-        const dem2di_ends *ends = dem2di_ends_at(world, i, true);
-        wall->stiffness += ends != NULL ? stiffness * dem2di_ends_weight(ends) : stiffness;
     }
-}
-
-/* Part of the missing force a servo wall makes up for in one step: below 1 because the contacts
-   behind the wall's own yield as well. */
-#define DEM2DI_SERVO_GAIN 0.8
-
-/* Weight of one step in the drift: its memory of about a hundred steps is long against the
-   vibration of contacts (20 to 60 steps) and short against any loading. */
-#define DEM2DI_SERVO_MEMORY 0.01
-
-/* v = drift + gain (target - force) / (K dt) along the normal; without a contact, at full speed.
-   The drift follows v: without it the force would stay off by v K dt / gain as long as the
-   grains behind the wall spread at v. */
-static dem2d_vec dem2di_servo_velocity(const dem2d_world *world, int j) {
-    const dem2d_wall_desc *desc = &world->walls[j].desc;
-    dem2di_wall_state *wall = &world->wall_next[j];
-    double target = desc->stress * dem2di_wall_length(world, world->wall_now, j);
-    double missing = target + dem2di_dot(wall->force, desc->normal);
-    double speed = missing > 0 ? desc->max_speed : missing < 0 ? -desc->max_speed : 0;
-    if (!(wall->stiffness > 0)) {
-        wall->drift = 0;
-        return dem2di_scale(desc->normal, speed);
-    }
-    double step = DEM2DI_SERVO_GAIN * missing / (wall->stiffness * world->time_step);
-    speed = dem2di_max(-desc->max_speed, dem2di_min(desc->max_speed, wall->drift + step));
-    if (speed == wall->drift + step) wall->drift += DEM2DI_SERVO_MEMORY * step;
-    return dem2di_scale(desc->normal, speed);
-}
-
-/* New wall velocities and points; true when one has left the reach of the list. */
-static bool dem2di_wall_pass(dem2d_world *world) {
-    bool stale = false;
-    for (int j = 0; j < world->wall_count; j++) {
-        const dem2di_wall *wall = &world->walls[j];
-        dem2di_wall_state *next = &world->wall_next[j];
-        if (!wall->alive) continue;
-        if (wall->desc.mode == DEM2D_WALL_SERVO) next->velocity = dem2di_servo_velocity(world, j);
-        next->point = dem2di_along(next->point, world->time_step, next->velocity);
-        double way = dem2di_wall_way(wall, dem2di_sub(next->point, wall->listed));
-        stale = stale || !(way <= wall->skin);
-    }
-    return stale;
 }
 
 /* One after the other, in the order of the partners' ids: contacts that are apart add nothing, so
@@ -12081,6 +12078,220 @@ static DEM2DI_INLINE dem2di_state dem2di_next_state(const dem2d_world *world, in
     if (spin && turns) next.q = dem2di_rotate(next.q, next.w * time_step);
     if (spin && !turns) next.q.c = dem2di_turned(next.q.c, next.w * time_step);
     return next;
+}
+
+/* The same, for the few particles of which it must be known before the others move. */
+static dem2di_state dem2di_foresee(const dem2d_world *world, int slot) {
+    dem2di_damping damping =
+        dem2di_damping_make(world->local_damping, world->global_damping, world->time_step);
+    return dem2di_next_state(world, slot, &damping, true, true, true, world->plan.turns);
+}
+
+/* --- servo walls --------------------------------------------------------------------------------
+   A wall's new speed V along its normal moves it to where the next force pass finds it, and is the
+   speed that the dashpots meet there. A contact whose spring presses with f now presses then with
+       max(0, f + (k dt + c) (V - u)),
+   with its stiffness k, its dashpot c and the speed u at which the particle's surface leaves the
+   wall. The particle's step depends on the forces of this pass alone, so that u is known. The wall
+   takes the V at which these forces, which never fall with V, add up to
+       target - b (V - drift).
+   So the force is right in every step, whatever the dashpots, and no feedback can become unstable.
+   The resistance b takes energy from the vibration of the contacts; as the drift follows V, it
+   does not bias the mean force when the particles yield steadily. */
+
+/* b over sqrt(k m), of the contacts and the particles at the wall: a tenth of the critical damping
+   of one of them, which takes half of the energy of a wave that meets the wall: 1 - (0.8/1.2)^2. */
+#define DEM2DI_SERVO_LOSS 0.2
+
+/* b over k dt is at least this. Where nothing yields behind the wall, each step then makes up for
+   1/1.25 of the missing force: stable up to 2.5 times the stiffness that is known. */
+#define DEM2DI_SERVO_MARGIN 0.25
+
+/* How much of its past the drift forgets in a time of sqrt(m/k): it remembers ten of them, about
+   three contact times, which is long against a vibration and short against any loading. */
+#define DEM2DI_SERVO_MEMORY 0.1
+
+static double dem2di_servo_resistance(const dem2di_backing *backing, double time_step) {
+    double least = DEM2DI_SERVO_MARGIN * backing->stiffness * time_step;
+    double loss = DEM2DI_SERVO_LOSS * sqrt(backing->stiffness * backing->mass);
+    return dem2di_max(least, loss);
+}
+
+/* Part of what it remembers that a servo wall forgets in a step. */
+static double dem2di_servo_forgets(const dem2di_backing *backing, double time_step) {
+    if (!(backing->mass > 0)) return DEM2DI_SERVO_MEMORY;
+    double times = time_step * sqrt(backing->stiffness / backing->mass);
+    return DEM2DI_SERVO_MEMORY * dem2di_min(1, times);
+}
+
+/* A caller's law is asked how its force rises with the speed: for a contact that closes a little
+   faster and is as much deeper. `elastic` is k dt. */
+static void dem2di_push_ask(const dem2d_world *world, int contact, double elastic,
+                            double *impedance, double *spring) {
+    int from = contact - world->list.discs;
+    const dem2di_link *link = &world->list.next_links[from];
+    dem2di_meeting meeting = dem2di_meeting_make(world, contact, from, dem2di_vec(0, 0));
+    double closing = meeting.closing, deeper = link->depth / 16, faster = deeper / world->time_step;
+    dem2d_law_output output;
+    meeting.closing += faster;
+    dem2di_ask_law(world, contact, from, &meeting, link->depth + deeper, &output);
+    *impedance = dem2di_max((output.normal_force - link->force) / faster, *impedance);
+    *spring = link->force - (*impedance - elastic) * closing;
+}
+
+/* A contact of a servo wall in the next pass; what it adds to the wall's backing. */
+static dem2di_push dem2di_push_make(const dem2d_world *world, int contact, dem2d_vec normal,
+                                    dem2di_backing *backing) {
+    const dem2di_list *list = &world->list;
+    const dem2di_link *link = &list->next_links[contact - list->discs];
+    const dem2d_pair_desc *law = dem2di_law_of(world, contact);
+    const dem2di_ends *ends = dem2di_ends_at(world, contact, true);
+    const dem2di_extra *extra = dem2di_extra_at(world, contact, true);
+    int a = list->keys[contact].a;
+    double inverse = world->inverse[a].mass, mass = inverse > 0 ? 1 / inverse : 0;
+    double weight = 1, spring = link->force;
+    dem2d_vec arm = link->point;
+    if (ends != NULL) { /* their springs act at the centre of the weights */
+        weight = dem2di_ends_weight(ends);
+        double offset = ends->weight[0] * ends->offset[0] + ends->weight[1] * ends->offset[1];
+        arm = dem2di_along(arm, offset / weight, dem2di_perp(link->normal));
+    }
+    double stiffness = weight * dem2di_stiffness_of(world, law, link);
+    double elastic = stiffness * world->time_step;
+    double impedance = elastic + weight * dem2di_dashpot(law, mass);
+    if (extra != NULL) spring -= extra->viscous;
+    if (world->law != NULL) dem2di_push_ask(world, contact, elastic, &impedance, &spring);
+    dem2di_state next = dem2di_foresee(world, a);
+    dem2d_vec surface = dem2di_along(next.v, next.w, dem2di_perp(arm));
+    dem2di_push push;
+    push.along = -dem2di_dot(link->normal, normal);
+    push.force = spring + impedance * dem2di_dot(link->normal, surface);
+    push.rise = impedance * push.along;
+    backing->stiffness += stiffness;
+    backing->impedance += impedance;
+    backing->mass += mass;
+    return push;
+}
+
+/* Sum of the forces on a servo wall at a speed, and how it rises with the speed. A caller's law may
+   pull. */
+static double dem2di_pushes_sum(const dem2di_push *pushes, int count, bool pulls, double speed,
+                                double *rise) {
+    double sum = 0;
+    *rise = 0;
+    for (int i = 0; i < count; i++) {
+        double force = pushes[i].force + pushes[i].rise * speed;
+        if (!(force > 0) && !pulls) continue;
+        sum += pushes[i].along * force;
+        *rise += pushes[i].along * pushes[i].rise;
+    }
+    return sum;
+}
+
+/* The speed in [-top, top] at which the pushes and the resistance times the speed add up to `aim`,
+   or come nearest to it, from a guess. Newton's iteration on lines that bend up ends after as many
+   bends; where a segment is pushed from both sides it may leave the bracket, which is then halved.
+ */
+static double dem2di_servo_balance(const dem2di_push *pushes, int count, bool pulls,
+                                   double resistance, double aim, double guess, double top) {
+    double low = -top, high = top, speed = guess, before = -1, rise;
+    if (dem2di_pushes_sum(pushes, count, pulls, high, &rise) + resistance * high <= aim) return top;
+    if (dem2di_pushes_sum(pushes, count, pulls, low, &rise) + resistance * low >= aim) return -top;
+    for (int i = 0; i < 64; i++) { /* halving alone would have come to the rounding of top */
+        double over = dem2di_pushes_sum(pushes, count, pulls, speed, &rise);
+        over += resistance * speed - aim;
+        rise += resistance;
+        if (over == 0 || rise == before) break; /* on the line it was found on */
+        before = rise;
+        if (over > 0)
+            high = speed;
+        else
+            low = speed;
+        double next = speed - over / rise;
+        speed = next > low && next < high ? next : low + (high - low) / 2;
+    }
+    return speed;
+}
+
+/* Without a contact a wall goes at its top speed. Where it has lost contact, so fast only that
+   what it pushed against would meet it with the target and no more: a wall that is thrown off would
+   else come back faster each time. It forgets this as it forgets its drift. */
+static double dem2di_servo_alone(dem2di_wall_state *wall, double target, double top,
+                                 double time_step) {
+    dem2di_backing *backing = &wall->backing;
+    double keep = 1 - dem2di_servo_forgets(backing, time_step);
+    double meets = backing->impedance + dem2di_servo_resistance(backing, time_step);
+    wall->drift = 0;
+    backing->stiffness *= keep;
+    backing->impedance *= keep;
+    backing->mass *= keep;
+    if (!(meets > 0)) return target > 0 ? top : target < 0 ? -top : 0;
+    return dem2di_max(-top, dem2di_min(top, target / meets));
+}
+
+/* Half of what a wall's drift is above that of the servo walls that face it. All that lies between
+   servo walls may slide along at a steady speed, which no force resists: this part of the drift is
+   not followed in full, so that b brings it to rest. When the particles between them yield, the
+   drifts of walls that face each other are equal. */
+static double dem2di_servo_slides(const dem2d_world *world, int j) {
+    dem2d_vec normal = world->walls[j].desc.normal;
+    double sum = 0, weights = 0;
+    for (int i = 0; i < world->wall_count; i++) {
+        const dem2di_wall *other = &world->walls[i];
+        double faces = -dem2di_dot(normal, other->desc.normal);
+        if (!other->alive || other->desc.mode != DEM2D_WALL_SERVO || !(faces > 0)) continue;
+        sum += faces * (world->wall_now[j].drift - world->wall_now[i].drift);
+        weights += faces;
+    }
+    return weights > 0 ? sum / weights / 2 : 0;
+}
+
+/* The new speed of servo wall j along its normal; its listed contacts are from begin to end. */
+static double dem2di_servo_speed(dem2d_world *world, int j, int begin, int end) {
+    const dem2d_wall_desc *desc = &world->walls[j].desc;
+    const dem2di_list *list = &world->list;
+    dem2di_wall_state *wall = &world->wall_next[j];
+    double dt = world->time_step, top = desc->max_speed;
+    double target = desc->stress * dem2di_wall_length(world, world->wall_now, j);
+    dem2di_backing backing = {0, 0, 0};
+    int count = 0;
+    for (int i = begin; i < end; i++)
+        if (list->next_links[i - list->discs].depth > 0)
+            world->pushes[count++] = dem2di_push_make(world, i, desc->normal, &backing);
+    if (count == 0) return dem2di_servo_alone(wall, target, top, dt);
+    double resistance = dem2di_servo_resistance(&backing, dt);
+    double guess = dem2di_dot(wall->velocity, desc->normal);
+    guess = dem2di_max(-top, dem2di_min(top, guess)); /* top may have been set lower */
+    double speed =
+        dem2di_servo_balance(world->pushes, count, world->law != NULL, resistance,
+                             target + resistance * wall->drift, guess, top);
+    wall->drift += dem2di_servo_forgets(&backing, dt) *
+                   (speed - wall->drift - dem2di_servo_slides(world, j));
+    wall->backing = backing;
+    return speed;
+}
+
+/* New wall velocities and points; true when one has left the reach of the list. Contacts with walls
+   are listed in the order of the walls. */
+static bool dem2di_wall_pass(dem2d_world *world) {
+    const dem2di_list *list = &world->list;
+    bool stale = false;
+    int begin = list->pairs, end;
+    for (int j = 0; j < world->wall_count; j++) {
+        const dem2di_wall *wall = &world->walls[j];
+        dem2di_wall_state *next = &world->wall_next[j];
+        if (!wall->alive) continue;
+        if (wall->desc.mode == DEM2D_WALL_SERVO) {
+            while (begin < list->count && list->keys[begin].b < j) begin++;
+            for (end = begin; end < list->count && list->keys[end].b == j;) end++;
+            double speed = dem2di_servo_speed(world, j, begin, end);
+            next->velocity = dem2di_scale(wall->desc.normal, speed);
+        }
+        next->point = dem2di_along(next->point, world->time_step, next->velocity);
+        double way = dem2di_wall_way(wall, dem2di_sub(next->point, wall->listed));
+        stale = stale || !(way <= wall->skin);
+    }
+    return stale;
 }
 
 /* New velocities and positions of the particles from begin to end, over the states of the last
@@ -12167,11 +12378,8 @@ static void dem2di_book_motion(dem2d_world *world) {
 
 /* A particle that the step would give a state that is not finite, or -1. */
 static int dem2di_unsound(const dem2d_world *world) {
-    dem2di_damping damping =
-        dem2di_damping_make(world->local_damping, world->global_damping, world->time_step);
     for (int i = 0; i < world->body_count; i++) {
-        dem2di_state next =
-            dem2di_next_state(world, i, &damping, true, true, true, world->plan.turns);
+        dem2di_state next = dem2di_foresee(world, i);
         if (!dem2di_state_finite(&next)) return i;
     }
     return -1;
@@ -13180,7 +13388,7 @@ static dem2d_result dem2di_writer_close(const dem2d_env *env, const char *path,
    on different systems, so that a copy as text is noticed. Whoever changes the list of fields
    changes the version. */
 #define DEM2DI_SNAPSHOT_MARK 0x0A0D64326D65648Du /* 8D "dem2d" 0D 0A */
-#define DEM2DI_SNAPSHOT_VERSION 2u
+#define DEM2DI_SNAPSHOT_VERSION 3u
 #define DEM2DI_SNAPSHOT_HEAD 24 /* bytes: mark, version, size */
 #define DEM2DI_SNAPSHOT_TAIL 8  /* the checksum */
 
@@ -13565,8 +13773,10 @@ static void dem2di_archive_wall_state(dem2di_archive *ar, dem2di_wall_state *sta
     dem2di_archive_vec(ar, "point", &state->point);
     dem2di_archive_vec(ar, "velocity", &state->velocity);
     dem2di_archive_vec(ar, "force", &state->force);
-    dem2di_archive_finite(ar, "stiffness", &state->stiffness);
     dem2di_archive_finite(ar, "drift", &state->drift);
+    dem2di_archive_not_negative(ar, "stiffness", &state->backing.stiffness);
+    dem2di_archive_not_negative(ar, "impedance", &state->backing.impedance);
+    dem2di_archive_not_negative(ar, "mass", &state->backing.mass);
 }
 
 /* Of an open contact, beside its normal and depth. */
@@ -13890,7 +14100,9 @@ static void dem2di_archive_keys(dem2di_archive *ar, dem2d_world *w) {
     bool fits = ar->aim != DEM2DI_LOADING ||
                 (dem2di_list_reserve(w, &w->plan, list->discs, list->count) &&
                  dem2di_tallies_reserve(w, list->discs, list->count) &&
-                 dem2di_scratch_reserve(w, dem2di_loads_bytes(w, (size_t)list->count)));
+                 dem2di_scratch_reserve(
+                     w, dem2di_loads_bytes(w, (size_t)list->count,
+                                           (size_t)(list->count - list->pairs))));
     if (!dem2di_archive_room(ar, fits)) return;
     for (int i = 0; i < list->count && dem2di_archive_good(ar); i++) {
         int others = i < list->pairs ? w->body_count : w->wall_count;
@@ -14878,6 +15090,9 @@ DEM2D_API dem2d_result dem2d_world_write_csv(const dem2d_world *world, const dem
             The long axis of a template (dem2d_shape_axis) is exact for every model. Pictures of two
             bytes per pixel, label masks, a region of interest, thresholds and grains in spite of
             frames. Warnings reach the log as DEM2D_WARNING.
+            Servo walls know the dashpots of their contacts and the next step of the particles: they
+            hold their stress for every damping ratio, and those that face each other come to rest.
+            Snapshots of version 3.
      0.5.0  The two points of faces conserve energy between free polygons as well: each has a
             normal of its own and tells its energy. Snapshots of version 2.
      0.4.0  Dashpots by restitution, rolling friction, a caller's law, segment walls. Measures of
