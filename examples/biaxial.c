@@ -29,6 +29,7 @@ static const char usage[] =
     "  --shapes SET      mixed (all five), noncircular (ellipse, polygon, bezier), or a\n"
     "                    comma-separated list of circle, ellipse, polygon, bezier, fs (mixed)\n"
     "  --damping KIND    local (Cundall, 0.7) or global (viscous, 0.7 1/s) (local)\n"
+    "  --restitution E   of head-on collisions, 0.01 to 1: below 1 contacts have a dashpot (1)\n"
     "  --solver NAME     of contacts: certified or gjk (GJK and EPA) (certified)\n"
     "  --faces RULE      forces where faces meet: two (points), one, or area (two)\n"
     "  --grains PATH     bezier and fs grains from an image (PBM, PGM), an outline (CSV, first\n"
@@ -56,6 +57,7 @@ typedef struct options {
     uint64_t seed;
     bool kinds[KINDS];
     bool global_damping;
+    double damping_ratio; // of the contacts' dashpots
     bool quick, pairs, vtk, ledger;
     int solver, faces;  // dem2d_solver, dem2d_face_rule
     const char *grains; // or NULL
@@ -69,13 +71,14 @@ static options parse_options(int count, char **arguments) {
     parse_shapes("mixed", o.kinds);
     static const char *const names[] = {
         "--quick", "--particles=", "--seed=",  "--shapes=", "--damping=", "--grains=",
-        "--out=",  "--solver=",    "--faces=", "--pairs",   "--vtk",      "--ledger"};
+        "--out=",  "--solver=",    "--faces=", "--pairs",   "--vtk",      "--ledger",
+        "--restitution="};
     static const char *const dampings[] = {"local", "global"};
     static const char *const solvers[] = {"certified", "gjk"};
     static const char *const rules[] = {"two", "one", "area"};
     for (int i = 1; i < count; i++) {
         const char *name = arguments[i], *value;
-        const int which = parse_option(count, arguments, &i, usage, names, 12, &value);
+        const int which = parse_option(count, arguments, &i, usage, names, 13, &value);
         if (which == 0) o.quick = true;
         if (which == 1) o.particles = (int)parse_integer(name, value, 10, 1000000);
         if (which == 2) o.seed = parse_integer(name, value, 0, UINT64_MAX);
@@ -88,6 +91,8 @@ static options parse_options(int count, char **arguments) {
         if (which == 9) o.pairs = true;
         if (which == 10) o.vtk = true;
         if (which == 11) o.ledger = true;
+        if (which == 12)
+            must(dem2d_damping_ratio(parse_real(name, value, 0.01, 1), &o.damping_ratio), name);
     }
     if (o.particles == 0) o.particles = o.quick ? 100 : 500;
     return o;
@@ -484,6 +489,7 @@ static void build_world(job *j, const options *o) {
     stone.normal_stiffness = 1e7; // N/m
     stone.tangential_stiffness = 1e7;
     stone.friction = 0.2;
+    stone.damping_ratio = o->damping_ratio;
     must(dem2d_world_add_material(j->world, &stone, &j->grain_material), "material");
     must(dem2d_world_add_material(j->world, &stone, &j->wall_material), "material");
 }
@@ -562,6 +568,7 @@ static bool consolidate(job *j) {
     dem2d_pair_desc smooth = {0};
     smooth.normal_stiffness = 1e7;
     smooth.tangential_stiffness = 1e7;
+    smooth.damping_ratio = j->options->damping_ratio;
     j->stage = CONSOLIDATION;
     must(dem2d_world_set_gravity(j->world, no_gravity), "gravity");
     must(dem2d_world_set_pair(j->world, j->grain_material, j->wall_material, &smooth), "friction");
