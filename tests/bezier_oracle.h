@@ -838,4 +838,306 @@ CASE_HELPER const char *wall_flaw(const pair *p, const wall *w, const dem2d_cont
     return NULL;
 }
 
+/* --- in a world ------------------------------------------------------------------------------ */
+
+/* The world's default for its contact_tolerance: of R_A + R_B + |d|. */
+#define WORLD_TOLERANCE 1e-8
+
+static dem2d_world *world_make(const pair *p, dem2d_vec start, dem2d_vec end, pair *placed) {
+    dem2d_world_desc desc = {0};
+    dem2d_material_desc material = {0};
+    dem2d_wall_desc segment = {0};
+    dem2d_world *world;
+    dem2d_wall_id wall_id;
+    desc.time_step = 1, desc.skip_time_step_check = true;
+    material.density = 1, material.normal_stiffness = 1e-6;
+    bool good = dem2d_world_create(&desc, &world) == DEM2D_OK &&
+                dem2d_world_add_material(world, &material, &segment.material) == DEM2D_OK;
+    segment.segment = true, segment.point = start, segment.end = end;
+    good = good && dem2d_world_add_wall(world, &segment, &wall_id) == DEM2D_OK;
+    *placed = *p;
+    for (int i = 0; good && i < 2; i++) {
+        const dem2d_pose *pose = i ? &p->pose_b : &p->pose_a;
+        dem2d_particle_desc particle = {0};
+        dem2d_particle_info info;
+        dem2d_particle_id id;
+        particle.material = segment.material, particle.position = pose->position;
+        particle.angle = dem2d_rot_angle(pose->rotation), particle.scale = pose->scale;
+        good = dem2d_world_add_shape(world, i ? p->b->shape : p->a->shape, &particle.shape) ==
+                   DEM2D_OK &&
+               dem2d_world_add_particle(world, &particle, &id) == DEM2D_OK &&
+               dem2d_world_get_particle(world, id, &info) == DEM2D_OK;
+        if (good) *(i ? &placed->pose_b : &placed->pose_a) = info.pose;
+    }
+    if (!good) case_broken("no world");
+    return world;
+}
+
+/* One contact, or none, where the truth has an overlap, or a gap. Of two points the normal is that
+   of their force. */
+static const char *listed_flaw(const pair *p, const dem2d_contact_info *c) {
+    const truth t = find_truth(p);
+    const real room = 2 * WORLD_TOLERANCE * pair_size(p);
+    if (c == NULL) return t.lower > room ? "no contact in the world" : NULL;
+    if (!(fabsl(c->depth - t.depth) <= room + t.depth - t.lower))
+        return "another depth in the world";
+    if (c->points == 1 && !(pair_value(p, spot_unit(spot_from(c->normal))) <= t.depth + 2 * room))
+        return "the normal in the world does not give the depth";
+    return NULL;
+}
+
+/* A segment that touches one of two shapes somewhere, and they one another, in a world. */
+CASE_HELPER const char *world_flaw(const pair *p, const wall *w, double length) {
+    const model line = {
+        .kind = POLYGON, .count = 2, .points = {{0, 0}, {1, 0}}, .info = {.circumscribed = 1}};
+    const dem2d_vec n = w->normal, start = w->point;
+    const dem2d_vec end = {start.x + length * n.y, start.y - length * n.x};
+    dem2d_contact_info found[3];
+    int count;
+    pair placed;
+    const char *flaw = NULL;
+    dem2d_world *world = world_make(p, start, end, &placed);
+    if (dem2d_world_step(world, 1, NULL) != DEM2D_OK ||
+        dem2d_world_contacts(world, found, 3, &count) != DEM2D_OK)
+        case_broken("a world without a step");
+    const dem2d_pose along = {
+        start, {(end.x - start.x) / length, (end.y - start.y) / length}, length};
+    const pair pairs[3] = {
+        placed, {placed.a, &line, placed.pose_a, along}, {placed.b, &line, placed.pose_b, along}};
+    for (int i = 0; i < 3 && flaw == NULL; i++) {
+        const dem2d_contact_info *contact = NULL;
+        for (int k = 0; k < count; k++) {
+            const bool with_wall = found[k].wall.generation != 0;
+            if (with_wall == (i > 0) && (!with_wall || (int)found[k].a.index == i - 1))
+                contact = &found[k];
+        }
+        flaw = listed_flaw(&pairs[i], contact);
+    }
+    dem2d_world_destroy(world);
+    return flaw;
+}
+
+/* --- what is counted ------------------------------------------------------------------------- */
+
+enum {
+    CREATION,
+    MEASURES,
+    BOUND,
+    STATE,
+    NORMAL,
+    OUTLINE,
+    PLACE,
+    UNRESOLVED,
+    BOX,
+    WALL,
+    WORLD,
+    CHECKS
+};
+static const char *const check_names[CHECKS] = {"made",   "mass",    "bound", "state",
+                                                "normal", "outline", "place", "gaveup",
+                                                "box",    "wall",    "world"};
+
+typedef struct row {
+    int64_t drawn, refused, pairs, states[4], unproved, flaws[CHECKS];
+} row;
+
+/* What is wrong, with what, how often, and the first pair. */
+typedef struct flaw_count {
+    const char *text;
+    int curve, written, partner; /* partner: KINDS if none */
+    int64_t count;
+    uint64_t number;
+} flaw_count;
+
+/* One of so many pairs in a world; pairs from one pool; grains and other shapes of each kind in it;
+   flaws that are told apart. Partners: the models of contact_cases.h up to Fourier series; for
+   BEZIER a grain. */
+enum {
+    WORLDS = 8,
+    BLOCK = 8192,
+    GRAINS = 12,
+    PARTNERS = 12,
+    FLAWS = 512,
+    PARTNER_KINDS = FOURIER + 1
+};
+
+typedef struct campaign {
+    uint64_t series, number; /* the seed; the pair that is tried */
+    int printed;             /* so many of a flaw are printed */
+    int64_t failures;
+    row rows[CURVES][WRITTEN];
+    flaw_count flaws[FLAWS];
+    grain grains[CURVES][GRAINS];
+    model partners[PARTNER_KINDS][PARTNERS];
+} campaign;
+
+/* Counts a flaw; true for the first few of a kind, which are printed. */
+static bool count_flaw(campaign *all, const grain *g, int check, int partner, const char *text) {
+    flaw_count *f = all->flaws;
+    all->failures++;
+    all->rows[g->curve][g->written].flaws[check]++;
+    while (f < &all->flaws[FLAWS - 1] && f->text != NULL &&
+           (strcmp(f->text, text) != 0 || f->curve != g->curve || f->written != g->written ||
+            f->partner != partner))
+        f++;
+    if (f->text == NULL) f->number = all->number;
+    f->text = text, f->curve = g->curve, f->written = g->written, f->partner = partner;
+    return ++f->count <= all->printed;
+}
+
+static void print_log(void *user, dem2d_result result, int index, const char *text) {
+    (void)user;
+    fprintf(stderr, "      %s (%d): %s\n", dem2d_result_text(result), index, text);
+}
+
+static void print_grain(const campaign *all, const grain *g, const char *text) {
+    const dem2d_pose none = {{0, 0}, {1, 0}, 1};
+    const dem2d_env env = {NULL, NULL, NULL, print_log};
+    dem2d_shape *shape;
+    fprintf(stderr, "\nFAIL  %s: %s, written as %s: %s (%s; kink %.3Lg)\n",
+            g->m.shape == NULL ? "creation" : "measures", curve_names[g->curve],
+            written_names[g->written], text, dem2d_result_text(g->result), g->kink);
+    fprintf(stderr, "      fuzz_bezier 1 %llu %llu\n", (unsigned long long)all->series,
+            (unsigned long long)all->number);
+    print_model("grain", &g->m, &none);
+    if (dem2d_shape_create_bezier(&env, g->m.points, g->m.count / 3, &shape) == DEM2D_OK)
+        dem2d_shape_destroy(shape);
+}
+
+/* --- grains and partners --------------------------------------------------------------------- */
+
+/* Draws until one is accepted. */
+static void pool_grain(campaign *all, grain *g, int kind, uint64_t seed) {
+    for (int i = 0; i < 20; i++) {
+        grain_draw(g, kind, seed + (uint64_t)i * 0x632be59bd9b4e019u);
+        row *r = &all->rows[g->curve][g->written];
+        r->drawn++, r->refused += g->m.shape == NULL;
+        const char *flaw = creation_flaw(g);
+        if (flaw != NULL && count_flaw(all, g, CREATION, KINDS, flaw)) print_grain(all, g, flaw);
+        if (g->m.shape == NULL) continue;
+        flaw = measures_flaw(g);
+        if (flaw != NULL && count_flaw(all, g, MEASURES, KINDS, flaw)) print_grain(all, g, flaw);
+        return;
+    }
+}
+
+static void pool_fill(campaign *all, uint64_t block) {
+    dice d = {all->series * 0x9e3779b97f4a7c15u ^ block * 0xbf58476d1ce4e5b9u};
+    for (int k = 0; k < CURVES; k++)
+        for (int i = 0; i < GRAINS; i++) pool_grain(all, &all->grains[k][i], k, dice_next(&d));
+    for (int k = 0; k < PARTNER_KINDS; k++)
+        for (int i = 0; i < PARTNERS && k != BEZIER; i++) model_draw(&all->partners[k][i], k, &d);
+}
+
+static void pool_empty(campaign *all) {
+    for (int k = 0; k < CURVES; k++)
+        for (int i = 0; i < GRAINS; i++) dem2d_shape_destroy(all->grains[k][i].m.shape);
+    for (int k = 0; k < PARTNER_KINDS; k++)
+        for (int i = 0; i < PARTNERS && k != BEZIER; i++)
+            dem2d_shape_destroy(all->partners[k][i].shape);
+}
+
+/* --- one pair -------------------------------------------------------------------------------- */
+
+static void report(campaign *all, const grain *g, int check, const pair *p, const dem2d_contact *c,
+                   const char *flaw) {
+    if (flaw == NULL) return;
+    if (!count_flaw(all, g, check,
+                    p->b == NULL    ? KINDS
+                    : p->b == &g->m ? p->a->kind
+                                    : p->b->kind,
+                    flaw))
+        return;
+    fprintf(stderr, "\nFAIL  %s: %s, written as %s: %s\n", check_names[check],
+            curve_names[g->curve], written_names[g->written], flaw);
+    fprintf(stderr, "      fuzz_bezier 1 %llu %llu\n", (unsigned long long)all->series,
+            (unsigned long long)all->number);
+    print_model("A", p->a, &p->pose_a);
+    if (p->b != NULL) print_model("B", p->b, &p->pose_b);
+    const truth t = find_truth(p);
+    fprintf(stderr,
+            "size %.17g; true depth %.21Lg (proved above %.21Lg), normal {%.21Lg, %.21Lg}\n",
+            pair_size(p), t.depth, t.lower, t.u.x, t.u.y);
+    if (c == NULL) return;
+    print_answer("answer", c, p);
+    fprintf(stderr, "    of the size: point_a below A's outline by %.3Lg",
+            depth_in(p->a, &p->pose_a, c->point_a.x, c->point_a.y) / pair_size(p));
+    if (p->b != NULL)
+        fprintf(stderr, ", point_b below B's by %.3Lg",
+                depth_in(p->b, &p->pose_b, c->point_b.x, c->point_b.y) / pair_size(p));
+    fprintf(stderr, "\n");
+}
+
+/* How the pair is asked for: tolerance and first direction. */
+static dem2d_contact_desc draw_desc(dice *d) {
+    static const double tolerances[] = {0, 0, 0, 1e-8, 1e-12, 1e-14};
+    dem2d_contact_desc desc = {0};
+    desc.tolerance = tolerances[dice_below(d, 6)];
+    if (dice_below(d, 4) == 0) desc.start = spot_rounded(dice_direction(d));
+    return desc;
+}
+
+static void check_contact(campaign *all, const grain *g, const pair *p, real kink,
+                          const dem2d_contact_desc *desc) {
+    dem2d_contact c;
+    if (dem2d_pair_contact(p->a->shape, p->pose_a, p->b->shape, p->pose_b, desc, &c) != DEM2D_OK)
+        case_broken("a pair was refused");
+    const double tolerance = desc->tolerance > 0 ? desc->tolerance : CASE_TOLERANCE;
+    const truth t = find_truth(p);
+    row *r = &all->rows[g->curve][g->written];
+    r->pairs++, r->states[c.state & 3]++;
+    r->unproved += !(t.depth - t.lower <= 1e-16L * pair_size(p));
+    report(all, g, BOUND, p, &c, bound_flaw(p, &c, &t, tolerance, kink));
+    report(all, g, STATE, p, &c, state_flaw(p, &c, &t));
+    report(all, g, UNRESOLVED, p, &c, unresolved_flaw(p, &c, &t, tolerance));
+    report(all, g, OUTLINE, p, &c, outline_flaw(p, &c));
+    if (c.state == DEM2D_UNRESOLVED) return;
+    const real value = pair_value(p, spot_unit(spot_from(c.normal)));
+    report(all, g, NORMAL, p, &c, normal_flaw(p, &c, value, tolerance, depth_slack(p)));
+    report(all, g, PLACE, p, &c, place_flaw(p, &c, tolerance));
+}
+
+static void check_wall(campaign *all, const grain *g, const pair *p, dice *d) {
+    const wall w = wall_draw(p, d);
+    const pair half = {p->a, NULL, p->pose_a, {w.point, {1, 0}, 1}};
+    dem2d_contact c;
+    report(all, g, BOX, &half, NULL, box_flaw(p));
+    if (dem2d_wall_contact(p->a->shape, p->pose_a, w.point, w.normal, &c) != DEM2D_OK)
+        case_broken("a wall was refused");
+    report(all, g, WALL, &half, &c, wall_flaw(p, &w, &c));
+    if (dice_below(d, WORLDS) == 0)
+        report(all, g, WORLD, p, NULL, world_flaw(p, &w, dice_scale(d, 0.1, 10)));
+}
+
+static void try_pair(campaign *all) {
+    dice d = {all->series * 0x9e3779b97f4a7c15u ^ all->number * 0xd1342543de82ef95u};
+    const int kind_a = (int)(all->number % CURVES),
+              kind = (int)(all->number / CURVES % PARTNER_KINDS);
+    const grain *g = &all->grains[kind_a][dice_below(&d, GRAINS)];
+    const grain *other = &all->grains[dice_below(&d, CURVES)][dice_below(&d, GRAINS)];
+    const model *b = kind == BEZIER ? &other->m : &all->partners[kind][dice_below(&d, PARTNERS)];
+    const double size_b = kind == BEZIER ? other->size : 1;
+    const dem2d_contact_desc desc = draw_desc(&d);
+    if (g->m.shape == NULL || b->shape == NULL) return;
+    pair p = pair_draw(&g->m, g->size, b, size_b, &d);
+    check_wall(all, g, &p, &d);
+    if (dice_below(&d, 2)) p = (pair){p.b, p.a, p.pose_b, p.pose_a};
+    check_contact(all, g, &p, fmaxl(g->kink, kind == BEZIER ? other->kink : 0), &desc);
+}
+
+/* Tries `count` pairs from number `first` on. */
+CASE_HELPER void campaign_run(campaign *all, uint64_t first, uint64_t count) {
+    uint64_t block = 0;
+    for (uint64_t i = 0; i < count; i++) {
+        all->number = first + i;
+        if (i == 0 || all->number / BLOCK != block) {
+            if (i > 0) pool_empty(all);
+            block = all->number / BLOCK;
+            pool_fill(all, block);
+        }
+        try_pair(all);
+    }
+    if (count > 0) pool_empty(all);
+}
+
 #endif

@@ -47,7 +47,7 @@ static real spot_cross(spot a, spot b) {
 }
 
 static spot spot_unit(spot a) {
-    const real length = hypotl(a.x, a.y);
+    const real length = sqrtl(a.x * a.x + a.y * a.y); /* squares of doubles are in range */
     return spot_make(a.x / length, a.y / length);
 }
 
@@ -420,21 +420,28 @@ static spot arc_point(const model *m, int first, real t) {
 
 /* Which arc of a polybezier is farthest along u, by its first control point, and where on it: of
    all arcs, whether they join smoothly or not. An arc is inside the hull of its control points:
-   most are ruled out by that. */
+   most are ruled out by that in double. Rounding of u, of products and of sums is 2.5 eps of the
+   coordinates, on both sides of a comparison. */
 static int arcs_farthest(const model *m, spot u, real *place) {
-    real p[MODEL_POINTS + 1], most = -HUGE_VALL, value;
-    int best = 0;
+    double p[MODEL_POINTS + 1], size = 0, most = -HUGE_VAL;
+    const double ux = (double)u.x, uy = (double)u.y;
+    real best = -HUGE_VALL, value, q[4];
+    int arc = 0;
     for (int i = 0; i < m->count; i++) {
-        p[i] = spot_dot(control_point(m, i), u);
-        if (i % 3 == 0 && p[i] > most) most = p[i], best = i;
+        const double x = m->points[i].x, y = m->points[i].y, reach = fabs(x) + fabs(y);
+        p[i] = x * ux + y * uy;
+        size = reach > size ? reach : size;
     }
-    p[m->count] = p[0], *place = 0;
+    p[m->count] = p[0];
+    for (int i = 0; i < m->count; i += 3) most = p[i] > most ? p[i] : most;
+    most -= 8 * DBL_EPSILON * size;
     for (int i = 0; i < m->count; i += 3) {
-        if (!(fmaxl(p[i + 1], p[i + 2]) > most)) continue;
-        const real t = arc_farthest(&p[i], &value);
-        if (value > most) most = value, best = i, *place = t;
+        if (p[i] < most && p[i + 1] < most && p[i + 2] < most && p[i + 3] < most) continue;
+        for (int k = 0; k < 4; k++) q[k] = spot_dot(control_point(m, i + k), u);
+        const real t = arc_farthest(q, &value);
+        if (value > best) best = value, arc = i, *place = t;
     }
-    return best;
+    return arc;
 }
 
 static spot arcs_support(const model *m, spot u) {
@@ -519,7 +526,7 @@ typedef struct truth {
     spot u;
 } truth;
 
-enum { SCAN_DIRECTIONS = 48, SCAN_EVALUATIONS = 3000 };
+enum { SCAN_DIRECTIONS = 24, SCAN_EVALUATIONS = 3000 };
 
 typedef struct scan {
     const pair *p;
@@ -559,18 +566,30 @@ static real arc_bound(spot u0, spot w0, spot u1, spot w1) {
     return fminl(arc_least(w0, u0, n), arc_least(w1, n, u1));
 }
 
-/* A dip between u0 and u1, where h' goes from below 0 to above. */
-static void scan_bisect(scan *s, spot u0, spot w0, spot u1, spot w1) {
-    for (int i = 0; i < 70; i++) {
-        const spot u = spot_unit(spot_make(u0.x + u1.x, u0.y + u1.y));
-        if ((u.x == u0.x && u.y == u0.y) || (u.x == u1.x && u.y == u1.y)) break;
+static bool scan_dips(spot u0, spot w0, spot u1, spot w1) {
+    return spot_cross(u0, w0) <= 0 && spot_cross(u1, w1) >= 0;
+}
+
+/* The lowest place of a dip between u0 and u1, where h' goes from below 0 to above: by turns where
+   a line through both slopes is 0, where two support points are equally far, in the middle. */
+static void scan_descend(scan *s, spot u0, spot w0, spot u1, spot w1) {
+    for (int i = 0; i < 200; i++) {
+        const real f0 = -spot_cross(u0, w0), f1 = spot_cross(u1, w1), part = f0 / (f0 + f1);
+        spot u = spot_unit(spot_make(u0.x + u1.x, u0.y + u1.y));
+        if (arc_bound(u0, w0, u1, w1) >= s->found.depth - s->tolerance) return;
+        if (i % 3 == 0 && f0 + f1 > 0)
+            u = spot_unit(spot_make(u0.x + part * (u1.x - u0.x), u0.y + part * (u1.y - u0.y)));
+        if (i % 3 == 1) u = chord_normal(u0, w0, u1, w1);
+        if ((u.x == u0.x && u.y == u0.y) || (u.x == u1.x && u.y == u1.y)) {
+            if (i % 3 == 2) return;
+            continue;
+        }
         const spot w = scan_look(s, u);
         if (spot_cross(u, w) < 0)
             u0 = u, w0 = w;
         else
             u1 = u, w1 = w;
     }
-    scan_look(s, chord_normal(u0, w0, u1, w1));
 }
 
 static void scan_prove(scan *s, spot u0, spot w0, spot u1, spot w1, int halvings) {
@@ -579,13 +598,13 @@ static void scan_prove(scan *s, spot u0, spot w0, spot u1, spot w1, int halvings
         s->found.lower = fminl(s->found.lower, bound);
         return;
     }
-    scan_look(s, chord_normal(u0, w0, u1, w1));
+    if (scan_dips(u0, w0, u1, w1)) scan_look(s, chord_normal(u0, w0, u1, w1));
     const spot u = spot_unit(spot_make(u0.x + u1.x, u0.y + u1.y)), w = scan_look(s, u);
     scan_prove(s, u0, w0, u, w, halvings - 1);
     scan_prove(s, u, w, u1, w1, halvings - 1);
 }
 
-/* Directions all round, bisection of h' in each dip that could be the least, and the proof that
+/* Directions all round, the lowest place of each dip that could be the least, and the proof that
    there is no other. */
 CASE_HELPER truth find_truth(const pair *p) {
     scan s = {p, {HUGE_VALL, HUGE_VALL, {1, 0}}, 1e-17L * pair_size(p), SCAN_EVALUATIONS};
@@ -596,9 +615,8 @@ CASE_HELPER truth find_truth(const pair *p) {
     }
     u[SCAN_DIRECTIONS] = u[0], w[SCAN_DIRECTIONS] = w[0];
     for (int i = 0; i < SCAN_DIRECTIONS; i++)
-        if (spot_cross(u[i], w[i]) <= 0 && spot_cross(u[i + 1], w[i + 1]) >= 0 &&
-            arc_bound(u[i], w[i], u[i + 1], w[i + 1]) < s.found.depth)
-            scan_bisect(&s, u[i], w[i], u[i + 1], w[i + 1]);
+        if (scan_dips(u[i], w[i], u[i + 1], w[i + 1]))
+            scan_descend(&s, u[i], w[i], u[i + 1], w[i + 1]);
     for (int i = 0; i < SCAN_DIRECTIONS; i++) scan_prove(&s, u[i], w[i], u[i + 1], w[i + 1], 60);
     s.found.lower = fminl(s.found.lower, s.found.depth);
     return s.found;
