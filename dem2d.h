@@ -831,11 +831,13 @@ DEM2D_API dem2d_result dem2d_outline_set_get(const dem2d_outline_set *set, int i
                                              dem2d_outline *outline);
 /// Release a set; NULL is allowed.
 DEM2D_API void dem2d_outline_set_destroy(dem2d_outline_set *set);
-/// Measures of a simple outline, either orientation. Errors: NULL_ARGUMENT, TOO_FEW_POINTS,
-/// NOT_FINITE, ZERO_AREA, OUT_OF_MEMORY.
+/// Measures of an outline, either orientation. It may touch itself, but no two edges may cross, and
+/// it must wind around each point once or not at all. Errors: NULL_ARGUMENT, TOO_FEW_POINTS,
+/// NOT_FINITE, CROSSING (the log names two edges and the place), ZERO_AREA, OUT_OF_MEMORY.
 DEM2D_API dem2d_result dem2d_outline_measure(const dem2d_env *env, const dem2d_vec *points,
                                              int count, dem2d_outline_info *info);
-/// Difference of two simple outlines, exact but for rounding. Errors as above.
+/// Difference of two outlines, exact but for rounding. Of one that crosses itself a place is inside
+/// that is wound around an odd number of times. Errors as above, without CROSSING.
 DEM2D_API dem2d_result dem2d_outline_compare(const dem2d_env *env, const dem2d_vec *reference,
                                              int reference_count, const dem2d_vec *other,
                                              int other_count, dem2d_difference *difference);
@@ -890,7 +892,7 @@ DEM2D_API dem2d_result dem2d_fourier_reduce(double *a, double *b, int order,
 /// uniform directions, tangents are perpendicular to them, and the two lengths of each arc
 /// minimise the exact area between arc and outline (not [P]'s step 4, which is the swarm:
 /// DEM2D_FIT_SWARM). control gets 3 * arcs points. Errors:
-/// TOO_FEW_POINTS, NOT_FINITE, OUT_OF_RANGE, ZERO_AREA, OUT_OF_MEMORY.
+/// TOO_FEW_POINTS, NOT_FINITE, OUT_OF_RANGE, CROSSING, ZERO_AREA, OUT_OF_MEMORY.
 DEM2D_API dem2d_result dem2d_bezier_fit(const dem2d_env *env, const dem2d_vec *points, int count,
                                         int arcs, dem2d_vec *control);
 
@@ -941,9 +943,10 @@ typedef struct dem2d_fit_report {
     int iterations;    ///< steps of the method, all attempts together
 } dem2d_fit_report;
 
-/// Fit a template to a simple outline, convex or not. Errors: NULL_ARGUMENT, TOO_FEW_POINTS,
-/// NOT_FINITE, ZERO_AREA, OUT_OF_RANGE (count, coverage, a method of another model), NOT_REACHED
-/// (no count up to 64 has the coverage), OUT_OF_MEMORY. report may be NULL.
+/// Fit a template to an outline, convex or not. Errors: NULL_ARGUMENT, TOO_FEW_POINTS, NOT_FINITE,
+/// CROSSING (see dem2d_outline_measure), ZERO_AREA, OUT_OF_RANGE (count, coverage, a method of
+/// another model), NOT_REACHED (no count up to 64 has the coverage), OUT_OF_MEMORY. report may be
+/// NULL.
 DEM2D_API dem2d_result dem2d_outline_fit(const dem2d_env *env, const dem2d_vec *points, int count,
                                          const dem2d_fit_desc *desc, dem2d_shape **shape,
                                          dem2d_fit_report *report);
@@ -4335,6 +4338,326 @@ typedef struct dem2di_side {
     double inverse; /* 1 / e.e */
 } dem2di_side;
 
+/* --- outlines that cross themselves ----------------------------------------------------------- */
+
+/* An outline is good if no two edges cross and it winds around every point once or not at all. It
+   may then touch itself, at points and along edges that it goes back on, as outlines from pixels
+   do. The windings tell what is wrong where edges meet at corners or lie on each other.
+
+   A line sweeps over the plane by x, then y (Shamos and Hoey 1976). The edges that it cuts are kept
+   in their order along it, in a tree that chance balances (a treap): O(n log n). Edges that become
+   neighbours are tested for a crossing inside both. At a point of the outline the edges through it
+   are put in their order beyond the point, and so the windings between them are known. Points
+   within a rounding of an edge are on it: what touches then does not cross. */
+#define DEM2DI_SWEEP_ROUNDING (64 * DBL_EPSILON) /* of the coordinates: some turns and sums */
+
+typedef struct dem2di_sweep_edge {
+    dem2d_vec left, right; /* in the order of the sweep; the edge goes up from left, for "above" */
+    double slack;          /* rounding times length */
+    int sign;              /* 1 if the outline goes from left to right, else -1 */
+    int winding;           /* just above the edge */
+    int name;              /* index of the outline's point where the edge begins */
+    int below, above;      /* neighbours on the line, or -1 */
+    int parent, child[2];  /* in the tree, or -1 */
+    uint32_t chance;       /* a parent's is not less than its children's */
+    bool cut;              /* by the line */
+} dem2di_sweep_edge;
+
+/* A point of the outline, from which the edge of this index goes on. */
+typedef struct dem2di_sweep_point {
+    dem2d_vec at;
+    int index;
+} dem2di_sweep_point;
+
+typedef struct dem2di_sweep {
+    dem2di_sweep_edge *edges;   /* count */
+    dem2di_sweep_point *points; /* count */
+    int count, room;            /* without points that coincide with the one before; with them */
+    double rounding;            /* of coordinates, which are relative to origin and size */
+    dem2d_vec origin;
+    double size;
+    int root, lowest;  /* edges, or -1 */
+    int sense;         /* winding inside: 1, -1, 0 until it is known */
+    int first, second; /* names of the edges that cross */
+    dem2d_vec where;
+} dem2di_sweep;
+
+/* Is p above an edge (1), below (-1), on its line to rounding (0)? */
+static int dem2di_sweep_side(const dem2di_sweep *s, int edge, dem2d_vec p) {
+    const dem2di_sweep_edge *e = &s->edges[edge];
+    double turn = dem2di_cross(dem2di_sub(e->right, e->left), dem2di_sub(p, e->left));
+    return (turn > e->slack) - (turn < -e->slack);
+}
+
+/* An edge of the tree takes its parent's place. */
+static void dem2di_sweep_rotate(dem2di_sweep *s, int edge) {
+    dem2di_sweep_edge *e = &s->edges[edge], *p = &s->edges[e->parent];
+    int parent = e->parent, grand = p->parent, k = p->child[1] == edge, inner = e->child[!k];
+    p->child[k] = inner;
+    if (inner >= 0) s->edges[inner].parent = parent;
+    e->child[!k] = parent;
+    p->parent = edge;
+    e->parent = grand;
+    if (grand < 0)
+        s->root = edge;
+    else
+        s->edges[grand].child[s->edges[grand].child[1] == parent] = edge;
+}
+
+/* Between two neighbours on the line; -1 is an end of it. */
+static void dem2di_sweep_link(dem2di_sweep *s, int below, int above) {
+    if (below >= 0)
+        s->edges[below].above = above;
+    else
+        s->lowest = above;
+    if (above >= 0) s->edges[above].below = below;
+}
+
+/* Does an edge that begins at the line go above another there? Where it begins, or, if that is on
+   the other, at the end that both reach. Edges that lie on each other have no order. */
+static bool dem2di_sweep_goes_above(const dem2di_sweep *s, int edge, int other) {
+    const dem2di_sweep_edge *e = &s->edges[edge], *o = &s->edges[other];
+    int side = dem2di_sweep_side(s, other, e->left);
+    if (side != 0) return side > 0;
+    if (dem2di_compare_points(&e->right, &o->right) <= 0)
+        return dem2di_sweep_side(s, other, e->right) >= 0;
+    return dem2di_sweep_side(s, edge, o->right) <= 0;
+}
+
+static void dem2di_sweep_insert(dem2di_sweep *s, int edge) {
+    dem2di_sweep_edge *e = &s->edges[edge];
+    int parent = -1, next = s->root, k = 0;
+    while (next >= 0) {
+        parent = next;
+        k = dem2di_sweep_goes_above(s, edge, parent);
+        next = s->edges[parent].child[k];
+    }
+    e->cut = true;
+    e->parent = parent;
+    e->child[0] = e->child[1] = -1;
+    int below = parent < 0 ? -1 : k ? parent : s->edges[parent].below;
+    int above = parent < 0 ? -1 : k ? s->edges[parent].above : parent;
+    dem2di_sweep_link(s, below, edge);
+    dem2di_sweep_link(s, edge, above);
+    if (parent < 0)
+        s->root = edge;
+    else
+        s->edges[parent].child[k] = edge;
+    while (e->parent >= 0 && s->edges[e->parent].chance < e->chance) dem2di_sweep_rotate(s, edge);
+}
+
+static void dem2di_sweep_remove(dem2di_sweep *s, int edge) {
+    dem2di_sweep_edge *e = &s->edges[edge];
+    while (e->child[0] >= 0 || e->child[1] >= 0) { /* down to a leaf */
+        int low = e->child[0], high = e->child[1];
+        bool up = low < 0 || (high >= 0 && s->edges[high].chance > s->edges[low].chance);
+        dem2di_sweep_rotate(s, up ? high : low);
+    }
+    if (e->parent < 0)
+        s->root = -1;
+    else
+        s->edges[e->parent].child[s->edges[e->parent].child[1] == edge] = -1;
+    dem2di_sweep_link(s, e->below, e->above);
+    e->cut = false;
+}
+
+/* The highest edge below a point, or -1. */
+static int dem2di_sweep_below(const dem2di_sweep *s, dem2d_vec p) {
+    int found = -1, next = s->root;
+    while (next >= 0) {
+        bool above = dem2di_sweep_side(s, next, p) > 0;
+        if (above) found = next;
+        next = s->edges[next].child[above];
+    }
+    return found;
+}
+
+static int dem2di_sweep_after(const dem2di_sweep *s, int edge) {
+    return edge >= 0 ? s->edges[edge].above : s->lowest;
+}
+
+static bool dem2di_sweep_found(dem2di_sweep *s, int first, int second, dem2d_vec where) {
+    int one = s->edges[first].name, other = s->edges[second].name;
+    s->first = one < other ? one : other;
+    s->second = one < other ? other : one;
+    s->where = where;
+    return false;
+}
+
+/* Do neighbours, or no edge (-1) and one, not cross inside both? */
+static bool dem2di_sweep_pair(dem2di_sweep *s, int low, int high) {
+    if (low < 0 || high < 0) return true;
+    const dem2di_sweep_edge *a = &s->edges[low], *b = &s->edges[high];
+    if (dem2di_sweep_side(s, low, b->left) * dem2di_sweep_side(s, low, b->right) >= 0 ||
+        dem2di_sweep_side(s, high, a->left) * dem2di_sweep_side(s, high, a->right) >= 0)
+        return true;
+    dem2d_vec along = dem2di_sub(a->right, a->left), other = dem2di_sub(b->right, b->left);
+    double t = dem2di_cross(dem2di_sub(b->left, a->left), other) / dem2di_cross(along, other);
+    return dem2di_sweep_found(s, low, high, dem2di_along(a->left, t, along));
+}
+
+/* From one edge on the line, or below all (-1), to another above it, or above all: neighbours. */
+static bool dem2di_sweep_pairs(dem2di_sweep *s, int from, int to) {
+    int next;
+    do {
+        next = dem2di_sweep_after(s, from);
+        if (!dem2di_sweep_pair(s, from, next)) return false;
+        from = next;
+    } while (next != to);
+    return true;
+}
+
+/* Do two edges through a point lie on each other beyond it? */
+static bool dem2di_sweep_overlap(const dem2di_sweep *s, int a, int b) {
+    const dem2di_sweep_edge *e = &s->edges[a], *f = &s->edges[b];
+    return dem2di_compare_points(&e->right, &f->right) <= 0
+               ? dem2di_sweep_side(s, b, e->right) == 0
+               : dem2di_sweep_side(s, a, f->right) == 0;
+}
+
+/* The windings between the edges through p, from the one above `below` to the one below `top`. */
+static bool dem2di_sweep_windings(dem2di_sweep *s, int below, int top, dem2d_vec p) {
+    int winding = below >= 0 ? s->edges[below].winding : 0, before = -1;
+    for (int e = dem2di_sweep_after(s, below); e != top && e >= 0; e = s->edges[e].above) {
+        int next = s->edges[e].above;
+        winding += s->edges[e].sign;
+        s->edges[e].winding = winding;
+        if (next == top || !dem2di_sweep_overlap(s, e, next)) {
+            if (s->sense == 0 && abs(winding) == 1) s->sense = winding;
+            if (winding != 0 && winding != s->sense)
+                return dem2di_sweep_found(s, before >= 0 ? before : next >= 0 ? next : below, e, p);
+        }
+        before = e;
+    }
+    return true;
+}
+
+/* Points that are one, to rounding. */
+static bool dem2di_sweep_same(const dem2di_sweep *s, dem2d_vec p, dem2d_vec q) {
+    dem2d_vec apart = dem2di_sub(p, q);
+    return dem2di_dot(apart, apart) <= 4 * s->rounding * s->rounding;
+}
+
+/* Edge i of those at the points, two at each: the one that goes on, the one that comes in. */
+static int dem2di_sweep_edge_at(const dem2di_sweep *s, int i) {
+    int index = s->points[i / 2].index;
+    return i % 2 == 0 ? index : index > 0 ? index - 1 : s->count - 1;
+}
+
+/* At points [from, to) of the outline, which are one. */
+static bool dem2di_sweep_event(dem2di_sweep *s, int from, int to) {
+    dem2d_vec p = s->points[from].at;
+    int below = dem2di_sweep_below(s, p), top = dem2di_sweep_after(s, below);
+    while (top >= 0 && dem2di_sweep_side(s, top, p) == 0) {
+        int next = s->edges[top].above;
+        if (dem2di_sweep_same(s, s->edges[top].right, p)) dem2di_sweep_remove(s, top);
+        top = next;
+    }
+    for (int i = 2 * from; i < 2 * to; i++) { /* none is left, but for rounding */
+        int edge = dem2di_sweep_edge_at(s, i);
+        bool ends = dem2di_compare_points(&s->edges[edge].right, &p) == 0;
+        if (ends && s->edges[edge].cut && edge != below && edge != top)
+            dem2di_sweep_remove(s, edge);
+    }
+    if (!dem2di_sweep_pairs(s, below, top)) return false;
+    for (int i = 2 * from; i < 2 * to; i++) {
+        int edge = dem2di_sweep_edge_at(s, i);
+        if (dem2di_compare_points(&s->edges[edge].left, &p) != 0) continue;
+        dem2di_sweep_insert(s, edge);
+        if (!dem2di_sweep_pair(s, s->edges[edge].below, edge)) return false;
+        if (!dem2di_sweep_pair(s, edge, s->edges[edge].above)) return false;
+    }
+    return dem2di_sweep_windings(s, below, top, p);
+}
+
+static int dem2di_compare_sweep_points(const void *a, const void *b) {
+    const dem2di_sweep_point *p = (const dem2di_sweep_point *)a;
+    const dem2di_sweep_point *q = (const dem2di_sweep_point *)b;
+    int order = dem2di_compare_points(&p->at, &q->at);
+    return order != 0 ? order : (p->index > q->index) - (p->index < q->index);
+}
+
+/* The points that differ from the one before, relative to origin and size; the last differs from
+   the first. */
+static void dem2di_sweep_points(dem2di_sweep *s, const dem2d_vec *points, int count) {
+    dem2d_vec low = points[0], high = points[0];
+    for (int i = 1; i < count; i++) {
+        low = dem2di_vec(dem2di_min(low.x, points[i].x), dem2di_min(low.y, points[i].y));
+        high = dem2di_vec(dem2di_max(high.x, points[i].x), dem2di_max(high.y, points[i].y));
+    }
+    s->origin = low;
+    s->size = dem2di_max(high.x - low.x, high.y - low.y);
+    if (!(s->size > 0)) return; /* all in one place */
+    s->rounding = DEM2DI_SWEEP_ROUNDING * (dem2di_coordinate_size(points, count) / s->size);
+    for (int i = 0; i < count; i++) {
+        dem2d_vec p = dem2di_sub(points[i], low);
+        p = dem2di_vec(p.x / s->size, p.y / s->size);
+        if (s->count > 0 && dem2di_sweep_same(s, p, s->points[s->count - 1].at)) continue;
+        s->edges[s->count].name = i;
+        s->points[s->count].at = p;
+        s->points[s->count].index = s->count;
+        s->count++;
+    }
+    while (s->count > 1 && dem2di_sweep_same(s, s->points[0].at, s->points[s->count - 1].at))
+        s->count--;
+}
+
+/* Edges from their points; chance from splitmix64's mixing of their numbers. */
+static void dem2di_sweep_edges(dem2di_sweep *s) {
+    for (int i = 0; i < s->count; i++) {
+        dem2di_sweep_edge *e = &s->edges[i];
+        dem2d_vec p = s->points[i].at, q = s->points[i + 1 < s->count ? i + 1 : 0].at;
+        bool rises = dem2di_compare_points(&p, &q) < 0;
+        uint64_t mixed = ((uint64_t)i + 1) * 0x9E3779B97F4A7C15u;
+        mixed = (mixed ^ (mixed >> 30)) * 0xBF58476D1CE4E5B9u;
+        e->chance = (uint32_t)(mixed >> 32);
+        e->left = rises ? p : q;
+        e->right = rises ? q : p;
+        e->sign = rises ? 1 : -1;
+        e->slack = s->rounding * dem2di_length(dem2di_sub(q, p));
+        e->cut = false;
+    }
+    s->root = s->lowest = -1;
+}
+
+/* Whether the outline is good; if not, which edges cross, and where. */
+static bool dem2di_sweep_run(dem2di_sweep *s, const dem2d_vec *points, int count) {
+    dem2di_sweep_points(s, points, count);
+    dem2di_sweep_edges(s);
+    qsort(s->points, (size_t)s->count, sizeof *s->points, dem2di_compare_sweep_points);
+    for (int i = 0, next; i < s->count; i = next) {
+        next = i + 1;
+        while (next < s->count && dem2di_compare_points(&s->points[next].at, &s->points[i].at) == 0)
+            next++;
+        if (!dem2di_sweep_event(s, i, next)) return false;
+    }
+    return true;
+}
+
+/* An outline of finite points must not wind around anything twice. */
+static dem2d_result dem2di_check_crossing(const dem2d_env *env, const char *name,
+                                          const dem2d_vec *points, int count) {
+    dem2di_sweep s;
+    size_t room = (size_t)count;
+    dem2d_result result = DEM2D_OK;
+    memset(&s, 0, sizeof s);
+    s.edges = (dem2di_sweep_edge *)dem2di_allocate(env, room, sizeof *s.edges);
+    if (s.edges != NULL)
+        s.points = (dem2di_sweep_point *)dem2di_allocate(env, room, sizeof *s.points);
+    if (s.points == NULL) {
+        result = dem2di_fail(env, DEM2D_OUT_OF_MEMORY, -1, "%s: %d points", name, count);
+    } else if (!dem2di_sweep_run(&s, points, count)) {
+        dem2d_vec where = dem2di_along(s.origin, s.size, s.where);
+        result = dem2di_fail(env, DEM2D_CROSSING, s.first,
+                             "%s: edges %d and %d cross, or go the same way, at (%.9g, %.9g); edge "
+                             "i begins at point i",
+                             name, s.first, s.second, where.x, where.y);
+    }
+    dem2di_release(env, s.points, room, sizeof *s.points);
+    dem2di_release(env, s.edges, room, sizeof *s.edges);
+    return result;
+}
+
 /* Points of a caller that enclose an area. */
 static dem2d_result dem2di_check_outline(const dem2d_env *env, const char *name,
                                          const dem2d_vec *points, int count, dem2d_mass *mass) {
@@ -4343,6 +4666,16 @@ static dem2d_result dem2di_check_outline(const dem2d_env *env, const char *name,
     result = dem2d_polygon_mass(points, count, mass);
     if (result != DEM2D_OK) return dem2di_fail(env, result, -1, "%s: no area", name);
     return DEM2D_OK;
+}
+
+/* That do so once: a figure of eight may have no area, so its crossing is told first. */
+static dem2d_result dem2di_check_good_outline(const dem2d_env *env, const char *name,
+                                              const dem2d_vec *points, int count,
+                                              dem2d_mass *mass) {
+    dem2d_result result = dem2di_check_points(env, name, points, count, 3);
+    if (result == DEM2D_OK) result = dem2di_check_crossing(env, name, points, count);
+    if (result != DEM2D_OK) return result;
+    return dem2di_check_outline(env, name, points, count, mass);
 }
 
 /* The sides that have a length, counter-clockwise, relative to an origin. */
@@ -4737,7 +5070,7 @@ DEM2D_API dem2d_result dem2d_outline_measure(const dem2d_env *env, const dem2d_v
     dem2d_outline_info found;
     memset(&found, 0, sizeof found);
     if (info == NULL) return dem2di_fail_null(env, "info");
-    dem2d_result result = dem2di_check_outline(env, "points", points, count, &found.mass);
+    dem2d_result result = dem2di_check_good_outline(env, "points", points, count, &found.mass);
     if (result != DEM2D_OK) return result;
     size_t n = (size_t)count, size = n + 2 * DEM2DI_SAMPLES;
     dem2di_side *sides = (dem2di_side *)dem2di_allocate(env, n, sizeof *sides);
@@ -5779,7 +6112,9 @@ DEM2D_API dem2d_result dem2d_bezier_fit(const dem2d_env *env, const dem2d_vec *p
     int iterations = 0;
     dem2d_result result = dem2di_outline_make(env, points, count, &outline);
     if (result != DEM2D_OK) return result;
-    result = dem2di_bezier_fit(env, &outline, arcs, NULL, control, &iterations);
+    result = dem2di_check_crossing(env, "points", points, count);
+    if (result == DEM2D_OK)
+        result = dem2di_bezier_fit(env, &outline, arcs, NULL, control, &iterations);
     for (int i = 0; i < 3 * arcs && result == DEM2D_OK; i++)
         control[i] = dem2di_add(control[i], outline.centre);
     dem2di_outline_release(env, &outline);
@@ -6381,13 +6716,16 @@ DEM2D_API dem2d_result dem2d_outline_fit(const dem2d_env *env, const dem2d_vec *
     fit.desc = desc;
     result = dem2di_outline_make(env, points, count, &fit.outline);
     if (result != DEM2D_OK) return result;
+    result = dem2di_check_crossing(env, "points", points, count);
     double turn = dem2di_twice_area(fit.outline.points, count);
-    size_t room = DEM2DI_FIT_POINTS;
-    fit.buffer = (dem2d_vec *)dem2di_allocate(env, room, sizeof *fit.buffer);
-    if (fit.buffer == NULL)
-        result = dem2di_fail(env, DEM2D_OUT_OF_MEMORY, -1, "a candidate's outline");
-    else if (!(turn > DEM2DI_ROUNDING * fit.outline.radius * fit.outline.radius))
+    if (result == DEM2D_OK && !(turn > DEM2DI_ROUNDING * fit.outline.radius * fit.outline.radius))
         result = dem2di_fail(env, DEM2D_ZERO_AREA, -1, "the outline's area is %g", turn / 2);
+    size_t room = DEM2DI_FIT_POINTS;
+    if (result == DEM2D_OK) {
+        fit.buffer = (dem2d_vec *)dem2di_allocate(env, room, sizeof *fit.buffer);
+        if (fit.buffer == NULL)
+            result = dem2di_fail(env, DEM2D_OUT_OF_MEMORY, -1, "a candidate's outline");
+    }
     if (result == DEM2D_OK) {
         fit.mass = dem2di_polygon_mass(fit.outline.points, count);
         result = dem2di_fit_counts(&fit);
@@ -6424,8 +6762,7 @@ DEM2D_API dem2d_result dem2d_radial_compare(const dem2d_env *env, const dem2d_ve
     const int rays = DEM2DI_FIT_POINTS;
     if (difference == NULL) return dem2di_fail_null(env, "difference");
     dem2d_mass mass;
-    dem2d_result result = dem2di_check_points(env, "points", points, count, 3);
-    if (result == DEM2D_OK) result = dem2d_polygon_mass(points, count, &mass);
+    dem2d_result result = dem2di_check_good_outline(env, "points", points, count, &mass);
     if (result != DEM2D_OK) return result;
     if (order < 0 || order > (rays - 1) / 2)
         return dem2di_fail(env, DEM2D_OUT_OF_RANGE, order, "order = %d", order);
@@ -15089,7 +15426,8 @@ DEM2D_API dem2d_result dem2d_world_write_csv(const dem2d_world *world, const dem
             the swarm's settings are fields of dem2d_fit_desc; a histogram of branch directions.
             The long axis of a template (dem2d_shape_axis) is exact for every model. Pictures of two
             bytes per pixel, label masks, a region of interest, thresholds and grains in spite of
-            frames. Warnings reach the log as DEM2D_WARNING.
+            frames. Warnings reach the log as DEM2D_WARNING. Outlines that cross themselves are
+            refused (DEM2D_CROSSING).
             Servo walls know the dashpots of their contacts and the next step of the particles: they
             hold their stress for every damping ratio, and those that face each other come to rest.
             Snapshots of version 3.

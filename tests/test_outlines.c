@@ -1128,6 +1128,200 @@ static void every_allocation_can_fail(void **state) {
         }
 }
 
+/* --- outlines that cross themselves ----------------------------------------------------------- */
+
+typedef struct strand {
+    double y;
+    int sign;
+} strand;
+
+static int by_height(const void *a, const void *b) {
+    const strand *p = a, *q = b;
+    return (p->y > q->y) - (p->y < q->y);
+}
+
+static int by_size(const void *a, const void *b) {
+    const double *p = a, *q = b;
+    return (*p > *q) - (*p < *q);
+}
+
+/* Where two edges cross or touch, along x; none for parallel ones. */
+static bool meet_at(dem2d_vec a, dem2d_vec b, dem2d_vec c, dem2d_vec d, double *x) {
+    const double ex = b.x - a.x, ey = b.y - a.y, fx = d.x - c.x, fy = d.y - c.y;
+    const double det = ex * fy - ey * fx;
+    if (det == 0) return false;
+    *x = a.x + ((c.x - a.x) * fy - (c.y - a.y) * fx) / det * ex;
+    return true;
+}
+
+/* Of corners with small whole coordinates: is every point wound around once, in one sense, or not
+   at all? Between neighbouring places where anything happens, along a line. */
+static bool winds_once(const dem2d_vec *p, int n) {
+    double places[400];
+    int count = 0, sense = 0;
+    for (int i = 0; i < n; i++) {
+        places[count++] = p[i].x;
+        for (int k = 0; k < i; k++)
+            count += meet_at(p[i], p[(i + 1) % n], p[k], p[(k + 1) % n], &places[count]);
+    }
+    qsort(places, (size_t)count, sizeof *places, by_size);
+    for (int i = 1; i < count; i++) {
+        const double x = (places[i - 1] + places[i]) / 2;
+        strand strands[32];
+        int cut = 0, winding = 0;
+        if (places[i] - places[i - 1] < 1e-9) continue;
+        for (int k = 0; k < n; k++) {
+            const dem2d_vec a = p[k], b = p[(k + 1) % n];
+            if ((a.x < x) == (b.x < x)) continue;
+            strands[cut].y = a.y + (x - a.x) / (b.x - a.x) * (b.y - a.y);
+            strands[cut++].sign = a.x < x ? 1 : -1;
+        }
+        qsort(strands, (size_t)cut, sizeof *strands, by_height);
+        for (int k = 0; k < cut; k++) {
+            winding += strands[k].sign;
+            if (k + 1 < cut && strands[k + 1].y - strands[k].y < 1e-9) continue;
+            if (sense == 0) sense = winding;
+            if (winding != 0 && (winding != sense || abs(winding) != 1)) return false;
+        }
+    }
+    return true;
+}
+
+/* No two edges cross inside both, and no point is wound around twice. */
+static bool is_good(const dem2d_vec *p, int n) {
+    for (int i = 0; i < n; i++)
+        for (int k = 0; k < i; k++) {
+            const dem2d_vec a = p[i], b = p[(i + 1) % n], c = p[k], d = p[(k + 1) % n];
+            if (turn_of(a, b, c) * turn_of(a, b, d) < 0 && turn_of(c, d, a) * turn_of(c, d, b) < 0)
+                return false;
+        }
+    return winds_once(p, n);
+}
+
+/* The log's edges are at the log's point. */
+static void check_message(const test_env *env, const dem2d_vec *p, int n) {
+    int edge[2];
+    dem2d_vec at;
+    assert_result(env->log.result, DEM2D_CROSSING);
+    assert_int_equal(sscanf(env->log.text,
+                            "points: edges %d and %d cross, or go the same way, at (%lf, %lf)",
+                            &edge[0], &edge[1], &at.x, &at.y),
+                     4);
+    assert_int_equal(env->log.index, edge[0]);
+    assert_true(edge[0] < edge[1] && edge[1] < n);
+    for (int i = 0; i < 2; i++) { /* an edge without a length is named with the next */
+        double least = HUGE_VAL;
+        int k = edge[i];
+        do {
+            least = fmin(least, side_distance(at, p[k], p[(k + 1) % n]));
+            k = (k + 1) % n;
+        } while (p[k].x == p[(k + n - 1) % n].x && p[k].y == p[(k + n - 1) % n].y);
+        assert_within(least, 0, 1e-6 * (1 + fabs(at.x) + fabs(at.y)));
+    }
+}
+
+static bool check_crossing(const dem2d_vec *p, int n, bool good) {
+    test_env env;
+    dem2d_difference d;
+    test_env_init(&env);
+    const dem2d_result result = dem2d_radial_compare(&env.env, p, n, 0, &d);
+    if (good) {
+        if (result != DEM2D_ZERO_AREA) assert_ok(result);
+    } else {
+        assert_result(result, DEM2D_CROSSING);
+        check_message(&env, p, n);
+    }
+    assert_clean(&env);
+    return result == DEM2D_OK;
+}
+
+/* Corners on a small lattice touch, repeat and lie on each other all the time; turned and moved
+   they do so but for rounding. */
+static void crossings_of_lattice_polygons(void **state) {
+    (void)state;
+    test_random random = {41};
+    int good = 0, runs = test_long() ? 200000 : 4000;
+    for (int run = 0; run < runs; run++) {
+        dem2d_vec p[16], q[16];
+        const int n = 3 + test_below(&random, 8), side = 2 + test_below(&random, 5);
+        for (int i = 0; i < n; i++)
+            p[i] = vec(test_below(&random, side), test_below(&random, side));
+        const bool once = is_good(p, n);
+        good += check_crossing(p, n, once);
+        const dem2d_vec u = direction(test_uniform(&random, 0, 7));
+        const double x = test_uniform(&random, -9, 9), size = exp(test_uniform(&random, -9, 9));
+        for (int i = 0; i < n; i++)
+            q[i] = vec(size * (p[i].x * u.x - p[i].y * u.y + x),
+                       size * (p[i].x * u.y + p[i].y * u.x - x));
+        (void)check_crossing(q, n, once);
+    }
+    assert_true(good > runs / 10);
+}
+
+static void crossings_of_known_outlines(void **state) {
+    (void)state;
+    enum { N = 400 };
+    static dem2d_vec p[2 * N];
+    static const dem2d_vec eight[] = {{0, 0}, {2, 2}, {2, 0}, {0, 2}};
+    static const dem2d_vec touch[] = {{0, 0}, {2, 2}, {4, 0}, {4, 4}, {2, 2}, {0, 4}};
+    static const dem2d_vec side[] = {{0, 0}, {4, 0}, {4, 4}, {2, 0}, {0, 4}};
+    static const dem2d_vec spike[] = {{0, 0}, {2, 0}, {5, 0}, {2, 0}, {2, 2}, {0, 2}};
+    static const dem2d_vec keyhole[] = {{0, 0}, {6, 0}, {6, 6}, {0, 6}, {0, 0},
+                                        {2, 2}, {2, 4}, {4, 4}, {4, 2}, {2, 2}};
+    static const dem2d_vec island[] = {{0, 0}, {6, 0}, {6, 6}, {0, 6}, {0, 0},
+                                       {2, 2}, {4, 2}, {4, 4}, {2, 4}, {2, 2}};
+    static const dem2d_vec repeated[] = {{0, 0}, {0, 0}, {3, 0}, {3, 0}, {3, 0}, {0, 3}, {0, 0}};
+    test_env env;
+    dem2d_outline_info info;
+    dem2d_fit_desc fit = {0};
+    dem2d_shape *shape = NULL;
+    dem2d_difference d;
+    check_crossing(eight, 4, false);
+    assert_true(check_crossing(touch, 6, true)); /* two triangles that share a corner */
+    assert_true(check_crossing(side, 5, true));  /* a corner on an edge */
+    assert_true(check_crossing(spike, 6, true)); /* there and back */
+    assert_true(check_crossing(keyhole, 10, true));
+    check_crossing(island, 10, false); /* the inner square is wound around twice */
+    assert_true(check_crossing(repeated, 7, true));
+    for (int kind = 0; kind < 2; kind++) { /* traced twice, shuffled */
+        for (int i = 0; i < N; i++) {
+            const dem2d_vec u =
+                direction(2 * (double)TEST_PI * (kind ? i * 7 % (N / 2) : i) * 2 / N);
+            p[i] = vec(2 * u.x, u.y);
+        }
+        check_crossing(p, N, false);
+        test_env_init(&env);
+        fit.model = DEM2D_FOURIER, fit.count = 8;
+        assert_result(dem2d_outline_measure(&env.env, p, N, &info), DEM2D_CROSSING);
+        assert_result(dem2d_outline_fit(&env.env, p, N, &fit, &shape, NULL), DEM2D_CROSSING);
+        assert_result(dem2d_radial_compare(&env.env, p, N, 4, &d), DEM2D_CROSSING);
+        assert_int_equal(env.log.count, 3);
+        assert_null(shape);
+        assert_result(dem2d_bezier_fit(&env.env, p, N, 8, p), DEM2D_CROSSING);
+        assert_clean(&env);
+    }
+}
+
+/* The line cuts all teeth of a comb at once; the last of them crosses the one before. */
+static void crossing_of_a_comb(void **state) {
+    (void)state;
+    const int teeth = 50000, n = 2 * teeth + 2;
+    dem2d_vec *p = malloc((size_t)n * sizeof *p);
+    test_env env;
+    dem2d_difference d;
+    for (int i = 0; i < teeth; i++) {
+        p[2 * i] = vec(100, i);
+        p[2 * i + 1] = vec(1 + i * 1e-6, i + 0.5);
+    }
+    p[n - 2] = vec(100, teeth), p[n - 1] = vec(101, teeth / 2);
+    p[n - 4] = vec(90, teeth - 2.8);
+    test_env_init(&env);
+    assert_result(dem2d_radial_compare(&env.env, p, n, 0, &d), DEM2D_CROSSING);
+    check_message(&env, p, n);
+    assert_true(env.log.index > n - 8);
+    free(p);
+}
+
 /* --- real grains ------------------------------------------------------------------------------ */
 
 static int read_outline(const char *folder, const char *name, dem2d_vec *points) {
@@ -1197,6 +1391,9 @@ int main(void) {
         cmocka_unit_test(differences_of_boxes),
         cmocka_unit_test(outline_errors),
         cmocka_unit_test(every_allocation_can_fail),
+        cmocka_unit_test(crossings_of_lattice_polygons),
+        cmocka_unit_test(crossings_of_known_outlines),
+        cmocka_unit_test(crossing_of_a_comb),
         cmocka_unit_test(roundness_of_real_grains),
     };
     return cmocka_run_group_tests_name("outlines", tests, NULL, NULL);
