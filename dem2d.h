@@ -341,6 +341,8 @@ OPTIONS (zero means: physical zero for physical fields; "library default" where 
     dem2d_fit_desc          scale                 -      HULL
     dem2d_fit_desc          min_radius            -      0.1        [0, 1), of a0/2
     dem2d_fit_desc          corners               -      false
+    dem2d_fit_desc          max_radius            -      20         0 or >= 1, of the size
+    dem2d_fit_desc          unbounded             -      false
     dem2d_fit_desc          seed                  -      0
     dem2d_fit_desc          birds                 -      30         0 or 2 to 256
     dem2d_fit_desc          moves                 -      60         0 to 100000
@@ -657,6 +659,7 @@ typedef struct dem2d_shape_info {
     double circumscribed;  ///< m, radius of the bounding circle about the centroid
     double inscribed;      ///< m, radius of the inscribed circle about the centroid
     double rho_min;        ///< m, lower bound of the radius of curvature; 0 with corners
+    double rho_max;        ///< m, upper bound of it, edges and straight arcs apart; custom: 0
     double equivalent; ///< m, radius of the circle of equal area ([P] equivalent size: twice it)
     size_t bytes;      ///< memory of the template
 } dem2d_shape_info;
@@ -893,6 +896,11 @@ DEM2D_API dem2d_result dem2d_fourier_reduce(double *a, double *b, int order,
 /// minimise the exact area between arc and outline (not [P]'s step 4, which is the swarm:
 /// DEM2D_FIT_SWARM). control gets 3 * arcs points. Errors:
 /// TOO_FEW_POINTS, NOT_FINITE, OUT_OF_RANGE, CROSSING, ZERO_AREA, OUT_OF_MEMORY.
+/// DEM2D_FIT_SWARM). No arc has a radius of curvature above 20 times that of the circle with the
+/// hull's area where that can be had: nearly flat arcs make the stable time step short. Long edges
+/// of the hull become straight arcs where that is better, and the joints between them lie in
+/// uniform directions. dem2d_outline_fit has another bound, or none. control gets 3 * arcs points.
+/// Errors: TOO_FEW_POINTS, NOT_FINITE, OUT_OF_RANGE, ZERO_AREA, OUT_OF_MEMORY.
 DEM2D_API dem2d_result dem2d_bezier_fit(const dem2d_env *env, const dem2d_vec *points, int count,
                                         int arcs, dem2d_vec *control);
 
@@ -926,6 +934,9 @@ typedef struct dem2d_fit_desc {
     dem2d_fit_scale scale;   ///< FOURIER
     double min_radius;       ///< CONSTRAINED: least radius of curvature, of a0/2; 0 for 0.1
     bool corners;            ///< CONSTRAINED: min_radius 0 is meant
+    double max_radius;       ///< BEZIER: greatest radius of curvature, of the radius of the circle
+                             ///< with the hull's area; 0 for 20
+    bool unbounded;          ///< BEZIER: any radius of curvature, and joints as in [P]
     uint64_t seed;           ///< SWARM: of its random numbers
     int birds;               ///< SWARM: how many search each arc; 0 for 30
     int moves;               ///< SWARM: of each bird; 0 for 60
@@ -940,6 +951,7 @@ typedef struct dem2d_fit_report {
     double difference; ///< m2, area of the symmetric difference
     double hausdorff;  ///< m, see dem2d_difference
     double convexity;  ///< m, proved least radius of curvature; 0 with corners
+    double max_radius; ///< m, greatest radius of curvature, edges and straight arcs apart
     int iterations;    ///< steps of the method, all attempts together
 } dem2d_fit_report;
 
@@ -947,6 +959,10 @@ typedef struct dem2d_fit_report {
 /// CROSSING (see dem2d_outline_measure), ZERO_AREA, OUT_OF_RANGE (count, coverage, a method of
 /// another model), NOT_REACHED (no count up to 64 has the coverage), OUT_OF_MEMORY. report may be
 /// NULL.
+/// Fit a template to a simple outline, convex or not. Errors: NULL_ARGUMENT, TOO_FEW_POINTS,
+/// NOT_FINITE, ZERO_AREA, OUT_OF_RANGE (count, coverage, a method of another model), NOT_REACHED
+/// (no count up to 64 has the coverage), OUT_OF_MEMORY. A bound of the radius of curvature that the
+/// arcs cannot have is no error: report->max_radius says what came out. report may be NULL.
 DEM2D_API dem2d_result dem2d_outline_fit(const dem2d_env *env, const dem2d_vec *points, int count,
                                          const dem2d_fit_desc *desc, dem2d_shape **shape,
                                          dem2d_fit_report *report);
@@ -2391,6 +2407,7 @@ struct dem2d_shape {
     double a, b; /* circle: radius; ellipse: squared half axes; Fourier: a0/2 */
     double rounding;
     double circumscribed, inscribed, rho_min;
+    double rho_max; /* edges and straight arcs apart; custom: 0, not known */
     dem2d_mass mass;
     dem2d_vec offset;
     dem2d_support_fn *function;
@@ -2929,7 +2946,7 @@ DEM2D_API dem2d_result dem2d_shape_create_circle(const dem2d_env *env, double ra
     if (result != DEM2D_OK) return result;
     dem2d_shape *made = dem2di_shape_allocate(env, DEM2D_CIRCLE, 0, 0);
     if (made == NULL) return DEM2D_OUT_OF_MEMORY;
-    made->a = made->circumscribed = made->inscribed = made->rho_min = radius;
+    made->a = made->circumscribed = made->inscribed = made->rho_min = made->rho_max = radius;
     made->mass.area = area;
     made->mass.polar_moment = polar;
     *shape = made;
@@ -2984,6 +3001,7 @@ DEM2D_API dem2d_result dem2d_shape_create_ellipse(const dem2d_env *env, double a
     made->circumscribed = dem2di_max(a, b);
     made->inscribed = dem2di_min(a, b);
     made->rho_min = made->inscribed * (made->inscribed / made->circumscribed);
+    made->rho_max = made->circumscribed * (made->circumscribed / made->inscribed);
     made->mass.area = area;
     made->mass.polar_moment = polar;
     dem2di_ellipse_floors(made);
@@ -3031,7 +3049,7 @@ static void dem2di_polygon_radii(dem2d_shape *shape) {
     }
     shape->circumscribed = outer + r;
     shape->inscribed = inner + r;
-    shape->rho_min = r;
+    shape->rho_min = shape->rho_max = r;
 }
 
 DEM2D_API dem2d_result dem2d_shape_create_polygon(const dem2d_env *env, const dem2d_vec *points,
@@ -3148,6 +3166,32 @@ static bool dem2di_arc_tangents(const dem2di_arc *arc, double rounding, dem2d_ve
     return first < 3 && dem2di_unit(*d[first], start) && dem2di_unit(*d[last], end);
 }
 
+/* An upper bound of rho on a whole arc, in the way of the lower one. */
+static double dem2di_arc_rho_ceiling(const dem2di_arc *arc) {
+    double turn = dem2di_min(dem2di_cross(arc->d0, arc->d1), dem2di_cross(arc->d1, arc->d2));
+    turn = dem2di_min(turn, dem2di_cross(arc->d0, arc->d2) / 2);
+    double speed = dem2di_max(dem2di_length(arc->d0), dem2di_length(arc->d2));
+    speed = dem2di_max(speed, dem2di_length(arc->d1));
+    return turn > 0 ? 1.5 * speed * (speed / turn * speed) : HUGE_VAL;
+}
+
+/* The greatest radius of curvature on an arc, at least what is known so far: from above, to a part
+   in 1000 (halving quarters what is too much), so that it is never too small. */
+static double dem2di_arc_rho_most(const dem2di_arc *arc, double known, int depth) {
+    known = dem2di_max(known, dem2di_max(dem2di_arc_rho(arc, 0), dem2di_arc_rho(arc, 1)));
+    double ceiling = dem2di_arc_rho_ceiling(arc);
+    if (ceiling <= known * 1.001 || depth == 0) return dem2di_max(known, ceiling);
+    dem2di_arc half[2];
+    dem2di_arc_halves(arc, half);
+    known = dem2di_arc_rho_most(&half[0], known, depth - 1);
+    return dem2di_arc_rho_most(&half[1], known, depth - 1);
+}
+
+/* 12 halvings: where curvature is lost in rounding, more would not end. */
+static double dem2di_arc_rho_max(const dem2di_arc *arc, double known) {
+    return dem2di_arc_rho_most(arc, known, 12);
+}
+
 /* Lower the floors of the sectors that the normals of an arc cross, by its bound of rho; halves
    while they turn by more than half a sector or the bound is far below what is attained. */
 static void dem2di_arc_floors(dem2d_shape *shape, const dem2di_arc *arc, int depth) {
@@ -3187,19 +3231,19 @@ static bool dem2di_turns_left(dem2d_vec a, dem2d_vec b, double rounding) {
     return turn >= -rounding * (la + lb) && (turn > rounding * (la + lb) || dem2di_dot(a, b) > 0);
 }
 
+/* A joint may turn by this much to be called smooth: coordinates written with seven digits. */
+#define DEM2DI_SMOOTH 1e-6
+
 /* Convex, turning left by at most pi: every turn of the control polygon is to the left, and so
-   is the whole turn. */
+   is the whole turn, but for the smoothness. */
 static bool dem2di_arc_convex(const dem2di_arc *arc, dem2d_vec start, dem2d_vec end,
                               double rounding) {
     double lengths = dem2di_length(arc->d0) + dem2di_length(arc->d2);
     return dem2di_turns_left(arc->d0, arc->d1, rounding) &&
            dem2di_turns_left(arc->d1, arc->d2, rounding) &&
            dem2di_cross(arc->d0, arc->d2) >= -rounding * lengths &&
-           dem2di_cross(start, end) >= -4 * DBL_EPSILON;
+           dem2di_cross(start, end) >= -2 * DEM2DI_SMOOTH;
 }
-
-/* A joint may turn by this much to be called smooth: coordinates written with seven digits. */
-#define DEM2DI_SMOOTH 1e-6
 
 /* The half of a unit tangent; horizontal within the smoothness is horizontal, so that a joint
    along the border of the halves is not counted twice. */
@@ -3279,6 +3323,10 @@ static void dem2di_finish_bezier(dem2d_shape *shape, double size) {
     shape->circumscribed = bounds.outer;
     shape->inscribed = bounds.inner;
     shape->rho_min = dem2di_finite(bounds.rho) ? bounds.rho : 0;
+    shape->rho_max = 0;
+    for (int k = 0; k < shape->count; k++)
+        if (!dem2di_arc_straight(shape, &shape->arcs[k]))
+            shape->rho_max = dem2di_arc_rho_max(&shape->arcs[k], shape->rho_max);
     for (int k = 0; k < DEM2DI_FLOORS; k++) shape->floors[k] = HUGE_VAL;
     for (int k = 0; k < shape->count; k++) dem2di_arc_floors(shape, &shape->arcs[k], 12);
     for (int k = 0; k < DEM2DI_FLOORS; k++) /* a sector no arc has come to has no bound */
@@ -3393,6 +3441,8 @@ static void dem2di_finish_fourier(dem2d_shape *shape, const double *a, const dou
     shape->circumscribed = -dem2di_series_minimum(&minus, 1e-12 * p.size).lower;
     shape->inscribed = dem2di_max(0, dem2di_series_minimum(&p, 1e-12 * p.size).lower);
     shape->rho_min = dem2di_max(0, rho_min);
+    dem2di_series flat = dem2di_series_make(a, b, order, true, -1);
+    shape->rho_max = -dem2di_series_minimum(&flat, 1e-9 * flat.size).lower;
     dem2di_fourier_floors(shape, a, b);
 }
 
@@ -3485,6 +3535,7 @@ DEM2D_API dem2d_result dem2d_shape_get(const dem2d_shape *shape, dem2d_shape_inf
     info->circumscribed = shape->circumscribed;
     info->inscribed = shape->inscribed;
     info->rho_min = shape->rho_min;
+    info->rho_max = shape->rho_max;
     info->equivalent = sqrt(shape->mass.area / DEM2DI_PI);
     info->bytes = shape->bytes;
     return DEM2D_OK;
@@ -5559,9 +5610,10 @@ DEM2D_API dem2d_result dem2d_fourier_reduce(double *a, double *b, int order,
 /* A joint of the polybezier: where, tangent, and the place in the outline it stands for. */
 typedef struct dem2di_joint {
     dem2d_vec point, normal, tangent;
-    int corner; /* of the hull: the support corner, or the first of an edge */
-    bool edge;  /* the direction is the normal of the edge from corner to the next */
-    int place;  /* in the outline */
+    int corner;    /* of the hull: the support corner, or the first of an edge */
+    bool edge;     /* the direction is the normal of the edge from corner to the next */
+    bool straight; /* an end of a straight arc along that edge */
+    int place;     /* in the outline */
 } dem2di_joint;
 
 /* Angles below this count as "the direction is the edge's normal": tangent lines then meet the
@@ -5574,37 +5626,117 @@ static int dem2di_place_of(const dem2di_outline *outline, dem2d_vec point) {
     return 0;
 }
 
-/* Support joints in uniform directions; where the direction is an edge's normal, the middle. */
-static inline void dem2di_joints_make(const dem2di_outline *outline, int arcs,
-                                      dem2di_joint *joints) {
-    int n = outline->hull_count, k = dem2di_hull_start(outline);
-    for (int i = 0; i < arcs; i++) {
-        dem2di_joint *joint = &joints[i];
+static dem2d_vec dem2di_hull_edge(const dem2di_outline *outline, int from) {
+    return dem2di_sub(outline->hull[(from + 1) % outline->hull_count], outline->hull[from]);
+}
+
+/* A joint at a fraction of a hull's edge: the outline below the edge is shared between the arcs
+   on both sides there. */
+static void dem2di_joint_on_edge(const dem2di_outline *outline, int from, double fraction,
+                                 dem2di_joint *joint) {
+    dem2d_vec start = outline->hull[from], edge = dem2di_hull_edge(outline, from);
+    int place = dem2di_place_of(outline, start);
+    joint->edge = true;
+    joint->corner = from;
+    joint->point = dem2di_along(start, fraction, edge);
+    for (int j = 0; j < outline->count; j++) {
+        dem2d_vec q = outline->points[place];
+        if (dem2di_dot(dem2di_sub(q, joint->point), edge) >= 0) break;
+        place = (place + 1) % outline->count;
+    }
+    joint->place = place;
+}
+
+/* The support joint in a direction, from a hull's corner at or before it; where the direction is an
+   edge's normal, the edge's middle. Returns the corner. */
+static int dem2di_joint_make(const dem2di_outline *outline, int k, dem2d_vec normal,
+                             dem2di_joint *joint) {
+    int n = outline->hull_count;
+    joint->normal = normal;
+    joint->tangent = dem2di_perp(normal);
+    joint->corner = k = dem2di_hull_climb(outline, k, normal);
+    joint->edge = joint->straight = false;
+    joint->point = outline->hull[k];
+    joint->place = dem2di_place_of(outline, joint->point);
+    for (int side = 0; side < 2 && !joint->edge; side++) {
+        int from = side == 0 ? k : (k + n - 1) % n;
+        dem2d_vec edge = dem2di_hull_edge(outline, from);
+        if (fabs(dem2di_dot(edge, joint->normal)) <= DEM2DI_EDGE_ANGLE * dem2di_length(edge))
+            dem2di_joint_on_edge(outline, from, 0.5, joint);
+    }
+    return k;
+}
+
+/* A hull's edge that becomes a straight arc, and the curved arcs from there to the next one. */
+typedef struct dem2di_straight {
+    int edge; /* of the hull, from corner `edge` */
+    double length;
+    double turn; /* angle to the normal of the next side */
+    int arcs;    /* that share it */
+} dem2di_straight;
+
+static dem2d_rot dem2di_edge_normal(const dem2di_outline *outline, int from) {
+    dem2d_vec unit = dem2di_vec(0, 0);
+    dem2d_rot z;
+    (void)dem2di_unit(dem2di_hull_edge(outline, from), &unit);
+    z.c = unit.y;
+    z.s = -unit.x;
+    return z;
+}
+
+/* Curved arcs for the turns between sides, in their order along the hull: one each, the rest where
+   an arc would turn most. False where one would turn by more than a third of a turn, as three arcs
+   without sides do. */
+static bool dem2di_share_arcs(const dem2di_outline *outline, dem2di_straight *sides, int count,
+                              int arcs) {
+    for (int j = 0; j < count; j++) {
+        dem2d_rot from = dem2di_edge_normal(outline, sides[j].edge), turn;
+        dem2d_rot to = dem2di_edge_normal(outline, sides[(j + 1) % count].edge);
+        turn.c = from.c * to.c + from.s * to.s;
+        turn.s = from.c * to.s - from.s * to.c;
+        sides[j].turn = count > 1 ? dem2d_rot_angle(turn) : 2 * DEM2DI_PI;
+        if (sides[j].turn < 0) sides[j].turn += 2 * DEM2DI_PI;
+        sides[j].arcs = 1;
+    }
+    for (int i = count; i <= arcs; i++) {
+        int most = 0;
+        for (int j = 1; j < count; j++)
+            if (sides[j].turn * sides[most].arcs > sides[most].turn * sides[j].arcs) most = j;
+        if (i == arcs) return sides[most].turn <= 2.1 * sides[most].arcs; /* 2 pi/3, and a bit */
+        sides[most].arcs++;
+    }
+    return false; /* more sides than arcs */
+}
+
+/* What is cut off a corner that is rounded, at most: a twentieth of the size. */
+static double dem2di_corner_reach(const dem2di_outline *outline) {
+    return 0.05 * outline->radius;
+}
+
+/* Joints in uniform directions; with sides, at both ends of each, and in uniform directions
+   between them. */
+static void dem2di_joints_make(const dem2di_outline *outline, int arcs,
+                               const dem2di_straight *sides, int count, dem2di_joint *joints) {
+    int k = dem2di_hull_start(outline);
+    for (int i = 0; i < arcs && count == 0; i++) {
         dem2d_rot z = dem2d_rot_make(2 * DEM2DI_PI * i / arcs);
-        joint->normal = dem2di_vec(z.c, z.s);
-        joint->tangent = dem2di_perp(joint->normal);
-        k = dem2di_hull_climb(outline, k, joint->normal);
-        joint->corner = k;
-        joint->edge = false;
-        joint->point = outline->hull[k];
-        joint->place = dem2di_place_of(outline, joint->point);
-        for (int side = 0; side < 2 && !joint->edge; side++) {
-            int from = side == 0 ? k : (k + n - 1) % n;
-            dem2d_vec start = outline->hull[from];
-            dem2d_vec edge = dem2di_sub(outline->hull[(from + 1) % n], start);
-            if (fabs(dem2di_dot(edge, joint->normal)) > DEM2DI_EDGE_ANGLE * dem2di_length(edge))
-                continue;
-            joint->edge = true;
-            joint->corner = from;
-            joint->point = dem2di_along(start, 0.5, edge);
-            /* the outline below the edge is shared between the arcs at the edge's middle */
-            int place = dem2di_place_of(outline, start);
-            for (int j = 0; j < outline->count; j++) {
-                dem2d_vec q = outline->points[place];
-                if (dem2di_dot(dem2di_sub(q, joint->point), edge) >= 0) break;
-                place = (place + 1) % outline->count;
-            }
-            joint->place = place;
+        k = dem2di_joint_make(outline, k, dem2di_vec(z.c, z.s), &joints[i]);
+    }
+    for (int j = 0; j < count; j++) {
+        const dem2di_straight *side = &sides[j];
+        dem2d_rot z = dem2di_edge_normal(outline, side->edge);
+        dem2d_vec normal = dem2di_vec(z.c, z.s);
+        double cut = dem2di_min(0.25, dem2di_corner_reach(outline) / side->length);
+        for (int end = 0; end < 2; end++, joints++) {
+            joints->normal = normal;
+            joints->tangent = dem2di_perp(normal);
+            joints->straight = true;
+            dem2di_joint_on_edge(outline, side->edge, end == 0 ? cut : 1 - cut, joints);
+        }
+        k = (side->edge + 1) % outline->hull_count;
+        for (int i = 1; i < side->arcs; i++, joints++) {
+            dem2d_rot turn = dem2d_rot_make(side->turn * i / side->arcs);
+            k = dem2di_joint_make(outline, k, dem2di_turn(turn, normal), joints);
         }
     }
 }
@@ -5625,7 +5757,7 @@ static void dem2di_round_corner(const dem2di_outline *outline, dem2di_joint *joi
                                 int first, int last, int low, int high) {
     dem2di_joint *start = &joints[low % arcs], *end = &joints[high % arcs];
     dem2d_vec corner = joints[first % arcs].point, bisector;
-    double before, after, unused, reach = 0.05 * outline->radius; /* a twentieth of the size */
+    double before, after, unused, reach = dem2di_corner_reach(outline);
     if (start->edge)
         before = dem2di_length(dem2di_sub(corner, start->point));
     else
@@ -5634,6 +5766,8 @@ static void dem2di_round_corner(const dem2di_outline *outline, dem2di_joint *joi
         after = dem2di_length(dem2di_sub(corner, end->point));
     else
         dem2di_tangent_lengths(end, &joints[(high + 1) % arcs], &after, &unused);
+    if (start->straight) before *= 2; /* it ends where the rounding begins */
+    if (end->straight) after *= 2;
     reach = dem2di_min(reach, dem2di_min(before, after) / 2);
     if (!dem2di_unit(dem2di_add(start->normal, end->normal), &bisector)) return;
     double cosine = dem2di_dot(bisector, start->normal); /* of half the angle */
@@ -5642,6 +5776,8 @@ static void dem2di_round_corner(const dem2di_outline *outline, dem2di_joint *joi
     dem2d_vec centre = dem2di_along(corner, -radius / cosine, bisector);
     for (int i = first; i <= last; i++)
         joints[i % arcs].point = dem2di_along(centre, radius, joints[i % arcs].normal);
+    if (start->straight) start->point = dem2di_along(corner, -reach, start->tangent);
+    if (end->straight) end->point = dem2di_along(corner, reach, end->tangent);
 }
 
 static void dem2di_round_corners(const dem2di_outline *outline, dem2di_joint *joints, int arcs) {
@@ -5673,7 +5809,9 @@ static void dem2di_round_corners(const dem2di_outline *outline, dem2di_joint *jo
 typedef struct dem2di_section {
     const dem2di_outline *outline;
     const dem2di_joint *from, *to;
-    double l1, l2; /* tangent lengths */
+    double l1, l2;  /* tangent lengths */
+    double rho_max; /* greatest radius of curvature asked for, m; HUGE_VAL: any */
+    double bend;    /* least curvature searched for, 1/m */
 } dem2di_section;
 
 static dem2di_arc dem2di_section_arc(const dem2di_section *section, double f1, double f2) {
@@ -5822,6 +5960,41 @@ static bool dem2di_may_cross(const dem2di_arc *arc, const dem2di_foot *a, const 
     return dem2di_min(a->outside, b->outside) <= 2 * bulge;
 }
 
+/* Samples of an arc's curvature, and by how much the curvature that is asked for is overdone, so
+   that it holds between them as well. */
+#define DEM2DI_BEND_SAMPLES 32
+#define DEM2DI_BEND_SPARE 1.02
+
+/* The penalty for what is flatter than asked for, m2: the mean square of the part of the curvature
+   that is missing, times the square of the chord. It costs about as much as the flat arc can gain,
+   the bulge, at a miss of DEM2DI_BEND_SPARE. Adds its slopes. */
+static double dem2di_section_penalty(const dem2di_section *section, const dem2di_arc *arc,
+                                     double slope[2]) {
+    dem2d_vec chord = dem2di_sub(section->to->point, section->from->point), d[2];
+    double weight = dem2di_dot(chord, chord) / (DEM2DI_BEND_SAMPLES + 1), sum = 0;
+    d[0] = dem2di_scale(section->from->tangent, section->l1);
+    d[1] = dem2di_scale(section->to->tangent, section->l2);
+    for (int i = 0; i <= DEM2DI_BEND_SAMPLES && section->bend > 0; i++) {
+        double t = (double)i / DEM2DI_BEND_SAMPLES, s = 1 - t;
+        dem2d_vec v = dem2di_arc_speed(arc, t);
+        dem2d_vec a = dem2di_along(dem2di_scale(dem2di_sub(arc->d1, arc->d0), s), t,
+                                   dem2di_sub(arc->d2, arc->d1));
+        double square = dem2di_dot(v, v), turn = dem2di_cross(v, a);
+        double unit = 1 / (1.5 * square * sqrt(square) * section->bend); /* see dem2di_arc_rho */
+        double missing = DEM2DI_BEND_SPARE - turn * unit;
+        if (!(missing > 0) || !(square > 0)) continue;
+        sum += missing * missing;
+        for (int j = 0; j < 2; j++) {
+            dem2d_vec dv = dem2di_scale(d[j], j == 0 ? s * s - 2 * t * s : t * t - 2 * t * s);
+            dem2d_vec da = dem2di_scale(d[j], j == 0 ? t - 2 * s : 2 * t - s);
+            double by = dem2di_cross(dv, a) + dem2di_cross(v, da);
+            by -= 3 * turn * dem2di_dot(v, dv) / square;
+            slope[j] -= 2 * weight * missing * unit * by;
+        }
+    }
+    return weight * sum;
+}
+
 /* Area between arc and outline: the two cross in points that cut both into loops; the area of
    each loop is the difference of two sweeps. Exact when arc and outline meet the crossings in
    one order. */
@@ -5861,7 +6034,7 @@ static double dem2di_section_area(const dem2di_section *section, const double f[
         p = q;
     }
     dem2di_section_loop(section, &arc, last, 1, loop, &area, slope);
-    return area;
+    return area + dem2di_section_penalty(section, &arc, slope);
 }
 
 /* Fractions stay in [1e-4, 1]: 1e-4 keeps the tangents at the joints, 1 the control polygon
@@ -5919,6 +6092,27 @@ static int dem2di_fit_section(const dem2di_section *section, double f[2]) {
             if (!dem2di_section_descend(section, inverse, f, slope, &area)) break;
         }
         if (begin - area <= 1e-6 * begin) break;
+    }
+    return steps;
+}
+
+/* Least area with a bound of the radius of curvature. A penalty is overdone somewhere and not
+   enough elsewhere: where the bound does not hold yet, more is asked for. Keeps the roundest where
+   it cannot hold, and returns the number of steps. */
+static int dem2di_fit_curved(dem2di_section *section, double f[2]) {
+    double least = 0, g[2];
+    int steps = 0;
+    memcpy(g, f, sizeof g);
+    for (int i = 0; i < 8; i++) { /* up to twice the curvature: 1.1^7 */
+        steps += dem2di_fit_section(section, g);
+        dem2di_arc arc = dem2di_section_arc(section, g[0], g[1]);
+        double rho = dem2di_arc_rho_max(&arc, 0);
+        if (i == 0 || rho < least) {
+            least = rho;
+            memcpy(f, g, sizeof g);
+        }
+        if (least <= section->rho_max) break;
+        section->bend *= 1.1;
     }
     return steps;
 }
@@ -5992,9 +6186,9 @@ static void dem2di_swarm_search(const dem2di_section *section, const dem2di_rast
     const double inertia = 0.7298437881283576, pull = 1.4961797656631331;
     struct {
         double x[2], v[2], best[2];
-        int cost;
+        double cost; /* px */
     } bird[DEM2DI_SWARM_BIRDS];
-    int least = INT_MAX;
+    double least = HUGE_VAL, unused[2] = {0, 0};
     memset(bird, 0, sizeof bird);
     for (int move = 0; move <= swarm->moves; move++)
         for (int i = 0; i < swarm->birds; i++) {
@@ -6006,7 +6200,8 @@ static void dem2di_swarm_search(const dem2di_section *section, const dem2di_rast
                 if (move == 0) bird[i].v[j] = 0;
             }
             dem2di_arc arc = dem2di_section_arc(section, bird[i].x[0], bird[i].x[1]);
-            int cost = dem2di_raster_cost(raster, &arc);
+            double cost = dem2di_section_penalty(section, &arc, unused);
+            cost = cost / (raster->pixel * raster->pixel) + dem2di_raster_cost(raster, &arc);
             if (move == 0 || cost < bird[i].cost) {
                 bird[i].cost = cost;
                 memcpy(bird[i].best, bird[i].x, sizeof bird[i].best);
@@ -6018,10 +6213,11 @@ static void dem2di_swarm_search(const dem2di_section *section, const dem2di_rast
         }
 }
 
-/* [P] sec. 4 step 4 for one section. iterations counts moves of the swarm. */
+/* [P] sec. 4 step 4 for one section: the arc, unless it is flatter than the bound and the one that
+   is known is not. iterations counts moves of the swarm. */
 static dem2d_result dem2di_swarm_section(const dem2d_env *env, const dem2di_section *section,
-                                         const dem2di_swarm *swarm, uint64_t *random, double f[2],
-                                         int *iterations) {
+                                         const dem2di_swarm *swarm, uint64_t *random,
+                                         dem2di_arc *arc, int *iterations) {
     const dem2di_outline *outline = section->outline;
     int place = section->from->place;
     int inner = (section->to->place - place + outline->count) % outline->count + 1;
@@ -6056,7 +6252,11 @@ static dem2d_result dem2di_swarm_section(const dem2d_env *env, const dem2di_sect
             dem2di_raster_row(&raster, points, (int)count, y);
             memcpy(raster.mask + (size_t)y * width, raster.row, width);
         }
+        double f[2] = {0, 0};
         dem2di_swarm_search(section, &raster, swarm, random, f);
+        dem2di_arc found = dem2di_section_arc(section, f[0], f[1]);
+        double rho = dem2di_arc_rho_max(&found, 0);
+        if (rho <= section->rho_max || rho <= dem2di_arc_rho_max(arc, 0)) *arc = found;
         *iterations += swarm->moves;
     }
     dem2di_release(env, points, count, sizeof *points);
@@ -6066,42 +6266,152 @@ static dem2d_result dem2di_swarm_section(const dem2d_env *env, const dem2di_sect
     return DEM2D_OK;
 }
 
-/* [P] sec. 4 on an outline made ready, relative to its centre. With a swarm by that, else (NULL) by
- * exact area. */
+/* A polybezier under way: joints, and the fractions of each arc. */
+typedef struct dem2di_bezier_plan {
+    const dem2di_outline *outline;
+    int arcs, iterations;
+    double rho_max;       /* greatest radius of curvature asked for, m; HUGE_VAL: any */
+    dem2di_joint *joints; /* arcs */
+    double *fractions;    /* 2 arcs */
+    double area, rho;     /* reached: between all arcs and the outline, greatest radius */
+} dem2di_bezier_plan;
+
+static bool dem2di_plan_section(const dem2di_bezier_plan *plan, int i, dem2di_section *section) {
+    section->outline = plan->outline;
+    section->from = &plan->joints[i];
+    section->to = &plan->joints[(i + 1) % plan->arcs];
+    section->rho_max = plan->rho_max;
+    section->bend = 1 / plan->rho_max;
+    bool straight = section->from->straight && section->to->straight &&
+                    section->from->corner == section->to->corner;
+    if (straight)
+        section->l1 = section->l2 =
+            dem2di_length(dem2di_sub(section->to->point, section->from->point));
+    else
+        dem2di_tangent_lengths(section->from, section->to, &section->l1, &section->l2);
+    return !straight;
+}
+
+/* Least area for the plan's joints. Arcs start from those of a circle, which have x/l =
+   (4/3) tan(phi/4) / tan(phi/2) = (4/3) cos(phi/2) / (1 + cos(phi/2)). */
+static void dem2di_plan_fit(dem2di_bezier_plan *plan) {
+    double unused[2];
+    plan->area = plan->rho = 0;
+    for (int i = 0; i < plan->arcs; i++) {
+        dem2di_section section;
+        double *f = &plan->fractions[2 * i];
+        f[0] = f[1] = 1.0 / 3; /* straight: even speed */
+        bool curved = dem2di_plan_section(plan, i, &section);
+        if (curved) {
+            double cosine = sqrt((1 + dem2di_dot(section.from->normal, section.to->normal)) / 2);
+            f[0] = f[1] = 4.0 / 3 * cosine / (1 + cosine);
+            plan->iterations += dem2di_fit_curved(&section, f);
+        }
+        dem2di_arc arc = dem2di_section_arc(&section, f[0], f[1]);
+        if (curved) plan->rho = dem2di_arc_rho_max(&arc, plan->rho);
+        section.bend = 0;
+        plan->area += dem2di_section_area(&section, f, unused);
+    }
+}
+
+/* Hull edges that may become straight arcs, the longest first: those of a fifth of the size and
+   more; as many as may be. An arc of 20 times the size along a shorter one loses less than 1e-5 of
+   the grain's area, L^3/(12 rho). Returns how many. */
+static int dem2di_find_sides(const dem2di_outline *outline, dem2di_straight *sides, int room) {
+    int count = 0;
+    for (int k = 0; k < outline->hull_count; k++) {
+        double length = dem2di_length(dem2di_hull_edge(outline, k));
+        int i = count;
+        if (length < 0.2 * outline->radius) continue;
+        if (count < room)
+            count++;
+        else if (sides[--i].length >= length)
+            continue;
+        for (; i > 0 && sides[i - 1].length < length; i--) sides[i] = sides[i - 1];
+        sides[i].edge = k;
+        sides[i].length = length;
+    }
+    return count;
+}
+
+/* The first sides of those found, in their order along the hull. */
+static void dem2di_sort_sides(const dem2di_straight *found, int count, dem2di_straight *sides) {
+    for (int i = 0; i < count; i++) {
+        int j = i;
+        for (; j > 0 && sides[j - 1].edge > found[i].edge; j--) sides[j] = sides[j - 1];
+        sides[j] = found[i];
+    }
+}
+
+/* Is a plan better than another? What meets the bound goes before what does not. */
+static bool dem2di_plan_better(const dem2di_bezier_plan *a, const dem2di_bezier_plan *b) {
+    bool met_a = a->rho <= a->rho_max, met_b = b->rho <= b->rho_max;
+    if (met_a && met_b) return a->area < b->area;
+    return met_a != met_b ? met_a : a->rho < b->rho;
+}
+
+/* The plan with no side, then with more and more of them, the longest first; the best is kept. */
+static void dem2di_plan_search(dem2di_bezier_plan *plan, dem2di_bezier_plan *spare,
+                               dem2di_straight *found, dem2di_straight *sides) {
+    int room = plan->arcs - 3;
+    int count = plan->rho_max < HUGE_VAL ? dem2di_find_sides(plan->outline, found, room) : 0;
+    for (int straight = 0; straight <= count; straight++) {
+        dem2di_sort_sides(found, straight, sides);
+        if (straight > 0 &&
+            !dem2di_share_arcs(plan->outline, sides, straight, plan->arcs - straight))
+            continue;
+        dem2di_joints_make(plan->outline, plan->arcs, sides, straight, spare->joints);
+        dem2di_round_corners(plan->outline, spare->joints, plan->arcs);
+        dem2di_plan_fit(spare);
+        if (straight > 0 && !dem2di_plan_better(spare, plan)) continue;
+        dem2di_bezier_plan swap = *plan;
+        *plan = *spare;
+        *spare = swap;
+    }
+}
+
+/* [P] sec. 4 on an outline made ready, relative to its centre. With a swarm by that, else (NULL)
+   by exact area; the greatest radius of curvature that is asked for may be HUGE_VAL. */
 static dem2d_result dem2di_bezier_fit(const dem2d_env *env, const dem2di_outline *outline, int arcs,
-                                      const dem2di_swarm *swarm, dem2d_vec *control,
+                                      double rho_max, const dem2di_swarm *swarm, dem2d_vec *control,
                                       int *iterations) {
     size_t count = (size_t)arcs;
-    dem2di_joint *joints = (dem2di_joint *)dem2di_allocate(env, count, sizeof *joints);
-    if (joints == NULL) return dem2di_fail(env, DEM2D_OUT_OF_MEMORY, -1, "%d joints", arcs);
-    dem2di_joints_make(outline, arcs, joints);
-    dem2di_round_corners(outline, joints, arcs);
-    /* start from the arc of a circle: x/l = (4/3) tan(phi/4) / tan(phi/2), phi = 2 pi/arcs */
-    dem2d_rot quarter = dem2d_rot_make(DEM2DI_PI / (2 * arcs)), half;
-    half = dem2d_rot_make(DEM2DI_PI / arcs);
-    double circle = 4.0 / 3 * (quarter.s / quarter.c) * (half.c / half.s);
+    size_t size = sizeof(dem2di_joint) + sizeof(dem2di_straight) + 2 * sizeof(double);
+    dem2di_joint *memory = (dem2di_joint *)dem2di_allocate(env, 2 * count, size);
+    if (memory == NULL) return dem2di_fail(env, DEM2D_OUT_OF_MEMORY, -1, "%d joints", arcs);
+    dem2di_bezier_plan plan, spare;
+    memset(&plan, 0, sizeof plan);
+    plan.outline = outline;
+    plan.arcs = arcs;
+    plan.rho_max = rho_max;
+    spare = plan;
+    plan.joints = memory;
+    spare.joints = memory + count;
+    dem2di_straight *sides = (dem2di_straight *)(void *)(spare.joints + count);
+    plan.fractions = (double *)(void *)(sides + 2 * count);
+    spare.fractions = plan.fractions + 2 * count;
+    dem2di_plan_search(&plan, &spare, sides, sides + count);
     dem2d_result result = DEM2D_OK;
     uint64_t random = swarm != NULL ? swarm->seed : 0;
+    if (swarm == NULL) *iterations += plan.iterations + spare.iterations;
     for (int i = 0; i < arcs && result == DEM2D_OK; i++) {
-        double f[2] = {circle, circle};
         dem2di_section section;
-        section.outline = outline;
-        section.from = &joints[i];
-        section.to = &joints[(i + 1) % arcs];
-        dem2di_tangent_lengths(section.from, section.to, &section.l1, &section.l2);
-        if (swarm != NULL)
-            result = dem2di_swarm_section(env, &section, swarm, &random, f, iterations);
-        else
-            *iterations += dem2di_fit_section(&section, f);
+        const double *f = &plan.fractions[2 * i];
+        bool curved = dem2di_plan_section(&plan, i, &section);
         dem2di_arc arc = dem2di_section_arc(&section, f[0], f[1]);
+        if (swarm != NULL && curved)
+            result = dem2di_swarm_section(env, &section, swarm, &random, &arc, iterations);
         dem2d_vec joint = section.from->point;
         control[3 * i] = joint;
         control[3 * i + 1] = dem2di_add(joint, arc.d0);
         control[3 * i + 2] = dem2di_add(joint, dem2di_add(arc.d0, arc.d1));
     }
-    dem2di_release(env, joints, count, sizeof *joints);
+    dem2di_release(env, memory, 2 * count, size);
     return result;
 }
+
+/* The greatest radius of curvature of a fit unless told, of the size. */
+#define DEM2DI_FIT_RHO_MAX 20
 
 DEM2D_API dem2d_result dem2d_bezier_fit(const dem2d_env *env, const dem2d_vec *points, int count,
                                         int arcs, dem2d_vec *control) {
@@ -6115,6 +6425,8 @@ DEM2D_API dem2d_result dem2d_bezier_fit(const dem2d_env *env, const dem2d_vec *p
     result = dem2di_check_crossing(env, "points", points, count);
     if (result == DEM2D_OK)
         result = dem2di_bezier_fit(env, &outline, arcs, NULL, control, &iterations);
+    result = dem2di_bezier_fit(env, &outline, arcs, DEM2DI_FIT_RHO_MAX * outline.radius, NULL,
+                               control, &iterations);
     for (int i = 0; i < 3 * arcs && result == DEM2D_OK; i++)
         control[i] = dem2di_add(control[i], outline.centre);
     dem2di_outline_release(env, &outline);
@@ -6491,7 +6803,9 @@ static dem2d_result dem2di_fit_bezier(dem2di_fit *fit) {
     swarm.moves = desc->moves > 0 ? desc->moves : 60;
     swarm.pixels = desc->pixels > 0 ? desc->pixels : 256;
     swarm.seed = desc->seed;
-    dem2d_result result = dem2di_bezier_fit(fit->env, &fit->outline, fit->count,
+    double rho_max = desc->max_radius == 0 ? DEM2DI_FIT_RHO_MAX : desc->max_radius;
+    rho_max = desc->unbounded ? HUGE_VAL : rho_max * fit->outline.radius;
+    dem2d_result result = dem2di_bezier_fit(fit->env, &fit->outline, fit->count, rho_max,
                                             desc->method == DEM2D_FIT_SWARM ? &swarm : NULL,
                                             control, &fit->report.iterations);
     if (result == DEM2D_OK)
@@ -6637,6 +6951,7 @@ static dem2d_result dem2di_fit_once(dem2di_fit *fit) {
     fit->report.difference = difference.area;
     fit->report.hausdorff = difference.hausdorff;
     fit->report.convexity = shape->rho_min;
+    fit->report.max_radius = shape->rho_max;
     return DEM2D_OK;
 }
 
@@ -6673,10 +6988,14 @@ static dem2d_result dem2di_check_fit(const dem2d_env *env, const dem2d_fit_desc 
     dem2d_result result = dem2di_check_not_negative(env, "min_radius", desc->min_radius);
     if (result == DEM2D_OK) result = dem2di_check_not_negative(env, "coverage", desc->coverage);
     if (result == DEM2D_OK) result = dem2di_check_swarm(env, desc);
+    if (result == DEM2D_OK) result = dem2di_check_not_negative(env, "max_radius", desc->max_radius);
     if (result != DEM2D_OK) return result;
     if (desc->min_radius >= 1)
         return dem2di_fail(env, DEM2D_OUT_OF_RANGE, -1, "min_radius = %g must be below 1",
                            desc->min_radius);
+    if (desc->max_radius > 0 && desc->max_radius < 1)
+        return dem2di_fail(env, DEM2D_OUT_OF_RANGE, -1, "max_radius = %g must be 0, or 1 or more",
+                           desc->max_radius);
     if (!counted) return DEM2D_OK;
     bool search = desc->count == 0 && desc->coverage > 0;
     if (search && desc->coverage < 1) return DEM2D_OK;
@@ -14042,6 +14361,7 @@ static void dem2di_archive_shape(dem2di_archive *ar, const dem2d_env *env, dem2d
     dem2di_archive_positive(ar, "circumscribed", &s->circumscribed);
     dem2di_archive_not_negative(ar, "inscribed", &s->inscribed);
     dem2di_archive_not_negative(ar, "rho_min", &s->rho_min);
+    dem2di_archive_not_negative(ar, "rho_max", &s->rho_max);
     dem2di_archive_positive(ar, "area", &s->mass.area);
     dem2di_archive_positive(ar, "polar_moment", &s->mass.polar_moment);
     dem2di_archive_vec(ar, "offset", &s->offset);
@@ -15431,6 +15751,8 @@ DEM2D_API dem2d_result dem2d_world_write_csv(const dem2d_world *world, const dem
             Servo walls know the dashpots of their contacts and the next step of the particles: they
             hold their stress for every damping ratio, and those that face each other come to rest.
             Snapshots of version 3.
+            Polybeziers are fitted with a radius of curvature of at most 20 of the size (max_radius,
+            unbounded) and straight arcs along straight edges; shapes and fits tell the greatest.
      0.5.0  The two points of faces conserve energy between free polygons as well: each has a
             normal of its own and tells its energy. Snapshots of version 2.
      0.4.0  Dashpots by restitution, rolling friction, a caller's law, segment walls. Measures of

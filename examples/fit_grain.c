@@ -26,6 +26,8 @@ static const char usage[] =
     "                     bezier: area, pso (area)\n"
     "  --min-radius F     constrained: least radius of curvature over the mean, 0 to 0.999; 0\n"
     "                     allows corners (0.1)\n"
+    "  --max-radius F     bezier: greatest radius of curvature over that of the circle with the\n"
+    "                     hull's area, 1 to 1e9; 0 has no bound (20)\n"
     "  --scale S          constrained and fejer, area as of: hull, grain, or none (hull)\n"
     "  --threshold N      image: grains are darker than this, 1 to 255 (Otsu's)\n"
     "  --bright           image: grains are not darker than the threshold\n"
@@ -49,6 +51,7 @@ enum {
     COVERAGE,
     METHOD,
     MIN_RADIUS,
+    MAX_RADIUS,
     SCALE,
     THRESHOLD,
     BRIGHT,
@@ -59,9 +62,9 @@ enum {
     OPTIONS
 };
 static const char *const option_names[OPTIONS] = {
-    "--model=",      "--order=",        "--segments=", "--vertices=",  "--coverage=",
-    "--method=",     "--min-radius=",   "--scale=",    "--threshold=", "--bright",
-    "--min-pixels=", "--scale-length=", "--outline=",  "--svg="};
+    "--model=",  "--order=",      "--segments=",     "--vertices=", "--coverage=",
+    "--method=", "--min-radius=", "--max-radius=",   "--scale=",    "--threshold=",
+    "--bright",  "--min-pixels=", "--scale-length=", "--outline=",  "--svg="};
 
 typedef struct options {
     const char *file;
@@ -121,6 +124,13 @@ static void take_fit(options *o) {
     refuse(o, SCALE, !constrained && !fejer, "is for the model fs by constrained or fejer");
     if (given[MIN_RADIUS] != NULL)
         fit->min_radius = parse_real("--min-radius", given[MIN_RADIUS], 0, 0.999);
+    refuse(o, MAX_RADIUS, fit->model != DEM2D_BEZIER, "is for the model bezier");
+    if (given[MAX_RADIUS] != NULL) {
+        fit->max_radius = parse_real("--max-radius", given[MAX_RADIUS], 0, 1e9);
+        if (fit->max_radius > 0 && fit->max_radius < 1)
+            fail(STATUS_BAD_INPUT, "--max-radius is 0, or 1 or more");
+        fit->unbounded = fit->max_radius == 0;
+    }
     fit->corners = given[MIN_RADIUS] != NULL && fit->min_radius == 0;
     if (given[SCALE] != NULL)
         fit->scale = (dem2d_fit_scale)parse_name("--scale", given[SCALE], scales, 3);

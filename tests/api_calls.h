@@ -111,6 +111,8 @@ static const row fit_rows[] = {
     FIELD_ENUM(fit_desc, scale, DEM2D_SCALE_NONE + 1),
     FIELD(fit_desc, min_radius, FRACTION),
     FIELD(fit_desc, corners, ANY_BOOL),
+    FIELD(fit_desc, max_radius, NOT_NEGATIVE),
+    FIELD(fit_desc, unbounded, ANY_BOOL),
     FIELD(fit_desc, seed, ANY_SEED),
     FIELD_INT(fit_desc, birds, INTEGER_OR_0, 2, 256),
     FIELD_INT(fit_desc, moves, INTEGER, 0, 100000),

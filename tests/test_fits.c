@@ -290,6 +290,22 @@ static void check_convexity(const dem2d_shape *shape, const dem2d_fit_report *r,
     assert_between(r->convexity, 0, least + 1e-12L * size);
 }
 
+/* The greatest radius of curvature is above what is found and, where its peak is broad, not far
+   above: apart from straight arcs, where it is infinite. */
+static void check_max_radius(const dem2d_shape *shape, const dem2d_fit_report *r) {
+    dem2d_shape_info info;
+    double most = 0;
+    assert_ok(dem2d_shape_get(shape, &info));
+    for (int i = 0; i < 2000; i++) {
+        dem2d_support s;
+        assert_ok(dem2d_shape_support(shape, r->pose, direction(0.00314159265358979 * i), &s));
+        if (s.rho < HUGE_VAL) most = fmax(most, s.rho);
+    }
+    assert_true(r->max_radius == info.rho_max);
+    assert_true(r->max_radius >= most * (1 - 1e-12));
+    if (info.type != DEM2D_BEZIER) assert_true(r->max_radius <= most * 1.001);
+}
+
 /* Every number of a report, by other means. */
 static void check_report(const outline *o, const dem2d_fit_desc *desc, const dem2d_shape *shape,
                          const dem2d_fit_report *r) {
@@ -313,6 +329,7 @@ static void check_report(const outline *o, const dem2d_fit_desc *desc, const dem
     const double one = farthest(o->p, o->count, p, DENSE), two = farthest(p, DENSE, o->p, o->count);
     assert_within(r->hausdorff, sqrt(fmax(one, two)), 0.01L * size);
     check_convexity(shape, r, size);
+    check_max_radius(shape, r);
     assert_true(r->iterations >= 0);
 }
 
@@ -564,6 +581,73 @@ static double oval_covers(const outline *o, oval e) {
         p[i] = vec(e.x + c * x - s * y, e.y + s * x + c * y);
     }
     return coverage(o->p, o->count, p, DENSE);
+}
+
+/* The greatest radius of curvature of an arc from its control points, in long double; -1 for one
+   that is straight to rounding. */
+static long double flattest(const dem2d_vec q[4], long double size) {
+    long double d[3][2], most = 0, across = 0;
+    for (int i = 0; i < 3; i++) {
+        d[i][0] = (long double)q[i + 1].x - q[i].x;
+        d[i][1] = (long double)q[i + 1].y - q[i].y;
+    }
+    const long double x = (long double)q[3].x - q[0].x, y = (long double)q[3].y - q[0].y;
+    for (int i = 0; i < 3; i++) across += fabsl(x * d[i][1] - y * d[i][0]) / hypotl(x, y);
+    if (across < 1e-14L * size) return -1;
+    for (int i = 0; i <= 1000; i++) {
+        const long double t = i / 1000.0L, s = 1 - t;
+        long double v[2], a[2];
+        for (int j = 0; j < 2; j++) {
+            v[j] = 3 * (s * s * d[0][j] + 2 * s * t * d[1][j] + t * t * d[2][j]);
+            a[j] = 6 * (s * (d[1][j] - d[0][j]) + t * (d[2][j] - d[1][j]));
+        }
+        const long double speed = hypotl(v[0], v[1]), turn = v[0] * a[1] - v[1] * a[0];
+        most = fmaxl(most, turn > 0 ? speed * speed * speed / turn : HUGE_VALL);
+    }
+    return most;
+}
+
+/* Polybeziers are bounded by 20 of the hull's radius, with straight arcs along straight edges; a
+   square is a square then. Without a bound some arc of a square is a thousand times flatter. */
+static void polybeziers_are_bounded(void **state) {
+    (void)state;
+    static const int some[] = {3, 4, 7, 10, 24};
+    for (int i = 0; i < OUTLINES; i++) {
+        static dem2d_vec hull[MOST];
+        const outline *o = &given[i];
+        int corners, straight = 0;
+        assert_ok(dem2d_polygon_hull(NULL, o->p, o->count, hull, &corners));
+        const double radius = sqrt((double)area_of(hull, corners) / 3.14159265358979324);
+        for (int k = 0; k < COUNT_OF(some); k++) {
+            dem2d_vec q[3 * 24 + 1];
+            long double most = 0;
+            assert_ok(dem2d_bezier_fit(NULL, o->p, o->count, some[k], q));
+            q[3 * some[k]] = q[0];
+            for (int j = 0; j < some[k]; j++) {
+                const long double one = flattest(&q[3 * j], fabs(q[0].x) + fabs(q[0].y) + radius);
+                straight += one < 0 && some[k] == 10;
+                most = fmaxl(most, one);
+            }
+            if (most > 20.000001L * radius)
+                print_error("%s, %d arcs: %Lg\n", o->name, some[k], most / radius);
+            assert_true(most <= 20.000001L * radius);
+        }
+        if (i == BOX) assert_int_equal(straight, 4);
+        if (i == ROUND) assert_int_equal(straight, 0);
+    }
+    static const dem2d_fit_desc bounded = {.model = DEM2D_BEZIER, .count = 10};
+    static const dem2d_fit_desc tight = {.model = DEM2D_BEZIER, .count = 10, .max_radius = 5};
+    static const dem2d_fit_desc free = {.model = DEM2D_BEZIER, .count = 10, .unbounded = true};
+    dem2d_fit_report report[3];
+    dem2d_shape_destroy(fit(&given[STEPS], &bounded, &report[0]));
+    dem2d_shape_destroy(fit(&given[STEPS], &tight, &report[1]));
+    dem2d_shape_destroy(fit(&given[STEPS], &free, &report[2]));
+    const double size = size_of(&given[STEPS]);
+    assert_true(report[1].max_radius <= 5 * size && report[0].max_radius <= 20 * size);
+    assert_true(report[1].coverage <= report[0].coverage);
+    assert_true(covers(&given[BOX], &bounded) >= 0.999);
+    dem2d_shape_destroy(fit(&given[BOX], &free, &report[2]));
+    assert_true(report[2].max_radius > 1000 * size_of(&given[BOX]));
 }
 
 /* The ellipse with an outline's second moments, turned and sized to its area. */
@@ -1173,6 +1257,7 @@ static const struct {
     {{FS(8, DEFAULT), .corners = true}, 0.953},
     {{FS(16, DEFAULT), .corners = true}, 0.967},
     {{.model = DEM2D_BEZIER, .count = 10}, 0.978},
+    {{.model = DEM2D_BEZIER, .count = 10, .unbounded = true}, 0.9794},
 };
 
 typedef struct sums {
@@ -1244,6 +1329,7 @@ int main(void) {
         cmocka_unit_test(scale_sets_the_area),
         cmocka_unit_test(no_ellipse_is_better),
         cmocka_unit_test(no_polygon_is_better),
+        cmocka_unit_test(polybeziers_are_bounded),
         cmocka_unit_test(swarm_repeats_and_area_is_as_good),
         cmocka_unit_test(least_count_reaches),
         cmocka_unit_test(what_is_impossible_is_not_reached),

@@ -1150,7 +1150,11 @@ static void coverage(const outline *grains, int count) {
          {FOURIER_FIT(CONSTRAINED, 8), .corners = true, .scale = DEM2D_SCALE_GRAIN},
          0.9507,
          0},
-        {"polybezier of 10 arcs", {.count = 10, .model = DEM2D_BEZIER}, 0.9795, 0},
+        {"polybezier of 10 arcs", {.count = 10, .model = DEM2D_BEZIER}, 0.978, 0},
+        {"polybezier of 10 arcs, any curvature",
+         {.count = 10, .model = DEM2D_BEZIER, .unbounded = true},
+         0.9795,
+         0},
     };
     basis = "trial";
     for (int i = 0; i < COUNT_OF(rows); i++) {
