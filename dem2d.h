@@ -212,8 +212,9 @@ HOW TO
                          Pass the last normal as desc.start when the pair has moved little, and
                          skip_points if the contact points are not needed.
     repeat the papers    dem2d_world_desc.solver = DEM2D_GJK_EPA, faces = DEM2D_ONE_POINT; templates
-                         by DEM2D_FIT_REDUCTION and DEM2D_FIT_SWARM; local_damping = 0.7 ([P]) or
-                         global_damping = 0.7 ([F]). examples/biaxial.c --papers is their test.
+                         by DEM2D_FIT_REDUCTION and DEM2D_FIT_SWARM, unbounded; local_damping = 0.7
+                         ([P]) or global_damping = 0.7 ([F]). examples/biaxial.c --papers is their
+                         test.
     choose a time step   dem2d_world_time_step_bounds on a settled scene. The world checks it
                          whenever it renews its list of pairs.
     lose energy          damping_ratio of the materials, from dem2d_damping_ratio(restitution);
@@ -267,9 +268,10 @@ open)
         same. Improved: DEM2D_TWO_POINTS where faces meet; the middle of two faces jumps with the
         last bit of the angle and does not conserve energy. At a wall it takes the foot point.
     [P] sec. 4 steps 1-5: templates by particle swarm      DEM2D_FIT_SWARM
-        same steps. Chosen: birds, moves, constriction, pixels; joints that share a corner of the
-        hull are moved off it. Improved: dem2d_bezier_fit and DEM2D_FIT_AREA take the same joints
-        and tangents and minimise the exact area of the symmetric difference.
+        same steps, when unbounded. Chosen: birds, moves, constriction, pixels; joints that share
+        a corner of the hull are moved off it. Improved: a bound of the radius of curvature, with
+        straight arcs; dem2d_bezier_fit and DEM2D_FIT_AREA minimise the exact area of the
+        symmetric difference.
     [P] sec. 5.1: accuracy score; [F] sec. 3.1: percent coverage     dem2d_outline_compare
         same (coverage, a fraction), by exact areas instead of pixels.
     [P] sec. 5.2: equivalent size                          dem2d_shape_info.equivalent
@@ -894,13 +896,11 @@ DEM2D_API dem2d_result dem2d_fourier_reduce(double *a, double *b, int order,
 /// Polybezier of an outline ([P] sec. 4): joints are support points of the hull in `arcs` >= 3
 /// uniform directions, tangents are perpendicular to them, and the two lengths of each arc
 /// minimise the exact area between arc and outline (not [P]'s step 4, which is the swarm:
-/// DEM2D_FIT_SWARM). control gets 3 * arcs points. Errors:
-/// TOO_FEW_POINTS, NOT_FINITE, OUT_OF_RANGE, CROSSING, ZERO_AREA, OUT_OF_MEMORY.
 /// DEM2D_FIT_SWARM). No arc has a radius of curvature above 20 times that of the circle with the
 /// hull's area where that can be had: nearly flat arcs make the stable time step short. Long edges
 /// of the hull become straight arcs where that is better, and the joints between them lie in
 /// uniform directions. dem2d_outline_fit has another bound, or none. control gets 3 * arcs points.
-/// Errors: TOO_FEW_POINTS, NOT_FINITE, OUT_OF_RANGE, ZERO_AREA, OUT_OF_MEMORY.
+/// Errors: TOO_FEW_POINTS, NOT_FINITE, OUT_OF_RANGE, CROSSING, ZERO_AREA, OUT_OF_MEMORY.
 DEM2D_API dem2d_result dem2d_bezier_fit(const dem2d_env *env, const dem2d_vec *points, int count,
                                         int arcs, dem2d_vec *control);
 
@@ -957,12 +957,9 @@ typedef struct dem2d_fit_report {
 
 /// Fit a template to an outline, convex or not. Errors: NULL_ARGUMENT, TOO_FEW_POINTS, NOT_FINITE,
 /// CROSSING (see dem2d_outline_measure), ZERO_AREA, OUT_OF_RANGE (count, coverage, a method of
-/// another model), NOT_REACHED (no count up to 64 has the coverage), OUT_OF_MEMORY. report may be
-/// NULL.
-/// Fit a template to a simple outline, convex or not. Errors: NULL_ARGUMENT, TOO_FEW_POINTS,
-/// NOT_FINITE, ZERO_AREA, OUT_OF_RANGE (count, coverage, a method of another model), NOT_REACHED
-/// (no count up to 64 has the coverage), OUT_OF_MEMORY. A bound of the radius of curvature that the
-/// arcs cannot have is no error: report->max_radius says what came out. report may be NULL.
+/// another model), NOT_REACHED (no count up to 64 has the coverage), OUT_OF_MEMORY. A bound of the
+/// radius of curvature that the arcs cannot have is no error: report->max_radius says what came
+/// out. report may be NULL.
 DEM2D_API dem2d_result dem2d_outline_fit(const dem2d_env *env, const dem2d_vec *points, int count,
                                          const dem2d_fit_desc *desc, dem2d_shape **shape,
                                          dem2d_fit_report *report);
@@ -6424,9 +6421,8 @@ DEM2D_API dem2d_result dem2d_bezier_fit(const dem2d_env *env, const dem2d_vec *p
     if (result != DEM2D_OK) return result;
     result = dem2di_check_crossing(env, "points", points, count);
     if (result == DEM2D_OK)
-        result = dem2di_bezier_fit(env, &outline, arcs, NULL, control, &iterations);
-    result = dem2di_bezier_fit(env, &outline, arcs, DEM2DI_FIT_RHO_MAX * outline.radius, NULL,
-                               control, &iterations);
+        result = dem2di_bezier_fit(env, &outline, arcs, DEM2DI_FIT_RHO_MAX * outline.radius, NULL,
+                                   control, &iterations);
     for (int i = 0; i < 3 * arcs && result == DEM2D_OK; i++)
         control[i] = dem2di_add(control[i], outline.centre);
     dem2di_outline_release(env, &outline);
@@ -9859,7 +9855,7 @@ struct dem2d_world {
     dem2di_list list;
     double *load_x, *load_y, *load_turn; /* force and torque of contact i on its A at 2 i, on its B
                                             at 2 i + 1, and 0 behind the last; in scratch */
-    dem2di_push *pushes; /* room for the contacts of a servo wall; in scratch */
+    dem2di_push *pushes;                 /* room for the contacts of a servo wall; in scratch */
     char *scratch; /* what only a step or only the building of the list needs */
     dem2di_tally *tallies;
     dem2di_overlap *overlap; /* contact-area rule: for each block twice what one overlap may have */
@@ -12144,8 +12140,8 @@ static dem2di_meeting dem2di_meeting_make(const dem2d_world *world, int i, int f
 }
 
 /* What the caller's law says of contact i at a depth. */
-static void dem2di_ask_law(const dem2d_world *world, int i, int from,
-                           const dem2di_meeting *meeting, double depth, dem2d_law_output *output) {
+static void dem2di_ask_law(const dem2d_world *world, int i, int from, const dem2di_meeting *meeting,
+                           double depth, dem2d_law_output *output) {
     const dem2di_list *list = &world->list;
     const dem2di_key *key = &list->keys[i];
     const dem2di_extra *last = &list->extras[from];
@@ -12918,11 +12914,10 @@ static double dem2di_servo_speed(dem2d_world *world, int j, int begin, int end) 
     double resistance = dem2di_servo_resistance(&backing, dt);
     double guess = dem2di_dot(wall->velocity, desc->normal);
     guess = dem2di_max(-top, dem2di_min(top, guess)); /* top may have been set lower */
-    double speed =
-        dem2di_servo_balance(world->pushes, count, world->law != NULL, resistance,
-                             target + resistance * wall->drift, guess, top);
-    wall->drift += dem2di_servo_forgets(&backing, dt) *
-                   (speed - wall->drift - dem2di_servo_slides(world, j));
+    double speed = dem2di_servo_balance(world->pushes, count, world->law != NULL, resistance,
+                                        target + resistance * wall->drift, guess, top);
+    wall->drift +=
+        dem2di_servo_forgets(&backing, dt) * (speed - wall->drift - dem2di_servo_slides(world, j));
     wall->backing = backing;
     return speed;
 }
@@ -14754,12 +14749,12 @@ static void dem2di_archive_keys(dem2di_archive *ar, dem2d_world *w) {
     dem2di_archive_count(ar, "contacts", &list->count, 4);
     dem2di_archive_int(ar, "pairs", &list->pairs, 0, list->count);
     dem2di_archive_int(ar, "discs", &list->discs, 0, list->pairs);
-    bool fits = ar->aim != DEM2DI_LOADING ||
-                (dem2di_list_reserve(w, &w->plan, list->discs, list->count) &&
-                 dem2di_tallies_reserve(w, list->discs, list->count) &&
-                 dem2di_scratch_reserve(
-                     w, dem2di_loads_bytes(w, (size_t)list->count,
-                                           (size_t)(list->count - list->pairs))));
+    bool fits =
+        ar->aim != DEM2DI_LOADING ||
+        (dem2di_list_reserve(w, &w->plan, list->discs, list->count) &&
+         dem2di_tallies_reserve(w, list->discs, list->count) &&
+         dem2di_scratch_reserve(
+             w, dem2di_loads_bytes(w, (size_t)list->count, (size_t)(list->count - list->pairs))));
     if (!dem2di_archive_room(ar, fits)) return;
     for (int i = 0; i < list->count && dem2di_archive_good(ar); i++) {
         int others = i < list->pairs ? w->body_count : w->wall_count;
