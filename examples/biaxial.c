@@ -34,7 +34,8 @@ static const char usage[] =
     "  --faces RULE      forces where faces meet: two (points), one, or area (two)\n"
     "  --grains PATH     bezier and fs grains from an image (PBM, PGM), an outline (CSV, first\n"
     "                    line \"x,y\"), or a directory of outlines, without any of images\n"
-    "                    (without PATH: a few outlines made here)\n"
+    "                    (without PATH: a few outlines made here)\n" SEARCH_USAGE
+    "  --min-coverage C  leave out grains that convex templates cover less, 0 to 1 (0.7)\n"
     "  --out DIR         for history.csv and a picture (SVG) and histograms (CSV) of the settled,\n"
     "                    packed and final state; made if its parent exists (out)\n"
     "  --pairs           also pairs.csv: support calls and residuals of GJK and EPA for all near\n"
@@ -61,6 +62,8 @@ typedef struct options {
     bool quick, pairs, vtk, ledger;
     int solver, faces;  // dem2d_solver, dem2d_face_rule
     const char *grains; // or NULL
+    dem2d_image_desc search;
+    double min_coverage;
     const char *out;
 } options;
 
@@ -68,17 +71,20 @@ static options parse_options(int count, char **arguments) {
     options o = {0};
     o.seed = 1;
     o.out = "out";
+    o.search = default_search();
+    o.min_coverage = 0.7;
     parse_shapes("mixed", o.kinds);
     static const char *const names[] = {
-        "--quick", "--particles=", "--seed=",  "--shapes=", "--damping=", "--grains=",
-        "--out=",  "--solver=",    "--faces=", "--pairs",   "--vtk",      "--ledger",
-        "--restitution="};
+        "--quick",        "--particles=",   "--seed=",        "--shapes=", "--damping=",
+        "--grains=",      "--out=",         "--solver=",      "--faces=",  "--pairs",
+        "--vtk",          "--ledger",       "--restitution=", "--crop=",   "--labels",
+        "--ignore-frame", "--min-coverage="};
     static const char *const dampings[] = {"local", "global"};
     static const char *const solvers[] = {"certified", "gjk"};
     static const char *const rules[] = {"two", "one", "area"};
     for (int i = 1; i < count; i++) {
         const char *name = arguments[i], *value;
-        const int which = parse_option(count, arguments, &i, usage, names, 13, &value);
+        const int which = parse_option(count, arguments, &i, usage, names, 17, &value);
         if (which == 0) o.quick = true;
         if (which == 1) o.particles = (int)parse_integer(name, value, 10, 1000000);
         if (which == 2) o.seed = parse_integer(name, value, 0, UINT64_MAX);
@@ -93,6 +99,10 @@ static options parse_options(int count, char **arguments) {
         if (which == 11) o.ledger = true;
         if (which == 12)
             must(dem2d_damping_ratio(parse_real(name, value, 0.01, 1), &o.damping_ratio), name);
+        if (which == 13) parse_crop(value, &o.search);
+        if (which == 14) o.search.labels = true;
+        if (which == 15) o.search.ignore_frame = true;
+        if (which == 16) o.min_coverage = parse_real(name, value, 0, 1);
     }
     if (o.particles == 0) o.particles = o.quick ? 100 : 500;
     return o;
@@ -780,7 +790,7 @@ static bool run(job *j, double *strain) {
 int main(int count, char **arguments) {
     example_name = "biaxial";
     const options o = parse_options(count, arguments);
-    template_set set = load_templates(o.grains);
+    template_set set = load_templates(o.grains, &o.search, o.min_coverage);
     make_directory(o.out); // all input is known to be good; nothing was written before
     if (o.vtk) {
         char *folder = join_text(o.out, "/", "vtk");

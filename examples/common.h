@@ -66,6 +66,7 @@ static library_message last_message;
 static inline void keep_message(void *user, dem2d_result result, int index, const char *text) {
     library_message *message = user;
     (void)index; // the text has it
+    if (result == DEM2D_WARNING) fprintf(stderr, "%s: warning: %s\n", example_name, text);
     message->result = result;
     snprintf(message->text, sizeof message->text, "%s", text);
 }
@@ -398,11 +399,17 @@ typedef struct outline {
     char *name; // for messages
 } outline;
 
-/* Grey levels, row 0 on top. */
+/* Grey levels, row 0 on top: of one byte, from 0 to 255, or of two, as they are in the file. */
 typedef struct image {
-    uint8_t *pixels;
+    uint8_t *pixels; // NULL with the other
     int width, height;
+    uint16_t *pixels16;
 } image;
+
+static inline void free_image(image *picture) {
+    free(picture->pixels);
+    free(picture->pixels16);
+}
 
 /* All bytes of a file; the caller frees them. The limit is that of the largest raw image. */
 static inline char *read_whole(const char *path, size_t *count) {
@@ -462,32 +469,106 @@ static inline bool parse_decimal(const char *text, size_t length, double *value)
     return strspn(copy, allowed) == length && end == copy + length && isfinite(*value);
 }
 
-static inline bool is_outline(const char *bytes, size_t count) {
-    rest r = rest_make(bytes, count), line = r;
-    return next_line(&r, &line) && line.end - line.at == 3 && memcmp(line.at, "x,y", 3) == 0;
+static inline bool is_blank(char c) {
+    return c == ' ' || c == '\t';
 }
 
-/* A line "x,y", then a point on each; blank lines at the end only. *number is the offending line,
-   0 for the file as a whole. */
+/* Next field of a line, without blanks and quotes around it; false when nothing is left, which is
+   where `at` is NULL. */
+static inline bool next_field(rest *line, char separator, rest *field) {
+    if (line->at == NULL) return false;
+    const char *stop = memchr(line->at, separator, (size_t)(line->end - line->at));
+    field->at = line->at;
+    field->end = stop != NULL ? stop : line->end;
+    line->at = stop != NULL ? stop + 1 : NULL;
+    while (field->at < field->end && is_blank(field->at[0])) field->at++;
+    while (field->at < field->end && is_blank(field->end[-1])) field->end--;
+    if (field->end - field->at >= 2 && field->at[0] == '"' && field->end[-1] == '"') {
+        field->at++;
+        field->end--;
+    }
+    return true;
+}
+
+/* What the first line of an outline's file says. */
+typedef struct columns {
+    int x, y, count; // x and y: which of them
+    char separator;
+} columns;
+
+/* A line that names the columns x and y, once each, in any order and among others, separated by
+   commas, semicolons or tabs: the first of semicolon, tab, comma that the line has. */
+static inline bool parse_columns(rest line, columns *result) {
+    columns c = {-1, -1, 0, ','};
+    rest field;
+    const size_t length = (size_t)(line.end - line.at);
+    if (length > 0 && memchr(line.at, '\t', length) != NULL) c.separator = '\t';
+    if (length > 0 && memchr(line.at, ';', length) != NULL) c.separator = ';';
+    for (; next_field(&line, c.separator, &field); c.count++) {
+        if (field.end - field.at != 1) continue;
+        const char name = field.at[0] | 0x20; // ASCII: the small letter
+        if ((name == 'x' && c.x >= 0) || (name == 'y' && c.y >= 0)) return false;
+        if (name == 'x') c.x = c.count;
+        if (name == 'y') c.y = c.count;
+    }
+    *result = c;
+    return c.x >= 0 && c.y >= 0;
+}
+
+/* Past a byte-order mark. */
+static inline rest outline_rest(const char *bytes, size_t count) {
+    const bool mark = count >= 3 && memcmp(bytes, "\xEF\xBB\xBF", 3) == 0;
+    return rest_make(bytes + (mark ? 3 : 0), count - (mark ? 3 : 0));
+}
+
+static inline bool is_outline(const char *bytes, size_t count) {
+    rest r = outline_rest(bytes, count), line = r;
+    columns unused;
+    return next_line(&r, &line) && parse_columns(line, &unused);
+}
+
+/* A number; where no comma separates it may have one for its point. */
+static inline bool parse_coordinate(rest field, char separator, double *value) {
+    char copy[400];
+    const size_t length = (size_t)(field.end - field.at);
+    if (length == 0 || length >= sizeof copy) return false;
+    memcpy(copy, field.at, length);
+    char *comma = separator != ',' ? memchr(copy, ',', length) : NULL;
+    if (comma != NULL) *comma = '.';
+    return parse_decimal(copy, length, value);
+}
+
+/* As many fields as columns, x and y of them. */
+static inline bool parse_point(rest line, const columns *c, dem2d_vec *p) {
+    rest field;
+    int count = 0;
+    bool good = true;
+    for (; next_field(&line, c->separator, &field); count++) {
+        if (count == c->x) good = good && parse_coordinate(field, c->separator, &p->x);
+        if (count == c->y) good = good && parse_coordinate(field, c->separator, &p->y);
+    }
+    return good && count == c->count;
+}
+
+/* A line that names x and y, then a point on each; blank lines at the end only. A last point that
+   is the first again is left out. *number is the offending line, 0 for the file as a whole. */
 static inline const char *parse_outline(const char *bytes, size_t count, outline *result,
                                         int *number) {
-    rest r = rest_make(bytes, count), line = r;
+    rest r = outline_rest(bytes, count), line = r;
     outline made = {NULL, 0, NULL};
+    columns c;
     const char *wrong = NULL;
     bool blank = false;
     *number = 1;
-    if (!is_outline(bytes, count)) return "expected \"x,y\"";
-    next_line(&r, &line);
+    if (!next_line(&r, &line) || !parse_columns(line, &c)) return "expected \"x,y\"";
     while (wrong == NULL && next_line(&r, &line)) {
         (*number)++;
         if (line.at == line.end) {
             blank = true;
             continue;
         }
-        const char *comma = memchr(line.at, ',', (size_t)(line.end - line.at));
         dem2d_vec p;
-        if (blank || comma == NULL || !parse_decimal(line.at, (size_t)(comma - line.at), &p.x) ||
-            !parse_decimal(comma + 1, (size_t)(line.end - comma) - 1, &p.y)) {
+        if (blank || !parse_point(line, &c, &p)) {
             wrong = "expected two finite numbers";
         } else if (made.count == 10000000) {
             wrong = "too many points";
@@ -498,6 +579,9 @@ static inline const char *parse_outline(const char *bytes, size_t count, outline
         }
     }
     if (wrong == NULL) *number = 0;
+    if (made.count > 1 && made.points[0].x == made.points[made.count - 1].x &&
+        made.points[0].y == made.points[made.count - 1].y)
+        made.count--;
     if (wrong == NULL && made.count < 3) wrong = "an outline needs 3 points or more";
     if (wrong != NULL)
         free(made.points);
@@ -556,10 +640,17 @@ static inline const char *parse_image_header(rest *r, int *format, image *made, 
     return NULL;
 }
 
+/* Puts a sample: of one byte scaled to 255, of two as it is. */
+static inline void put_sample(image *made, size_t i, unsigned value, unsigned most) {
+    if (made->pixels16 != NULL)
+        made->pixels16[i] = (uint16_t)value;
+    else
+        made->pixels[i] = (uint8_t)((value * 255 + most / 2) / most);
+}
+
 /* Samples written as decimal numbers, bits also without white space between them. */
 static inline const char *parse_plain_samples(rest *r, int most, bool bits, image *made) {
     const size_t samples = (size_t)made->width * (size_t)made->height;
-    const unsigned top = (unsigned)most;
     for (size_t i = 0; i < samples; i++) {
         int value;
         skip_space(r);
@@ -570,8 +661,8 @@ static inline const char *parse_plain_samples(rest *r, int most, bool bits, imag
             value = next_natural(r, most);
         if (value < 0) return "a sample is not a number";
         if (value > most) return "a sample is above the greatest value";
-        made->pixels[i] = (uint8_t)(((unsigned)value * 255 + top / 2) / top);
-        if (bits) made->pixels[i] = value == 1 ? 0 : 255; // 1 is black
+        put_sample(made, i, bits ? 1 - (unsigned)value : (unsigned)value,
+                   (unsigned)most); // 1: black
     }
     return NULL;
 }
@@ -580,19 +671,19 @@ static inline const char *parse_plain_samples(rest *r, int most, bool bits, imag
 static inline const char *parse_raw_samples(rest *r, int most, bool bits, image *made) {
     const unsigned top = (unsigned)most;
     const uint8_t *in = (const uint8_t *)r->at;
-    uint8_t *out = made->pixels;
+    size_t i = 0;
     for (int row = 0; row < made->height; row++) {
         for (int column = 0; column < made->width; column++) {
             unsigned value;
             if (bits) {
                 value = (unsigned)in[column / 8] >> (7 - column % 8) & 1;
-                *out++ = value == 1 ? 0 : 255; // 1 is black
+                put_sample(made, i++, 1 - value, 1); // 1 is black
                 continue;
             }
             value = *in++;
             if (most > 255) value = value << 8 | *in++;
             if (value > top) return "a sample is above the greatest value";
-            *out++ = (uint8_t)((value * 255 + top / 2) / top);
+            put_sample(made, i++, value, top);
         }
         if (bits) in += (made->width + 7) / 8;
     }
@@ -600,11 +691,12 @@ static inline const char *parse_raw_samples(rest *r, int most, bool bits, image 
     return NULL;
 }
 
-/* Netpbm P1, P2, P4, P5, scaled to 8 bits; black bits are 0, white ones 255. Memory is asked for
-   only when the buffer is long enough for the pixels. */
+/* Netpbm P1, P2, P4, P5: to 8 bits, black bits 0, white ones 255; or, if the header has a greatest
+   value above 255, two bytes as they are: many files have values of 12 bits and say 65535. Memory
+   is asked for only when the buffer is long enough for the pixels. */
 static inline const char *parse_image(const char *bytes, size_t count, image *result) {
     rest r = rest_make(bytes, count);
-    image made = {NULL, 0, 0};
+    image made = {NULL, 0, 0, NULL};
     int format, most;
     const char *wrong = parse_image_header(&r, &format, &made, &most);
     if (wrong != NULL) return wrong;
@@ -620,13 +712,16 @@ static inline const char *parse_image(const char *bytes, size_t count, image *re
         r.at += r.at < r.end;
     }
     if ((size_t)(r.end - r.at) < least) return "truncated: less data than the header says";
-    made.pixels = get_memory(NULL, columns, rows);
+    if (most > 255)
+        made.pixels16 = get_memory(NULL, columns * rows, sizeof *made.pixels16);
+    else
+        made.pixels = get_memory(NULL, columns, rows);
     wrong =
         raw ? parse_raw_samples(&r, most, bits, &made) : parse_plain_samples(&r, most, bits, &made);
     skip_space(&r);
     if (wrong == NULL && r.at < r.end) wrong = "more data than the header says";
     if (wrong != NULL)
-        free(made.pixels);
+        free_image(&made);
     else
         *result = made;
     return wrong;
@@ -660,12 +755,41 @@ static inline void free_outlines(outline_list *list) {
     free(list->items);
 }
 
+/* Options for what is looked for in images, and their text for --help. */
+#define SEARCH_USAGE                                                                              \
+    "  --crop X,Y,W,H     image: look at W by H pixels only, X from the left, Y from the top; 0 " \
+    "for\n"                                                                                       \
+    "                     W or H: all the rest (0,0,0,0)\n"                                       \
+    "  --labels           image: a label mask, each grain of a grey value of its own on 0\n"      \
+    "  --ignore-frame     image: a frame has no say in the threshold\n"
+
+/* All but the pixels: one metre per pixel. */
+static inline dem2d_image_desc default_search(void) {
+    dem2d_image_desc search = {0};
+    search.scale = 1;
+    return search;
+}
+
+static inline void parse_crop(const char *text, dem2d_image_desc *search) {
+    int *const fields[4] = {&search->crop_left, &search->crop_top, &search->crop_width,
+                            &search->crop_height};
+    rest line = rest_make(text, strlen(text)), field;
+    for (int i = 0; i < 4 || line.at != NULL; i++) {
+        const bool there = i < 4 && next_field(&line, ',', &field);
+        if (there) *fields[i] = next_natural(&field, IMAGE_SIDE);
+        if (!there || *fields[i] < 0 || *fields[i] > IMAGE_SIDE || field.at != field.end)
+            fail(STATUS_BAD_INPUT, "--crop %s: expected X,Y,W,H of whole pixels up to %d", text,
+                 IMAGE_SIDE);
+    }
+}
+
 /* The outlines of an image's grains; `search` has all but the pixels. */
 static inline void list_image(outline_list *list, const image *picture,
                               const dem2d_image_desc *search, const char *path) {
     dem2d_image_desc desc = *search;
     dem2d_outline_set *found;
     desc.pixels = picture->pixels;
+    desc.pixels16 = picture->pixels16;
     desc.width = picture->width;
     desc.height = picture->height;
     need(dem2d_image_outlines(example_env(), &desc, &found), STATUS_BAD_INPUT, path);
@@ -702,7 +826,7 @@ static inline file_kind read_grains(const char *path, const dem2d_image_desc *se
     char *bytes = read_whole(path, &count);
     const char *wrong = NULL;
     outline o = {NULL, 0, NULL};
-    image picture = {NULL, 0, 0};
+    image picture = {NULL, 0, 0, NULL};
     int line = 0;
     file_kind kind = is_outline(bytes, count) ? FILE_OUTLINE : FILE_OTHER;
     if (is_image_name(path) || is_image(bytes, count)) kind = FILE_IMAGE;
@@ -717,7 +841,7 @@ static inline file_kind read_grains(const char *path, const dem2d_image_desc *se
     }
     if (kind == FILE_IMAGE) {
         list_image(list, &picture, search, path);
-        free(picture.pixels);
+        free_image(&picture);
     }
     return kind;
 }
@@ -769,22 +893,20 @@ static inline void list_grains(const char *directory, const dem2d_image_desc *se
         free(names);
     }
     if (skipped > 0 && list->count > 0)
-        fprintf(stderr, "%s: skipped %d CSV file%s in %s: first line is not \"x,y\"\n",
+        fprintf(stderr, "%s: skipped %d CSV file%s in %s: first line does not name x and y\n",
                 example_name, skipped, skipped == 1 ? "" : "s", directory);
 }
 
 /* The grains of an image or outline, of a directory, or (NULL) self-made ones. */
-static inline outline_list load_grains(const char *path) {
+static inline outline_list load_grains(const char *path, const dem2d_image_desc *search) {
     outline_list list = {NULL, 0};
-    dem2d_image_desc search = {0};
     struct stat status;
-    search.scale = 1;
     for (int i = 0; path == NULL && i < SELF_MADE; i++) list_self_made(&list, i);
     if (path == NULL) return list;
     if (stat(path, &status) == 0 && S_ISDIR(status.st_mode))
-        list_grains(path, &search, &list);
+        list_grains(path, search, &list);
     else
-        read_grains(path, &search, &list);
+        read_grains(path, search, &list);
     if (list.count == 0)
         fail(STATUS_BAD_INPUT,
              "no outline (CSV, first line \"x,y\") and no grain of an image in %s", path);
@@ -820,13 +942,17 @@ static inline void parse_shapes(const char *text, bool kinds[KINDS]) {
 
 enum { FOURIER_ORDER = 8, BEZIER_ARCS = 10 };
 
-static inline dem2d_shape *fitted_template(const outline *o, dem2d_shape_type model, int count) {
+/* coverage, if asked for, is lowered to that of this fit. */
+static inline dem2d_shape *fitted_template(const outline *o, dem2d_shape_type model, int count,
+                                           double *coverage) {
     dem2d_fit_desc fit = {0};
+    dem2d_fit_report report;
     fit.model = model;
     fit.count = count;
     dem2d_shape *shape;
-    need(dem2d_outline_fit(example_env(), o->points, o->count, &fit, &shape, NULL),
+    need(dem2d_outline_fit(example_env(), o->points, o->count, &fit, &shape, &report),
          STATUS_BAD_INPUT, o->name);
+    if (coverage != NULL && report.coverage < *coverage) *coverage = report.coverage;
     return shape;
 }
 
@@ -866,19 +992,39 @@ static inline void add_template(template_set *set, dem2d_shape *shape) {
     set->shapes[set->count++] = shape;
 }
 
-/* Templates of the grains at a path (see load_grains). */
-static inline template_set load_templates(const char *path) {
+/* Both templates of an outline; false, and a line on stderr, when one of them covers too little. */
+static inline bool add_fitted(template_set *set, const outline *o, double min_coverage) {
+    double coverage = 1;
+    dem2d_shape *fs = fitted_template(o, DEM2D_FOURIER, FOURIER_ORDER, &coverage);
+    dem2d_shape *bezier = fitted_template(o, DEM2D_BEZIER, BEZIER_ARCS, &coverage);
+    const bool good = coverage >= min_coverage;
+    if (!good || coverage < 0.5)
+        fprintf(stderr, "%s: %s: convex templates cover %.3f of it%s\n", example_name, o->name,
+                coverage, good ? "" : ": left out");
+    if (good) {
+        add_template(set, fs);
+        add_template(set, bezier);
+        set->outlines++;
+    } else {
+        dem2d_shape_destroy(fs);
+        dem2d_shape_destroy(bezier);
+    }
+    return good;
+}
+
+/* Templates of the grains at a path (see load_grains), without those that cover too little. */
+static inline template_set load_templates(const char *path, const dem2d_image_desc *search,
+                                          double min_coverage) {
     template_set set = {NULL, 0, 0};
     dem2d_shape *circle;
-    outline_list grains = load_grains(path);
+    outline_list grains = load_grains(path, search);
     must(dem2d_shape_create_circle(example_env(), 1, &circle), "circle");
     add_template(&set, circle);
-    for (int i = 0; i < grains.count; i++) {
-        const outline *o = &grains.items[i];
-        add_template(&set, fitted_template(o, DEM2D_FOURIER, FOURIER_ORDER));
-        add_template(&set, fitted_template(o, DEM2D_BEZIER, BEZIER_ARCS));
-    }
-    set.outlines = grains.count;
+    for (int i = 0; i < grains.count; i++) (void)add_fitted(&set, &grains.items[i], min_coverage);
+    if (set.outlines < grains.count)
+        fprintf(stderr, "%s: %d of %d grains left out: a coverage below %g\n", example_name,
+                grains.count - set.outlines, grains.count, min_coverage);
+    if (set.outlines == 0) fail(STATUS_BAD_INPUT, "no grain of %s is left (--min-coverage)", path);
     free_outlines(&grains);
     return set;
 }
@@ -1017,7 +1163,8 @@ static inline void add_falling(dem2d_world *world, dem2d_material_id material, i
     dem2d_shape_id ids[TEMPLATES];
     dem2d_shape_info info[TEMPLATES];
     uint64_t random = 1;
-    template_set set = load_templates(NULL);
+    const dem2d_image_desc search = default_search();
+    template_set set = load_templates(NULL, &search, 0);
     for (int i = 0; i < TEMPLATES; i++) {
         const int t = random_template(&set, all, &random); // may move set.shapes
         const dem2d_shape *shape = set.shapes[t];

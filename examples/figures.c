@@ -460,7 +460,8 @@ static outline hull_of(const outline *o) {
 
 static void make_fits(fits *f, const options *o) {
     progress p;
-    f->outlines = o->grains != NULL ? load_grains(o->grains) : make_outlines();
+    const dem2d_image_desc search = default_search();
+    f->outlines = o->grains != NULL ? load_grains(o->grains, &search) : make_outlines();
     f->templates = f->outlines.count < TEMPLATES ? f->outlines.count : TEMPLATES;
     progress_start(&p, "templates", f->templates);
     for (int i = 0; i < f->templates; i++) {
@@ -1357,8 +1358,8 @@ static void make_models(dem2d_shape *shapes[MODELS]) {
     must(dem2d_shape_create_ellipse(env, 1, 0.6, &shapes[1]), "ellipse");
     must(dem2d_shape_create_polygon(env, corners, 5, 0, &shapes[2]), "polygon");
     must(dem2d_shape_create_polygon(env, inner, 5, 0.25, &shapes[3]), "rounded polygon");
-    shapes[4] = fitted_template(&list.items[2], DEM2D_BEZIER, BEZIER_ARCS);
-    shapes[5] = fitted_template(&list.items[1], DEM2D_FOURIER, FOURIER_ORDER);
+    shapes[4] = fitted_template(&list.items[2], DEM2D_BEZIER, BEZIER_ARCS, NULL);
+    shapes[5] = fitted_template(&list.items[1], DEM2D_FOURIER, FOURIER_ORDER, NULL);
     must(dem2d_shape_create_custom(env, &custom, &shapes[6]), "custom shape");
     free_outlines(&list);
 }

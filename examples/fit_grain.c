@@ -15,8 +15,8 @@
 
 static const char usage[] =
     "usage: fit_grain FILE [options]\n"
-    "Fits a template to each grain of an image (PBM, PGM) or to one outline (CSV, first line "
-    "\"x,y\").\n"
+    "Fits a template to each grain of an image (PBM, PGM) or to one outline (CSV, its first line\n"
+    "names x and y).\n"
     "  --model M          fs, bezier, polygon, ellipse or circle (fs)\n"
     "  --order N          of fs, 1 to 64 (8)\n"
     "  --segments N       arcs of bezier, 3 to 64 (10)\n"
@@ -29,7 +29,10 @@ static const char usage[] =
     "  --max-radius F     bezier: greatest radius of curvature over that of the circle with the\n"
     "                     hull's area, 1 to 1e9; 0 has no bound (20)\n"
     "  --scale S          constrained and fejer, area as of: hull, grain, or none (hull)\n"
-    "  --threshold N      image: grains are darker than this, 1 to 255 (Otsu's)\n"
+    /* of images: */
+    SEARCH_USAGE
+    "  --threshold N      image: grains are darker than this, 1 to 255; where the file has values\n"
+    "                     above 255, 1 to 65535 of these (Otsu's)\n"
     "  --bright           image: grains are not darker than the threshold\n"
     "  --min-pixels N     image: smaller grains are left out (16)\n"
     "  --scale-length L   image: metres per pixel (1)\n"
@@ -53,6 +56,9 @@ enum {
     MIN_RADIUS,
     MAX_RADIUS,
     SCALE,
+    CROP,
+    LABELS,
+    IGNORE_FRAME,
     THRESHOLD,
     BRIGHT,
     MIN_PIXELS,
@@ -62,9 +68,10 @@ enum {
     OPTIONS
 };
 static const char *const option_names[OPTIONS] = {
-    "--model=",  "--order=",      "--segments=",     "--vertices=", "--coverage=",
-    "--method=", "--min-radius=", "--max-radius=",   "--scale=",    "--threshold=",
-    "--bright",  "--min-pixels=", "--scale-length=", "--outline=",  "--svg="};
+    "--model=",        "--order=",       "--segments=",   "--vertices=", "--coverage=",
+    "--method=",       "--min-radius=",  "--max-radius=", "--scale=",    "--crop=",
+    "--labels",        "--ignore-frame", "--threshold=",  "--bright",    "--min-pixels=",
+    "--scale-length=", "--outline=",     "--svg="};
 
 typedef struct options {
     const char *file;
@@ -139,10 +146,17 @@ static void take_fit(options *o) {
 static void take_search(options *o) {
     const char *const *given = o->given;
     dem2d_image_desc *search = &o->search;
-    search->scale = 1;
+    *search = default_search();
     search->bright = given[BRIGHT] != NULL;
+    search->labels = given[LABELS] != NULL;
+    search->ignore_frame = given[IGNORE_FRAME] != NULL;
+    refuse(o, THRESHOLD, search->labels || search->ignore_frame,
+           "and --labels or --ignore-frame exclude each other");
+    refuse(o, IGNORE_FRAME, search->labels, "and --labels exclude each other");
+    refuse(o, BRIGHT, search->labels, "and --labels exclude each other");
+    if (given[CROP] != NULL) parse_crop(given[CROP], search);
     if (given[THRESHOLD] != NULL)
-        search->threshold = (int)parse_integer("--threshold", given[THRESHOLD], 1, 255);
+        search->threshold = (int)parse_integer("--threshold", given[THRESHOLD], 1, 65535);
     if (given[MIN_PIXELS] != NULL)
         search->min_pixels = (int)parse_integer("--min-pixels", given[MIN_PIXELS], 1, INT_MAX);
     if (given[SCALE_LENGTH] != NULL)
@@ -172,8 +186,9 @@ static outline_list load(const options *o) {
     outline_list list = {NULL, 0};
     const file_kind kind = read_grains(o->file, &o->search, &list);
     if (kind == FILE_OTHER)
-        fail(STATUS_BAD_INPUT, "%s: neither PBM, PGM nor CSV whose first line is \"x,y\"", o->file);
-    for (int option = THRESHOLD; option <= SCALE_LENGTH; option++)
+        fail(STATUS_BAD_INPUT, "%s: neither PBM, PGM nor CSV whose first line names x and y",
+             o->file);
+    for (int option = CROP; option <= SCALE_LENGTH; option++)
         refuse(o, option, kind != FILE_IMAGE, "is for images");
     if (list.count == 0) fail(STATUS_BAD_INPUT, "%s: no grain found", o->file);
     return list;

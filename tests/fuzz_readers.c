@@ -19,10 +19,11 @@ static void promise(bool holds) {
 static volatile unsigned sink; // every byte of a result is read, for the sanitizers
 
 static void try_image(const char *bytes, size_t size) {
-    image made = {NULL, -1, -1};
+    image made = {NULL, -1, -1, NULL};
     const char *wrong = parse_image(bytes, size, &made);
     if (wrong != NULL) { // untouched then
-        promise(wrong[0] != '\0' && made.pixels == NULL && made.width == -1 && made.height == -1);
+        promise(wrong[0] != '\0' && made.pixels == NULL && made.pixels16 == NULL &&
+                made.width == -1 && made.height == -1);
         return;
     }
     promise(is_image(bytes, size));
@@ -31,9 +32,10 @@ static void try_image(const char *bytes, size_t size) {
     const size_t count = (size_t)made.width * (size_t)made.height;
     promise(count <= 8 * size);
     unsigned sum = 0;
-    for (size_t i = 0; i < count; i++) sum += made.pixels[i];
+    for (size_t i = 0; i < count; i++)
+        sum += made.pixels != NULL ? made.pixels[i] : made.pixels16[i];
     sink = sum;
-    free(made.pixels);
+    free_image(&made);
 }
 
 static void try_outline(const char *bytes, size_t size) {
