@@ -9758,7 +9758,7 @@ typedef struct dem2di_plan {
     bool turns; /* some particle is no circle: rotations matter, and pairs are skipped by travel */
     bool one_law; /* all particles are of one material: */
     int material;
-    bool joints;        /* two segments meet */
+    bool joints;        /* two segments may meet */
     bool full;          /* some law has a dashpot or rolling friction, or is the caller's: what the
                            circles' batches do not know, so that all pairs have links and extras */
     bool again;         /* friction is only there for the springs of the last list: look again */
@@ -11274,9 +11274,9 @@ typedef struct dem2di_build {
    a gap that no grain can tell, far above the rounding of walls that move together. */
 #define DEM2DI_JOINT 1e-6
 
-/* The ends of two segments that are a joint: numbers of 0 (start) and 1 (end) in `which`; false
-   when there is none. */
-static bool dem2di_segments_meet(const dem2d_world *world, int a, int b, int which[2],
+/* The ends of two segments that are a joint, or may be one when the walls have moved together by
+   `way`: numbers of 0 (start) and 1 (end) in `which`; false when there is none. */
+static bool dem2di_segments_meet(const dem2d_world *world, int a, int b, double way, int which[2],
                                  dem2d_vec *at) {
     const dem2di_wall *w[2] = {&world->walls[a], &world->walls[b]};
     int slot[2] = {a, b};
@@ -11286,7 +11286,7 @@ static bool dem2di_segments_meet(const dem2d_world *world, int a, int b, int whi
         end[k][0] = world->wall_now[slot[k]].point;
         end[k][1] = dem2di_segment_end(w[k], end[k][0]);
     }
-    double near = DEM2DI_JOINT * dem2di_min(w[0]->extent, w[1]->extent);
+    double near = DEM2DI_JOINT * dem2di_min(w[0]->extent, w[1]->extent) + way;
     for (which[0] = 0; which[0] < 2; which[0]++)
         for (which[1] = 0; which[1] < 2; which[1]++) {
             *at = end[0][which[0]];
@@ -11295,12 +11295,19 @@ static bool dem2di_segments_meet(const dem2d_world *world, int a, int b, int whi
     return false;
 }
 
-static bool dem2di_has_joints(const dem2d_world *world) {
+/* May two segments be joined before the list is renewed? It is, when a wall has moved by its skin:
+   twice that is beyond what both may add. */
+static bool dem2di_may_join(const dem2d_world *world) {
     int which[2];
     dem2d_vec at;
     for (int a = 0; a < world->wall_count; a++)
-        for (int b = 0; b < a && world->walls[a].desc.segment; b++)
-            if (dem2di_segments_meet(world, a, b, which, &at)) return true;
+        for (int b = 0; b < a && world->walls[a].desc.segment; b++) {
+            const dem2di_wall *w[2] = {&world->walls[a], &world->walls[b]};
+            double way = 0;
+            for (int k = 0; k < 2; k++)
+                if (w[k]->desc.mode != DEM2D_WALL_STILL) way += 2 * w[k]->skin;
+            if (dem2di_segments_meet(world, a, b, way, which, &at)) return true;
+        }
     return false;
 }
 
@@ -11335,7 +11342,7 @@ static dem2di_plan dem2di_plan_make(const dem2d_world *world) {
             plan.friction = plan.friction || (law->friction > 0 && law->tangential_stiffness > 0);
             plan.full = plan.full || rolls || law->damping_ratio > 0;
         }
-    plan.joints = dem2di_has_joints(world);
+    plan.joints = dem2di_may_join(world);
     plan.full = plan.full || world->law != NULL;
     plan.faces = plan.faces && world->law == NULL;
     /* springs and rotations of the last force pass must outlast a step that is refused */
@@ -11736,13 +11743,13 @@ static dem2d_result dem2di_build_list(dem2d_world *world) {
     bool room = dem2di_tallies_reserve(world, 0, 0) && dem2di_arrange(world);
     if (room) {
         dem2di_tune_skin(world);
-        build.plan = dem2di_plan_make(world);
-        room = !build.plan.turns ||
-               dem2di_group_reserve(world, DEM2DI_TRAVELS, world->body_count, false);
         for (int i = 0; i < world->body_count; i++)
             largest = dem2di_max(largest, world->now[i].radius);
         for (int j = 0; j < world->wall_count; j++)
             world->walls[j].skin = dem2di_skin_of(world, largest, world->wall_now[j].velocity);
+        build.plan = dem2di_plan_make(world);
+        room = !build.plan.turns ||
+               dem2di_group_reserve(world, DEM2DI_TRAVELS, world->body_count, false);
     }
     if (!room || !dem2di_build_search(&build)) return dem2di_list_failed(world, skin, interval);
     int blocks = dem2di_blocks(world->body_count, DEM2DI_BLOCK);
@@ -12554,7 +12561,7 @@ static void dem2di_joint_yield(const dem2d_world *world, int a, int b) {
     int which[2], near[2];
     bool two[2], ends[2], side[2];
     dem2d_vec at;
-    if (!dem2di_segments_meet(world, wall[0], wall[1], which, &at)) return;
+    if (!dem2di_segments_meet(world, wall[0], wall[1], 0, which, &at)) return;
     for (int k = 0; k < 2; k++) {
         int corner = dem2di_segment_corner(world, contact[k]);
         link[k] = &list->next_links[contact[k] - list->discs];
@@ -12586,7 +12593,7 @@ static int dem2di_joint_source(const dem2d_world *world, int contact) {
         int other = list->incident[k] / 2;
         if (dem2di_segment_touched(world, other, false) &&
             !dem2di_segment_touched(world, other, true) &&
-            dem2di_segments_meet(world, key->b, list->keys[other].b, which, &at))
+            dem2di_segments_meet(world, key->b, list->keys[other].b, 0, which, &at))
             return other - list->discs;
     }
     return own;
@@ -14452,7 +14459,7 @@ static void dem2di_archive_ends(dem2di_archive *ar, dem2di_ends *ends) {
 static void dem2di_archive_extra(dem2di_archive *ar, dem2di_extra *extra) {
     dem2di_archive_finite(ar, "viscous force", &extra->viscous);
     dem2di_archive_finite(ar, "moment", &extra->moment);
-    dem2di_archive_finite(ar, "energy", &extra->energy);
+    dem2di_archive_bits(ar, &extra->energy); /* the caller's, as the state: anything */
     for (int k = 0; k < 2; k++) dem2di_archive_bits(ar, &extra->state[k]);
 }
 
@@ -14789,7 +14796,9 @@ static void dem2di_archive_memory(dem2di_archive *ar, const dem2d_world *w, int 
         dem2di_archive_int(ar, "corner", &link->feature.corner[k], INT_MIN, INT_MAX);
 }
 
-/* May the next step go by the plan without a look at the scene? */
+/* May the next step go by the plan without a look at the scene? Where the list is not stale, only
+   walls have moved by themselves since the plan was made: what depends on where they are (joints)
+   can't be checked, and need not be, as no memory depends on it. */
 static bool dem2di_plan_holds(const dem2d_world *w) {
     const dem2di_plan *plan = &w->plan;
     if (w->list_stale || w->body_count == 0) return true;
@@ -14797,7 +14806,6 @@ static bool dem2di_plan_holds(const dem2d_world *w) {
     dem2di_plan need = dem2di_plan_make(w);
     return plan->friction >= need.friction && plan->spin >= need.spin &&
            plan->turns >= need.turns && plan->faces >= need.faces && plan->full == need.full &&
-           plan->joints == need.joints &&
            (!plan->one_law || (need.one_law && plan->material == need.material));
 }
 
@@ -15748,6 +15756,8 @@ DEM2D_API dem2d_result dem2d_world_write_csv(const dem2d_world *world, const dem
             Snapshots of version 3.
             Polybeziers are fitted with a radius of curvature of at most 20 of the size (max_radius,
             unbounded) and straight arcs along straight edges; shapes and fits tell the greatest.
+            Every snapshot that was written can be read, also when segments have parted or met since
+            the list was made; whether two segments are joined is seen in every step.
      0.5.0  The two points of faces conserve energy between free polygons as well: each has a
             normal of its own and tells its energy. Snapshots of version 2.
      0.4.0  Dashpots by restitution, rolling friction, a caller's law, segment walls. Measures of

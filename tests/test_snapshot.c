@@ -470,6 +470,47 @@ static void test_resume_joints(void **state) {
     }
 }
 
+/* Two segments under a disc part, or meet, while the list lasts: every snapshot is read, and a new
+   list in every step makes no difference. */
+static void check_joint_moves(double start, double speed) {
+    snapshot_scene s[2];
+    int contacts = 0;
+    for (int k = 0; k < 2; k++) {
+        dem2d_world_desc desc = scene_desc(SCENE_RUBBING);
+        dem2d_particle_desc grain = {.scale = 1};
+        dem2d_particle_id id;
+        scene_make(&s[k], SCENE_RUBBING, 0, &desc);
+        for (int i = 0; i < 2; i++) {
+            dem2d_wall_desc wall = {.material = s[k].stone, .segment = true};
+            dem2d_wall_id wall_id;
+            wall.point = vec(i == 0 ? 0.5 + start : 1, 1);
+            wall.end = vec(i == 0 ? 1 + start : 1.5, i == 0 ? 1 : 1.0625);
+            if (i == 0) wall.mode = DEM2D_WALL_MOVING, wall.velocity.x = speed;
+            assert_ok(dem2d_world_add_wall(s[k].world, &wall, &wall_id));
+        }
+        grain.shape = s[k].shapes[0], grain.material = s[k].stone;
+        grain.position = vec(1, 1.0249);
+        assert_ok(dem2d_world_add_particle(s[k].world, &grain, &id));
+    }
+    for (int i = 0; i < 200; i++) {
+        s[1].world->list_stale = true;
+        for (int k = 0; k < 2; k++) assert_ok(dem2d_world_step(s[k].world, 1, NULL));
+        assert_int_equal(dem2d_world_hash(s[0].world), dem2d_world_hash(s[1].world));
+        dem2d_stats stats;
+        assert_ok(dem2d_world_stats(s[0].world, &stats));
+        contacts += stats.wall_contacts;
+        if (i < 20 || i % 10 == 0) check_resume(s[0].world, i % 2 == 1, 0);
+    }
+    assert_true(contacts > 100);
+    for (int k = 0; k < 2; k++) dem2d_world_destroy(s[k].world);
+}
+
+static void test_joint_moves(void **state) {
+    (void)state;
+    check_joint_moves(0, -0.1);
+    check_joint_moves(-1e-5, 0.005);
+}
+
 /* Ids hold in the loaded world, stale ones stay stale, and the next one is the same. */
 static void test_ids(void **state) {
     (void)state;
@@ -1011,6 +1052,34 @@ static void test_law(void **state) {
     free(bytes.bytes), free(plain.bytes);
 }
 
+/* The energy that a law tells is the caller's business, as its state is. */
+static void strange_law(void *user, const dem2d_law_input *in, dem2d_law_output *out) {
+    scene_law(user, in, out);
+    out->energy = NAN;
+    out->state[0] = HUGE_VAL;
+}
+
+static void test_strange_law(void **state) {
+    (void)state;
+    snapshot_scene s;
+    dem2d_world_desc desc = scene_desc(SCENE_LAW);
+    desc.law = strange_law;
+    scene_make(&s, SCENE_LAW, 20, &desc);
+    assert_ok(dem2d_world_step(s.world, 300, NULL));
+    dem2d_stats stats;
+    assert_ok(dem2d_world_stats(s.world, &stats));
+    assert_true(stats.contacts + stats.wall_contacts > 0);
+    scene_bytes bytes = scene_save(s.world);
+    test_env env;
+    test_env_init(&env);
+    dem2d_world *copy = load_with(&bytes, &env.env, false);
+    assert_int_equal(dem2d_world_hash(copy), dem2d_world_hash(s.world));
+    dem2d_world_destroy(copy);
+    assert_clean(&env);
+    dem2d_world_destroy(s.world);
+    free(bytes.bytes);
+}
+
 static void test_arguments(void **state) {
     (void)state;
     scene_bytes bytes = small_snapshot(SCENE_CIRCLES);
@@ -1057,6 +1126,7 @@ int main(void) {
         cmocka_unit_test(test_crafted),        cmocka_unit_test(test_writes_fail),
         cmocka_unit_test(test_memory_fails),   cmocka_unit_test(test_files),
         cmocka_unit_test(test_custom),         cmocka_unit_test(test_law),
+        cmocka_unit_test(test_joint_moves),    cmocka_unit_test(test_strange_law),
         cmocka_unit_test(test_arguments),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
