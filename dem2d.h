@@ -1031,6 +1031,10 @@ typedef struct dem2d_contact_point {
     double depth;       ///< m, overlap there, at a right angle to the face that is met
     double weight;      ///< force there over kn depth: 1, but for short common parts
     double energy;      ///< m2, energy stored there over kn; the sum is the contact's
+    /// The corner it is at, for springs that are kept from step to step: 2 i of A, 2 i + 1 of B, at
+    /// the counter-clockwise end of edge or arc i (up to the next straight arc). The same in every
+    /// pose; where A and B change places, so does the last bit. -1 of one point.
+    int corner;
 } dem2d_contact_point;
 
 /// Answer to a contact query, in the coordinates of the poses.
@@ -8456,6 +8460,8 @@ typedef struct dem2di_face {
     double height, rise; /* of its line at place 0; for each place */
     double square;       /* of its length */
     double rounding;
+    int corner0, corner1; /* at its ends, as in dem2d_contact_point; */
+    bool endless;         /* or a half-plane, which has none */
 } dem2di_face;
 
 /* A straight arc whose end is round counts up to this angle (sine): a tenth of a radian is tilt, a
@@ -8503,6 +8509,15 @@ static inline int dem2di_face_find(const dem2d_shape *shape, dem2d_vec v, int co
                                side);
 }
 
+/* The last face of a shape before one of its edges or arcs: the corner between is named by it. */
+static int dem2di_face_before(const dem2d_shape *shape, int face) {
+    int k = dem2di_around(shape->count, face, -1);
+    while (shape->type == DEM2D_BEZIER && k != face &&
+           !dem2di_arc_straight(shape, &shape->arcs[k]))
+        k = dem2di_around(shape->count, k, -1);
+    return k;
+}
+
 /* A face that was found, of a shape of a scale, seen from its centre. */
 static void dem2di_face_set(const dem2d_shape *shape, double scale, dem2d_vec v, int found,
                             dem2di_face *face) {
@@ -8526,6 +8541,10 @@ static void dem2di_face_set(const dem2d_shape *shape, double scale, dem2d_vec v,
     face->height = (dem2di_dot(v, from) - face->rise * x0) * scale;
     face->square = dem2di_dot(way, way) * (scale * scale);
     face->rounding = shape->rounding * scale;
+    face->endless = false;
+    face->corner0 = 2 * dem2di_face_before(shape, found);
+    face->corner1 = 2 * found;
+    if (face->corner0 == face->corner1) face->corner0 += 2 * shape->count; /* the only face */
 }
 
 /* B's face towards -u, seen along u from A's centre. */
@@ -8535,6 +8554,9 @@ static void dem2di_face_turn(dem2d_vec d, dem2d_vec u, dem2di_face *face) {
     face->x1 = place - face->x0;
     face->x0 = left;
     face->near = place - face->near;
+    int corner = face->corner0;
+    face->corner0 = face->corner1 + 1;
+    face->corner1 = corner + 1;
 }
 
 static double dem2di_face_height(const dem2di_face *face, double x) {
@@ -8546,6 +8568,7 @@ static double dem2di_face_height(const dem2di_face *face, double x) {
 typedef struct dem2di_second {
     int side;                  /* 1 or -1: beyond or before the deeper end */
     int base;                  /* whose face is met: 0 for A's, 1 for B's */
+    int corner, corner_deep;   /* at both ends */
     double x_deep, level;      /* the deeper end: place, middle between both surfaces there */
     double x, core;            /* the corner, which may be rounded: place, height */
     double place, y;           /* the point, in the middle between both surfaces there */
@@ -8556,6 +8579,17 @@ typedef struct dem2di_second {
     double energy;             /* over kn, beside that of the deeper end, depth^2/2 */
     double deep, press, slide; /* forces over kn: deeper end, along and across the base's normal */
 } dem2di_second;
+
+/* The deeper end, where the later of both faces begins, or ends. */
+static void dem2di_second_deep(const dem2di_face *a, const dem2di_face *b, int side,
+                               dem2di_second *end) {
+    double xa = side > 0 ? dem2di_min(a->x0, a->near) : dem2di_max(a->x1, a->near);
+    double xb = side > 0 ? dem2di_min(b->x0, b->near) : dem2di_max(b->x1, b->near);
+    bool of_a = b->endless || side * (xa - xb) >= 0;
+    const dem2di_face *face = of_a ? a : b;
+    end->x_deep = of_a ? xa : xb;
+    end->corner_deep = side > 0 ? face->corner0 : face->corner1;
+}
 
 /* The end on a side of two faces that meet in a contact of a depth; false when they do not touch
    there: tilted by more than 45 degrees, or to the other side. Whose corner it is changes where
@@ -8568,7 +8602,7 @@ static bool dem2di_second_place(const dem2di_face *a, const dem2di_face *b, doub
     double xa = side > 0 ? a->x1 : a->x0, xb = side > 0 ? b->x1 : b->x0;
     double from = side > 0 ? dem2di_max(a->x0, b->x0) : dem2di_min(a->x1, b->x1);
     double apart = dem2di_face_height(b, xb) - dem2di_face_height(a, xa);
-    end->base = side * ((xb - xa) + apart * (a->rise + b->rise) / 2) > 0;
+    end->base = b->endless || side * ((xb - xa) + apart * (a->rise + b->rise) / 2) > 0;
     end->x = end->base ? xa : xb;
     double way = side * (end->x - from);
     if (!(way > 0) || -tilt * way > DEM2DI_ROUNDING * size) return false;
@@ -8577,15 +8611,13 @@ static bool dem2di_second_place(const dem2di_face *a, const dem2di_face *b, doub
     double radii = a->rounding + b->rounding, square = 1 + end->rise * end->rise;
     if (gap >= 0 && gap * gap >= radii * radii * square) return false;
     end->side = side;
+    end->corner = side > 0 ? (end->base ? a : b)->corner1 : (end->base ? a : b)->corner0;
     end->slope = sqrt(square);
     end->depth = dem2di_min(depth, radii - gap / end->slope);
     end->core = end->base ? on_a : on_a + gap;
     end->y = on_a + a->rounding + (gap - radii) / 2;
     end->place = end->x - (end->y - end->core) * end->rise;
-    if (side > 0)
-        end->x_deep = dem2di_max(dem2di_min(a->x0, a->near), dem2di_min(b->x0, b->near));
-    else
-        end->x_deep = dem2di_min(dem2di_max(a->x1, a->near), dem2di_max(b->x1, b->near));
+    dem2di_second_deep(a, b, side, end);
     end->level = a->top - depth / 2;
     double lean = side * (end->base ? -gap : gap) * end->rise;
     end->width = way * end->slope + lean / end->slope;
@@ -8681,6 +8713,7 @@ static void dem2di_two_points(const dem2di_second *end, double depth, dem2d_vec 
     one->depth = depth;
     one->weight = end->deep / depth;
     one->energy = depth * depth / 2;
+    one->corner = end->corner_deep;
     other->position = dem2di_along(dem2di_scale(u, end->y), end->place, across);
     other->normal = u;
     if (size > 0)
@@ -8688,6 +8721,7 @@ static void dem2di_two_points(const dem2di_second *end, double depth, dem2d_vec 
     other->depth = end->depth;
     other->weight = size / end->depth;
     other->energy = end->energy;
+    other->corner = end->corner;
 }
 
 /* The one point of a contact. */
@@ -8700,6 +8734,7 @@ static void dem2di_one_point(dem2d_vec position, double depth, dem2d_vec u,
     point->depth = depth;
     point->weight = 1;
     point->energy = depth * depth / 2;
+    point->corner = -1;
 }
 
 /* The second point of an overlapping pair, on either side; its energy is 0 when there is none. */
@@ -8753,7 +8788,7 @@ static int dem2di_wall_points(const dem2d_shape *shape, dem2d_rot q, double scal
                               dem2d_contact_point points[2]) {
     double size = 2 * shape->circumscribed * scale;
     dem2d_vec v = dem2di_turn_back(q, u);
-    dem2di_face face, wall = {-size, size, 0, surface, surface, 0, size * size, 0};
+    dem2di_face face, wall = {-size, size, 0, surface, surface, 0, size * size, 0, -1, -1, true};
     dem2di_second second;
     second.energy = 0;
     for (int side = -1; side <= 1 && shape->flat; side += 2) {
@@ -9307,6 +9342,7 @@ typedef struct dem2di_ends {
     double offset[2]; /* along perp(normal) from the link's point */
     double shear[2];
     double energy; /* m2: that in the normal springs over kn */
+    int corner[2]; /* as in dem2d_contact_point */
 } dem2di_ends;
 
 /* What the full law keeps beside a contact's link: dashpot, rolling, the caller's law. All zero for
@@ -9353,35 +9389,27 @@ static inline void dem2di_law_apply(const dem2d_pair_desc *law, double slip, dou
     link->shear = dem2di_max(-limit, dem2di_min(limit, link->shear));
 }
 
-/* Place of a point of two along the tangent, from A's centre. */
-static double dem2di_ends_place(const dem2di_link *link, const dem2di_ends *ends, int i) {
-    return dem2di_cross(link->normal, link->point) + ends->offset[i];
+/* Are there two? One of them may be without force: deep in a face it could only pull. */
+static inline bool dem2di_ends_two(const dem2di_ends *ends) {
+    return ends->weight[0] > 0 || ends->weight[1] > 0;
 }
 
-/* The springs of the last step's points, handed on to those of this step: each to the point that
-   is where it was. A spring of one point is shared out by the normal forces; of a point that has
-   gone it is left to the other. */
+/* The springs of the last step's points, handed on to those of this step. Each stays at its end of
+   the common part, whichever shape's corner that is by now; where one end's corner is now that of
+   the other end, both have changed sides, as a grain tips over it. A spring of one point is shared
+   out by the normal forces, and one point has the sum of two. */
 static void dem2di_ends_hand_on(const dem2di_link *last, const dem2di_ends *last_ends,
-                                const dem2di_link *link, const dem2di_ends *ends,
-                                const double force[2], double shear[2]) {
-    if (!(last_ends->weight[0] > 0)) {
+                                const dem2di_ends *ends, const double force[2], double shear[2]) {
+    if (!dem2di_ends_two(last_ends)) {
         double sum = force[0] + force[1]; /* 0 where dashpots leave nothing */
         shear[1] = last->shear * (sum > 0 ? force[1] / sum : 0.5);
         shear[0] = last->shear - shear[1];
         return;
     }
-    double now[2], before[2];
-    for (int i = 0; i < 2; i++) {
-        now[i] = dem2di_ends_place(link, ends, i);
-        before[i] = dem2di_ends_place(last, last_ends, i);
-    }
-    shear[0] = last_ends->shear[0];
-    shear[1] = last_ends->shear[1];
-    bool left = fabs(now[1] - before[0]) < fabs(now[1] - before[1]);  /* a new one clockwise */
-    bool right = fabs(now[0] - before[1]) < fabs(now[0] - before[0]); /* or on the other side */
-    if (left == right) return;
-    shear[left ? 1 : 0] = last->shear;
-    shear[left ? 0 : 1] = 0;
+    bool crossed =
+        ends->corner[0] == last_ends->corner[1] || ends->corner[1] == last_ends->corner[0];
+    shear[0] = last_ends->shear[crossed ? 1 : 0];
+    shear[1] = last_ends->shear[crossed ? 0 : 1];
 }
 
 /* Normal forces of two points. */
@@ -9398,7 +9426,7 @@ static void dem2di_law_apply_ends(const dem2d_pair_desc *law, double slip, doubl
                                   dem2di_link *link) {
     link->force = force[0] + force[1];
     link->shear = 0;
-    dem2di_ends_hand_on(last, last_ends, link, ends, force, ends->shear);
+    dem2di_ends_hand_on(last, last_ends, ends, force, ends->shear);
     for (int i = 0; i < 2; i++) {
         double limit = law->friction * force[i];
         double shear =
@@ -9431,6 +9459,7 @@ static void dem2di_ends_set(const dem2d_contact_point points[2], dem2di_ends *en
     for (int i = 0; i < 2; i++) {
         ends->weight[i] = points[i].weight * (total / both);
         ends->depth[i] = points[i].depth;
+        ends->corner[i] = points[i].corner;
         ends->offset[i] = dem2di_dot(dem2di_sub(points[i].position, link->point), t);
     }
     ends->energy = points[0].energy + points[1].energy;
@@ -10613,7 +10642,7 @@ static const dem2di_ends *dem2di_ends_at(const dem2d_world *world, int contact, 
     const dem2di_list *list = &world->list;
     if (!world->plan.faces || contact < list->discs) return NULL;
     const dem2di_ends *ends = &(next ? list->next_ends : list->ends)[contact - list->discs];
-    return ends->weight[0] > 0 ? ends : NULL;
+    return dem2di_ends_two(ends) ? ends : NULL;
 }
 
 /* What the full law keeps of a contact; NULL without it. */
@@ -14451,6 +14480,7 @@ static void dem2di_archive_ends(dem2di_archive *ar, dem2di_ends *ends) {
         dem2di_archive_finite(ar, "depth", &ends->depth[k]);
         dem2di_archive_finite(ar, "offset", &ends->offset[k]);
         dem2di_archive_finite(ar, "shear", &ends->shear[k]);
+        dem2di_archive_int(ar, "corner", &ends->corner[k], INT_MIN, INT_MAX);
     }
     dem2di_archive_finite(ar, "energy", &ends->energy);
 }
@@ -15758,6 +15788,8 @@ DEM2D_API dem2d_result dem2d_world_write_csv(const dem2d_world *world, const dem
             unbounded) and straight arcs along straight edges; shapes and fits tell the greatest.
             Every snapshot that was written can be read, also when segments have parted or met since
             the list was made; whether two segments are joined is seen in every step.
+            Each of two contact points keeps its spring at its corner (dem2d_contact_point.corner),
+            whichever grain has the lower id.
      0.5.0  The two points of faces conserve energy between free polygons as well: each has a
             normal of its own and tells its energy. Snapshots of version 2.
      0.4.0  Dashpots by restitution, rolling friction, a caller's law, segment walls. Measures of

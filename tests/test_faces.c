@@ -614,6 +614,62 @@ static void test_points_on_a_wall(void **state) {
     assert_within(moment, 0, 1e-12);
 }
 
+static dem2d_vec mirror(dem2d_vec p) {
+    return vec(-p.x, p.y);
+}
+
+static dem2d_vec quarter(dem2d_vec p) {
+    return vec(-p.y, p.x);
+}
+
+/* What a wall does to a polygon, and to its image by a map of the plane. */
+static void check_image(const dem2d_vec *points, int count, double rounding, double depth,
+                        double tilt, dem2d_vec (*map)(dem2d_vec)) {
+    dem2d_vec image[8];
+    dem2d_contact c[2];
+    const dem2d_vec n = direction(tilt);
+    for (int i = 0; i < count; i++) image[i] = map(points[i]);
+    for (int k = 0; k < 2; k++) {
+        dem2d_shape *shape = polygon(k == 0 ? points : image, count, rounding);
+        const dem2d_vec normal = k == 0 ? n : map(n);
+        const double low = -reach(shape, still(), vec(-normal.x, -normal.y)) + depth;
+        assert_ok(dem2d_wall_contact(shape, still(), vec(low * normal.x, low * normal.y), normal,
+                                     &c[k]));
+        dem2d_shape_destroy(shape);
+    }
+    assert_int_equal(c[0].count, c[1].count);
+    const bool turned = map(vec(1, 0)).x < 0; /* left and right change */
+    for (int i = 0; i < c[0].count; i++) {
+        const dem2d_contact_point *p = &c[0].points[i];
+        const dem2d_contact_point *q = &c[1].points[turned ? c[0].count - 1 - i : i];
+        const dem2d_vec at = map(p->position);
+        assert_within(q->position.x, at.x, 1e-12 * (1 + depth));
+        assert_within(q->position.y, at.y, 1e-12 * (1 + depth));
+        assert_within(q->depth, p->depth, 1e-12 * (1 + depth));
+        assert_within(q->weight, p->weight, 1e-10);
+    }
+}
+
+/* From a touch to many sizes behind the surface. */
+static void test_points_of_images(void **state) {
+    (void)state;
+    test_random random = {11};
+    for (int i = 0; i < 4000; i++) {
+        const int count = 3 + test_below(&random, 5);
+        const double rounding = i % 3 == 0 ? test_uniform(&random, 0, 0.3) : 0;
+        const double depth = pow(10, test_uniform(&random, -4, 1.2));
+        const double flat = test_uniform(&random, 0.2, 1), tilt = test_uniform(&random, 0, 6);
+        dem2d_vec points[8];
+        for (int k = 0; k < count; k++) {
+            const dem2d_vec u =
+                direction(2 * (double)TEST_PI * (k + test_uniform(&random, -0.2, 0.2)) / count);
+            points[k] = vec(u.x, flat * u.y);
+        }
+        check_image(points, count, rounding, depth, tilt, mirror);
+        check_image(points, count, rounding, depth, tilt, quarter);
+    }
+}
+
 /* The common part of two faces, whoever of them ends it. perp(normal) is -x. */
 static void test_points_of_a_pair(void **state) {
     (void)state;
@@ -1416,7 +1472,104 @@ static void test_shear_of_a_roller(void **state) {
     }
 }
 
+/* Two driven shapes turn and slide on each other; the world knows them in this order or the other. */
+static scene driven_pair(uint64_t seed, const int kinds[2], bool swapped) {
+    dem2d_world_desc desc = basic_desc(1e-3);
+    test_random random = {seed};
+    dem2d_particle_id id[2];
+    dem2d_vec at[2];
+    double angle[2], spin[2];
+    desc.skip_time_step_check = true;
+    const scene s = make_scene(&desc, KN, 0.5);
+    for (int k = 0; k < 2; k++) {
+        angle[k] = test_uniform(&random, -3, 3), spin[k] = test_uniform(&random, -2, 2);
+        at[k] = vec(0, 0);
+    }
+    const dem2d_pose pose[2] = {dem2d_pose_make(0, 0, angle[0], 1),
+                                dem2d_pose_make(0, 0, angle[1], 1)};
+    const dem2d_vec up = direction(test_uniform(&random, 0, 6)), down = vec(-up.x, -up.y);
+    const double far = reach(shapes[kinds[0]], pose[0], up) +
+                       reach(shapes[kinds[1]], pose[1], down) - test_uniform(&random, 0.01, 0.1);
+    const double aside = test_uniform(&random, -0.2, 0.2);
+    at[1] = vec(far * up.x - aside * up.y, far * up.y + aside * up.x);
+    const dem2d_vec v = vec(test_uniform(&random, -1, 1), test_uniform(&random, -1, 1));
+    for (int k = 0; k < 2; k++) {
+        const int i = swapped ? 1 - k : k;
+        id[i] = add(&s, shapes[kinds[i]], DEM2D_DRIVEN, at[i].x, at[i].y, angle[i]);
+        assert_ok(dem2d_world_drive_particle(s.world, id[i], DEM2D_DRIVEN,
+                                             i == 1 ? v : vec(0, 0), spin[i]));
+    }
+    return s;
+}
+
+/* Which of two grains has the lower id changes rounding only: each point keeps its spring, whoever's
+   corner it is at, as edges and normals come and go. Returns the steps with two points. */
+static int check_order(uint64_t seed, const int kinds[2]) {
+    const scene s[2] = {driven_pair(seed, kinds, false), driven_pair(seed, kinds, true)};
+    int twos = 0;
+    for (int i = 0; i < 300; i++) {
+        dem2d_contact_info c[2];
+        for (int k = 0; k < 2; k++) {
+            step(&s[k], 1);
+            if (contacts(&s[k], &c[k], 1) == 0) memset(&c[k], 0, sizeof c[k]);
+        }
+        /* a tie of the least depth: either normal is right */
+        if (length(vec(c[0].normal.x + c[1].normal.x, c[0].normal.y + c[1].normal.y)) > 1e-6) break;
+        const double size = 1e-6 * (KN * 1e-3 + c[0].normal_force);
+        assert_int_equal(c[0].points, c[1].points);
+        assert_within(c[1].normal_force, c[0].normal_force, size);
+        assert_within(c[1].tangential_force, c[0].tangential_force, size);
+        twos += c[0].points == 2;
+    }
+    for (int k = 0; k < 2; k++) dem2d_world_destroy(s[k].world);
+    return twos;
+}
+
+static void test_shear_by_order(void **state) {
+    (void)state;
+    static const int kinds[] = {BOX, HEXAGON, GON64, ROUNDED, TRIANGLE, QUAD, STADIUM, SMALL};
+    const int n = COUNT_OF(kinds), most = test_long() ? 4096 : 256;
+    int twos = 0;
+    for (int i = 0; i < most; i++) {
+        const int pair[2] = {kinds[i % n], kinds[i / n % n]};
+        twos += check_order((uint64_t)i + 1, pair);
+    }
+    assert_true(twos > 30 * most);
+}
+
 /* --- what the world reports ------------------------------------------------------------------ */
+
+/* Deep behind a wall the second point may carry nothing: it is there in a mirror image as well. */
+static void test_deep_images(void **state) {
+    (void)state;
+    test_random random = {5};
+    int twos = 0;
+    for (int i = 0; i < 400; i++) {
+        const dem2d_vec left[3] = {{-1, 0}, {1, test_uniform(&random, -0.5, 0.5)}, {0.3, 1.5}};
+        const double angle = test_uniform(&random, -3, 3), y = test_uniform(&random, -4, 0);
+        dem2d_contact_info c[2];
+        dem2d_particle_info info[2];
+        for (int k = 0; k < 2; k++) {
+            const dem2d_world_desc desc = basic_desc(1e-4);
+            const scene s = floor_scene(&desc, KN, 0);
+            dem2d_vec points[3];
+            for (int n = 0; n < 3; n++) points[n] = k == 0 ? left[n] : mirror(left[n]);
+            dem2d_shape *shape = polygon(points, 3, 0);
+            const dem2d_particle_id id =
+                add(&s, shape, DEM2D_DRIVEN, 0, y, k == 0 ? angle : -angle);
+            step(&s, 1);
+            assert_int_equal(contacts(&s, &c[k], 1), 1);
+            info[k] = particle(&s, id);
+            dem2d_shape_destroy(shape);
+            dem2d_world_destroy(s.world);
+        }
+        assert_int_equal(c[0].points, c[1].points);
+        assert_near(c[1].normal_force, c[0].normal_force, 1e-12);
+        assert_within(info[1].torque, -info[0].torque, 1e-12 * c[0].normal_force);
+        twos += c[0].points == 2;
+    }
+    assert_true(twos > 100);
+}
 
 /* Force of all points over kn, and a point on its line. */
 static dem2d_vec sum_points(const dem2d_contact *c, dem2d_vec *mean) {
@@ -1715,6 +1868,7 @@ int main(void) {
         cmocka_unit_test(test_presses),
         cmocka_unit_test(test_turns_by_epa),
         cmocka_unit_test(test_points_on_a_wall),
+        cmocka_unit_test(test_points_of_images),
         cmocka_unit_test(test_points_of_a_pair),
         cmocka_unit_test(test_points_conserve),
         cmocka_unit_test(test_box_at_rest),
@@ -1732,7 +1886,9 @@ int main(void) {
         cmocka_unit_test(test_shear_at_rest),
         cmocka_unit_test(test_shear_from_two_to_one),
         cmocka_unit_test(test_shear_over_a_corner),
+        cmocka_unit_test(test_shear_by_order),
         cmocka_unit_test(test_shear_of_a_roller),
+        cmocka_unit_test(test_deep_images),
         cmocka_unit_test(test_reports),
         cmocka_unit_test(test_one_point_reports),
         cmocka_unit_test(test_no_contact_is_late),
