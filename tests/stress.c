@@ -1,8 +1,8 @@
 /* stress [--quick] [CASE] - tries to break the solver: steps at their limit, ratios of stiffness,
    mass and size, speeds, overlaps, long runs, tall piles, needles, far places, units, changes in
-   the middle of a run, jamming. Each row has a criterion that was fixed before it was first run; a
-   row that fails stays, and is told. CASE: only those whose name begins so. Exit status: 0, 1 if a
-   row failed, 2 for bad usage. */
+   the middle of a run, jamming, servo walls. Each row has a criterion that was fixed before it was
+   first run; a row that fails stays, and is told. CASE: only those whose name begins so. Exit
+   status: 0, 1 if a row failed, 2 for bad usage. */
 #define DEM2D_IMPLEMENTATION
 #include "dem2d.h"
 
@@ -1164,6 +1164,168 @@ static void case_squeeze(void) {
         if (!quick || i != 1) squeeze(&list[i]);
 }
 
+/* --- servo walls ----------------------------------------------------------------------------- */
+
+/* Grains under servo walls. Times are in contact times of one of them at a wall; speeds in units of
+   the force on one at rest over sqrt(kn m). */
+typedef struct press {
+    int kind;  /* -1: all */
+    int side;  /* grains in a row and in a column */
+    bool open; /* left and right are servo walls as well as the lid */
+    double damping_ratio, steps, top_speed;
+    double weight, local; /* of a grain over the force on it; damping */
+    bool segment;
+    dem2d_law_fn *law;
+} press;
+
+typedef struct press_scene {
+    scene s;
+    double target, unit; /* Pa; m/s */
+    int first;           /* servo walls: from here to 3 */
+} press_scene;
+
+/* What a spring twice as stiff as told and a dashpot that is not told of do. */
+static void untold_law(void *user, const dem2d_law_input *in, dem2d_law_output *out) {
+    (void)user;
+    const double kn = 2 * in->pair.normal_stiffness;
+    out->normal_force = fmax(0, kn * in->depth + 2 * 0.4 * sqrt(in->mass * kn) * in->closing);
+}
+
+/* From now on the servo walls hold the target, or so many times as much, at such a top speed. */
+static void press_set(press_scene *p, const press *c, double top_speed, double times) {
+    for (int i = p->first; i < 4; i++) {
+        const dem2d_wall_info now = wall_of(&p->s, i);
+        dem2d_wall_desc w = wall_desc(&p->s, now.point.x, now.point.y, now.normal.x, now.normal.y);
+        w.mode = DEM2D_WALL_SERVO, w.stress = times * p->target, w.max_speed = top_speed * p->unit;
+        w.spans[0] = p->s.walls[i == 3 ? 1 : 0], w.spans[1] = p->s.walls[i == 3 ? 2 : 3];
+        if (c->segment) { /* twice as long as the box is wide */
+            const double width = wall_of(&p->s, 2).point.x;
+            memset(w.spans, 0, sizeof w.spans);
+            w.segment = true, w.end = w.point, w.stress /= 2;
+            w.point.x = 1.5 * width, w.end.x = -0.5 * width;
+        }
+        must(dem2d_world_set_wall(p->s.world, p->s.walls[i], &w), "servo wall");
+    }
+    p->target *= times;
+}
+
+static press_scene press_make(const press *c) {
+    const double r = 0.02, kn = 1e7, overlap = 1e-3 * r, mass = 2000 * PI * r * r;
+    const double cell = c->side > 1 ? 2.3 * r : 4 * r, width = c->side * cell;
+    const dem2d_material_desc rock = {2000, kn, 0.8 * kn, 0.3, c->law ? 0 : c->damping_ratio, 0};
+    dem2d_world_desc d = {0};
+    d.time_step = contact_time(mass, kn, false) / c->steps, d.local_damping = c->local;
+    d.gravity.y = -c->weight * kn * overlap / mass, d.law = c->law;
+    press_scene p = {make_scene(&d, &rock), kn * overlap / (c->side > 1 ? 2 * r : width), 0, 0};
+    p.unit = overlap * sqrt(kn / mass), p.first = c->open ? 1 : 3;
+    for (int i = 0; i < c->side * c->side; i++) {
+        const int kind = c->kind >= 0 ? c->kind : i % KINDS;
+        dem2d_particle_desc g =
+            grain_desc(&p.s, kind, c->side > 1 ? i % VARIANTS : 0, r * (i % 2 ? 0.75 : 1),
+                       cell * (i % c->side + 0.5), cell * (i / c->side + 0.5));
+        g.angle = c->side > 1 ? uniform(-3, 3) : 0;
+        add_desc(&p.s, &g);
+    }
+    add_box(&p.s, 0, 0, width, width);
+    return p;
+}
+
+/* Are all servo walls at such a top speed at rest over ten contact times: mean stress right to 1e-4, that of each step
+   to 1e-2, speed below 1e-3 of the top speed? */
+static bool press_rests(press_scene *p, const press *c, double top_speed) {
+    const int steps = (int)(10 * c->steps);
+    double mean[4] = {0, 0, 0, 0};
+    bool rests = true;
+    for (int i = 0; i < steps; i++) {
+        step(&p->s, 1);
+        for (int k = p->first; k < 4; k++) {
+            const dem2d_wall_info w = wall_of(&p->s, k);
+            const double speed = hypot(w.velocity.x, w.velocity.y);
+            mean[k] += w.stress / w.target / steps;
+            rests = rests && fabs(w.stress / w.target - 1) < 1e-2 &&
+                    speed < 1e-3 * top_speed * p->unit;
+        }
+    }
+    for (int k = p->first; k < 4; k++) rests = rests && fabs(mean[k] - 1) < 1e-4;
+    return rests;
+}
+
+/* Contact times until the walls are at rest, and still are after as long again; more than `most` if
+   they do not come to it. */
+static double press_time(press_scene *p, const press *c, double top_speed, double most) {
+    double time = 0;
+    for (int rested = 0; rested < 2 && time <= most; time += 10)
+        rested = press_rests(p, c, top_speed) ? rested + 1 : 0;
+    return time;
+}
+
+/* The same after the target has risen by a tenth, the grains having been pressed before by fast
+   walls; -1: the time step is above what is safe. */
+static double press_run(const press *c, double most) {
+    press_scene p = press_make(c);
+    const double fast = c->side > 1 ? 30 : 100;
+    double safe, limit, time = -1;
+    press_set(&p, c, fast, 1);
+    (void)press_time(&p, c, fast, most);
+    must(dem2d_world_time_step_bounds(p.s.world, &safe, &limit, NULL), "bounds");
+    if (contact_time(2000 * PI * 4e-4, 1e7, false) / c->steps <= safe) {
+        press_set(&p, c, c->top_speed, 1.1);
+        time = press_time(&p, c, c->top_speed, most);
+    }
+    end_scene(&p.s);
+    return time;
+}
+
+/* A row of the table: the same for all damping ratios, time steps and top speeds. */
+static void press_row(const char *name, press c, const double *steps, int step_count, double most) {
+    static const double ratios[] = {0, 0.02, 0.2, 0.5, 1}, speeds[] = {0.01, 0.1, 1, 10, 100};
+    int runs = 0, failed = 0, unsafe = 0;
+    double longest = 0;
+    for (int i = 0; i < COUNT_OF(ratios); i++)
+        for (int j = 0; j < step_count; j++)
+            for (int k = 0; k < COUNT_OF(speeds); k++) {
+                if (quick && (i + j + k) % 3) continue;
+                c.damping_ratio = ratios[i], c.steps = steps[j], c.top_speed = speeds[k];
+                const double time = press_run(&c, most);
+                runs += time >= 0, unsafe += time < 0, failed += time > most;
+                longest = fmax(longest, time);
+                if (time > most)
+                    fprintf(stderr, "%s: damping ratio %g, t_c/%g, top speed %g\n", name,
+                            c.damping_ratio, c.steps, c.top_speed);
+            }
+    row(failed == 0 && runs > 0, name, "rests: mean 1e-4, steps 1e-2, speed 1e-3 of top",
+        "%d of %d fail, %d unsafe; %.0f t_c", failed, runs, unsafe, longest);
+}
+
+/* A grain that is no disc rocks between floor and lid at an angle of least width, where to first
+   order the lid does not move: local damping alone takes that energy. */
+static void case_servo(void) {
+    static const double steps[] = {10, 30, 100, 300, 1000}, few[] = {15, 50};
+    for (int kind = 0; kind < KINDS; kind++) {
+        const press one = {kind, 1, false, 0, 0, 0, 0, kind == DISC ? 0 : 0.7, false, NULL};
+        char name[64];
+        snprintf(name, sizeof name, "servo: one of the %s", kind_names[kind]);
+        press_row(name, one, steps, quick ? 3 : 5, 1000);
+    }
+    press_row("servo: one, segment", (press){DISC, 1, false, 0, 0, 0, 0, 0, true, NULL}, few, 2,
+              1000);
+    press_row("servo: one, three times its target",
+              (press){DISC, 1, false, 0, 0, 0, 3, 0, false, NULL}, few, 2, 1000);
+    press_row("servo: one, local damping", (press){DISC, 1, false, 0, 0, 0, 0, 0.7, false, NULL},
+              few, 2, 1000);
+    press_row("servo: one, a law it is not told of",
+              (press){DISC, 1, false, 0, 0, 0, 0, 0, false, untold_law}, few, 2, 1000);
+    press_row("servo: 289 discs", (press){DISC, 17, false, 0, 0, 0, 0, 0.3, false, NULL}, few, 2,
+              3000);
+    press_row("servo: 289 of all kinds", (press){-1, 17, false, 0, 0, 0, 0, 0.3, false, NULL}, few,
+              2, 3000);
+    press_row("servo: 289 of all kinds, three walls",
+              (press){-1, 17, true, 0, 0, 0, 0, 0.3, false, NULL}, few, 2, 3000);
+    if (!quick)
+        press_row("servo: 289 discs, t_c/1000", (press){DISC, 17, true, 0, 0, 0, 0, 0.7, false, NULL},
+                  &steps[4], 1, 500);
+}
+
 /* --- the table ------------------------------------------------------------------------------- */
 
 typedef struct stress_case {
@@ -1179,7 +1341,7 @@ static const stress_case cases[] = {
     {"pile", case_pile},       {"needle", case_needle},
     {"far", case_far},         {"units", case_units},
     {"gravity", case_gravity}, {"exchange", case_exchange},
-    {"squeeze", case_squeeze},
+    {"squeeze", case_squeeze}, {"servo", case_servo},
 };
 
 int main(int argc, char **argv) {
