@@ -38,6 +38,8 @@
 #define _POSIX_C_SOURCE 200809L
 #define DEM2D_IMPLEMENTATION
 #include "dem2d.h"
+#define BENCH_NAME "bench_world"
+#include "bench_beds.h"
 
 #include <fcntl.h>
 #include <math.h>
@@ -54,25 +56,11 @@
 #include <time.h>
 #include <unistd.h>
 
-#define COUNT_OF(array) ((int)(sizeof(array) / sizeof((array)[0])))
-#define PI 3.14159265358979323846
-#define TIME_STEP 1e-4 /* s */
-#define GRAVITY 9.8    /* m/s2 */
-#define DENSITY 2700   /* kg/m2 */
-#define STIFFNESS 1e7  /* N/m, both */
-#define FRICTION 0.2
 #define STRESS 1e5    /* Pa, biaxial */
 #define TOP_SPEED 0.1 /* m/s, biaxial */
-#define ARCS 10
-#define ORDER 8
-#define MOST_CORNERS 7
-#define OUTLINE 720  /* points */
-#define TEMPLATES 32 /* of each model; one circle */
 #define BATCHES 7
 #define SKINS 4 /* that LAMMPS may choose from */
 
-enum { CIRCLE, ELLIPSE, POLYGON, BEZIER, FS, MODELS };
-enum { DISCS, POLYGONS, ELLIPSES, BEZIERS, FOURIERS, MIXED, SCENES };
 enum { PART_DT = SCENES, PART_ORDER, PART_SKIN, PART_SIZES, PARTS };
 enum { SETTLED, BIAXIAL, TESTS };
 enum { LEFT, RIGHT, BOTTOM, TOP, WALLS };
@@ -81,26 +69,6 @@ static const char *const model_names[MODELS] = {"circle", "ellipse", "polygon", 
 static const char *const part_names[PARTS] = {"discs", "polygons", "ellipses", "beziers", "fourier",
                                               "mixed", "dt",       "order",    "skin",    "sizes"};
 static const char *const test_names[TESTS] = {"settled", "biaxial"};
-
-static void fail(const char *format, ...) {
-    va_list arguments;
-    va_start(arguments, format);
-    fprintf(stderr, "bench_world: ");
-    vfprintf(stderr, format, arguments);
-    fprintf(stderr, "\n");
-    va_end(arguments);
-    exit(2);
-}
-
-static void check(dem2d_result result, const char *what) {
-    if (result != DEM2D_OK) fail("%s: %s", what, dem2d_result_text(result));
-}
-
-static void *get_memory(size_t count, size_t size) {
-    void *memory = calloc(count + 1, size);
-    if (!memory) fail("out of memory");
-    return memory;
-}
 
 static FILE *create(const char *path) {
     FILE *file = fopen(path, "w");
@@ -121,14 +89,6 @@ static double seconds(void) {
 /* On a core, of this thread. */
 static double busy_seconds(void) {
     return read_clock(CLOCK_THREAD_CPUTIME_ID);
-}
-
-static uint64_t random_state;
-
-/* Uniform in [lower, upper): Knuth's congruential generator, high bits. */
-static double uniform(double lower, double upper) {
-    random_state = random_state * 6364136223846793005u + 1442695040888963407u;
-    return lower + (upper - lower) * ((double)(random_state >> 11) * 0x1p-53);
 }
 
 /* --- figures ---------------------------------------------------------------------------------- */
@@ -152,124 +112,7 @@ static figure summary(const double *values, int count) {
     return f;
 }
 
-/* --- templates -------------------------------------------------------------------------------- */
-
-#define KINDS (MODELS * TEMPLATES)
-
-/* Template i of model m is at k = m * TEMPLATES + i, its mirror image (y to -y) at k + KINDS. */
-static dem2d_shape *templates[2 * KINDS];
-
-static void make_polygon(dem2d_shape **shape) {
-    const int count = 4 + (int)uniform(0, MOST_CORNERS - 3);
-    const double stretch = sqrt(uniform(1, 1.4)), turn = uniform(0, 2 * PI);
-    dem2d_vec points[MOST_CORNERS];
-    for (int i = 0; i < count; i++) {
-        const double angle = 2 * PI * (i + uniform(-0.25, 0.25)) / count + turn;
-        points[i].x = cos(angle) * stretch, points[i].y = sin(angle) / stretch;
-    }
-    check(dem2d_shape_create_polygon(NULL, points, count, 0, &shape[0]), "polygon");
-    for (int i = 0; i < count; i++) points[i].y = -points[i].y;
-    check(dem2d_shape_create_polygon(NULL, points, count, 0, &shape[KINDS]), "polygon");
-}
-
-/* Coefficients of a smooth random grain. */
-static void draw_series(int order, double roughness, double *a, double *b) {
-    dem2d_virtual_desc desc = {0};
-    desc.radius = 1, desc.seed = (uint64_t)uniform(0, 1e9);
-    desc.elongation = uniform(0.02, 0.08), desc.roundness = 0.02, desc.roughness = roughness;
-    check(dem2d_fourier_virtual(&desc, order, a, b), "virtual grain");
-}
-
-static void make_series(dem2d_shape **shape) {
-    double a[ORDER + 1], b[ORDER + 1];
-    draw_series(ORDER, 0.002, a, b);
-    check(dem2d_shape_create_fourier(NULL, a, b, ORDER, &shape[0]), "series");
-    for (int n = 0; n <= ORDER; n++) b[n] = -b[n];
-    check(dem2d_shape_create_fourier(NULL, a, b, ORDER, &shape[KINDS]), "series");
-}
-
-static void make_bezier(dem2d_shape **shape) {
-    double a[ORDER + 1], b[ORDER + 1];
-    dem2d_vec outline[OUTLINE], control[3 * ARCS];
-    dem2d_shape *grain;
-    draw_series(ORDER, 0.002, a, b);
-    check(dem2d_shape_create_fourier(NULL, a, b, ORDER, &grain), "series");
-    check(dem2d_shape_outline(grain, dem2d_pose_make(0, 0, 0, 1), OUTLINE, outline), "outline");
-    check(dem2d_bezier_fit(NULL, outline, OUTLINE, ARCS, control), "polybezier");
-    check(dem2d_shape_create_bezier(NULL, control, ARCS, &shape[0]), "polybezier");
-    for (int i = 0; i < 3 * ARCS; i++) control[i].y = -control[i].y;
-    check(dem2d_shape_create_bezier(NULL, control, ARCS, &shape[KINDS]), "polybezier");
-    dem2d_shape_destroy(grain);
-}
-
-static void make_templates(void) {
-    for (int i = 0; i < TEMPLATES; i++) {
-        const double root = sqrt(uniform(1, 2.5));
-        dem2d_shape **t = templates + i;
-        for (int mirror = 0; mirror <= KINDS; mirror += KINDS) {
-            dem2d_shape **ellipse = t + mirror + ELLIPSE * TEMPLATES;
-            check(dem2d_shape_create_circle(NULL, 1, t + mirror), "circle");
-            check(dem2d_shape_create_ellipse(NULL, root, 1 / root, ellipse), "ellipse");
-        }
-        make_polygon(t + POLYGON * TEMPLATES);
-        make_bezier(t + BEZIER * TEMPLATES);
-        make_series(t + FS * TEMPLATES);
-    }
-}
-
-static int random_template(int scene) {
-    static const int only[MIXED] = {CIRCLE, POLYGON, ELLIPSE, BEZIER, FS};
-    const int model = scene == MIXED ? (int)uniform(0, MODELS) : only[scene];
-    return model == CIRCLE ? 0 : model * TEMPLATES + (int)uniform(0, TEMPLATES);
-}
-
-/* --- beds ------------------------------------------------------------------------------------- */
-
-typedef struct grain {
-    int shape; /* of the bed's templates */
-    double scale, x, y, angle;
-} grain;
-
-/* Grains at rest in a box; open above when top is 0. */
-typedef struct bed {
-    dem2d_shape *const *shapes;
-    int shape_count, count;
-    grain *grains;
-    double left, right, bottom, top;
-} bed;
-
-static bed make_bed(int count) {
-    bed b = {templates, COUNT_OF(templates), count, NULL, 0, 0, 0, 0};
-    b.grains = get_memory((size_t)count, sizeof *b.grains);
-    return b;
-}
-
-static double bounding_radius(const bed *b, const grain *g) {
-    dem2d_shape_info info;
-    check(dem2d_shape_get(b->shapes[g->shape], &info), "template");
-    return info.circumscribed * g->scale;
-}
-
-static grain random_grain(const bed *b, int template) {
-    dem2d_shape_info info;
-    grain g = {template, 0, 0, 0, 0};
-    check(dem2d_shape_get(b->shapes[template], &info), "template");
-    g.scale = 0.5 * uniform(0.04, 0.06) / info.equivalent;
-    g.angle = uniform(-PI, PI);
-    return g;
-}
-
-/* Rows from the left wall to the right one, each as high as its largest grain. */
-static void lay_rows(bed *b) {
-    double x = b->left, row = b->bottom, height = 0;
-    for (int i = 0; i < b->count; i++) {
-        grain *g = &b->grains[i];
-        const double room = bounding_radius(b, g) * uniform(1.01, 1.1);
-        if (x + 2 * room > b->right) x = b->left, row += height, height = 0;
-        g->x = x + room, g->y = row + room;
-        x += 2 * room, height = fmax(height, 2 * room);
-    }
-}
+/* --- copies of beds --------------------------------------------------------------------------- */
 
 /* Turned over at the middle of the bed, left and right or up and down. */
 static grain mirror(const bed *b, grain g, bool sideways) {
@@ -340,20 +183,8 @@ static void add_materials(run *r, int test) {
 }
 
 static void add_grains(run *r) {
-    const bed *b = r->bed;
-    dem2d_shape_id *shapes = get_memory((size_t)b->shape_count, sizeof *shapes);
-    r->ids = get_memory((size_t)b->count, sizeof *r->ids);
-    for (int i = 0; i < b->count; i++) {
-        const grain *g = &b->grains[i];
-        dem2d_shape_id *shape = &shapes[g->shape];
-        dem2d_particle_desc desc = {0};
-        if (shape->generation == 0)
-            check(dem2d_world_add_shape(r->world, b->shapes[g->shape], shape), "shape");
-        desc.shape = *shape, desc.material = r->grain_material, desc.scale = g->scale;
-        desc.position.x = g->x, desc.position.y = g->y, desc.angle = g->angle;
-        check(dem2d_world_add_particle(r->world, &desc, &r->ids[i]), "particle");
-    }
-    free(shapes);
+    r->ids = get_memory((size_t)r->bed->count, sizeof *r->ids);
+    add_bed(r->world, r->bed, r->grain_material, r->ids);
 }
 
 static dem2d_wall_desc wall_desc(const run *r, int which, double place) {
@@ -511,7 +342,6 @@ static int tile_size(void) {
 static bed settle(bed b) {
     const int fall = 7000, rest = opt.quick ? 5000 : 9000;
     const setup s = plain_setup(SETTLED, 0.3);
-    lay_rows(&b);
     run r = open_run(&b, &s);
     take_steps(&r, fall);
     damp(&r, 0.7);
@@ -523,11 +353,7 @@ static bed settle(bed b) {
 }
 
 static bed settle_scene(int scene, int count) {
-    bed b = make_bed(count);
-    random_state = (uint64_t)(7919 * count + scene);
-    b.right = count / 500.0;
-    for (int i = 0; i < count; i++) b.grains[i] = random_grain(&b, random_template(scene));
-    return settle(b);
+    return settle(draw_bed(scene, count, (uint64_t)(7919 * count + scene), count / 500.0));
 }
 
 /* The settled bed between servo walls, without its weight. */
@@ -1274,6 +1100,7 @@ static bed settle_originals(dem2d_shape *const *originals) {
     bed b = make_bed(500);
     b.shapes = originals, b.shape_count = ORIGINALS, b.right = 1;
     for (int i = 0; i < b.count; i++) b.grains[i] = random_grain(&b, (int)uniform(0, ORIGINALS));
+    lay_rows(&b);
     return settle(b);
 }
 
