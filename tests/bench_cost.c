@@ -1,120 +1,280 @@
-/* bench_cost settle FILE                 settles discs in a box and writes them
-   bench_cost FILE FEATURE STATE STEPS    takes steps in `measured`, for bench_cost.sh to count
+/* bench_cost settle SCENE SEED FILE              settles a scene and saves it
+   bench_cost go-on FILE STEPS                    takes steps of a saved scene in `measured`
+   bench_cost feature FILE FEATURE STATE STEPS    the discs of a saved scene with a feature, likewise
 
-   The settled discs swing a little about their places, without friction, damping, gravity or spin.
-   STATE tells how they have a feature: 0 absent; 1 there, but not used; 2 in use. Prints discs,
-   contacts at the end, and how often the list was made anew. Exit status: 0, 1 for a failed call, 2
-   for bad usage. */
+   bench_cost.sh has the instructions of `measured` counted. A saved scene goes on as it was when it
+   is continued. A feature is tried on the scene "smooth discs": discs in a closed box, squeezed,
+   which swing a little about their places, without friction, damping, gravity or spin. STATE tells
+   how they have a feature: 0 absent; 1 there, but not used; 2 in use. Prints particles, contacts at
+   the end, and how often the list was made anew. Exit status: 0, 2 for a failed call or bad usage. */
 #define DEM2D_IMPLEMENTATION
 #include "dem2d.h"
+#define BENCH_NAME "bench_cost"
+#include "bench_beds.h"
 
-#include <math.h>
-#include <stdio.h>
-#include <stdlib.h>
-#include <string.h>
+enum { ABSENT, OFF, ON };
+enum { COLUMNS = 25, /* of discs in rows */
+       CORNERS = 24 }; /* of a polygon: so many that it stays in contact in a disc's place */
+enum { FLOOR, LEFT, RIGHT, LID, WALLS };
 
-enum { DISCS = 600, COLUMNS = 25, ABSENT = 0, OFF, ON };
-enum { CORNERS = 24 }; /* of a polygon: so many that it stays in contact in a disc's place */
+/* What a saved scene has beside its world. */
+typedef struct kept {
+    dem2d_wall_id walls[WALLS];
+    int renewal; /* steps after which the neighbour list is made anew; 0: when it has to be */
+} kept;
 
-#define PITCH 0.052 /* m, at the start */
-#define KN 1e7
-#define DENSITY 2700.0
-
-static void check(dem2d_result result, const char *what) {
-    if (result == DEM2D_OK) return;
-    fprintf(stderr, "bench_cost: %s: %s\n", what, dem2d_result_text(result));
-    exit(1);
-}
-
-static uint64_t random_state = 1;
-
-/* Uniform in [lower, upper): splitmix64. */
-static double uniform(double lower, double upper) {
-    uint64_t z = (random_state += 0x9e3779b97f4a7c15u);
-    z = (z ^ (z >> 30)) * 0xbf58476d1ce4e5b9u;
-    z = (z ^ (z >> 27)) * 0x94d049bb133111ebu;
-    return lower + (upper - lower) * ((double)((z ^ (z >> 31)) >> 11) * 0x1p-53);
-}
-
-/* The world of a run, and what its features need. */
+/* A world that is measured, and what its features need. */
 typedef struct bench {
     dem2d_world *world;
     dem2d_material_id material;
     dem2d_shape_id disc, polygon; /* of radius 1 */
-    dem2d_wall_id walls[4];       /* floor, left, right, lid */
-    dem2d_particle_id ids[DISCS];
-    dem2d_vec at[DISCS];
-    double radius[DISCS];
+    kept kept;
+    int count;
+    dem2d_particle_id *ids;
+    dem2d_vec *at;
+    double *radius;
     double width, height;
-    bool ask; /* for energy, stress and packing, each step */
+    bool ask; /* for energy and stress, each step */
 } bench;
 
-/* --- settling ------------------------------------------------------------------------------- */
-
 static void add_wall(bench *b, int i, dem2d_wall_mode mode) {
-    const double normals[4][2] = {{0, 1}, {1, 0}, {-1, 0}, {0, -1}};
+    const double normals[WALLS][2] = {{0, 1}, {1, 0}, {-1, 0}, {0, -1}};
     dem2d_wall_desc desc = {0};
     desc.mode = mode, desc.material = b->material;
     desc.normal.x = normals[i][0], desc.normal.y = normals[i][1];
-    desc.point.x = i == 2 ? b->width : 0, desc.point.y = i == 3 ? b->height : 0;
-    desc.length = i == 1 || i == 2 ? b->height : b->width;
+    desc.point.x = i == RIGHT ? b->width : 0, desc.point.y = i == LID ? b->height : 0;
+    desc.length = i == LEFT || i == RIGHT ? b->height : b->width;
     desc.stress = 1e5, desc.max_speed = 0.2;
-    check(dem2d_world_add_wall(b->world, &desc, &b->walls[i]), "wall");
+    check(dem2d_world_add_wall(b->world, &desc, &b->kept.walls[i]), "wall");
 }
 
-static void make_world(bench *b, const dem2d_world_desc *desc) {
-    const dem2d_material_desc smooth = {DENSITY, KN, 0, 0, 0, 0};
-    dem2d_shape *disc;
+static void open_bench(bench *b, const dem2d_world_desc *desc, double friction) {
+    dem2d_material_desc stone = {DENSITY, STIFFNESS, 0, 0, 0, 0};
+    stone.friction = friction, stone.tangential_stiffness = friction > 0 ? STIFFNESS : 0;
     check(dem2d_world_create(desc, &b->world), "world");
-    check(dem2d_world_add_material(b->world, &smooth, &b->material), "material");
-    check(dem2d_shape_create_circle(NULL, 1, &disc), "disc");
-    check(dem2d_world_add_shape(b->world, disc, &b->disc), "disc");
-    dem2d_shape_destroy(disc);
+    check(dem2d_world_add_material(b->world, &stone, &b->material), "material");
 }
 
-static dem2d_particle_desc disc_desc(const bench *b, dem2d_vec at, double radius) {
-    dem2d_particle_desc desc = {0};
-    desc.scale = radius, desc.shape = b->disc, desc.material = b->material, desc.position = at;
-    return desc;
+static void get_arrays(bench *b, int count) {
+    b->count = count;
+    b->ids = get_memory((size_t)count, sizeof *b->ids);
+    b->at = get_memory((size_t)count, sizeof *b->at);
+    b->radius = get_memory((size_t)count, sizeof *b->radius);
 }
 
-static void settle(bench *b, const char *path) {
+static void close_bench(bench *b) {
+    dem2d_world_destroy(b->world);
+    free(b->ids), free(b->at), free(b->radius);
+}
+
+/* --- scenes ----------------------------------------------------------------------------------- */
+
+/* OPEN: heaped in a box without a lid. SQUEEZED: without weight, under a lid that holds 100 kPa.
+   GAS: flying about in a closed box, area fraction 0.6. CHAIN: heaped on 1,000 segments that go up
+   and down; the neighbour list is made anew every RENEWAL steps, as if the heap moved. */
+typedef enum place { OPEN, SQUEEZED, GAS, CHAIN } place;
+
+enum { SEGMENTS = 1000, RENEWAL = 50 };
+#define SEGMENT_LENGTH 0.01 /* m, along x; they rise and fall by half of that */
+
+typedef struct scene {
+    const char *name;
+    int grains; /* of bench_beds.h */
+    place place;
+    int count;
+    double friction, damping_ratio, rolling;
+    bool law;
+} scene;
+
+static const scene scenes[] = {
+    {"smooth discs", DISCS, SQUEEZED, 600, 0, 0, 0, false},
+    {"discs", DISCS, OPEN, 800, FRICTION, 0, 0, false},
+    {"discs, dashpot", DISCS, OPEN, 800, FRICTION, 0.2, 0, false},
+    {"discs, dashpot, rolling", DISCS, OPEN, 800, FRICTION, 0.2, 0.1, false},
+    {"discs, law", DISCS, OPEN, 800, FRICTION, 0, 0, true},
+    {"polygons", POLYGONS, OPEN, 800, FRICTION, 0, 0, false},
+    {"ellipses", ELLIPSES, OPEN, 800, FRICTION, 0, 0, false},
+    {"polybeziers", BEZIERS, OPEN, 800, FRICTION, 0, 0, false},
+    {"Fourier series", FOURIERS, OPEN, 800, FRICTION, 0, 0, false},
+    {"mixed", MIXED, OPEN, 800, FRICTION, 0, 0, false},
+    {"moving discs", DISCS, GAS, 1000, 0, 0, 0, false},
+    {"segments", MIXED, CHAIN, 200, FRICTION, 0, 0, false},
+};
+
+static const scene *find_scene(const char *name) {
+    for (int i = 0; i < COUNT_OF(scenes); i++)
+        if (strcmp(scenes[i].name, name) == 0) return &scenes[i];
+    fail("no scene %s", name);
+    return NULL;
+}
+
+/* Spring and friction, as the world has them. */
+static void spring_law(void *user, const dem2d_law_input *in, dem2d_law_output *out) {
+    (void)user;
+    const double force = in->pair.normal_stiffness * in->depth;
+    const double limit = in->pair.friction * force;
+    double along = in->tangential_force - in->pair.tangential_stiffness * in->slip * in->time_step;
+    if (along > limit) along = limit;
+    if (along < -limit) along = -limit;
+    out->normal_force = force, out->tangential_force = along;
+    out->energy = 0.5 * force * in->depth;
+}
+
+/* On a square lattice, in a box that holds them at area fraction 0.6. */
+static void lay_gas(bed *b) {
+    const int columns = (int)sqrt(b->count);
+    double area = 0;
+    for (int i = 0; i < b->count; i++) {
+        double *radius = &b->grains[i].scale;
+        *radius = 0.025 + 0.25 * (*radius - 0.025); /* nearer to each other: all fit in a cell */
+        area += PI * *radius * *radius;
+    }
+    const double pitch = sqrt(area / (0.6 * b->count));
+    for (int i = 0; i < b->count; i++) {
+        grain *g = &b->grains[i];
+        g->x = pitch * (i % columns + 0.5), g->y = pitch * (i / columns + 0.5);
+    }
+    b->right = columns * pitch, b->top = (b->count + columns - 1) / columns * pitch;
+}
+
+static void add_chain(bench *b) {
+    for (int i = 0; i < SEGMENTS; i++) {
+        dem2d_wall_desc desc = {0};
+        dem2d_wall_id id;
+        desc.segment = true, desc.material = b->material;
+        desc.point.x = SEGMENT_LENGTH * i, desc.end.x = SEGMENT_LENGTH * (i + 1);
+        *(i % 2 ? &desc.point.y : &desc.end.y) = -0.5 * SEGMENT_LENGTH;
+        check(dem2d_world_add_wall(b->world, &desc, &id), "segment");
+    }
+}
+
+static void add_box(bench *b, place place) {
+    static const bool there[][WALLS] = {{1, 1, 1, 0}, {1, 1, 1, 1}, {1, 1, 1, 1}, {0, 1, 1, 0}};
+    for (int i = 0; i < WALLS; i++) {
+        const bool servo = i == LID && place == SQUEEZED;
+        if (there[place][i]) add_wall(b, i, servo ? DEM2D_WALL_SERVO : DEM2D_WALL_STILL);
+    }
+    if (place == CHAIN) add_chain(b), b->kept.renewal = RENEWAL;
+}
+
+static void stir(bench *b, double speed) {
+    for (int i = 0; i < b->count; i++) {
+        const dem2d_vec v = {uniform(-speed, speed), uniform(-speed, speed)};
+        check(dem2d_world_drive_particle(b->world, b->ids[i], DEM2D_FREE, v, 0), "velocity");
+    }
+}
+
+static bench open_scene(const scene *s, uint64_t seed) {
+    static const double widths[] = {3.2, 1.3, 2, SEGMENTS * SEGMENT_LENGTH};
+    bench b = {0};
     dem2d_world_desc desc = {0};
-    desc.time_step = 1e-4, desc.local_damping = 0.7, desc.gravity.y = -9.81;
-    b->width = COLUMNS * PITCH, b->height = DISCS / COLUMNS * PITCH;
-    make_world(b, &desc);
-    for (int i = 0; i < 4; i++) add_wall(b, i, i == 3 ? DEM2D_WALL_SERVO : DEM2D_WALL_STILL);
-    for (int i = 0; i < DISCS; i++) {
-        const double radius = uniform(0.02, 0.026);
-        const dem2d_vec at = {PITCH * (i % COLUMNS + 0.5), PITCH * (i / COLUMNS + 0.5)};
-        dem2d_particle_desc d = disc_desc(b, at, radius);
-        d.velocity.x = uniform(-0.5, 0.5);
-        check(dem2d_world_add_particle(b->world, &d, &b->ids[i]), "disc");
-    }
-    check(dem2d_world_step(b->world, 25000, NULL), "settling");
-    dem2d_wall_info lid;
-    check(dem2d_world_get_wall(b->world, b->walls[3], &lid), "lid");
-    FILE *file = fopen(path, "w");
-    if (file == NULL) exit(1);
-    fprintf(file, "%a %a\n", b->width, lid.point.y);
-    for (int i = 0; i < DISCS; i++) {
-        dem2d_particle_info p;
-        check(dem2d_world_get_particle(b->world, b->ids[i], &p), "disc");
-        fprintf(file, "%a %a %a\n", p.pose.position.x, p.pose.position.y, p.pose.scale);
-    }
-    if (fclose(file) != 0) exit(1);
+    desc.time_step = TIME_STEP;
+    desc.gravity.y = s->place == OPEN || s->place == CHAIN ? -GRAVITY : 0;
+    if (s->law) desc.law = spring_law;
+    bed grains = draw_bed(s->grains, s->count, seed, widths[s->place]);
+    if (s->place == GAS) lay_gas(&grains);
+    b.width = grains.right;
+    b.height = s->place == GAS ? grains.top : grains.grains[s->count - 1].y + 0.06;
+    open_bench(&b, &desc, s->friction);
+    const dem2d_pair_desc pair = {STIFFNESS, s->friction > 0 ? STIFFNESS : 0, s->friction,
+                                  s->damping_ratio, s->rolling};
+    check(dem2d_world_set_pair(b.world, b.material, b.material, &pair), "pair");
+    get_arrays(&b, s->count);
+    add_bed(b.world, &grains, b.material, b.ids);
+    add_box(&b, s->place);
+    free(grains.grains);
+    return b;
 }
 
-static void read_discs(bench *b, const char *path) {
-    FILE *file = fopen(path, "r");
-    int got = file ? fscanf(file, "%la %la", &b->width, &b->height) : 0;
-    for (int i = 0; i < DISCS && got > 0; i++)
-        got = fscanf(file, "%la %la %la", &b->at[i].x, &b->at[i].y, &b->radius[i]);
-    if (got != 3) {
-        fprintf(stderr, "bench_cost: %s: no settled discs\n", path);
-        exit(2);
+static void rest(bench *b, int steps) {
+    check(dem2d_world_set_damping(b->world, 0.7, 0), "damping");
+    check(dem2d_world_step(b->world, steps, NULL), "coming to rest");
+}
+
+/* Falls, and rests until the neighbour list of a while ago still holds, which it hardly ever does
+   when a few grains still roll. */
+static void settle_heap(bench *b, int fall) {
+    enum { WHILE = 3000, TRIES = 8 };
+    int64_t lists = -1;
+    check(dem2d_world_set_damping(b->world, 0.3, 0), "damping");
+    check(dem2d_world_step(b->world, fall, NULL), "falling");
+    for (int i = 0; i < TRIES; i++) {
+        dem2d_stats stats;
+        check(dem2d_world_stats(b->world, &stats), "stats");
+        if (stats.list_rebuilds == lists) return;
+        lists = stats.list_rebuilds;
+        rest(b, WHILE);
     }
+}
+
+static void settle(bench *b, const scene *s) {
+    enum { MIXING = 2000, SQUEEZING = 25000, HIGH_FALL = 4000, LOW_FALL = 2000 };
+    if (s->place == GAS) {
+        stir(b, 1);
+        check(dem2d_world_step(b->world, MIXING, NULL), "mixing");
+    } else if (s->place == SQUEEZED) {
+        stir(b, 0.5);
+        rest(b, SQUEEZING);
+    } else {
+        settle_heap(b, s->place == OPEN ? HIGH_FALL : LOW_FALL);
+    }
+}
+
+/* --- saved scenes: what is kept beside the world, then its snapshot -------------------------- */
+
+static bool put_bytes(void *user, const char *bytes, size_t count) {
+    return fwrite(bytes, 1, count, (FILE *)user) == count;
+}
+
+static bool get_bytes(void *user, char *bytes, size_t count) {
+    return fread(bytes, 1, count, (FILE *)user) == count;
+}
+
+static FILE *open_file(const char *path, const char *mode) {
+    FILE *file = fopen(path, mode);
+    if (!file) fail("can't open %s", path);
+    return file;
+}
+
+static void save_scene(const bench *b, const char *path) {
+    dem2d_save_desc desc = {0};
+    FILE *file = open_file(path, "wb");
+    desc.write = put_bytes, desc.user = file;
+    const bool written = put_bytes(file, (const char *)&b->kept, sizeof b->kept);
+    check(dem2d_world_save(b->world, &desc, NULL), "saving");
+    if (fclose(file) != 0 || !written) fail("can't write %s", path);
+}
+
+static bench load_scene(const char *path) {
+    bench b = {0};
+    dem2d_load_desc desc = {0};
+    FILE *file = open_file(path, "rb");
+    int count = 0;
+    desc.read = get_bytes, desc.user = file, desc.law = spring_law;
+    if (!get_bytes(file, (char *)&b.kept, sizeof b.kept)) fail("%s: no saved scene", path);
+    check(dem2d_world_load(&desc, NULL, &b.world), path);
     fclose(file);
+    check(dem2d_world_particles(b.world, NULL, 0, &count), "particles");
+    get_arrays(&b, count);
+    check(dem2d_world_particles(b.world, b.ids, count, &count), "particles");
+    return b;
+}
+
+/* The discs of a saved scene, for a world of its own. */
+static bench load_discs(const char *path) {
+    bench b = load_scene(path);
+    dem2d_wall_info right, lid;
+    check(dem2d_world_get_wall(b.world, b.kept.walls[RIGHT], &right), "right wall");
+    check(dem2d_world_get_wall(b.world, b.kept.walls[LID], &lid), "lid");
+    b.width = right.point.x, b.height = lid.point.y;
+    for (int i = 0; i < b.count; i++) {
+        dem2d_particle_info p;
+        check(dem2d_world_get_particle(b.world, b.ids[i], &p), "disc");
+        b.at[i] = p.pose.position, b.radius[i] = p.radius;
+    }
+    dem2d_world_destroy(b.world);
+    b.world = NULL;
+    return b;
 }
 
 /* --- features ------------------------------------------------------------------------------- */
@@ -128,12 +288,12 @@ static void serial(void *user, dem2d_phase phase, int count, dem2d_task_fn *task
 }
 
 static void set_friction(bench *b, double friction) {
-    const dem2d_pair_desc pair = {KN, friction > 0 ? KN : 0, friction, 0, 0};
+    const dem2d_pair_desc pair = {STIFFNESS, friction > 0 ? STIFFNESS : 0, friction, 0, 0};
     check(dem2d_world_set_pair(b->world, b->material, b->material, &pair), "pair");
 }
 
 static void set_dashpot(bench *b, double damping_ratio) {
-    const dem2d_pair_desc pair = {KN, 0, 0, damping_ratio, 0};
+    const dem2d_pair_desc pair = {STIFFNESS, 0, 0, damping_ratio, 0};
     check(dem2d_world_set_pair(b->world, b->material, b->material, &pair), "pair");
 }
 
@@ -149,7 +309,7 @@ static void describe(const char *feature, int state, dem2d_world_desc *desc) {
 /* The right half moved away: by 0.5 m, by 1 km, not at all. */
 static void shift_half(bench *b, int state) {
     const double by = state == ABSENT ? 0.5 : state == OFF ? 1000 : 0, middle = 0.5 * b->width;
-    for (int i = 0; i < DISCS; i++)
+    for (int i = 0; i < b->count; i++)
         if (b->at[i].x > middle) b->at[i].x += by;
     b->width += by;
 }
@@ -159,40 +319,56 @@ static void shift_half(bench *b, int state) {
 static void space_out(bench *b, int state, bool polygons) {
     const double near = polygons ? 0.998 : 1.02, touching = polygons ? 0.99 : 0.999;
     const double pitch = 0.05 * (state == ABSENT ? 1.4 : state == OFF ? near : touching);
-    for (int i = 0; i < DISCS; i++) {
+    for (int i = 0; i < b->count; i++) {
         b->at[i].x = pitch * (i % COLUMNS + 1), b->at[i].y = pitch * (i / COLUMNS + 1);
         b->radius[i] = 0.025;
     }
-    b->width = pitch * (COLUMNS + 1), b->height = pitch * (DISCS / COLUMNS + 1);
+    b->width = pitch * (COLUMNS + 1), b->height = pitch * (b->count / COLUMNS + 1);
 }
 
-static void place(bench *b, const char *feature, int state) {
+static dem2d_particle_desc disc_desc(const bench *b, dem2d_vec at, double radius) {
+    dem2d_particle_desc desc = {0};
+    desc.scale = radius, desc.shape = b->disc, desc.material = b->material, desc.position = at;
+    return desc;
+}
+
+static void place_discs(bench *b, const char *feature, int state) {
     const bool polygons = strcmp(feature, "gaps of polygons") == 0;
     const bool still = polygons || strcmp(feature, "gaps of discs") == 0;
     if (strcmp(feature, "empty region") == 0) shift_half(b, state);
     if (still) space_out(b, state, polygons);
-    for (int i = 0; i < 4; i++) add_wall(b, i, DEM2D_WALL_STILL);
-    for (int i = 0; i < DISCS; i++) {
+    for (int i = 0; i < WALLS; i++) add_wall(b, i, DEM2D_WALL_STILL);
+    for (int i = 0; i < b->count; i++) {
         dem2d_particle_desc d = disc_desc(b, b->at[i], b->radius[i]);
         d.velocity.x = uniform(-0.01, 0.01), d.velocity.y = uniform(-0.01, 0.01);
         if (strcmp(feature, "polygons") == 0 && state == ON && i % 10 == 0) d.shape = b->polygon;
         if (strcmp(feature, "fixed") == 0 && state == ON && i % 10 < 3) d.motion = DEM2D_FIXED;
-        if (polygons) d.shape = b->polygon, d.angle = 3.14159265358979323846 / CORNERS;
+        if (polygons) d.shape = b->polygon, d.angle = PI / CORNERS;
         if (still || d.motion == DEM2D_FIXED) d.velocity.x = d.velocity.y = 0;
         check(dem2d_world_add_particle(b->world, &d, &b->ids[i]), "disc");
     }
+}
+
+static void add_shape(bench *b, dem2d_shape *shape, dem2d_shape_id *id) {
+    check(dem2d_world_add_shape(b->world, shape, id), "shape");
+    dem2d_shape_destroy(shape);
+}
+
+static void add_disc(bench *b) {
+    dem2d_shape *shape;
+    check(dem2d_shape_create_circle(NULL, 1, &shape), "disc");
+    add_shape(b, shape, &b->disc);
 }
 
 static void add_polygon(bench *b) {
     dem2d_vec corners[CORNERS];
     dem2d_shape *shape;
     for (int i = 0; i < CORNERS; i++) {
-        const dem2d_rot r = dem2d_rot_make(i * 6.283185307179586 / CORNERS);
+        const dem2d_rot r = dem2d_rot_make(i * 2 * PI / CORNERS);
         corners[i].x = r.c, corners[i].y = r.s;
     }
     check(dem2d_shape_create_polygon(NULL, corners, CORNERS, 0, &shape), "polygon");
-    check(dem2d_world_add_shape(b->world, shape, &b->polygon), "polygon");
-    dem2d_shape_destroy(shape);
+    add_shape(b, shape, &b->polygon);
 }
 
 /* Two that touch each other and, behind it, the lid; out of reach of all others. */
@@ -207,8 +383,8 @@ static void add_fixed_pair(bench *b) {
 }
 
 static void add_rough_material(bench *b) {
-    const dem2d_material_desc rough = {DENSITY, KN, KN, 0.4, 0, 0};
-    const dem2d_pair_desc pair = {KN, KN, 0.4, 0.1, 0.1};
+    const dem2d_material_desc rough = {DENSITY, STIFFNESS, STIFFNESS, 0.4, 0, 0};
+    const dem2d_pair_desc pair = {STIFFNESS, STIFFNESS, 0.4, 0.1, 0.1};
     dem2d_material_id id;
     check(dem2d_world_add_material(b->world, &rough, &id), "material");
     check(dem2d_world_set_pair(b->world, id, id, &pair), "pair");
@@ -244,7 +420,7 @@ static void add_feature(bench *b, const char *feature, int state) {
 }
 
 static void set_spin(bench *b, double spin) {
-    for (int i = 0; i < DISCS; i++) {
+    for (int i = 0; i < b->count; i++) {
         dem2d_particle_info p;
         check(dem2d_world_get_particle(b->world, b->ids[i], &p), "disc");
         check(dem2d_world_drive_particle(b->world, b->ids[i], p.motion, p.velocity, spin), "spin");
@@ -267,7 +443,9 @@ static void set_feature(bench *b, const char *feature, bool on) {
 
 /* bench_cost.sh has the instructions counted between the start and the end of this function, which
    is therefore not to be inlined or cloned. */
-#if defined(__GNUC__)
+#if defined(__clang__)
+__attribute__((noinline))
+#elif defined(__GNUC__)
 __attribute__((noinline, noclone))
 #endif
 void measured(bench *b, int steps);
@@ -275,46 +453,64 @@ void measured(bench *b, int steps);
 void measured(bench *b, int steps) {
     dem2d_energy e;
     dem2d_stress s;
-    const int calls = b->ask ? steps : 1;
-    for (int i = 0; i < calls; i++) {
-        check(dem2d_world_step(b->world, steps / calls, NULL), "step");
+    const int stride = b->ask ? 1 : b->kept.renewal > 0 ? b->kept.renewal : steps;
+    for (int done = 0; done < steps; done += stride) {
+        if (b->kept.renewal > 0) check(dem2d_world_set_time_step(b->world, TIME_STEP), "renewal");
+        check(dem2d_world_step(b->world, stride, NULL), "step");
         if (b->ask) check(dem2d_world_energy(b->world, &e), "energy");
         if (b->ask) check(dem2d_world_stress(b->world, 1, &s), "stress");
     }
 }
 
-int main(int count, char **arguments) {
-    static bench b;
-    if (count == 3 && strcmp(arguments[1], "settle") == 0) {
-        settle(&b, arguments[2]);
-        dem2d_world_destroy(b.world);
-        return 0;
-    }
-    if (count != 5) {
-        fprintf(stderr, "usage: bench_cost settle FILE | FILE FEATURE STATE STEPS\n");
-        return 2;
-    }
-    const char *feature = arguments[2];
-    const int state = atoi(arguments[3]), steps = atoi(arguments[4]);
-    dem2d_world_desc desc = {0};
+static void measure(bench *b, int steps) {
     dem2d_stats before, after;
-    desc.time_step = 1e-4;
+    check(dem2d_world_stats(b->world, &before), "stats");
+    measured(b, steps);
+    check(dem2d_world_stats(b->world, &after), "stats");
+    printf("%d %d %d\n", b->count, after.contacts + after.wall_contacts,
+           (int)(after.list_rebuilds - before.list_rebuilds));
+}
+
+static bench open_feature(const char *path, const char *feature, int state) {
+    bench b = load_discs(path);
+    dem2d_world_desc desc = {0};
+    desc.time_step = TIME_STEP;
     describe(feature, state, &desc);
-    make_world(&b, &desc);
-    read_discs(&b, arguments[1]);
+    open_bench(&b, &desc, 0);
+    add_disc(&b);
     if (strcmp(feature, "gaps of polygons") == 0) add_polygon(&b);
     if (strcmp(feature, "polygons") == 0 && state != ABSENT) add_polygon(&b);
-    place(&b, feature, state);
+    place_discs(&b, feature, state);
     if (state != ABSENT) add_feature(&b, feature, state);
     if (state != ABSENT) set_feature(&b, feature, true);
     check(dem2d_world_step(b.world, 1, NULL), "step");
     if (state == OFF) set_feature(&b, feature, false);
     check(dem2d_world_step(b.world, 20, NULL), "step");
-    check(dem2d_world_stats(b.world, &before), "stats");
-    measured(&b, steps);
-    check(dem2d_world_stats(b.world, &after), "stats");
-    printf("%d %d %d\n", DISCS, after.contacts + after.wall_contacts,
-           (int)(after.list_rebuilds - before.list_rebuilds));
-    dem2d_world_destroy(b.world);
+    return b;
+}
+
+int main(int count, char **arguments) {
+    const char *task = count > 1 ? arguments[1] : "";
+    bench b;
+    random_state = 1;
+    if (count == 5 && strcmp(task, "settle") == 0) {
+        const scene *s = find_scene(arguments[2]);
+        make_templates();
+        b = open_scene(s, strtoull(arguments[3], NULL, 10));
+        settle(&b, s);
+        save_scene(&b, arguments[4]);
+    } else if (count == 4 && strcmp(task, "go-on") == 0) {
+        b = load_scene(arguments[2]);
+        measure(&b, atoi(arguments[3]));
+    } else if (count == 6 && strcmp(task, "feature") == 0) {
+        b = open_feature(arguments[2], arguments[3], atoi(arguments[4]));
+        measure(&b, atoi(arguments[5]));
+    } else {
+        fprintf(stderr, "usage: bench_cost settle SCENE SEED FILE | go-on FILE STEPS | feature "
+                        "FILE FEATURE STATE STEPS\n");
+        return 2;
+    }
+    close_bench(&b);
+    for (int i = 0; i < COUNT_OF(templates); i++) dem2d_shape_destroy(templates[i]);
     return 0;
 }
