@@ -425,6 +425,7 @@ OPTIONS (zero means: physical zero for physical fields; "library default" where 
     dem2d_svg_desc          width                 px     800        >= 0
     dem2d_svg_desc          outline_points        -      64         0 or >= 3
     dem2d_svg_desc          force_chains          -      false
+    dem2d_svg_desc          view                  m      all        upper above lower, or all zero
     dem2d_svg_desc          write                 -      none       or a path, not both
     dem2d_svg_desc          user                  -      NULL
     dem2d_vtp_desc          outline_points        -      64         0 or >= 3
@@ -1325,6 +1326,7 @@ typedef struct dem2d_contact_info {
 /// Counters of a world.
 typedef struct dem2d_stats {
     int64_t steps;         ///< done since creation
+    double time;           ///< s, the sum of their time steps
     int64_t list_rebuilds; ///< of the pair list
     int64_t support_calls; ///< in all steps
     int64_t looks; ///< at pairs with overlapping bounding circles, not skipped, in all steps
@@ -1606,11 +1608,11 @@ DEM2D_API uint64_t dem2d_world_hash(const dem2d_world *world);
 /// OUT_OF_MEMORY, IO.
 DEM2D_API dem2d_result dem2d_world_save(const dem2d_world *world, const dem2d_save_desc *desc,
                                         const char *path);
-/// The world of a snapshot: all ids hold, and its steps are those of the world that was saved, to
-/// the bit, with all statistics but bytes. read must have no byte after the snapshot. Memory beside
-/// the world's: at most one and a half times the snapshot's size. Errors: NULL_ARGUMENT (also a tag
-/// that custom does not know, a law that is not given), OUT_OF_RANGE (path and read),
-/// OUT_OF_MEMORY, IO, FORMAT, FORMAT_VERSION.
+/// The world of a snapshot (desc may be NULL: all zero, then path is needed): all ids hold, and its
+/// steps are those of the world that was saved, to the bit, with all statistics but bytes. read
+/// must have no byte after the snapshot. Memory beside the world's: at most one and a half times
+/// the snapshot's size. Errors: NULL_ARGUMENT (also a tag that custom does not know, a law that is
+/// not given), OUT_OF_RANGE (path and read), OUT_OF_MEMORY, IO, FORMAT, FORMAT_VERSION.
 DEM2D_API dem2d_result dem2d_world_load(const dem2d_load_desc *desc, const char *path,
                                         dem2d_world **world);
 
@@ -1623,6 +1625,7 @@ typedef struct dem2d_svg_desc {
     double width;          ///< px, 0 for 800; the height follows from the scene
     int outline_points;    ///< per curved particle, 0 for 64
     bool force_chains;     ///< lines along branches, width by normal force
+    dem2d_box view;        ///< m, what is drawn; all zero for all there is
     dem2d_write_fn *write; ///< where the bytes go, or NULL when a path is given
     void *user;            ///< handed to write
 } dem2d_svg_desc;
@@ -1666,7 +1669,11 @@ typedef struct dem2d_csv_desc {
    world. Errors: NULL_ARGUMENT, OUT_OF_RANGE, NOT_FINITE, IO (the file can't be opened, written or
    closed, or write returns false). */
 
-/// Draw shapes (a colour per model), walls, force chains and, below, a scale bar.
+/// Draw shapes (a colour per model; fixed particles grey, driven ones hatched), walls, force chains
+/// and, below, a scale bar. All there is: particles, segments, and half-planes that are no farther
+/// off than a third of what these take up. The mean normal force has a line as wide as a quarter of
+/// the mean radius, but no more than 1/400 of the picture; none is wider than the smaller
+/// particle's radius. desc may be NULL: all zero.
 DEM2D_API dem2d_result dem2d_world_write_svg(const dem2d_world *world, const dem2d_svg_desc *desc,
                                              const char *path);
 /// Write one part of a world for VTK and ParaView. Cell data of particles: id (index), type,
@@ -1680,7 +1687,7 @@ DEM2D_API dem2d_result dem2d_world_write_vtp(const dem2d_world *world, const dem
 /// Write a collection of files that make a series in time. env (may be NULL) gets the messages.
 DEM2D_API dem2d_result dem2d_pvd_write(const dem2d_env *env, const dem2d_pvd_desc *desc,
                                        const char *path);
-/// Write a row: step, time (steps done times the present time step), translational, rotational,
+/// Write a row: step, time (dem2d_stats), translational, rotational,
 /// normal, tangential, rolling, potential (dem2d_energy), kinetic_ratio, mean_speed, max_speed,
 /// unbalanced (dem2d_equilibrium), coordination, coordination_loaded, rattlers (dem2d_packing),
 /// contacts, wall_contacts, max_overlap, then the caller's columns.
@@ -9856,6 +9863,8 @@ struct dem2d_world {
     bool bounded;    /* no state can become infinite while the list lasts */
     double spread;   /* mean distance in memory of two partners when last sorted */
     int64_t steps, rebuilds, slow_time_step, fast_motion, listed_at;
+    int64_t timed_at; /* steps when the time step was last changed */
+    double timed;     /* s, the time then: one product adds the rest, with one rounding */
     dem2di_count count;
     dem2di_plan plan;
     dem2di_ledger ledger;
@@ -10989,10 +10998,19 @@ DEM2D_API dem2d_result dem2d_world_set_damping(dem2d_world *world, double local,
     return DEM2D_OK;
 }
 
+/* Of the steps done. */
+static double dem2di_time(const dem2d_world *world) {
+    return world->timed + (double)(world->steps - world->timed_at) * world->time_step;
+}
+
 DEM2D_API dem2d_result dem2d_world_set_time_step(dem2d_world *world, double time_step) {
     if (world == NULL) return DEM2D_NULL_ARGUMENT;
     dem2d_result result = dem2di_check_positive(&world->env, "time_step", time_step);
     if (result != DEM2D_OK) return result;
+    if (time_step != world->time_step) {
+        world->timed = dem2di_time(world);
+        world->timed_at = world->steps;
+    }
     world->time_step = time_step;
     world->list_stale = true; /* so that the step is checked */
     world->ledger.edited = true;
@@ -13421,6 +13439,7 @@ static int dem2di_open_contacts(const dem2d_world *world, int begin, int end) {
 DEM2D_API dem2d_result dem2d_world_stats(const dem2d_world *world, dem2d_stats *stats) {
     if (world == NULL || stats == NULL) return DEM2D_NULL_ARGUMENT;
     stats->steps = world->steps;
+    stats->time = dem2di_time(world);
     stats->list_rebuilds = world->rebuilds;
     stats->support_calls = world->count.calls;
     stats->looks = world->count.looks;
@@ -14283,6 +14302,9 @@ static void dem2di_archive_settings(dem2di_archive *ar, dem2d_world *w) {
                                                      DEM2D_FACE_RULE_COUNT - 1);
     dem2di_archive_bool(ar, "check_time_step", &w->check_time_step);
     dem2di_archive_tally(ar, "steps", &w->steps);
+    dem2di_archive_tally(ar, "timed_at", &w->timed_at);
+    dem2di_archive_expect(ar, w->timed_at <= w->steps, "timed_at is to come");
+    dem2di_archive_not_negative(ar, "timed", &w->timed);
 }
 
 static void dem2di_archive_material(dem2di_archive *ar, dem2d_material_desc *material) {
@@ -15025,7 +15047,9 @@ static dem2d_result dem2di_source_load(const dem2di_source *source, dem2d_world 
 
 DEM2D_API dem2d_result dem2d_world_load(const dem2d_load_desc *desc, const char *path,
                                         dem2d_world **world) {
-    if (desc == NULL) return DEM2D_NULL_ARGUMENT;
+    dem2d_load_desc plain;
+    memset(&plain, 0, sizeof plain);
+    if (desc == NULL) desc = &plain;
     const dem2d_env *env = desc->env;
     if (world == NULL) return dem2di_fail_null(env, "world");
     if (path == NULL && desc->read == NULL) return dem2di_fail_null(env, "path and read");
@@ -15106,9 +15130,21 @@ static void dem2di_box_grow(dem2d_box *all, bool first, dem2d_vec lower, dem2d_v
     all->upper.y = first ? upper.y : dem2di_max(all->upper.y, upper.y);
 }
 
-/* The box of all particles and segments with a margin of a twentieth of the larger side; a unit
-   square without any. */
-static dem2d_box dem2di_scene_box(const dem2d_world *world) {
+/* The box grows to a half-plane beside it, if that is no farther off than a third of its size: what
+   is farther would make all else small. */
+static void dem2di_box_reach(const dem2d_world *world, int j, double size, dem2d_box *all) {
+    dem2d_vec n = world->walls[j].desc.normal, nearest;
+    nearest.x = n.x > 0 ? all->lower.x : all->upper.x;
+    nearest.y = n.y > 0 ? all->lower.y : all->upper.y;
+    double gap = dem2di_dot(n, dem2di_sub(nearest, world->wall_before[j].point));
+    if (!(gap > 0 && gap <= size / 3)) return;
+    dem2d_vec foot = dem2di_along(nearest, -gap, n);
+    dem2di_box_grow(all, false, foot, foot);
+}
+
+/* The box of all particles and segments, and, if asked for, of half-planes beside them, with a
+   margin of a twentieth of the larger side; a unit square without any. */
+static dem2d_box dem2di_scene_box(const dem2d_world *world, bool beside) {
     dem2d_box all = {{0, 0}, {1, 1}};
     bool first = true;
     int index = 0;
@@ -15127,6 +15163,10 @@ static dem2d_box dem2di_scene_box(const dem2d_world *world) {
         first = false;
     }
     dem2d_vec size = dem2di_sub(all.upper, all.lower);
+    for (int j = 0; beside && j < world->wall_count; j++)
+        if (world->walls[j].alive && !world->walls[j].desc.segment)
+            dem2di_box_reach(world, j, dem2di_max(size.x, size.y), &all);
+    size = dem2di_sub(all.upper, all.lower);
     double margin = dem2di_max(size.x, size.y) / 20;
     all.lower = dem2di_sub(all.lower, dem2di_vec(margin, margin));
     all.upper = dem2di_add(all.upper, dem2di_vec(margin, margin));
@@ -15184,9 +15224,24 @@ static dem2d_vec dem2di_pixel(const dem2di_view *view, dem2d_vec p) {
                       view->height - (p.y - view->box.lower.y) * view->factor);
 }
 
-static dem2di_view dem2di_view_make(const dem2d_world *world, double width) {
+static bool dem2di_box_given(const dem2d_box *box) {
+    return box->lower.x != 0 || box->lower.y != 0 || box->upper.x != 0 || box->upper.y != 0;
+}
+
+static dem2d_result dem2di_check_view(const dem2d_env *env, const dem2d_box *view) {
+    dem2d_result result = dem2di_check_vec(env, "view.lower", view->lower);
+    if (result == DEM2D_OK) result = dem2di_check_vec(env, "view.upper", view->upper);
+    if (result != DEM2D_OK || !dem2di_box_given(view)) return result;
+    if (view->upper.x > view->lower.x && view->upper.y > view->lower.y) return DEM2D_OK;
+    return dem2di_fail(env, DEM2D_OUT_OF_RANGE, -1,
+                       "view from (%g, %g) to (%g, %g): upper must be above lower", view->lower.x,
+                       view->lower.y, view->upper.x, view->upper.y);
+}
+
+static dem2di_view dem2di_view_make(const dem2d_world *world, const dem2d_svg_desc *desc) {
     dem2di_view view;
-    view.box = dem2di_scene_box(world);
+    double width = desc->width == 0 ? 800 : desc->width;
+    view.box = dem2di_box_given(&desc->view) ? desc->view : dem2di_scene_box(world, true);
     dem2d_vec size = dem2di_sub(view.box.upper, view.box.lower);
     view.factor = width / size.x;
     view.width = width;
@@ -15195,17 +15250,33 @@ static dem2di_view dem2di_view_make(const dem2d_world *world, double width) {
     return view;
 }
 
+/* By model; of those that do not move by forces, by motion. */
+static const char *dem2di_fill_of(const dem2di_body *body, const dem2d_shape *shape) {
+    static const char *const colour[] = {"#e8c468", "#8fb9d8", "#b9a3d6",
+                                         "#94c99b", "#e59a83", "#c9c9c9"};
+    if (body->motion == DEM2D_FIXED) return "#8c8c8c";
+    return body->motion == DEM2D_DRIVEN ? "url(#dem2d-driven)" : colour[shape->type];
+}
+
+/* Is the circle around a particle off the view? */
+static bool dem2di_off_view(const dem2d_world *world, const dem2di_view *view, int slot) {
+    dem2d_vec c = world->before[slot].x;
+    const dem2di_body *body = &world->bodies[slot];
+    double r = dem2di_shape_of(world, body)->circumscribed * body->scale;
+    return c.x + r < view->box.lower.x || c.x - r > view->box.upper.x ||
+           c.y + r < view->box.lower.y || c.y - r > view->box.upper.y;
+}
+
 /* One particle as a path: exact corners for sharp polygons, points for all else. */
 static void dem2di_draw_particle(const dem2d_world *world, const dem2di_view *view, int points,
                                  int i, dem2di_writer *writer) {
-    static const char *const colour[] = {"#e8c468", "#8fb9d8", "#b9a3d6",
-                                         "#94c99b", "#e59a83", "#c9c9c9"};
     const dem2d_shape *shape = dem2di_shape_of(world, &world->bodies[i]);
+    const char *fill = dem2di_fill_of(&world->bodies[i], shape);
     dem2d_pose pose = dem2di_pose_of(world, world->before, i);
     if (shape->type == DEM2D_CIRCLE) {
         dem2d_vec c = dem2di_pixel(view, pose.position);
         dem2di_print(writer, "<circle cx=\"%.2f\" cy=\"%.2f\" r=\"%.2f\" fill=\"%s\"/>\n", c.x, c.y,
-                     shape->a * pose.scale * view->factor, colour[shape->type]);
+                     shape->a * pose.scale * view->factor, fill);
         return;
     }
     points = dem2di_drawn_points(shape, points);
@@ -15215,7 +15286,7 @@ static void dem2di_draw_particle(const dem2d_world *world, const dem2di_view *vi
         p = dem2di_pixel(view, dem2di_place(&pose, p));
         dem2di_print(writer, "%c%.2f %.2f", k == 0 ? 'M' : 'L', p.x, p.y);
     }
-    dem2di_print(writer, "Z\" fill=\"%s\"/>\n", colour[shape->type]);
+    dem2di_print(writer, "Z\" fill=\"%s\"/>\n", fill);
 }
 
 static void dem2di_draw_line(dem2d_vec p, dem2d_vec q, double width, dem2di_writer *writer) {
@@ -15237,24 +15308,40 @@ static void dem2di_draw_walls(const dem2d_world *world, const dem2di_view *view,
     dem2di_print(writer, "</g>\n");
 }
 
-/* Force chains: from centre to centre (or wall contact point); the mean force is 1/400 of the
-   picture's width wide, enough to be seen and not to hide the grains. */
+/* Pixels, of the smaller particle of a contact. */
+static double dem2di_drawn_radius(const dem2d_world *world, const dem2di_view *view,
+                                  const dem2di_tour *walk) {
+    const dem2di_key *key = &world->list.keys[walk->contact];
+    double radius = dem2di_equivalent(world, key->a);
+    if (!walk->walls) radius = dem2di_min(radius, dem2di_equivalent(world, key->b));
+    return radius * view->factor;
+}
+
+/* Force chains: from centre to centre (or wall contact point). The mean force is a quarter of the
+   mean radius wide, so that lines leave room for grains however many there are; 1/400 of the
+   picture is enough to be seen. The strongest are as wide as their smaller grain is high. */
 static void dem2di_draw_chains(const dem2d_world *world, const dem2di_view *view,
                                dem2di_writer *writer) {
-    double sum = 0;
+    double sum = 0, radii = 0;
     int open = 0;
     dem2di_tour walk = dem2di_tour_start(false);
-    for (; dem2di_tour_next(world, &walk); open++) sum += walk.link.force;
-    double unit = sum > 0 ? view->width / 400 * open / sum : 0;
+    for (; dem2di_tour_next(world, &walk); open++) {
+        sum += walk.link.force;
+        radii += dem2di_drawn_radius(world, view, &walk);
+    }
+    double usual = open > 0 ? dem2di_min(view->width / 400, radii / open / 4) : 0;
+    double unit = sum > 0 ? usual * open / sum : 0;
     dem2di_print(writer, "<g stroke=\"#7a0019\" stroke-opacity=\"0.75\" "
                          "stroke-linecap=\"round\">\n");
     for (int wall = 0; wall < 2; wall++) {
         walk = dem2di_tour_start(wall == 1);
         while (dem2di_tour_next(world, &walk)) {
-            dem2d_vec start = world->before[world->list.keys[walk.contact].a].x;
-            dem2d_vec end = dem2di_add(start, walk.branch);
+            int a = world->list.keys[walk.contact].a;
+            dem2d_vec start = world->before[a].x, end = dem2di_add(start, walk.branch);
+            double most = dem2di_drawn_radius(world, view, &walk);
+            if (dem2di_off_view(world, view, a)) continue;
             dem2di_draw_line(dem2di_pixel(view, start), dem2di_pixel(view, end),
-                             walk.link.force * unit, writer);
+                             dem2di_min(walk.link.force * unit, most), writer);
         }
     }
     dem2di_print(writer, "</g>\n");
@@ -15288,29 +15375,46 @@ static void dem2di_draw_scale(const dem2di_view *view, dem2di_writer *writer) {
 
 static void dem2di_draw(const dem2d_world *world, const dem2d_svg_desc *desc,
                         dem2di_writer *writer) {
-    dem2di_view view = dem2di_view_make(world, desc->width == 0 ? 800 : desc->width);
+    dem2di_view view = dem2di_view_make(world, desc);
     double height = view.height + view.strip;
     dem2di_print(writer,
                  "<svg xmlns=\"http://www.w3.org/2000/svg\" width=\"%.0f\" height=\"%.0f\" "
                  "viewBox=\"0 0 %.2f %.2f\">\n<rect width=\"100%%\" height=\"100%%\" "
-                 "fill=\"white\"/>\n<g stroke=\"#333\" stroke-width=\"%.3f\">\n",
-                 view.width, height, view.width, height, view.width / 1600);
+                 "fill=\"white\"/>\n",
+                 view.width, height, view.width, height);
+    dem2di_print(writer, /* hatches, a hundred across the picture */
+                 "<defs><pattern id=\"dem2d-driven\" width=\"%.3f\" height=\"9\" "
+                 "patternUnits=\"userSpaceOnUse\" patternTransform=\"rotate(45)\">"
+                 "<rect width=\"100%%\" height=\"9\" fill=\"#dcdcdc\"/>"
+                 "<rect width=\"%.3f\" height=\"9\" fill=\"#6c6c6c\"/></pattern></defs>\n",
+                 view.width / 100, view.width / 300);
+    /* an inner picture cuts off what is beyond the view */
+    dem2di_print(writer,
+                 "<svg width=\"%.2f\" height=\"%.2f\">\n"
+                 "<g stroke=\"#333\" stroke-width=\"%.3f\">\n",
+                 view.width, view.height, view.width / 1600);
     int index = 0, slot;
     while ((slot = dem2di_next_particle(world, &index)) >= 0 && writer->good)
-        dem2di_draw_particle(world, &view, desc->outline_points, slot, writer);
+        if (!dem2di_off_view(world, &view, slot))
+            dem2di_draw_particle(world, &view, desc->outline_points, slot, writer);
     dem2di_print(writer, "</g>\n");
     dem2di_draw_walls(world, &view, writer);
     if (desc->force_chains) dem2di_draw_chains(world, &view, writer);
+    dem2di_print(writer, "</svg>\n");
     dem2di_draw_scale(&view, writer);
     dem2di_print(writer, "</svg>\n");
 }
 
 DEM2D_API dem2d_result dem2d_world_write_svg(const dem2d_world *world, const dem2d_svg_desc *desc,
                                              const char *path) {
-    if (world == NULL || desc == NULL) return DEM2D_NULL_ARGUMENT;
+    dem2d_svg_desc plain;
+    if (world == NULL) return DEM2D_NULL_ARGUMENT;
+    memset(&plain, 0, sizeof plain);
+    if (desc == NULL) desc = &plain;
     const dem2d_env *env = &world->env;
     dem2di_writer writer;
     dem2d_result result = dem2di_check_not_negative(env, "width", desc->width);
+    if (result == DEM2D_OK) result = dem2di_check_view(env, &desc->view);
     if (result == DEM2D_OK) result = dem2di_check_outline_points(env, desc->outline_points);
     if (result == DEM2D_OK)
         result = dem2di_writer_open(env, desc->write, desc->user, path, false, &writer);
@@ -15337,7 +15441,7 @@ static dem2di_item dem2di_item_start(const dem2d_world *world, const dem2d_vtp_d
     memset(&item, 0, sizeof item);
     item.part = desc->part;
     item.outline_points = desc->outline_points;
-    if (desc->part == DEM2D_VTP_WALLS) item.box = dem2di_scene_box(world);
+    if (desc->part == DEM2D_VTP_WALLS) item.box = dem2di_scene_box(world, false);
     item.walk = dem2di_tour_start(false);
     return item;
 }
@@ -15675,7 +15779,7 @@ static void dem2di_csv_values(const dem2d_world *world, double values[DEM2DI_CSV
     (void)dem2d_world_packing(world, &packing);
     (void)dem2d_world_stats(world, &stats);
     const double all[DEM2DI_CSV_COLUMNS] = {(double)stats.steps,
-                                            (double)stats.steps * world->time_step,
+                                            stats.time,
                                             energy.translational,
                                             energy.rotational,
                                             energy.normal,
@@ -15790,6 +15894,9 @@ DEM2D_API dem2d_result dem2d_world_write_csv(const dem2d_world *world, const dem
             the list was made; whether two segments are joined is seen in every step.
             Each of two contact points keeps its spring at its corner (dem2d_contact_point.corner),
             whichever grain has the lower id.
+            dem2d_stats.time sums the time steps; histories have it. SVG: a view, half-planes beside
+            the grains, fixed and driven grains, chains no wider than grains; desc may be NULL, as
+            that of dem2d_world_load.
      0.5.0  The two points of faces conserve energy between free polygons as well: each has a
             normal of its own and tells its energy. Snapshots of version 2.
      0.4.0  Dashpots by restitution, rolling friction, a caller's law, segment walls. Measures of

@@ -208,6 +208,8 @@ static const row svg_rows[] = {
     FIELD(svg_desc, width, NOT_NEGATIVE),
     FIELD_INT(svg_desc, outline_points, INTEGER_OR_0, 3, INT_MAX),
     FIELD(svg_desc, force_chains, ANY_BOOL),
+    FIELD(svg_desc, view.lower, VECTOR),
+    FIELD(svg_desc, view.upper, VECTOR),
     FIELD(svg_desc, write, POINTER), /* there is no path */
     FIELD(svg_desc, user, ANY_POINTER),
 };

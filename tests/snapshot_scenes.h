@@ -35,9 +35,9 @@ static const char *const scene_names[SCENE_COUNT] = {
 /* After so many steps of so many grains; see `make golden`. */
 enum { GOLDEN_GRAINS = 20, GOLDEN_STEPS = 500 };
 static const uint64_t golden_hashes[SCENE_COUNT] = {
-    0x8fb3c11b26b430ecu, 0x633cf89112514dfcu, 0x199087172dde0c65u, 0xe44bc3f39a2ee064u,
-    0xbba2c626f236e8c3u, 0x4316defaab458df2u, 0xbd8f28b79b3b229bu, 0x38fef9193dd1ed6bu,
-    0x0afabf116a51294cu, 0x80a3fdd53a8392dbu};
+    0x8eeea1f2dae9ce22u, 0xf6cf3bed491a3d9fu, 0xec59470156f55106u, 0x7ef2289e05604621u,
+    0xfbececef0e136750u, 0x6b0c7b0eb4b1f67au, 0xfeef9833649e994du, 0x29e4e8a98c565302u,
+    0x87bfc4b0821c2c6fu, 0xacb874549de80904u};
 
 enum { SCENE_SHAPES = 8, SCENE_WALLS = 4, SCENE_LINKS = 3, SCENE_TAG = -7, SCENE_LAW_TAG = 12 };
 

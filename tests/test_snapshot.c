@@ -1089,7 +1089,8 @@ static void test_arguments(void **state) {
     test_env env;
     test_env_init(&env);
     load.env = &env.env;
-    assert_result(dem2d_world_load(NULL, "x", &world), DEM2D_NULL_ARGUMENT);
+    assert_result(dem2d_world_load(NULL, "build/no such file", &world), DEM2D_IO);
+    assert_result(dem2d_world_load(NULL, NULL, &world), DEM2D_NULL_ARGUMENT);
     assert_result(dem2d_world_load(&load, "x", NULL), DEM2D_NULL_ARGUMENT);
     assert_logged(&env, DEM2D_NULL_ARGUMENT, -1, "world");
     assert_result(dem2d_world_load(&load, NULL, &world), DEM2D_NULL_ARGUMENT);

@@ -296,7 +296,7 @@ static void test_null_arguments(void **state) {
     test_env_init(&env);
     make_scene(&s, &env.env);
     assert_result(dem2d_world_write_svg(NULL, &svg, "x"), DEM2D_NULL_ARGUMENT);
-    assert_result(dem2d_world_write_svg(s.world, NULL, "x"), DEM2D_NULL_ARGUMENT);
+    assert_result(dem2d_world_write_svg(s.world, NULL, NULL), DEM2D_NULL_ARGUMENT);
     assert_result(dem2d_world_write_vtp(NULL, &vtp, "x"), DEM2D_NULL_ARGUMENT);
     assert_result(dem2d_world_write_vtp(s.world, NULL, "x"), DEM2D_NULL_ARGUMENT);
     assert_result(dem2d_world_write_csv(NULL, &csv, "x"), DEM2D_NULL_ARGUMENT);
@@ -535,6 +535,191 @@ static void check_refused(const scene *s, const test_env *env, const dem2d_csv_d
     assert_result(dem2d_world_write_csv(s->world, &with, NULL), result);
     assert_logged(env, result, index, word);
     assert_int_equal(out->calls, 0);
+}
+
+/* --- pictures of large, strayed and driven scenes ------------------------------------------------
+ */
+
+/* Attributes of the elements that begin with some text, one after the other; false at the end. */
+static bool next_element(const char **at, const char *start) {
+    const char *found = strstr(*at, start);
+    if (found) *at = found + strlen(start);
+    return found != NULL;
+}
+
+static int count_of(const char *text, const char *start) {
+    int count = 0;
+    for (const char *at = text; next_element(&at, start);) count++;
+    return count;
+}
+
+static const char *svg_text(const dem2d_world *world, dem2d_svg_desc desc) {
+    const char *const path = "build/test_writers_picture.svg";
+    assert_ok(dem2d_world_write_svg(world, &desc, path));
+    const char *text = read_file(path);
+    assert_int_equal(remove(path), 0);
+    return text;
+}
+
+/* Discs of radius 1 in rows that overlap a little, one row on a floor. */
+static void make_rows(scene *s, int columns, int rows) {
+    make_scene(s, NULL);
+    dem2d_shape *disc = test_disc(1);
+    dem2d_shape_id shape;
+    assert_ok(dem2d_world_add_shape(s->world, disc, &shape));
+    dem2d_shape_destroy(disc);
+    for (int i = 0; i < columns * rows; i++) {
+        dem2d_particle_desc grain = {0};
+        dem2d_particle_id id;
+        grain.scale = 1, grain.shape = shape, grain.material = s->materials[0];
+        grain.position = vec(1.99 * (i % columns), 1.99 * (i / columns) + 0.99);
+        assert_ok(dem2d_world_add_particle(s->world, &grain, &id));
+    }
+}
+
+/* Lines of forces are narrower than grains, however many there are. */
+static void test_chain_width(void **state) {
+    (void)state;
+    for (int columns = 2; columns <= 200; columns *= 10) {
+        const dem2d_svg_desc desc = {.force_chains = true};
+        scene s;
+        make_rows(&s, columns, 2);
+        step(&s, 1);
+        const char *text = svg_text(s.world, desc), *at = text;
+        const double radius = attribute(text, "r");
+        double sum = 0;
+        int lines = 0;
+        assert_true(next_element(&at, "stroke-linecap"));
+        while (next_element(&at, "<line ")) {
+            if (strstr(at, "</svg>") > strstr(at, "<text")) break; /* the scale bar */
+            const double width = attribute(at, "stroke-width");
+            assert_true(width > 0 && width <= radius + 0.01);
+            sum += width, lines++;
+        }
+        assert_true(lines >= 3 * columns - 2);
+        assert_near(sum / lines, fmin(800 / 400, radius / 4), 0.02L);
+        dem2d_world_destroy(s.world);
+    }
+}
+
+/* One stray grain shrinks everything, unless a view is given: what is off it is not drawn. */
+static void test_view(void **state) {
+    (void)state;
+    scene s;
+    dem2d_svg_desc desc = {0};
+    make_rows(&s, 10, 1);
+    const char *text = svg_text(s.world, desc);
+    const double radius = attribute(text, "r");
+    dem2d_particle_desc stray = {0};
+    dem2d_particle_id id;
+    dem2d_particle_id all[16];
+    dem2d_particle_info info;
+    int count;
+    assert_ok(dem2d_world_particles(s.world, all, 16, &count));
+    assert_ok(dem2d_world_get_particle(s.world, all[0], &info));
+    stray.shape = info.shape, stray.material = s.materials[0], stray.scale = 1;
+    stray.position = vec(3000, 3000);
+    assert_ok(dem2d_world_add_particle(s.world, &stray, &id));
+    text = svg_text(s.world, desc);
+    assert_true(attribute(text, "r") < radius / 50);
+    assert_int_equal(count_of(text, "<circle"), 11);
+    desc.view.lower = vec(-1, 0), desc.view.upper = vec(19, 2);
+    text = svg_text(s.world, desc);
+    assert_int_equal(count_of(text, "<circle"), 10);
+    assert_within(attribute(text, "r"), 800 / 20.0, 0.01);
+    const dem2d_box bad[] = {
+        {{0, 0}, {0, 1}}, {{0, 0}, {1, 0}}, {{1, 1}, {0, 0}}, {{0, 0}, {NAN, 1}}};
+    for (int i = 0; i < COUNT_OF(bad); i++) {
+        desc.view = bad[i];
+        assert_result(dem2d_world_write_svg(s.world, &desc, "build/none.svg"),
+                      i == 3 ? DEM2D_NOT_FINITE : DEM2D_OUT_OF_RANGE);
+    }
+    dem2d_world_destroy(s.world);
+}
+
+/* Half-planes beside the grains are drawn; one far away is not. */
+static void test_walls_beside(void **state) {
+    (void)state;
+    const double below[] = {0, 1, 6, 100};
+    for (int i = 0; i < COUNT_OF(below); i++) {
+        scene s;
+        make_rows(&s, 10, 1);
+        dem2d_wall_desc wall = {0};
+        dem2d_wall_id id;
+        wall.material = s.materials[0], wall.normal = vec(0, 1), wall.point = vec(7, -below[i]);
+        assert_ok(dem2d_world_add_wall(s.world, &wall, &id));
+        const dem2d_svg_desc desc = {0};
+        const int with = count_of(svg_text(s.world, desc), "<line ");
+        assert_ok(dem2d_world_remove_wall(s.world, id));
+        assert_int_equal(with - count_of(svg_text(s.world, desc), "<line "), below[i] <= 6);
+        dem2d_world_destroy(s.world);
+    }
+}
+
+static void test_motions_shown(void **state) {
+    (void)state;
+    scene s;
+    dem2d_particle_id all[8];
+    dem2d_particle_info info;
+    int count;
+    make_rows(&s, 4, 1);
+    assert_ok(dem2d_world_particles(s.world, all, 8, &count));
+    assert_ok(dem2d_world_get_particle(s.world, all[0], &info));
+    for (int motion = DEM2D_FIXED; motion <= DEM2D_DRIVEN; motion++) {
+        dem2d_particle_desc grain = {0};
+        dem2d_particle_id id;
+        grain.shape = info.shape, grain.material = s.materials[0], grain.scale = 1;
+        grain.position = vec(3.0 * motion, 5), grain.motion = (dem2d_motion)motion;
+        assert_ok(dem2d_world_add_particle(s.world, &grain, &id));
+    }
+    const dem2d_svg_desc desc = {0};
+    const char *text = svg_text(s.world, desc);
+    assert_int_equal(count_of(text, "<circle"), 6);
+    assert_int_equal(count_of(text, "fill=\"#8c8c8c\""), 1);
+    assert_int_equal(count_of(text, "fill=\"url(#dem2d-driven)\""), 1);
+    assert_ok(dem2d_world_write_svg(s.world, NULL, "build/test_writers_plain.svg")); /* all zero */
+    assert_string_equal(read_file("build/test_writers_plain.svg"), svg_text(s.world, desc));
+    assert_int_equal(remove("build/test_writers_plain.svg"), 0);
+    dem2d_world_destroy(s.world);
+}
+
+/* --- time ----------------------------------------------------------------------------------------
+ */
+
+/* Of all steps, each with the time step that it had; saved and loaded. */
+static void test_time(void **state) {
+    (void)state;
+    const char *const path = "build/test_writers.snapshot";
+    const double steps[] = {1e-5, 1e-6, 1e-6, 3e-5, 1e-5};
+    scene s;
+    dem2d_stats n;
+    long double time = 0;
+    double before = -1;
+    make_scene(&s, NULL);
+    for (int i = 0; i < COUNT_OF(steps); i++) {
+        assert_ok(dem2d_world_set_time_step(s.world, steps[i]));
+        for (int k = 0; k < 3; k++) {
+            step(&s, 1000 + k);
+            time += (long double)steps[i] * (1000 + k);
+            assert_ok(dem2d_world_stats(s.world, &n));
+            assert_near(n.time, time, 1e-15L);
+            assert_true(n.time > before);
+            before = n.time;
+            const char *row = strchr(text_of(put_csv, s.world), '\n') + 1;
+            assert_same_bits(strtod(strchr(row, ',') + 1, NULL), n.time);
+        }
+        dem2d_world *loaded = NULL;
+        const uint64_t hash = dem2d_world_hash(s.world);
+        assert_ok(dem2d_world_save(s.world, &(dem2d_save_desc){0}, path));
+        assert_ok(dem2d_world_load(NULL, path, &loaded));
+        assert_true(dem2d_world_hash(loaded) == hash);
+        dem2d_world_destroy(s.world);
+        s.world = loaded;
+        assert_ok(dem2d_world_stats(s.world, &n));
+        assert_same_bits(n.time, before);
+    }
+    assert_int_equal(remove(path), 0);
+    dem2d_world_destroy(s.world);
 }
 
 static void test_csv_errors(void **state) {
@@ -966,6 +1151,11 @@ int main(void) {
         cmocka_unit_test(test_scale_bar),
         cmocka_unit_test(test_decimal_comma),
         cmocka_unit_test(test_csv),
+        cmocka_unit_test(test_chain_width),
+        cmocka_unit_test(test_view),
+        cmocka_unit_test(test_walls_beside),
+        cmocka_unit_test(test_motions_shown),
+        cmocka_unit_test(test_time),
         cmocka_unit_test(test_csv_errors),
         cmocka_unit_test(test_pvd),
         cmocka_unit_test(test_pvd_errors),
