@@ -110,7 +110,7 @@ QUICK START (examples/hello.c, the same bytes)
         dem2d_world_desc scene = {0};
         scene.time_step = 1e-4;  // s
         scene.gravity.y = -9.81; // m/s2
-        scene.local_damping = 0.3;
+        scene.local_damping = 0.3; // brakes free fall too: to 0.7 g
         dem2d_world *world;
         check(dem2d_world_create(&scene, &world));
 
@@ -220,12 +220,15 @@ HOW TO
     lose energy          damping_ratio of the materials, from dem2d_damping_ratio(restitution);
                          rolling_friction for grains that should not roll; else friction, damping.
     use a law of yours   dem2d_world_desc.law: it gets depth, speeds and what it kept.
-    stop friction        dem2d_world_set_pair for the two materials.
+    change how two       dem2d_world_set_pair: stiffnesses, friction, damping ratio and rolling
+      materials meet     friction of a pair; friction 0, for one, makes a wall smooth.
     build a hopper       walls with segment: chains of them count once at their joints.
     follow the energy    dem2d_world_desc.ledger, then dem2d_world_ledger: what gravity, walls and
                          you put in, where it went, and by how much the sum is wrong.
-    hold a stress        a wall with mode DEM2D_WALL_SERVO, stress, and a length: constant or the
-                         distance between two other walls.
+    hold a stress        a wall with mode DEM2D_WALL_SERVO, stress, max_speed (no default: how fast
+                         it may follow), and a length: constant or the distance between two other
+                         walls. Its normal points to the grains it presses on; so does a
+                         segment's, which grains may touch from both sides.
     stop and go on       dem2d_world_save, dem2d_world_load: to the same bits as without a stop.
     compare two runs     dem2d_world_hash after as many steps.
     draw                 dem2d_world_write_svg, or dem2d_shape_outline for your own pictures.
@@ -1182,14 +1185,15 @@ typedef struct dem2d_law_input {
 
 /// What a caller's law answers; all zero at the call but for the state, which is the input's.
 typedef struct dem2d_law_output {
-    double normal_force;     ///< N/m, on B along the normal; may pull
+    double normal_force;     ///< N/m, on B along the normal; below 0 it pulls, while depth > 0
     double tangential_force; ///< N/m, on B along the normal turned by +90 degrees
     double moment;           ///< N, on B
     double energy;           ///< J/m, stored in the contact, for the energies
     double state[2];         ///< for the next step
 } dem2d_law_output;
 
-/// A contact law: forces of a contact that is closed. Called by the threads of parallel_for. Of a
+/// A contact law: forces of a contact. Called while depth > 0, never across a gap: where the shapes
+/// part, its force ends and its state is dropped. Called by the threads of parallel_for. Of a
 /// contact with a servo wall it is asked once more in a step, by the caller's thread, for a little
 /// more depth and closing speed: the wall learns how the force will rise, and drops that answer.
 typedef void dem2d_law_fn(void *user, const dem2d_law_input *input, dem2d_law_output *output);
@@ -1360,7 +1364,10 @@ DEM2D_API dem2d_result dem2d_world_add_material(dem2d_world *world, const dem2d_
                                                 dem2d_material_id *id);
 /// Damping ratio zeta of the dashpot that gives a restitution coefficient in (0, 1], at any speed
 /// and with no pull: -ln e = 2 zeta acos(zeta)/sqrt(1 - zeta^2), and likewise with acosh beyond
-/// zeta = 1 (Schwager, Poeschel 2007). Errors: NULL_ARGUMENT, OUT_OF_RANGE, NOT_FINITE.
+/// zeta = 1 (Schwager, Poeschel 2007). Exact in the limit of small steps and of first order in them
+/// (a dashpot starts with a jump: 0.8 asked gives 0.8067 in steps of a tenth of the contact time),
+/// for central impacts at one point. Two contact points of faces that meet carry twice the
+/// stiffness and twice the dashpot. Errors: NULL_ARGUMENT, OUT_OF_RANGE, NOT_FINITE.
 DEM2D_API dem2d_result dem2d_damping_ratio(double restitution, double *damping_ratio);
 /// Say how two materials (or one with itself) meet from now on.
 DEM2D_API dem2d_result dem2d_world_set_pair(dem2d_world *world, dem2d_material_id a,

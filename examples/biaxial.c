@@ -747,6 +747,8 @@ static bool report(const job *j, const options *o, double strain) {
         {"peak_stress_ratio", peak, "-", {0.1, 0.7}, {0.1, 0.7}},
         {"plateau_over_peak", plateau / peak, "-", {0.6, 1.01}, {0.6, 1.01}},
         {"axial_strain_final", strain, "-", {0.001, 2}, {0.001, 2}},
+        {"axial_strain_final_engineering", 1 - read_walls(j).height / j->height0, "-", FINITE,
+         FINITE},
         {"final_stress_ratio", end.ratio, "-", FINITE, FINITE},
         {"final_stress_ratio_foretold", f->stress_ratio, "-", FINITE, FINITE},
         {"anisotropy_normals", f->normals.coefficient, "-", FINITE, FINITE},

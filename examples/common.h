@@ -491,15 +491,15 @@ static inline bool next_field(rest *line, char separator, rest *field) {
 }
 
 /* What the first line of an outline's file says. */
-typedef struct columns {
+typedef struct outline_columns {
     int x, y, count; // x and y: which of them
     char separator;
-} columns;
+} outline_columns;
 
 /* A line that names the columns x and y, once each, in any order and among others, separated by
    commas, semicolons or tabs: the first of semicolon, tab, comma that the line has. */
-static inline bool parse_columns(rest line, columns *result) {
-    columns c = {-1, -1, 0, ','};
+static inline bool parse_columns(rest line, outline_columns *result) {
+    outline_columns c = {-1, -1, 0, ','};
     rest field;
     const size_t length = (size_t)(line.end - line.at);
     if (length > 0 && memchr(line.at, '\t', length) != NULL) c.separator = '\t';
@@ -523,7 +523,7 @@ static inline rest outline_rest(const char *bytes, size_t count) {
 
 static inline bool is_outline(const char *bytes, size_t count) {
     rest r = outline_rest(bytes, count), line = r;
-    columns unused;
+    outline_columns unused;
     return next_line(&r, &line) && parse_columns(line, &unused);
 }
 
@@ -539,7 +539,7 @@ static inline bool parse_coordinate(rest field, char separator, double *value) {
 }
 
 /* As many fields as columns, x and y of them. */
-static inline bool parse_point(rest line, const columns *c, dem2d_vec *p) {
+static inline bool parse_point(rest line, const outline_columns *c, dem2d_vec *p) {
     rest field;
     int count = 0;
     bool good = true;
@@ -556,7 +556,7 @@ static inline const char *parse_outline(const char *bytes, size_t count, outline
                                         int *number) {
     rest r = outline_rest(bytes, count), line = r;
     outline made = {NULL, 0, NULL};
-    columns c;
+    outline_columns c;
     const char *wrong = NULL;
     bool blank = false;
     *number = 1;
