@@ -1407,7 +1407,9 @@ DEM2D_API dem2d_result dem2d_world_set_damping(dem2d_world *world, double local,
 DEM2D_API dem2d_result dem2d_world_set_time_step(dem2d_world *world, double time_step);
 /// Bounds of the stable time step for the contacts open in the last force pass: at or below
 /// `safe` it is stable, above `limit` it is not (s; HUGE_VAL for limit without contacts; without
-/// contacts `safe` counts one contact per particle). limit_particle (may be NULL) is the particle
+/// contacts `safe` counts one contact per particle). Nearly flat arcs under a force lower both, as
+/// they resist rocking. Stable are contacts that stay: those that open and close again within less
+/// than about six steps (time steps above a quarter of `safe`) may gain energy. limit_particle (may be NULL) is the particle
 /// that sets the limit, generation 0 if none.
 DEM2D_API dem2d_result dem2d_world_time_step_bounds(const dem2d_world *world, double *safe,
                                                     double *limit,
@@ -13133,6 +13135,57 @@ static double dem2di_lagging(double value, double lag) {
     return 4 / (time_step * time_step);
 }
 
+/* Flatter than this many circumscribed radii counts as that: it turns by 1e-5 over the size, and
+   what swings by less has less than 1e-6 of the force times the size for its energy. */
+#define DEM2DI_FLATTEST 1e5
+
+/* What the safe bound counts more of it: a load put on at once is twice what it comes to; and where
+   a flat arc ends the moment stops growing: swings beyond gain energy above w dt = 1, not 2^(1/2),
+   by trial (test_rocking.c). */
+#define DEM2DI_ROCKING_SPARE 4
+
+/* One of the two of a contact of one point: height of its surface along the outward normal u, and
+   the radius of curvature there, or the greatest of its shape. */
+static double dem2di_contact_height(const dem2d_world *world, int slot, const dem2di_state *state,
+                                    dem2d_vec u, bool greatest, double *rho) {
+    const dem2di_body *body = &world->bodies[slot];
+    const dem2d_shape *shape = dem2di_shape_of(world, body);
+    dem2d_vec v = dem2di_turn_back(state->q, u);
+    double height = dem2di_dot(dem2di_support(shape, v, rho), v) * body->scale;
+    if (greatest) *rho = dem2di_max(*rho, shape->rho_max);
+    *rho = dem2di_min(*rho, DEM2DI_FLATTEST * shape->circumscribed) * body->scale;
+    return height;
+}
+
+/* Stiffness against rocking of the partner A (side 0) or B (1) of a contact, N m. The depth is least
+   over the normals, which turn with the two. Its second derivative by the partner's angle is
+   p e/(p + e), p = rho - height and e = rho of the other + height - depth, or p on a wall: what is
+   flatter than a circle about the centre lifts the centre when it rolls. Times the force, it is
+   beside the other stiffnesses; between two that are free it couples both angles, as they do, so
+   that twice its own part bounds it. For the limit with the curvatures at a contact of one point;
+   for the safe bound with the greatest, as grains come to rest on their flattest parts, and as the
+   ends of straight arcs are curved. Zero for circles and corners. */
+static double dem2di_rocking(const dem2d_world *world, int contact, int side, bool next,
+                             const dem2di_link *link, bool greatest) {
+    const dem2di_list *list = &world->list;
+    if (contact < list->discs || world->faces == DEM2D_CONTACT_AREA) return 0;
+    const dem2di_key *key = &list->keys[contact];
+    const dem2di_state *states = dem2di_states_at(world, next);
+    int slot = side ? key->b : key->a, other = side ? key->a : key->b;
+    const dem2d_shape *shape = dem2di_shape_of(world, &world->bodies[slot]);
+    double rho, other_rho;
+    if (shape->type != DEM2D_CUSTOM && !(shape->rho_max > shape->inscribed)) return 0;
+    dem2d_vec u = side ? dem2di_negate(link->normal) : link->normal;
+    double height = dem2di_contact_height(world, slot, &states[slot], u, greatest, &rho);
+    double p = rho - height;
+    if (!(p > 0)) return 0;
+    if (contact >= list->pairs) return link->force * p;
+    (void)dem2di_contact_height(world, other, &states[other], dem2di_negate(u), greatest,
+                                &other_rho);
+    double e = other_rho + height - link->depth;
+    return e > 0 ? link->force * (p * (e / (p + e))) : 0;
+}
+
 /* Stiffness of the contacts of a particle for the limit (0) and for the safe bound (1), which
    counts those between two free particles twice. One that slides does not resist, and may not that
    rolls, or by the caller's law: it counts for the safe bound only. */
@@ -13159,6 +13212,9 @@ static void dem2di_stiffness_sum(const dem2d_world *world, int slot, bool next,
             double slide = sticks || (bound == 1 && rubs) ? f * kt : 0;
             if (bound == 1 && law->rolling_friction > 0)
                 sum[1].rr += f * dem2di_rolling_stiffness(law, dem2di_reduced_radius(world, i));
+            if (ends == NULL || bound == 1)
+                sum[bound].rr += f * (bound == 1 ? DEM2DI_ROCKING_SPARE : 1) *
+                                 dem2di_rocking(world, i, side, next, &link, bound == 1);
             for (int p = 0; p < (ends != NULL ? 2 : 1); p++) {
                 double w = ends != NULL ? ends->weight[p] : 1;
                 dem2d_vec at = ends != NULL ? dem2di_along(arm, ends->offset[p], t) : arm;
@@ -15904,6 +15960,7 @@ DEM2D_API dem2d_result dem2d_world_write_csv(const dem2d_world *world, const dem
             dem2d_stats.time sums the time steps; histories have it. SVG: a view, half-planes beside
             the grains, fixed and driven grains, chains no wider than grains; desc may be NULL, as
             that of dem2d_world_load.
+            The bounds of the time step count the rocking stiffness of flat surfaces under a force.
      0.5.0  The two points of faces conserve energy between free polygons as well: each has a
             normal of its own and tells its energy. Snapshots of version 2.
      0.4.0  Dashpots by restitution, rolling friction, a caller's law, segment walls. Measures of
