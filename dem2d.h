@@ -9806,7 +9806,8 @@ typedef struct dem2di_plan {
     bool joints;        /* two segments may meet */
     bool full;          /* some law has a dashpot or rolling friction, or is the caller's: what the
                            circles' batches do not know, so that all pairs have links and extras */
-    bool again;         /* friction is only there for the springs of the last list: look again */
+    bool friction_again, full_again; /* it is there for what the last list had of it: see
+                                        dem2di_outlasts */
     bool faces;         /* contacts may have two points: by the rule, and some particle has faces */
     bool heavy, damped; /* gravity, damping: as they are set at the step */
 } dem2di_plan;
@@ -11372,6 +11373,12 @@ static bool dem2di_has_disc_kernel(const dem2d_world *world, const dem2di_plan *
     return world->solver == DEM2D_CERTIFIED && world->faces != DEM2D_CONTACT_AREA && !plan->full;
 }
 
+/* Is a feature that the scene no longer needs there for one list more: what its contacts had of it
+   in the last force pass must outlast a step that is refused. `again`: it is there for that. */
+static bool dem2di_outlasts(const dem2d_world *world, bool needed, bool had, bool again) {
+    return !needed && had && !(again && world->steps > world->listed_at);
+}
+
 /* What the scene makes use of. */
 static dem2di_plan dem2di_plan_make(const dem2d_world *world) {
     dem2di_plan plan;
@@ -11401,10 +11408,12 @@ static dem2di_plan dem2di_plan_make(const dem2d_world *world) {
     plan.joints = dem2di_may_join(world);
     plan.full = plan.full || world->law != NULL;
     plan.faces = plan.faces && world->law == NULL;
-    /* springs and rotations of the last force pass must outlast a step that is refused */
-    bool outlasted = world->plan.again && world->steps > world->listed_at;
-    plan.again = !plan.friction && world->plan.friction && !outlasted;
-    plan.friction = plan.friction || plan.again;
+    const dem2di_plan *last = &world->plan;
+    plan.friction_again =
+        dem2di_outlasts(world, plan.friction, last->friction, last->friction_again);
+    plan.full_again = dem2di_outlasts(world, plan.full, last->full, last->full_again);
+    plan.friction = plan.friction || plan.friction_again;
+    plan.full = plan.full || plan.full_again;
     plan.turns = plan.turns || !dem2di_has_disc_kernel(world, &plan);
     plan.turns = plan.turns || (world->plan.turns && world->body_count > 0);
     plan.spin = plan.spin || plan.turns || plan.friction;
@@ -13429,7 +13438,7 @@ static dem2d_result dem2di_step(dem2d_world *world) {
     if (listed) dem2di_use_laws(world);
     world->worn = path;
     world->list_worn = worn;
-    world->list_stale = worn || world->plan.again;
+    world->list_stale = worn || world->plan.friction_again || world->plan.full_again;
     world->rebuilds += listed;
     world->count = count;
     world->slow_time_step += slow;
@@ -14626,10 +14635,10 @@ static void dem2di_hash_contacts(dem2di_archive *ar, const dem2d_world *w, bool 
         dem2di_archive_hold(ar, &walk.link);
         dem2di_archive_law(ar, &law);
         const dem2di_extra *beside = dem2di_extra_at(w, walk.contact, false);
-        if (beside != NULL) {
-            dem2di_extra extra = *beside;
-            dem2di_archive_extra(ar, &extra);
-        }
+        dem2di_extra extra; /* all zero is as good as none: it comes with a law, before any force */
+        memset(&extra, 0, sizeof extra);
+        if (beside != NULL) extra = *beside;
+        dem2di_archive_extra(ar, &extra);
         if (two == NULL) continue;
         dem2di_ends ends = *two;
         dem2di_archive_ends(ar, &ends);
@@ -14724,7 +14733,8 @@ static void dem2di_archive_plan(dem2di_archive *ar, const dem2d_world *w, dem2di
     dem2di_archive_bool(ar, "turns", &plan->turns);
     dem2di_archive_bool(ar, "one_law", &plan->one_law);
     dem2di_archive_int(ar, "material", &plan->material, 0, materials > 0 ? materials - 1 : 0);
-    dem2di_archive_bool(ar, "again", &plan->again);
+    dem2di_archive_bool(ar, "friction_again", &plan->friction_again);
+    dem2di_archive_bool(ar, "full_again", &plan->full_again);
     dem2di_archive_bool(ar, "faces", &plan->faces);
     dem2di_archive_bool(ar, "joints", &plan->joints);
     dem2di_archive_bool(ar, "full", &plan->full);
@@ -14917,7 +14927,7 @@ static void dem2di_archive_memory(dem2di_archive *ar, const dem2d_world *w, int 
 static bool dem2di_plan_holds(const dem2d_world *w) {
     const dem2di_plan *plan = &w->plan;
     if (w->list_stale || w->body_count == 0) return true;
-    if (w->holes > 0 || plan->again) return false;
+    if (w->holes > 0 || plan->friction_again || plan->full_again) return false;
     dem2di_plan need = dem2di_plan_make(w);
     return plan->friction >= need.friction && plan->spin >= need.spin &&
            plan->turns >= need.turns && plan->faces >= need.faces && plan->full == need.full &&
@@ -15950,6 +15960,7 @@ DEM2D_API dem2d_result dem2d_world_write_csv(const dem2d_world *world, const dem
             refused (DEM2D_CROSSING).
             Servo walls know the dashpots of their contacts and the next step of the particles: they
             hold their stress for every damping ratio, and those that face each other come to rest.
+            A step that is refused keeps the moments of a law that has just lost rolling friction.
             Snapshots of version 3.
             Polybeziers are fitted with a radius of curvature of at most 20 of the size (max_radius,
             unbounded) and straight arcs along straight edges; shapes and fits tell the greatest.

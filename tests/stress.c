@@ -1230,8 +1230,8 @@ static press_scene press_make(const press *c) {
     return p;
 }
 
-/* Are all servo walls at such a top speed at rest over ten contact times: mean stress right to 1e-4, that of each step
-   to 1e-2, speed below 1e-3 of the top speed? */
+/* Are all servo walls at such a top speed at rest over ten contact times: mean stress right to
+   1e-4, that of each step to 1e-2, speed below 1e-3 of the top speed? */
 static bool press_rests(press_scene *p, const press *c, double top_speed) {
     const int steps = (int)(10 * c->steps);
     double mean[4] = {0, 0, 0, 0};
@@ -1322,8 +1322,8 @@ static void case_servo(void) {
     press_row("servo: 289 of all kinds, three walls",
               (press){-1, 17, true, 0, 0, 0, 0, 0.3, false, NULL}, few, 2, 3000);
     if (!quick)
-        press_row("servo: 289 discs, t_c/1000", (press){DISC, 17, true, 0, 0, 0, 0, 0.7, false, NULL},
-                  &steps[4], 1, 500);
+        press_row("servo: 289 discs, t_c/1000",
+                  (press){DISC, 17, true, 0, 0, 0, 0, 0.7, false, NULL}, &steps[4], 1, 500);
 }
 
 /* --- the table ------------------------------------------------------------------------------- */
