@@ -1409,8 +1409,8 @@ DEM2D_API dem2d_result dem2d_world_set_time_step(dem2d_world *world, double time
 /// `safe` it is stable, above `limit` it is not (s; HUGE_VAL for limit without contacts; without
 /// contacts `safe` counts one contact per particle). Nearly flat arcs under a force lower both, as
 /// they resist rocking. Stable are contacts that stay: those that open and close again within less
-/// than about six steps (time steps above a quarter of `safe`) may gain energy. limit_particle (may be NULL) is the particle
-/// that sets the limit, generation 0 if none.
+/// than about six steps (time steps above a quarter of `safe`) may gain energy. limit_particle (may
+/// be NULL) is the particle that sets the limit, generation 0 if none.
 DEM2D_API dem2d_result dem2d_world_time_step_bounds(const dem2d_world *world, double *safe,
                                                     double *limit,
                                                     dem2d_particle_id *limit_particle);
@@ -13166,8 +13166,8 @@ static double dem2di_contact_height(const dem2d_world *world, int slot, const de
     return height;
 }
 
-/* Stiffness against rocking of the partner A (side 0) or B (1) of a contact, N m. The depth is least
-   over the normals, which turn with the two. Its second derivative by the partner's angle is
+/* Stiffness against rocking of the partner A (side 0) or B (1) of a contact, N m. The depth is the
+   least over the normals, which turn with the two. Its second derivative by the partner's angle is
    p e/(p + e), p = rho - height and e = rho of the other + height - depth, or p on a wall: what is
    flatter than a circle about the centre lifts the centre when it rolls. Times the force, it is
    beside the other stiffnesses; between two that are free it couples both angles, as they do, so
