@@ -7634,6 +7634,7 @@ typedef struct dem2di_core {
     dem2d_rot q;
     double scale, sign; /* both negative for B */
     double radius;      /* that it is grown by */
+    double behind;      /* of the first: see dem2di_walk_on */
 } dem2di_core;
 
 static void dem2di_core_set(const dem2d_shape *shape, dem2d_rot q, double scale, double sign,
@@ -7648,6 +7649,17 @@ static void dem2di_core_set(const dem2d_shape *shape, dem2d_rot q, double scale,
     core->scale = sign * scale;
     core->sign = sign;
     core->radius = (circle ? shape->a : shape->rounding) * scale;
+    core->behind = 0;
+}
+
+/* The two edges of a segment are half a turn apart: when one has just been passed, the sign of a
+   cross product can't tell an edge parallel to it from the other. Where the next tangents are on
+   one line to rounding, the other core's comes first: right when they are opposite, and as good as
+   the other order when they are not. */
+static void dem2di_cores_set(const dem2di_pair *pair, dem2di_core core[2]) {
+    dem2di_core_set(pair->a, pair->ra, pair->scale_a, 1, &core[0]);
+    dem2di_core_set(pair->b, pair->rb, pair->scale_b, -1, &core[1]);
+    core[0].behind = ((core[0].count == 2) - (core[1].count == 2)) * (8 * DBL_EPSILON);
 }
 
 /* A corner of A minus B minus d: one corner of each core, and to one side the tangents of the
@@ -7699,7 +7711,7 @@ static void dem2di_walk_set(const dem2di_pair *pair, const dem2di_core core[2], 
 static inline void dem2di_walk_on(const dem2di_pair *pair, const dem2di_core core[2], int side,
                                   dem2di_walk *walk, dem2di_beside *edge) {
     /* no short circuits: which comes first can't be predicted */
-    int first = side * dem2di_cross(walk->t[0], walk->t[1]) > 0;
+    int first = side * dem2di_cross(walk->t[0], walk->t[1]) > core[0].behind;
     int i = 1 - ((first & (core[0].count > 1)) | (core[1].count == 1));
     edge->own = i;
     edge->side = side;
@@ -7916,8 +7928,7 @@ static bool dem2di_edges_solve(dem2di_pair *pair, const dem2di_feature *last, de
     int best = 0;
     dem2d_vec end[2], n[2];
     bool cone = false;
-    dem2di_core_set(pair->a, pair->ra, pair->scale_a, 1, &core[0]);
-    dem2di_core_set(pair->b, pair->rb, pair->scale_b, -1, &core[1]);
+    dem2di_cores_set(pair, core);
     pair->calls++;
     search->proof = DEM2D_BY_FORM;
     if (dem2di_edge_again(pair, core, last, search)) return true;
@@ -15972,6 +15983,7 @@ DEM2D_API dem2d_result dem2d_world_write_csv(const dem2d_world *world, const dem
             the grains, fixed and driven grains, chains no wider than grains; desc may be NULL, as
             that of dem2d_world_load.
             The bounds of the time step count the rocking stiffness of flat surfaces under a force.
+            Polygons cut through by a longer segment along one of their edges are no longer missed.
      0.5.0  The two points of faces conserve energy between free polygons as well: each has a
             normal of its own and tells its energy. Snapshots of version 2.
      0.4.0  Dashpots by restitution, rolling friction, a caller's law, segment walls. Measures of

@@ -909,7 +909,6 @@ CASE_HELPER const char *world_flaw(const pair *p, const wall *w, double length, 
     const pair pairs[3] = {
         placed, {placed.a, &line, placed.pose_a, along}, {placed.b, &line, placed.pose_b, along}};
     for (int i = 0; i < 3 && flaw == NULL; i++) {
-        if (i > 0 && pairs[i].a->kind != BEZIER) continue; /* polygons and segments: elsewhere */
         const dem2d_contact_info *contact = NULL;
         for (int k = 0; k < count; k++) {
             const bool with_wall = found[k].wall.generation != 0;

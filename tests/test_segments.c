@@ -292,11 +292,42 @@ static void test_moves(void **state) {
     dem2d_world_destroy(world);
 }
 
+/* Regular polygons cut through by a longer segment along two of their edges: the overlap is that of
+   the nearer edge. The segment has two edges half a turn apart, the next is never passed twice. */
+static void test_cut_through(void **state) {
+    (void)state;
+    for (int corners = 4; corners <= 12; corners += 2)
+        for (int i = -9; i <= 9; i++)
+            for (int edge = 0; edge < corners; edge++) {
+                dem2d_vec points[12];
+                dem2d_material_id material;
+                dem2d_contact_info contact;
+                dem2d_shape *shape;
+                int count;
+                const double r = 0.05 / cos(TEST_PI / corners), h = i * 0.005;
+                for (int k = 0; k < corners; k++) {
+                    const dem2d_vec u = direction((2 * k + 1) * TEST_PI / corners);
+                    points[k] = vec(r * u.x, r * u.y);
+                }
+                const dem2d_vec n = direction(2 * edge * TEST_PI / corners);
+                assert_ok(dem2d_shape_create_polygon(NULL, points, corners, 0, &shape));
+                dem2d_world *world = make_world(0, vec(0, 0), false, &material);
+                add_segment(world, material, vec(h * n.x - 0.2 * n.y, h * n.y + 0.2 * n.x),
+                            vec(h * n.x + 0.1 * n.y, h * n.y - 0.1 * n.x));
+                add(world, material, shape, vec(0, 0), 0, vec(0, 0));
+                assert_ok(dem2d_world_step(world, 1, NULL));
+                assert_ok(dem2d_world_contacts(world, &contact, 1, &count));
+                assert_int_equal(count, 1);
+                assert_within(contact.depth, 0.05 - fabs(h), 1e-14);
+                dem2d_world_destroy(world);
+            }
+}
+
 int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(test_depth),       cmocka_unit_test(test_flat_joints),
         cmocka_unit_test(test_joint_kinds), cmocka_unit_test(test_hopper),
-        cmocka_unit_test(test_moves),
+        cmocka_unit_test(test_moves),       cmocka_unit_test(test_cut_through),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }
