@@ -1024,7 +1024,7 @@ static inline template_set load_templates(const char *path, const dem2d_image_de
     if (set.outlines < grains.count)
         fprintf(stderr, "%s: %d of %d grains left out: a coverage below %g\n", example_name,
                 grains.count - set.outlines, grains.count, min_coverage);
-    if (set.outlines == 0) fail(STATUS_BAD_INPUT, "no grain of %s is left (--min-coverage)", path);
+    if (set.outlines == 0) fail(STATUS_BAD_INPUT, "no grain is left (--min-coverage)");
     free_outlines(&grains);
     return set;
 }

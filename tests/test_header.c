@@ -720,8 +720,41 @@ static void test_mutation(void **state) {
     assert_int_not_equal(errors, 0);
 }
 
+// The first block of C in a text is a file, byte by byte; how many lines it has, or -1.
+static int block_lines(const doc *readme, const doc *world) {
+    int first = line_starting(readme, 0, "```c") + 1;
+    if (first == 0 || world->count == 0 || !world->ends) return -1;
+    for (int i = 0; i < world->count; i++) {
+        if (first + i >= readme->count) return -1;
+        if (strcmp(readme->line[first + i], world->line[i]) == 0) continue;
+        return -fault(readme, first + i, "world.c has: ", world->line[i]);
+    }
+    int last = first + world->count;
+    if (last < readme->count && strcmp(readme->line[last], "```") == 0) return world->count;
+    return -fault(readme, first, "world.c has ended", "");
+}
+
+// The world of the README is a program of the examples, which are compiled and run.
+static void test_readme(void **state) {
+    (void)state;
+    doc readme = doc_read("DEM2D_README", "../README.md");
+    doc world = doc_read("DEM2D_WORLD", "../examples/world.c");
+    doc hello = doc_read("DEM2D_HELLO", HELLO_PATH);
+    int lines = block_lines(&readme, &world);
+    bool programs = line_starting(&readme, 0, "    cc -I. examples/hello.c -lm") >= 0;
+    quiet = true;
+    int other = block_lines(&readme, &hello);
+    quiet = false;
+    doc_free(&readme);
+    doc_free(&world);
+    doc_free(&hello);
+    assert_in_range(lines, 15, 30);
+    assert_true(programs);
+    assert_int_equal(other, -1);
+}
+
 int main(void) {
-    struct CMUnitTest tests[RULES + 1 + MUTATIONS] = {{0}};
+    struct CMUnitTest tests[RULES + 2 + MUTATIONS] = {{0}};
     int count = 0;
     for (int i = 0; i < RULES; i++, count++) {
         tests[count].name = rules[i].name;
@@ -730,6 +763,8 @@ int main(void) {
     }
     tests[count].name = "accepts: a sample without faults";
     tests[count++].test_func = test_sample;
+    tests[count].name = "the README's world is world.c";
+    tests[count++].test_func = test_readme;
     for (int i = 0; i < MUTATIONS; i++, count++) {
         tests[count].name = mutations[i].name;
         tests[count].test_func = test_mutation;
