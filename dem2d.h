@@ -14387,7 +14387,7 @@ static void dem2di_archive_settings(dem2di_archive *ar, dem2d_world *w) {
     dem2di_archive_tally(ar, "steps", &w->steps);
     dem2di_archive_tally(ar, "timed_at", &w->timed_at);
     dem2di_archive_expect(ar, w->timed_at <= w->steps, "timed_at is to come");
-    dem2di_archive_not_negative(ar, "timed", &w->timed);
+    dem2di_archive_bits(ar, &w->timed); /* a sum, which may overflow */
 }
 
 static void dem2di_archive_material(dem2di_archive *ar, dem2d_material_desc *material) {
@@ -14567,9 +14567,9 @@ static void dem2di_archive_wall_state(dem2di_archive *ar, dem2di_wall_state *sta
     dem2di_archive_vec(ar, "velocity", &state->velocity);
     dem2di_archive_vec(ar, "force", &state->force);
     dem2di_archive_finite(ar, "drift", &state->drift);
-    dem2di_archive_not_negative(ar, "stiffness", &state->backing.stiffness);
-    dem2di_archive_not_negative(ar, "impedance", &state->backing.impedance);
-    dem2di_archive_not_negative(ar, "mass", &state->backing.mass);
+    dem2di_archive_bits(ar, &state->backing.stiffness); /* sums may overflow */
+    dem2di_archive_bits(ar, &state->backing.impedance);
+    dem2di_archive_bits(ar, &state->backing.mass);
 }
 
 /* Of an open contact, beside its normal and depth. */
