@@ -7,6 +7,8 @@
 int inside_slot(const dem2d_world *world, int index);
 /* Sort the particles in space with the next list, or do not. */
 void inside_scatter(dem2d_world *world, bool scattered);
+/* Renew the list of pairs in the next step. */
+void inside_renew_list(dem2d_world *world);
 /* Write to a file that is open for reading only; the result of closing it. */
 dem2d_result inside_write_in_vain(const char *path, bool *good);
 /* A text with a locale's decimal comma, a comma that is meant, and a number; was all taken? */
@@ -20,6 +22,10 @@ int inside_slot(const dem2d_world *world, int index) {
 
 void inside_scatter(dem2d_world *world, bool scattered) {
     world->scattered = scattered;
+}
+
+void inside_renew_list(dem2d_world *world) {
+    world->list_stale = true;
 }
 
 dem2d_result inside_write_in_vain(const char *path, bool *good) {
