@@ -7,9 +7,12 @@
 
    1. Settling      Grains are placed at random without overlap in a box 1.0 x 3.0 m (higher in
                     proportion for more than 500) and fall; all friction 0.2.
-   2. Consolidation No gravity, walls frictionless. A top wall is put on the highest grain; top,
-                    left and right wall are moved so that each presses with 100 kPa.
+   2. Consolidation No gravity, walls frictionless (the papers keep friction there, and do not
+                    say whether gravity: --wall-friction, --gravity). A top wall is put on the
+                    highest grain; top, left and right wall move so that each presses with 100 kPa.
    3. Compression   The top wall goes down at a constant speed; left and right hold 100 kPa.
+
+   The papers are [P] and [F] as the manual in dem2d.h cites them.
 
    Then the figures go to stdout ("name value unit"), and the exit status tells whether they are
    what physics asks for: 0 yes, 1 no (stderr names the check), 2 bad usage or input. After Ctrl-C
@@ -28,17 +31,22 @@ static const char usage[] =
     "  --seed S          of the random numbers, 0 to 2^64 - 1 (1)\n"
     "  --shapes SET      mixed (all five), noncircular (ellipse, polygon, bezier), or a\n"
     "                    comma-separated list of circle, ellipse, polygon, bezier, fs (mixed)\n"
-    "  --damping KIND    local (Cundall, 0.7) or global (viscous, 0.7 1/s) (local)\n"
+    "  --damping KIND    local (Cundall, 0.7: [P]) or global (viscous, 0.7 1/s: [F]) (local)\n"
     "  --restitution E   of head-on collisions, 0.01 to 1: below 1 contacts have a dashpot (1)\n"
+    "  --stiffness K     of contacts, N/m, 1e5 to 1e9; the time step goes with it (1e7)\n"
+    "  --wall-friction   keep friction 0.2 at the walls after settling, as the papers do\n"
+    "  --gravity         keep gravity after settling: the papers do not say\n"
     "  --solver NAME     of contacts: certified or gjk (GJK and EPA) (certified)\n"
     "  --faces RULE      forces where faces meet: two (points), one, or area (two)\n"
+    "  --papers          the papers' way: GJK and EPA for every pair in every step, circles too,\n"
+    "                    one contact point, templates by their fits, friction at the walls\n"
     "  --grains PATH     bezier and fs grains from an image (PBM, PGM), an outline (CSV, first\n"
     "                    line \"x,y\"), or a directory of outlines, without any of images\n"
     "                    (without PATH: a few outlines made here)\n" SEARCH_USAGE
     "  --min-coverage C  leave out grains that convex templates cover less, 0 to 1 (0.7)\n"
     "  --out DIR         for history.csv and a picture (SVG) and histograms (CSV) of the settled,\n"
     "                    packed and final state; made if its parent exists (out)\n"
-    "  --pairs           also pairs.csv: support calls and residuals of GJK and EPA for all near\n"
+    "  --pairs           also pairs.csv: support calls of GJK and EPA's residuals for all near\n"
     "                    pairs of the settled state\n"
     "  --ledger          keep the ledger of energies: its columns in history.csv, and a check\n"
     "                    that it closes\n"
@@ -48,8 +56,8 @@ static const char usage[] =
     "Exit status: 0 all physical checks hold, 1 one failed, 2 bad usage or input, 130 stopped by\n"
     "Ctrl-C, with what there was written.\n";
 
-static const double STRESS = 1e5;     // Pa, on the sides, and on the top while consolidating
-static const double TIME_STEP = 1e-4; // s
+static const double STRESS = 1e5; // Pa, on the sides, and on the top while consolidating
+static const double STIFFNESS_OF_PAPERS = 1e7; // N/m
 
 /* ---- options ---- */
 
@@ -60,6 +68,8 @@ typedef struct options {
     bool global_damping;
     double damping_ratio; // of the contacts' dashpots
     bool quick, pairs, vtk, ledger;
+    bool papers, wall_friction, gravity;
+    double stiffness;   // N/m
     int solver, faces;  // dem2d_solver, dem2d_face_rule
     const char *grains; // or NULL
     dem2d_image_desc search;
@@ -67,42 +77,78 @@ typedef struct options {
     const char *out;
 } options;
 
+enum {
+    QUICK,
+    PARTICLES,
+    SEED,
+    SHAPES,
+    DAMPING,
+    RESTITUTION,
+    STIFFNESS,
+    WALL_FRICTION,
+    GRAVITY,
+    SOLVER,
+    FACES,
+    PAPERS,
+    GRAINS,
+    CROP,
+    LABELS,
+    IGNORE_FRAME,
+    MIN_COVERAGE,
+    OUT,
+    PAIRS,
+    LEDGER,
+    VTK,
+    OPTIONS
+};
+static const char *const option_names[OPTIONS] = {
+    "--quick",        "--particles=",    "--seed=",         "--shapes=", "--damping=",
+    "--restitution=", "--stiffness=",    "--wall-friction", "--gravity", "--solver=",
+    "--faces=",       "--papers",        "--grains=",       "--crop=",   "--labels",
+    "--ignore-frame", "--min-coverage=", "--out=",          "--pairs",   "--ledger",
+    "--vtk"};
+
 static options parse_options(int count, char **arguments) {
+    static const char *const dampings[] = {"local", "global"};
+    static const char *const solvers[] = {"certified", "gjk"};
+    static const char *const rules[] = {"two", "one", "area"};
     options o = {0};
     o.seed = 1;
+    o.stiffness = STIFFNESS_OF_PAPERS;
     o.out = "out";
     o.search = default_search();
     o.min_coverage = 0.7;
     parse_shapes("mixed", o.kinds);
-    static const char *const names[] = {
-        "--quick",        "--particles=",   "--seed=",        "--shapes=", "--damping=",
-        "--grains=",      "--out=",         "--solver=",      "--faces=",  "--pairs",
-        "--vtk",          "--ledger",       "--restitution=", "--crop=",   "--labels",
-        "--ignore-frame", "--min-coverage="};
-    static const char *const dampings[] = {"local", "global"};
-    static const char *const solvers[] = {"certified", "gjk"};
-    static const char *const rules[] = {"two", "one", "area"};
     for (int i = 1; i < count; i++) {
         const char *name = arguments[i], *value;
-        const int which = parse_option(count, arguments, &i, usage, names, 17, &value);
-        if (which == 0) o.quick = true;
-        if (which == 1) o.particles = (int)parse_integer(name, value, 10, 1000000);
-        if (which == 2) o.seed = parse_integer(name, value, 0, UINT64_MAX);
-        if (which == 3) parse_shapes(value, o.kinds);
-        if (which == 4) o.global_damping = parse_name(name, value, dampings, 2) == 1;
-        if (which == 5) o.grains = value;
-        if (which == 6) o.out = value;
-        if (which == 7) o.solver = parse_name(name, value, solvers, 2);
-        if (which == 8) o.faces = parse_name(name, value, rules, 3);
-        if (which == 9) o.pairs = true;
-        if (which == 10) o.vtk = true;
-        if (which == 11) o.ledger = true;
-        if (which == 12)
+        const int which = parse_option(count, arguments, &i, usage, option_names, OPTIONS, &value);
+        if (which == QUICK) o.quick = true;
+        if (which == PARTICLES) o.particles = (int)parse_integer(name, value, 10, 1000000);
+        if (which == SEED) o.seed = parse_integer(name, value, 0, UINT64_MAX);
+        if (which == SHAPES) parse_shapes(value, o.kinds);
+        if (which == DAMPING) o.global_damping = parse_name(name, value, dampings, 2) == 1;
+        if (which == RESTITUTION)
             must(dem2d_damping_ratio(parse_real(name, value, 0.01, 1), &o.damping_ratio), name);
-        if (which == 13) parse_crop(value, &o.search);
-        if (which == 14) o.search.labels = true;
-        if (which == 15) o.search.ignore_frame = true;
-        if (which == 16) o.min_coverage = parse_real(name, value, 0, 1);
+        if (which == STIFFNESS) o.stiffness = parse_real(name, value, 1e5, 1e9);
+        if (which == WALL_FRICTION) o.wall_friction = true;
+        if (which == GRAVITY) o.gravity = true;
+        if (which == SOLVER) o.solver = parse_name(name, value, solvers, 2);
+        if (which == FACES) o.faces = parse_name(name, value, rules, 3);
+        if (which == PAPERS) o.papers = true;
+        if (which == GRAINS) o.grains = value;
+        if (which == CROP) parse_crop(value, &o.search);
+        if (which == LABELS) o.search.labels = true;
+        if (which == IGNORE_FRAME) o.search.ignore_frame = true;
+        if (which == MIN_COVERAGE) o.min_coverage = parse_real(name, value, 0, 1);
+        if (which == OUT) o.out = value;
+        if (which == PAIRS) o.pairs = true;
+        if (which == LEDGER) o.ledger = true;
+        if (which == VTK) o.vtk = true;
+    }
+    if (o.papers) {
+        o.solver = DEM2D_GJK_EPA;
+        o.faces = DEM2D_ONE_POINT;
+        o.wall_friction = true;
     }
     if (o.particles == 0) o.particles = o.quick ? 100 : 500;
     return o;
@@ -111,6 +157,7 @@ static options parse_options(int count, char **arguments) {
 /* ---- the plan: sizes and times of a run ---- */
 
 typedef struct plan {
+    double time_step;                  // s
     double width, height;              // m, of the box
     double gravity;                    // m/s2, while settling
     double servo_speed;                // m/s, at most
@@ -122,13 +169,15 @@ typedef struct plan {
     int particles;
 } plan;
 
+enum { ROW = 500 }; // steps from one row of the history to the next, but in compression
+
 /* The papers' test. Fewer than 500 grains fill less of the box: the top wall then goes slower in
    proportion, for the same strain. */
 static plan full_plan(const options *o) {
     const double more = o->particles > 500 ? o->particles / 500.0 : 1;
     const double fewer = o->particles < 500 ? o->particles / 500.0 : 1;
-    plan p = {1.0, 3.0 * more, 9.8,   0.1,   0.1 * fewer, 0.7,
-              0,   50000,      10000, 20000, 2000,        o->particles};
+    plan p = {1e-4, 1.0,   3.0 * more, 9.8,   0.1,  0.1 * fewer, 0.7,
+              0,    50000, 10000,      20000, 2000, o->particles};
     return p;
 }
 
@@ -137,7 +186,8 @@ static plan full_plan(const options *o) {
    Other numbers of grains scale the box both ways, and speeds and gravity with it. */
 static plan quick_plan(const options *o) {
     const double s = sqrt(o->particles / 100.0);
-    plan p = {0.45 * s, s, 49 * s, 0.5 * s, 0.1 * s, 0.7, 0, 3500, 1500, 3000, 500, o->particles};
+    plan p = {1e-4, 0.45 * s, s,    49 * s, 0.5 * s, 0.1 * s,     0.7,
+              0,    3500,     1500, 3000,   500,     o->particles};
     return p;
 }
 
@@ -147,6 +197,11 @@ static plan make_plan(const options *o) {
         p.local_damping = 0;
         p.global_damping = o->quick ? 10 : 0.7; // settling is 14 times shorter
     }
+    /* contacts swing faster by the root of their stiffness: as many more steps, of whole rows */
+    const double faster = sqrt(o->stiffness / STIFFNESS_OF_PAPERS);
+    int *const steps[4] = {&p.settle, &p.consolidate, &p.compress, &p.frame};
+    for (int i = 0; i < 4; i++) *steps[i] = ROW * (int)ceil(*steps[i] * faster / ROW);
+    p.time_step /= faster;
     return p;
 }
 
@@ -351,7 +406,7 @@ static void write_frame(job *j) {
         need(dem2d_world_write_vtp(j->world, &desc, path), STATUS_BAD_INPUT, path);
         free(path);
     }
-    j->frame_times[j->frames++] = j->steps * TIME_STEP;
+    j->frame_times[j->frames++] = j->steps * j->plan.time_step;
 }
 
 static void write_series(const job *j) {
@@ -377,8 +432,8 @@ enum { RESIDUALS = 30 };
 
 /* A row of a pair whose bounding circles overlap: kinds, whether it is in contact, support calls of
    GJK from the line of centres; then the size that tolerances are relative to (m) and, of two in
-   contact, the residual (m) that EPA has after 1, 2, .. iterations: the difference of its bounds of
-   the depth. Cells are empty until GJK has found its simplex in as many iterations. */
+   contact, the residual of EPA (m, as the papers define it) after 1, 2, .. iterations. Cells are
+   empty until GJK has found its simplex in as many iterations, and once EPA has ended. */
 static void write_pair(FILE *file, const dem2d_world *world, const dem2d_particle_info *a,
                        const dem2d_particle_info *b) {
     const dem2d_shape *one = dem2d_world_shape(world, a->shape);
@@ -394,15 +449,17 @@ static void write_pair(FILE *file, const dem2d_world *world, const dem2d_particl
     const bool touch = gjk.state != DEM2D_SEPARATED;
     fprintf(file, "%d,%d,%d,%d,%.9g", (int)info[0].type, (int)info[1].type, touch,
             gjk.support_calls, reach + sqrt(dx * dx + dy * dy));
+    bool done = !touch;
     for (int k = 1; k <= RESIDUALS; k++) {
         dem2d_contact_desc desc = {0};
         desc.solver = DEM2D_GJK_EPA;
-        desc.tolerance = 1e-16;
+        desc.tolerance = 1e-15;
         desc.max_iterations = k;
         fputc(',', file);
-        if (!touch || k < gjk.iterations) continue;
+        if (done || k <= gjk.iterations) continue;
         must(dem2d_pair_contact(one, a->pose, other, b->pose, &desc, &epa), "contact");
-        fprintf(file, "%.9g", epa.error);
+        fprintf(file, "%.9g", epa.residual);
+        done = epa.state != DEM2D_UNRESOLVED;
     }
     fputc('\n', file);
 }
@@ -484,7 +541,7 @@ static void watch_overlap(job *j) {
 
 static void build_world(job *j, const options *o) {
     dem2d_world_desc scene = {0};
-    scene.time_step = TIME_STEP;
+    scene.time_step = j->plan.time_step;
     scene.gravity.y = -j->plan.gravity;
     scene.local_damping = j->plan.local_damping;
     scene.global_damping = j->plan.global_damping;
@@ -495,9 +552,9 @@ static void build_world(job *j, const options *o) {
     scene.env = example_env();
     must(dem2d_world_create(&scene, &j->world), "world");
     dem2d_material_desc stone = {0};
-    stone.density = 2700;         // kg/m2
-    stone.normal_stiffness = 1e7; // N/m
-    stone.tangential_stiffness = 1e7;
+    stone.density = 2700; // kg/m2
+    stone.normal_stiffness = o->stiffness;
+    stone.tangential_stiffness = o->stiffness;
     stone.friction = 0.2;
     stone.damping_ratio = o->damping_ratio;
     must(dem2d_world_add_material(j->world, &stone, &j->grain_material), "material");
@@ -537,7 +594,6 @@ static void fill_box(job *j, grain *grains, uint64_t *random) {
 }
 
 static bool settle(job *j) {
-    enum { ROW = 500 };
     bool going = true;
     j->stage = SETTLING;
     for (int done = 0; going && done < j->plan.settle; done += ROW) {
@@ -572,16 +628,18 @@ static void control_wall(job *j, int which, dem2d_wall_mode mode, int span_a, in
 }
 
 static bool consolidate(job *j) {
-    enum { SAMPLE = 10, ROW = 500 };
+    enum { SAMPLE = 10 };
     const dem2d_vec no_gravity = {0, 0};
     bool going = true;
     dem2d_pair_desc smooth = {0};
-    smooth.normal_stiffness = 1e7;
-    smooth.tangential_stiffness = 1e7;
+    smooth.normal_stiffness = j->options->stiffness;
+    smooth.tangential_stiffness = j->options->stiffness;
     smooth.damping_ratio = j->options->damping_ratio;
     j->stage = CONSOLIDATION;
-    must(dem2d_world_set_gravity(j->world, no_gravity), "gravity");
-    must(dem2d_world_set_pair(j->world, j->grain_material, j->wall_material, &smooth), "friction");
+    if (!j->options->gravity) must(dem2d_world_set_gravity(j->world, no_gravity), "gravity");
+    if (!j->options->wall_friction)
+        must(dem2d_world_set_pair(j->world, j->grain_material, j->wall_material, &smooth),
+             "friction");
     add_wall(j, TOP, 0, highest_point(j), 0, -1);
     control_wall(j, TOP, DEM2D_WALL_SERVO, LEFT, RIGHT);
     control_wall(j, LEFT, DEM2D_WALL_SERVO, BOTTOM, TOP);
@@ -792,7 +850,7 @@ static bool run(job *j, double *strain) {
 int main(int count, char **arguments) {
     example_name = "biaxial";
     const options o = parse_options(count, arguments);
-    template_set set = load_templates(o.grains, &o.search, o.min_coverage);
+    template_set set = load_templates(o.grains, &o.search, o.min_coverage, o.papers);
     make_directory(o.out); // all input is known to be good; nothing was written before
     if (o.vtk) {
         char *folder = join_text(o.out, "/", "vtk");

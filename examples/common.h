@@ -944,11 +944,12 @@ enum { FOURIER_ORDER = 8, BEZIER_ARCS = 10 };
 
 /* coverage, if asked for, is lowered to that of this fit. */
 static inline dem2d_shape *fitted_template(const outline *o, dem2d_shape_type model, int count,
-                                           double *coverage) {
+                                           dem2d_fit_method method, double *coverage) {
     dem2d_fit_desc fit = {0};
     dem2d_fit_report report;
     fit.model = model;
     fit.count = count;
+    fit.method = method;
     dem2d_shape *shape;
     need(dem2d_outline_fit(example_env(), o->points, o->count, &fit, &shape, &report),
          STATUS_BAD_INPUT, o->name);
@@ -992,11 +993,15 @@ static inline void add_template(template_set *set, dem2d_shape *shape) {
     set->shapes[set->count++] = shape;
 }
 
-/* Both templates of an outline; false, and a line on stderr, when one of them covers too little. */
-static inline bool add_fitted(template_set *set, const outline *o, double min_coverage) {
+/* Both templates of an outline, by the papers' fits or the default ones; false, and a line on
+ * stderr, when one of them covers too little. */
+static inline bool add_fitted(template_set *set, const outline *o, double min_coverage,
+                              bool papers) {
     double coverage = 1;
-    dem2d_shape *fs = fitted_template(o, DEM2D_FOURIER, FOURIER_ORDER, &coverage);
-    dem2d_shape *bezier = fitted_template(o, DEM2D_BEZIER, BEZIER_ARCS, &coverage);
+    dem2d_shape *fs = fitted_template(o, DEM2D_FOURIER, FOURIER_ORDER,
+                                      papers ? DEM2D_FIT_REDUCTION : DEM2D_FIT_DEFAULT, &coverage);
+    dem2d_shape *bezier = fitted_template(o, DEM2D_BEZIER, BEZIER_ARCS,
+                                          papers ? DEM2D_FIT_SWARM : DEM2D_FIT_DEFAULT, &coverage);
     const bool good = coverage >= min_coverage;
     if (!good || coverage < 0.5)
         fprintf(stderr, "%s: %s: convex templates cover %.3f of it%s\n", example_name, o->name,
@@ -1014,13 +1019,14 @@ static inline bool add_fitted(template_set *set, const outline *o, double min_co
 
 /* Templates of the grains at a path (see load_grains), without those that cover too little. */
 static inline template_set load_templates(const char *path, const dem2d_image_desc *search,
-                                          double min_coverage) {
+                                          double min_coverage, bool papers) {
     template_set set = {NULL, 0, 0};
     dem2d_shape *circle;
     outline_list grains = load_grains(path, search);
     must(dem2d_shape_create_circle(example_env(), 1, &circle), "circle");
     add_template(&set, circle);
-    for (int i = 0; i < grains.count; i++) (void)add_fitted(&set, &grains.items[i], min_coverage);
+    for (int i = 0; i < grains.count; i++)
+        (void)add_fitted(&set, &grains.items[i], min_coverage, papers);
     if (set.outlines < grains.count)
         fprintf(stderr, "%s: %d of %d grains left out: a coverage below %g\n", example_name,
                 grains.count - set.outlines, grains.count, min_coverage);
@@ -1164,7 +1170,7 @@ static inline void add_falling(dem2d_world *world, dem2d_material_id material, i
     dem2d_shape_info info[TEMPLATES];
     uint64_t random = 1;
     const dem2d_image_desc search = default_search();
-    template_set set = load_templates(NULL, &search, 0);
+    template_set set = load_templates(NULL, &search, 0, false);
     for (int i = 0; i < TEMPLATES; i++) {
         const int t = random_template(&set, all, &random); // may move set.shapes
         const dem2d_shape *shape = set.shapes[t];

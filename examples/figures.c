@@ -1358,8 +1358,9 @@ static void make_models(dem2d_shape *shapes[MODELS]) {
     must(dem2d_shape_create_ellipse(env, 1, 0.6, &shapes[1]), "ellipse");
     must(dem2d_shape_create_polygon(env, corners, 5, 0, &shapes[2]), "polygon");
     must(dem2d_shape_create_polygon(env, inner, 5, 0.25, &shapes[3]), "rounded polygon");
-    shapes[4] = fitted_template(&list.items[2], DEM2D_BEZIER, BEZIER_ARCS, NULL);
-    shapes[5] = fitted_template(&list.items[1], DEM2D_FOURIER, FOURIER_ORDER, NULL);
+    shapes[4] = fitted_template(&list.items[2], DEM2D_BEZIER, BEZIER_ARCS, DEM2D_FIT_DEFAULT, NULL);
+    shapes[5] =
+        fitted_template(&list.items[1], DEM2D_FOURIER, FOURIER_ORDER, DEM2D_FIT_DEFAULT, NULL);
     must(dem2d_shape_create_custom(env, &custom, &shapes[6]), "custom shape");
     free_outlines(&list);
 }
