@@ -160,6 +160,29 @@ plot for [i=1:3] names[i]."_local/history.csv" \
          using (100 * column("axial_strain")):(column("stage") == 2 ? 100 * column("volumetric_strain") : NaN) \
          with lines dashtype 2 linecolor rgb colours[i] notitle
 
+# Beside them the runs in the papers' mode, where there are any.
+array folders[2] = ["noncircular_local", "irregular_global"]
+array modes[2] = ["papers_p", "papers_f"]
+array pages[2] = ["p17_papers", "f07_papers"]
+array scenes[2] = ["noncircular, local damping", "all models, global damping"]
+if (system("test -e papers_p/history.csv -a -e papers_f/history.csv && echo 1") eq "1") {
+    set key maxrows 2
+    do for [k=1:2] {
+        set output pages[k].".svg"
+        set title scenes[k] font ",15"
+        set ylabel "q/p; volumetric strain / 10 %"
+        plot folders[k]."/history.csv" using (100 * column("axial_strain")):(column("stage") == 2 ? column("stress_ratio") : NaN) \
+                 with lines linecolor "#1f5fbf" title "q/p, default", \
+             modes[k]."/history.csv" using (100 * column("axial_strain")):(column("stage") == 2 ? column("stress_ratio") : NaN) \
+                 with lines linecolor "#c8382c" title "q/p, papers' mode", \
+             folders[k]."/history.csv" using (100 * column("axial_strain")):(column("stage") == 2 ? 10 * column("volumetric_strain") : NaN) \
+                 with lines dashtype 2 linecolor "#1f5fbf" title "volume, default", \
+             modes[k]."/history.csv" using (100 * column("axial_strain")):(column("stage") == 2 ? 10 * column("volumetric_strain") : NaN) \
+                 with lines dashtype 2 linecolor "#c8382c" title "volume, papers' mode"
+    }
+    set key maxrows 1
+}
+
 set title "full: axial, dashed: lateral" font ",15"
 set yrange [0:*]
 set xrange [*:*]
@@ -179,14 +202,15 @@ unset title
 # ---- polar diagrams ----
 
 # Greatest radii first: stats does not work in polar mode.
-array polars[4] = ["alignment", "polar_normals", "polar_forces", "polar_shear"]
-array roses[4] = ["p12_alignment", "p18_normals", "p18_forces", "p18_shear"]
-array heads[4] = ["long axes, % in 10 degrees", "contact normals, % in 10 degrees", \
-                  "mean normal force, kN/m", "mean shear force, kN/m"]
-array others[4] = ["irregular", "circular", "circular", "circular"]
-array reach[4]
-array step[4]
-do for [k=1:4] {
+array polars[5] = ["alignment", "polar_normals", "polar_branches", "polar_forces", "polar_shear"]
+array roses[5] = ["p12_alignment", "p18_normals", "p18_branches", "p18_forces", "p18_shear"]
+array heads[5] = ["long axes, % in 10 degrees", "contact normals, % in 10 degrees", \
+                  "contact branches, % in 10 degrees", "mean normal force, kN/m", \
+                  "mean shear force, kN/m"]
+array others[5] = ["irregular", "circular", "circular", "circular", "circular"]
+array reach[5]
+array step[5]
+do for [k=1:5] {
     stats polars[k].".csv" using "noncircular" name "A" nooutput
     stats polars[k].".csv" using others[k] name "B" nooutput
     top = A_max > B_max ? A_max : B_max
@@ -209,7 +233,7 @@ set style fill transparent solid 0.35 border
 set key outside center bottom horizontal noreverse Right samplen 2 width 0 maxrows auto
 set lmargin 4
 set rmargin 4
-do for [k=1:4] {
+do for [k=1:5] {
     set output roses[k].".svg"
     set title heads[k] font ",15"
     set rrange [0:reach[k]]
