@@ -1394,8 +1394,8 @@ static void report_strength(study *s) {
         const double paper = d == LOCAL ? 15 : 16;
         number(p, d == LOCAL ? "P sec. 5.3" : "F sec. 3.2",
                "final axial strain, about, %; here: engineering, 1 - H/H0", paper, paper - 1,
-               paper + 1, 100 * result(s, set, d, "axial_strain_engineering"),
-               100 * paper_result(s, d == LOCAL ? OF_P : OF_F, "axial_strain_engineering"));
+               paper + 1, 100 * result(s, set, d, "axial_strain_final_engineering"),
+               100 * paper_result(s, d == LOCAL ? OF_P : OF_F, "axial_strain_final_engineering"));
         note(p, claim("the same as a logarithm, the strain of P's formula", d), "%.1f %%",
              100 * final_strain(s, set, d));
     }
@@ -1425,7 +1425,7 @@ static void report_stages(study *s) {
             "at %.1f %%",
             late_ratio(r), cell(&r->results, 0, "final_stress_ratio"),
             cell(&r->results, 0, "porosity_packed"),
-            100 * cell(&r->results, 0, "axial_strain_engineering"), v.end, v.most, v.strain);
+            100 * cell(&r->results, 0, "axial_strain_final_engineering"), v.end, v.most, v.strain);
     }
     close_figure(p);
 }
