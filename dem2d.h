@@ -676,6 +676,7 @@ typedef struct dem2d_shape_info {
     double inscribed;      ///< m, radius of the inscribed circle about the centroid
     double rho_min;        ///< m, lower bound of the radius of curvature; 0 with corners
     double rho_max;        ///< m, upper bound of it, edges and straight arcs apart; custom: 0
+    double deviation;      ///< m, of a polybezier: contacts may be off by so much; in their error
     double equivalent; ///< m, radius of the circle of equal area ([P] equivalent size: twice it)
     size_t bytes;      ///< memory of the template
 } dem2d_shape_info;
@@ -707,8 +708,13 @@ DEM2D_API dem2d_result dem2d_shape_create_polygon(const dem2d_env *env, const de
                                                   int count, double rounding, dem2d_shape **shape);
 /// Closed chain of cubic Bezier arcs: control[3 * arcs], arc i uses points 3i .. 3i + 3 (cyclic).
 /// arcs >= 2; each arc convex, turning by at most pi, neighbours with one tangent (G1), one turn
-/// in all. Clockwise is turned. Errors: NOT_FINITE, TOO_FEW_POINTS, NOT_CONVEX, NOT_SMOOTH,
-/// DUPLICATE_POINT (an arc that is a point), ZERO_AREA. ([P] sec. 2; M3 = M4 = 0 allowed.)
+/// in all: to a sine of 1e-6, as coordinates written with seven digits have it. Contacts then work
+/// with arcs that are convex and smooth, and straight where they are so to the rounding that kinks
+/// and dents show; how far these are from the given ones is the `deviation` of dem2d_shape_info,
+/// and part of every error. Mass, outline, box, dem2d_shape_support and dem2d_wall_contact are of
+/// the given arcs. Arcs below 6e-14 of the size are corners and may turn in any way. Clockwise is
+/// turned. Errors: NOT_FINITE, TOO_FEW_POINTS, NOT_CONVEX, NOT_SMOOTH, DUPLICATE_POINT (an arc that
+/// is a point), ZERO_AREA. ([P] sec. 2; M3 = M4 = 0 allowed.)
 DEM2D_API dem2d_result dem2d_shape_create_bezier(const dem2d_env *env, const dem2d_vec *control,
                                                  int arcs, dem2d_shape **shape);
 /// Support function p(t) = a[0]/2 + sum over n = 1..order of a[n] cos nt + b[n] sin nt; a and b
@@ -2423,10 +2429,17 @@ static dem2di_bounds dem2di_series_minimum(const dem2di_series *s, double tolera
    4.9 against 6.3 ns with four, 6.2 each with six, 7.3 against 6.3 with eight. */
 #define DEM2DI_FEW_CORNERS 6
 
-/* One arc: its first point and its three control differences. */
+/* One arc: its first point and its three control differences. Three equal ones: a straight arc;
+   all zero: a corner. */
 typedef struct dem2di_arc {
     dem2d_vec start, d0, d1, d2;
 } dem2di_arc;
+
+/* The straight arcs before and after a part of a polybezier; -1: there are none. A straight arc is
+   its own. */
+typedef struct dem2di_beyond {
+    int before, after;
+} dem2di_beyond;
 
 /* Four terms n, n+1, n+2, n+3 of a Fourier series, n times them for the derivative, and n^2. */
 typedef struct dem2di_block {
@@ -2438,10 +2451,12 @@ typedef struct dem2di_block {
 
 struct dem2d_shape {
     dem2d_shape_type type;
-    int count;   /* vertices, arcs, order */
-    int sectors; /* length of the sector table, a power of two, or 0 */
-    bool flat;   /* has faces: a polygon, or a Bezier with straight arcs */
-    double a, b; /* circle: radius; ellipse: squared half axes; Fourier: a0/2 */
+    int count;        /* vertices, arcs, order, as the caller sees them */
+    int parts;        /* polygon: count; Bezier: the kernel's arcs and corners */
+    int sectors;      /* length of the sector table, a power of two, or 0 */
+    bool flat;        /* has edges: a polygon, or a Bezier with straight arcs */
+    double a, b;      /* circle: radius; ellipse: squared half axes; Fourier: a0/2 */
+    double deviation; /* Bezier: the parts are nowhere farther than this from the caller's arcs */
     double rounding;
     double circumscribed, inscribed, rho_min;
     double rho_max; /* edges and straight arcs apart; custom: 0, not known */
@@ -2455,10 +2470,12 @@ struct dem2d_shape {
     /* What follows the struct in one block of memory: */
     dem2d_vec *corners; /* polygon: count */
     dem2d_vec *ends;    /* unit tangent; polygon: of the edge leaving k; Bezier: at the end of k */
-    dem2di_arc *arcs;   /* Bezier: count */
-    dem2di_block *blocks; /* Fourier: terms 1..order, padded with zeros */
-    double *floors;       /* smooth, not a circle: least rho in the sectors k and k + 1 */
-    int *sector;          /* first guess of the corner or arc for a range of directions */
+    dem2di_arc *given;  /* Bezier: count, the caller's, for the mass and the outline */
+    dem2di_arc *arcs;   /* Bezier: parts, for the support */
+    dem2di_beyond *beyond; /* Bezier: parts */
+    dem2di_block *blocks;  /* Fourier: terms 1..order, padded with zeros */
+    double *floors;        /* smooth, not a circle: least rho in the sectors k and k + 1 */
+    int *sector;           /* first guess of the corner or arc for a range of directions */
 };
 
 static int dem2di_block_count(int order) {
@@ -2468,7 +2485,7 @@ static int dem2di_block_count(int order) {
 /* Place the arrays of a shape behind it; bytes is the size of the whole. */
 static void dem2di_shape_layout(dem2d_shape *shape) {
     char *next = (char *)(shape + 1);
-    size_t n = (size_t)shape->count;
+    size_t n = (size_t)shape->parts;
     if (shape->type == DEM2D_POLYGON) {
         shape->corners = (dem2d_vec *)(void *)next;
         next += n * sizeof(dem2d_vec);
@@ -2476,6 +2493,10 @@ static void dem2di_shape_layout(dem2d_shape *shape) {
     if (shape->type == DEM2D_BEZIER) {
         shape->arcs = (dem2di_arc *)(void *)next;
         next += n * sizeof(dem2di_arc);
+        shape->given = (dem2di_arc *)(void *)next;
+        next += (size_t)shape->count * sizeof(dem2di_arc);
+        shape->beyond = (dem2di_beyond *)(void *)next;
+        next += n * sizeof(dem2di_beyond);
     }
     if (shape->type == DEM2D_POLYGON || shape->type == DEM2D_BEZIER) {
         shape->ends = (dem2d_vec *)(void *)next;
@@ -2553,8 +2574,8 @@ static inline int dem2di_sector_find(const dem2d_shape *shape, dem2d_vec u) {
         k = shape->sector[place & (shape->sectors - 1)];
     }
     /* once around at most: a damaged snapshot may hold any tangents */
-    for (int left = shape->count; dem2di_dot(shape->ends[k], u) > 0 && left > 0; left--)
-        k = k + 1 < shape->count ? k + 1 : 0;
+    for (int left = shape->parts; dem2di_dot(shape->ends[k], u) > 0 && left > 0; left--)
+        k = k + 1 < shape->parts ? k + 1 : 0;
     return k;
 }
 
@@ -2611,8 +2632,7 @@ static double dem2di_arc_parameter(double q0, double q1, double q2) {
 
 /* With B'/3 along the tangent and B''/6 against u, rho = |B'|^2 / (-B''.u) = 9/6 of their own; at
    the root the latter is the square root of [P]'s formula. */
-static dem2d_vec dem2di_bezier_support(const dem2d_shape *shape, dem2d_vec u, double *rho) {
-    const dem2di_arc *arc = &shape->arcs[dem2di_sector_find(shape, u)];
+static inline dem2d_vec dem2di_arc_support(const dem2di_arc *arc, dem2d_vec u, double *rho) {
     double q0 = dem2di_dot(arc->d0, u), q1 = dem2di_dot(arc->d1, u), q2 = dem2di_dot(arc->d2, u);
     double t = dem2di_arc_parameter(q0, q1, q2);
     if (rho != NULL) {
@@ -2666,20 +2686,57 @@ static inline dem2d_vec dem2di_ellipse_support(const dem2d_shape *shape, dem2d_v
     return dem2di_vec(s.x * f, s.y * f);
 }
 
-/* Straight to the rounding of its control differences, which may cancel to 8 eps of the size. */
-static bool dem2di_arc_straight(const dem2d_shape *shape, const dem2di_arc *arc) {
-    double rounding = 8 * DBL_EPSILON * shape->circumscribed;
-    double lengths = dem2di_length(arc->d0) + dem2di_length(arc->d1) + dem2di_length(arc->d2);
-    double turn = fabs(dem2di_cross(arc->d0, arc->d1)) + fabs(dem2di_cross(arc->d1, arc->d2)) +
-                  fabs(dem2di_cross(arc->d0, arc->d2));
-    return turn <= rounding * lengths;
+/* As the parts of a polybezier are made: to the bit. */
+static bool dem2di_arc_straight(const dem2di_arc *arc) {
+    dem2d_vec d = arc->d0;
+    return (d.x != 0 || d.y != 0) && d.x == arc->d1.x && d.y == arc->d1.y && d.x == arc->d2.x &&
+           d.y == arc->d2.y;
 }
 
-static bool dem2di_has_faces(const dem2d_shape *shape) {
-    bool straight = shape->type == DEM2D_POLYGON;
-    for (int k = 0; shape->type == DEM2D_BEZIER && k < shape->count; k++)
-        straight = straight || dem2di_arc_straight(shape, &shape->arcs[k]);
-    return straight;
+/* The edges of a shape: of a polygon all, of a polybezier the straight arcs, each between two other
+   parts. */
+static void dem2di_find_edges(dem2d_shape *shape) {
+    int n = shape->parts, last = -1;
+    shape->flat = shape->type == DEM2D_POLYGON;
+    if (shape->type != DEM2D_BEZIER) return;
+    for (int i = 0; i < 2 * n; i++) {
+        if (dem2di_arc_straight(&shape->arcs[i % n])) last = i % n;
+        shape->beyond[i % n].before = last;
+    }
+    shape->flat = last >= 0;
+    for (int i = 2 * n - 1; i >= 0; i--) {
+        if (dem2di_arc_straight(&shape->arcs[i % n])) last = i % n;
+        shape->beyond[i % n].after = last;
+    }
+}
+
+static inline bool dem2di_has_parts(const dem2d_shape *shape) {
+    return shape->type == DEM2D_POLYGON || shape->type == DEM2D_BEZIER;
+}
+
+/* The part of a shape that has them, not itself an edge, that holds the support point. */
+static inline int dem2di_part_find(const dem2d_shape *shape, dem2d_vec u) {
+    return shape->type == DEM2D_POLYGON ? dem2di_polygon_corner(shape, u)
+                                        : dem2di_sector_find(shape, u);
+}
+
+/* The edge before (-1) or after (1) a part: edges of polygons have the number of the corner that
+   they leave. */
+static inline int dem2di_edge_beside(const dem2d_shape *shape, int k, int side) {
+    if (shape->type == DEM2D_POLYGON) return side > 0 ? k : dem2di_around(shape->count, k, -1);
+    return side > 0 ? shape->beyond[k].after : shape->beyond[k].before;
+}
+
+/* The part that an edge comes from (side -1) or leads to (1). */
+static inline int dem2di_edge_part(const dem2d_shape *shape, int edge, int side) {
+    if (shape->type == DEM2D_POLYGON) return side < 0 ? edge : dem2di_around(shape->count, edge, 1);
+    return dem2di_around(shape->parts, edge, side);
+}
+
+/* The first point of an edge, or its last. */
+static inline dem2d_vec dem2di_edge_end(const dem2d_shape *shape, int edge, bool last) {
+    int k = last ? dem2di_around(shape->parts, edge, 1) : edge;
+    return shape->type == DEM2D_POLYGON ? shape->corners[k] : shape->arcs[k].start;
 }
 
 /* Support point of a template in a unit direction; rho, if asked for, is the radius of curvature
@@ -2693,7 +2750,7 @@ static inline dem2d_vec dem2di_support(const dem2d_shape *shape, dem2d_vec u, do
     case DEM2D_ELLIPSE:
         return dem2di_ellipse_support(shape, u, rho);
     case DEM2D_BEZIER:
-        return dem2di_bezier_support(shape, u, rho);
+        return dem2di_arc_support(&shape->arcs[dem2di_sector_find(shape, u)], u, rho);
     case DEM2D_FOURIER:
         return dem2di_fourier_support(shape, u, rho);
     case DEM2D_CUSTOM:
@@ -2874,7 +2931,7 @@ static dem2d_vec dem2di_outline_point(const dem2d_shape *shape, int i, int count
         int each = (int)(((int64_t)(k + 1) * count + n - 1) / n) - first;
         double t = (double)(i - first) / each;
         if (shape->type == DEM2D_BEZIER)
-            return dem2di_arc_point(&shape->arcs[k], (double)(place % count) / count);
+            return dem2di_arc_point(&shape->given[k], (double)(place % count) / count);
         if (shape->rounding == 0) {
             dem2d_vec edge = dem2di_sub(shape->corners[(k + 1) % n], shape->corners[k]);
             return dem2di_along(shape->corners[k], t, edge);
@@ -2910,14 +2967,29 @@ DEM2D_API dem2d_result dem2d_shape_mass_interpolated(const dem2d_shape *shape, i
    uses: config, math, memory, hull, series, support, mass
    ============================================================================================ */
 
+/* The table has four to eight entries for each corner or arc, so that most look-ups need no step
+   and are predicted well: a power of two. */
+static int dem2di_sector_count(int count) {
+    int sectors = 16;
+    while (sectors / 4 < count && sectors < (1 << 28)) sectors *= 2;
+    return sectors;
+}
+
+/* What a model has: for a few corners the table is not worth it. */
+static int dem2di_sectors_of(dem2d_shape_type type, int count) {
+    bool table = type == DEM2D_BEZIER || (type == DEM2D_POLYGON && count > DEM2DI_FEW_CORNERS);
+    return table ? dem2di_sector_count(count) : 0;
+}
+
 /* A zeroed template of a model with its arrays placed. */
 static dem2d_shape *dem2di_shape_allocate(const dem2d_env *env, dem2d_shape_type type, int count,
-                                          int sectors) {
+                                          int parts) {
     dem2d_shape plan;
     memset(&plan, 0, sizeof plan);
     plan.type = type;
     plan.count = count;
-    plan.sectors = sectors;
+    plan.parts = parts;
+    plan.sectors = dem2di_sectors_of(type, parts);
     dem2di_shape_layout(&plan);
     dem2d_shape *shape = (dem2d_shape *)dem2di_allocate(env, 1, plan.bytes);
     if (shape == NULL) {
@@ -2927,7 +2999,8 @@ static dem2d_shape *dem2di_shape_allocate(const dem2d_env *env, dem2d_shape_type
     memset((void *)shape, 0, plan.bytes);
     shape->type = type;
     shape->count = count;
-    shape->sectors = sectors;
+    shape->parts = parts;
+    shape->sectors = plan.sectors;
     dem2di_shape_layout(shape);
     if (env != NULL) shape->env = *env;
     return shape;
@@ -2948,7 +3021,7 @@ DEM2D_API void dem2d_shape_destroy(dem2d_shape *shape) {
 
 /* A copy in the memory of another environment. */
 static dem2d_shape *dem2di_shape_copy(const dem2d_env *env, const dem2d_shape *shape) {
-    dem2d_shape *copy = dem2di_shape_allocate(env, shape->type, shape->count, shape->sectors);
+    dem2d_shape *copy = dem2di_shape_allocate(env, shape->type, shape->count, shape->parts);
     if (copy == NULL) return NULL;
     dem2d_env own = copy->env;
     memcpy((void *)copy, (const void *)shape, shape->bytes);
@@ -3052,29 +3125,15 @@ static void dem2di_fill_sectors(dem2d_shape *shape) {
     for (int s = 0; s < sectors; s++) {
         dem2d_vec u = dem2di_sector_start(s, sectors);
         if (s == 0) { /* the one start that is not beyond: the end before it gains, its own not */
-            while (!(dem2di_dot(shape->ends[(k + shape->count - 1) % shape->count], u) > 0 &&
+            while (!(dem2di_dot(shape->ends[(k + shape->parts - 1) % shape->parts], u) > 0 &&
                      dem2di_dot(shape->ends[k], u) <= 0) &&
-                   k + 1 < shape->count)
+                   k + 1 < shape->parts)
                 k++;
         }
-        for (int left = shape->count; dem2di_dot(shape->ends[k], u) > 0 && left > 0; left--)
-            k = (k + 1) % shape->count;
+        for (int left = shape->parts; dem2di_dot(shape->ends[k], u) > 0 && left > 0; left--)
+            k = (k + 1) % shape->parts;
         shape->sector[s] = k;
     }
-}
-
-/* The table has four to eight entries for each corner or arc, so that most look-ups need no step
-   and are predicted well: a power of two. */
-static int dem2di_sector_count(int count) {
-    int sectors = 16;
-    while (sectors / 4 < count && sectors < (1 << 28)) sectors *= 2;
-    return sectors;
-}
-
-/* What a model has: for a few corners the table is not worth it. */
-static int dem2di_sectors_of(dem2d_shape_type type, int count) {
-    bool table = type == DEM2D_BEZIER || (type == DEM2D_POLYGON && count > DEM2DI_FEW_CORNERS);
-    return table ? dem2di_sector_count(count) : 0;
 }
 
 /* Radii of a polygon about its centroid, the origin. */
@@ -3102,13 +3161,12 @@ DEM2D_API dem2d_result dem2d_shape_create_polygon(const dem2d_env *env, const de
     result = dem2di_clean_polygon(env, corners, (int *)(void *)(corners + count), &count);
     dem2d_shape *made = NULL;
     if (result == DEM2D_OK) {
-        made = dem2di_shape_allocate(env, DEM2D_POLYGON, count,
-                                     dem2di_sectors_of(DEM2D_POLYGON, count));
+        made = dem2di_shape_allocate(env, DEM2D_POLYGON, count, count);
         if (made == NULL) result = DEM2D_OUT_OF_MEMORY;
     }
     if (made != NULL) {
         made->rounding = rounding;
-        made->flat = dem2di_has_faces(made);
+        dem2di_find_edges(made);
         made->mass = dem2di_rounded_polygon_mass(corners, count, rounding);
         made->offset = made->mass.centroid;
         made->mass.centroid = dem2di_vec(0, 0);
@@ -3179,8 +3237,10 @@ static void dem2di_bound_arc(dem2di_arc_bounds *bounds, const dem2di_arc *arc, i
     attained[1] = dem2di_min(attained[1], dem2di_min(ends[0], ends[1]));
     attained[2] =
         dem2di_min(attained[2], dem2di_min(dem2di_arc_rho(arc, 0), dem2di_arc_rho(arc, 1)));
+    /* the rounding of a large radius of curvature is above any part of the size */
+    double small = dem2di_max(bounds->tolerance, 1e-6 * attained[2]);
     bool open = outer > attained[0] + bounds->tolerance ||
-                inner < attained[1] - bounds->tolerance || rho < attained[2] - bounds->tolerance;
+                inner < attained[1] - bounds->tolerance || rho < attained[2] - small;
     if (!open || depth == 0) {
         bounds->outer = dem2di_max(bounds->outer, outer);
         bounds->inner = dem2di_min(bounds->inner, inner);
@@ -3193,14 +3253,15 @@ static void dem2di_bound_arc(dem2di_arc_bounds *bounds, const dem2di_arc *arc, i
     dem2di_bound_arc(bounds, &half[1], depth - 1);
 }
 
-/* Tangents at the ends of an arc: the first difference that is longer than rounding. */
-static bool dem2di_arc_tangents(const dem2di_arc *arc, double rounding, dem2d_vec *start,
-                                dem2d_vec *end) {
+/* The first difference of an arc that is longer than rounding, or the last; NULL when there is
+   none. */
+static const dem2d_vec *dem2di_arc_side(const dem2di_arc *arc, double rounding, bool last) {
     const dem2d_vec *d[3] = {&arc->d0, &arc->d1, &arc->d2};
-    int first = 0, last = 2;
-    while (first < 3 && dem2di_length(*d[first]) <= rounding) first++;
-    while (last >= 0 && dem2di_length(*d[last]) <= rounding) last--;
-    return first < 3 && dem2di_unit(*d[first], start) && dem2di_unit(*d[last], end);
+    for (int i = 0; i < 3; i++) {
+        const dem2d_vec *side = d[last ? 2 - i : i];
+        if (dem2di_length(*side) > rounding) return side;
+    }
+    return NULL;
 }
 
 /* An upper bound of rho on a whole arc, in the way of the lower one. */
@@ -3229,7 +3290,28 @@ static double dem2di_arc_rho_max(const dem2di_arc *arc, double known) {
     return dem2di_arc_rho_most(arc, known, 12);
 }
 
-/* Lower the floors of the sectors that the normals of an arc cross, by its bound of rho; halves
+/* Tangents at the ends of an arc. */
+static bool dem2di_arc_tangents(const dem2di_arc *arc, double rounding, dem2d_vec *start,
+                                dem2d_vec *end) {
+    const dem2d_vec *first = dem2di_arc_side(arc, rounding, false);
+    const dem2d_vec *last = dem2di_arc_side(arc, rounding, true);
+    return first != NULL && last != NULL && dem2di_unit(*first, start) && dem2di_unit(*last, end);
+}
+
+/* Lower the floors of the sectors from the normal of one tangent to that of another. */
+static void dem2di_lower_floors(dem2d_shape *shape, dem2d_vec from, dem2d_vec to, double rho) {
+    /* widened by more than rounding can move them over the border of a sector */
+    from = dem2di_along(from, -1e-12, dem2di_perp(from));
+    to = dem2di_along(to, 1e-12, dem2di_perp(to));
+    int k = dem2di_floor_sector(dem2di_negate(dem2di_perp(from)));
+    int last = dem2di_floor_sector(dem2di_negate(dem2di_perp(to)));
+    for (;; k = (k + 1) & (DEM2DI_FLOORS - 1)) {
+        shape->floors[k] = dem2di_min(shape->floors[k], rho);
+        if (k == last) break;
+    }
+}
+
+/* The same for an arc, by its bound of rho, in halves
    while they turn by more than half a sector or the bound is far below what is attained. */
 static void dem2di_arc_floors(dem2d_shape *shape, const dem2di_arc *arc, int depth) {
     dem2d_vec from, to;
@@ -3244,77 +3326,88 @@ static void dem2di_arc_floors(dem2d_shape *shape, const dem2di_arc *arc, int dep
         dem2di_arc_floors(shape, &half[1], depth - 1);
         return;
     }
-    /* normals, widened by more than rounding can move them over the border of a sector */
-    from = dem2di_along(from, -1e-12, dem2di_perp(from));
-    to = dem2di_along(to, 1e-12, dem2di_perp(to));
-    int k = dem2di_floor_sector(dem2di_negate(dem2di_perp(from)));
-    int last = dem2di_floor_sector(dem2di_negate(dem2di_perp(to)));
-    for (;; k = (k + 1) & (DEM2DI_FLOORS - 1)) {
-        shape->floors[k] = dem2di_min(shape->floors[k], rho);
-        if (k == last) break;
-    }
+    dem2di_lower_floors(shape, from, to, rho);
 }
 
-/* Rounding of the difference of two control points. */
-static double dem2di_control_rounding(double size) {
-    return 8 * DBL_EPSILON * size;
+/* A joint may turn by this much to be called smooth, and an arc to be called straight: coordinates
+   written with seven digits. */
+#define DEM2DI_SMOOTH 1e-6
+
+/* An arc shorter than this part of the size (2^-44, 256 eps) is a corner: rounding of its control
+   points leaves it no direction. */
+#define DEM2DI_TINY (1.0 / 17592186044416.0)
+
+/* Lengths that mean nothing in a control polygon. */
+typedef struct dem2di_limits {
+    double rounding; /* of the difference of two points */
+    double tiny;     /* an arc as short as that is a corner */
+} dem2di_limits;
+
+static double dem2di_arc_length(const dem2di_arc *arc) { /* of its control polygon */
+    return dem2di_length(arc->d0) + dem2di_length(arc->d1) + dem2di_length(arc->d2);
 }
 
-/* Does b turn left of a, to rounding, and not back? Differences within rounding have no
-   direction. */
+static dem2d_vec dem2di_arc_way(const dem2di_arc *arc) {
+    return dem2di_add(dem2di_add(arc->d0, arc->d1), arc->d2);
+}
+
+/* Sine (times both lengths) that two differences may have by the rounding of their coordinates. */
+static double dem2di_turn_slack(double la, double lb, double rounding) {
+    return dem2di_max(rounding * (la + lb), DEM2DI_SMOOTH * la * lb);
+}
+
+/* Does b turn left of a, or to the right within the smoothness, and not back? Differences within
+   rounding have no direction. */
 static bool dem2di_turns_left(dem2d_vec a, dem2d_vec b, double rounding) {
     double la = dem2di_length(a), lb = dem2di_length(b), turn = dem2di_cross(a, b);
     if (la <= rounding || lb <= rounding) return true;
-    return turn >= -rounding * (la + lb) && (turn > rounding * (la + lb) || dem2di_dot(a, b) > 0);
+    return turn >= -dem2di_turn_slack(la, lb, rounding) &&
+           (turn > rounding * (la + lb) || dem2di_dot(a, b) > 0);
 }
 
-/* A joint may turn by this much to be called smooth: coordinates written with seven digits. */
-#define DEM2DI_SMOOTH 1e-6
-
-/* Convex, turning left by at most pi: every turn of the control polygon is to the left, and so
-   is the whole turn, but for the smoothness. */
+/* Convex, turning left by at most pi, within the smoothness: every turn of the control polygon is
+   to the left, and so is the whole turn. */
 static bool dem2di_arc_convex(const dem2di_arc *arc, dem2d_vec start, dem2d_vec end,
                               double rounding) {
-    double lengths = dem2di_length(arc->d0) + dem2di_length(arc->d2);
+    double slack = dem2di_turn_slack(dem2di_length(arc->d0), dem2di_length(arc->d2), rounding);
     return dem2di_turns_left(arc->d0, arc->d1, rounding) &&
            dem2di_turns_left(arc->d1, arc->d2, rounding) &&
-           dem2di_cross(arc->d0, arc->d2) >= -rounding * lengths &&
+           dem2di_cross(arc->d0, arc->d2) >= -slack &&
            dem2di_cross(start, end) >= -2 * DEM2DI_SMOOTH;
 }
 
-/* The half of a unit tangent; horizontal within the smoothness is horizontal, so that a joint
-   along the border of the halves is not counted twice. */
-static bool dem2di_upper_tangent(dem2d_vec tangent) {
-    if (fabs(tangent.y) <= DEM2DI_SMOOTH) tangent.y = 0;
-    return dem2di_upper(tangent);
+/* Is a joint smooth? `kink` gets the sine between the tangents. */
+static bool dem2di_joint_smooth(const dem2di_arc *before, const dem2di_arc *after, double rounding,
+                                double *kink) {
+    dem2d_vec a = *dem2di_arc_side(before, rounding, true);
+    dem2d_vec b = *dem2di_arc_side(after, rounding, false);
+    double la = dem2di_length(a), lb = dem2di_length(b), turn = dem2di_cross(a, b);
+    *kink = turn / la / lb;
+    return fabs(turn) <= dem2di_turn_slack(la, lb, rounding) && dem2di_dot(a, b) > 0;
 }
 
-/* All arcs convex, joints G1, one turn in all. */
+/* Each arc is none but a tiny one or convex, and joints of two that are not tiny are smooth. */
 static dem2d_result dem2di_check_arcs(const dem2d_env *env, const dem2di_arc *arcs, int count,
-                                      bool reversed, double size) {
-    int entries = 0;
-    double rounding = dem2di_control_rounding(size);
-    dem2d_vec start, end, before, joint;
-    if (!dem2di_arc_tangents(&arcs[count - 1], rounding, &joint, &before))
-        joint = before = arcs->d0;
+                                      bool reversed, dem2di_limits limits) {
+    const dem2di_arc *before = &arcs[count - 1];
     for (int k = 0; k < count; k++) {
         int place = reversed ? count - 1 - k : k; /* in the caller's numbering */
-        if (!dem2di_arc_tangents(&arcs[k], rounding, &start, &end))
+        const dem2di_arc *arc = &arcs[k];
+        dem2d_vec start, end;
+        double kink;
+        if (!dem2di_arc_tangents(arc, limits.rounding, &start, &end))
             return dem2di_fail(env, DEM2D_DUPLICATE_POINT, place, "arc %d is a point", place);
-        if (!dem2di_arc_convex(&arcs[k], start, end, rounding))
+        bool tiny = dem2di_arc_length(arc) <= limits.tiny;
+        if (!tiny && !dem2di_arc_convex(arc, start, end, limits.rounding))
             return dem2di_fail(env, DEM2D_NOT_CONVEX, place, "arc %d is not convex", place);
-        double kink = dem2di_cross(before, start);
         if (reversed) place = (count - k) % count;
-        if (fabs(kink) > DEM2DI_SMOOTH || dem2di_dot(before, start) < 0)
+        if (!tiny && dem2di_arc_length(before) > limits.tiny &&
+            !dem2di_joint_smooth(before, arc, limits.rounding, &kink))
             return dem2di_fail(env, DEM2D_NOT_SMOOTH, place,
                                "the tangents at the start of arc %d differ by a sine of %g", place,
                                kink);
-        entries += !dem2di_upper_tangent(joint) && dem2di_upper_tangent(start);
-        joint = start; /* one tangent for each joint: that of the arc that starts there */
-        before = end;
+        before = arc;
     }
-    if (entries != 1)
-        return dem2di_fail(env, DEM2D_NOT_CONVEX, -1, "the arcs do not turn exactly once");
     return DEM2D_OK;
 }
 
@@ -3334,18 +3427,348 @@ static void dem2di_arcs_from_control(const dem2d_vec *control, int count, bool r
     }
 }
 
-/* Everything about a polybezier but its arcs. */
-static void dem2di_finish_bezier(dem2d_shape *shape, double size) {
-    dem2d_vec start;
-    double rounding = dem2di_control_rounding(size);
-    for (int pass = 0; pass < 2; pass++) { /* the second makes the moments central */
-        dem2d_mass mass = dem2di_bezier_mass(shape->arcs, shape->count);
-        for (int k = 0; k < shape->count; k++)
-            shape->arcs[k].start = dem2di_sub(shape->arcs[k].start, mass.centroid);
-        shape->offset = dem2di_add(shape->offset, mass.centroid);
-        shape->mass = mass;
+/* --- from the caller's arcs to the parts of the kernel ---
+   The kernel needs joints with one tangent, straight arcs that are straight to the bit, arcs that
+   turn by at most a right angle, and none too short to have a direction. Coordinates are rounded,
+   so that the caller's arcs are all this only to the smoothness. The control polygon is put right:
+   differences that should have one direction, and those that turn to the right, are tied together,
+   and the points between them are moved onto the chord of their group. The greatest way of a point
+   bounds how far the outline has moved, and goes into the error of every answer. */
+
+/* The control polygon of all arcs that are not tiny, as differences. */
+typedef struct dem2di_chain {
+    int count;        /* of differences, three for each arc */
+    dem2d_vec *start; /* of each arc */
+    dem2d_vec *d;
+    bool *tied; /* does d[k] have the direction of d[k + 1]? */
+    dem2di_limits limits;
+    double noise; /* m, rounding of the coordinates as kinks and dents show it */
+    double moved; /* m, greatest way of a point */
+} dem2di_chain;
+
+/* The first difference at an end of an arc that is not tiny. */
+static dem2d_vec *dem2di_chain_side(const dem2di_chain *chain, int arc, bool last) {
+    dem2d_vec *d = &chain->d[3 * arc + (last ? 2 : 0)];
+    if (dem2di_length(*d) <= chain->limits.tiny) d = &chain->d[3 * arc + 1];
+    if (dem2di_length(*d) > chain->limits.tiny) return d;
+    return &chain->d[3 * arc + (last ? 0 : 2)];
+}
+
+/* A tiny corner between two arcs: they meet in the middle of it. */
+static void dem2di_chain_corner(dem2di_chain *chain, int before, int after, dem2d_vec way,
+                                double length) {
+    dem2d_vec half = dem2di_scale(way, 0.5), *end = dem2di_chain_side(chain, before, true);
+    *end = dem2di_add(*end, half);
+    end = dem2di_chain_side(chain, after, false);
+    *end = dem2di_add(*end, half);
+    chain->start[after] = dem2di_sub(chain->start[after], half);
+    chain->tied[3 * before + 2] = false;
+    chain->moved = dem2di_max(chain->moved, length);
+}
+
+/* The arcs that are not tiny, from the first of them on. False when they are less than two. */
+static bool dem2di_chain_take(dem2di_chain *chain, const dem2di_arc *arcs, int count) {
+    int first = 0, kept = 0;
+    double length = 0; /* of the tiny ones since the last that was kept */
+    dem2d_vec way = dem2di_vec(0, 0);
+    while (first < count && dem2di_arc_length(&arcs[first]) <= chain->limits.tiny) first++;
+    for (int i = 0; i < count && first < count; i++) {
+        const dem2di_arc *arc = &arcs[(first + i) % count];
+        double own = dem2di_arc_length(arc);
+        if (own <= chain->limits.tiny) {
+            way = dem2di_add(way, dem2di_arc_way(arc));
+            length += own;
+            continue;
+        }
+        chain->start[kept] = arc->start;
+        chain->d[3 * kept] = arc->d0;
+        chain->d[3 * kept + 1] = arc->d1;
+        chain->d[3 * kept + 2] = arc->d2;
+        chain->tied[3 * kept] = chain->tied[3 * kept + 1] = false;
+        chain->tied[3 * kept + 2] = true;
+        if (length > 0) dem2di_chain_corner(chain, kept - 1, kept, way, length);
+        way = dem2di_vec(0, 0);
+        length = 0;
+        kept++;
     }
-    shape->mass.centroid = dem2di_vec(0, 0);
+    if (kept < 2) return false;
+    chain->count = 3 * kept;
+    if (length > 0) dem2di_chain_corner(chain, kept - 1, 0, way, length);
+    return true;
+}
+
+/* How far the coordinates are rounded: by kinks of joints, and where the control polygon turns to
+   the right, as ways of the point between two differences onto their chord. */
+static void dem2di_chain_listen(dem2di_chain *chain) {
+    chain->noise = chain->limits.rounding / 8; /* of one coordinate */
+    for (int k = 0; k < chain->count; k++) {
+        dem2d_vec a = chain->d[k], b = chain->d[(k + 1) % chain->count];
+        double turn = dem2di_cross(a, b), lengths = dem2di_length(a) + dem2di_length(b);
+        bool joint = k % 3 == 2 && chain->tied[k];
+        if (joint || turn < 0) chain->noise = dem2di_max(chain->noise, fabs(turn) / lengths);
+    }
+}
+
+/* Is the arc from difference k on straight, and in line with its joints: to the smoothness, and to
+   four times the rounding of the coordinates? The greatest of a few errors is seldom below a
+   quarter of another. */
+static bool dem2di_chain_straight(const dem2di_chain *chain, int k) {
+    int n = chain->count, before = (k + n - 1) % n, after = (k + 3) % n;
+    int from = chain->tied[before] ? before : k, last = chain->tied[k + 2] ? after : k + 2;
+    double rounding = chain->limits.rounding;
+    dem2d_vec along, sum = chain->d[last], at = dem2di_vec(0, 0);
+    for (int i = from; i != last; i = (i + 1) % n) sum = dem2di_add(sum, chain->d[i]);
+    if (!dem2di_unit(sum, &along)) return false;
+    for (int i = from; i != last; i = (i + 1) % n) {
+        dem2d_vec d = chain->d[i];
+        double length = dem2di_length(d), slack = dem2di_max(DEM2DI_SMOOTH * length, rounding);
+        at = dem2di_add(at, d);
+        if (length > rounding && (dem2di_dot(d, along) < 0 || fabs(dem2di_cross(d, along)) > slack))
+            return false;
+        if (fabs(dem2di_cross(at, along)) > 4 * chain->noise) return false;
+    }
+    return true;
+}
+
+/* Tie what is straight, and what is too short to have a direction to what is beside it. */
+static void dem2di_chain_tie(dem2di_chain *chain) {
+    double rounding = chain->limits.rounding;
+    dem2di_chain_listen(chain);
+    for (int k = 0; k < chain->count; k += 3) {
+        const dem2d_vec *d = &chain->d[k];
+        bool straight = dem2di_chain_straight(chain, k), none = dem2di_length(d[1]) <= rounding;
+        chain->tied[k] = straight || none || dem2di_length(d[0]) <= rounding;
+        chain->tied[k + 1] = straight || dem2di_length(d[2]) <= rounding;
+    }
+}
+
+/* The sum of a group from a difference on; `end` is its last. */
+static dem2d_vec dem2di_chain_sum(const dem2di_chain *chain, int from, int *end) {
+    dem2d_vec sum = chain->d[from];
+    for (*end = from; chain->tied[*end];) {
+        *end = (*end + 1) % chain->count;
+        sum = dem2di_add(sum, chain->d[*end]);
+    }
+    return sum;
+}
+
+/* The first difference of a group; -1 when all are tied. */
+static int dem2di_chain_first(const dem2di_chain *chain) {
+    for (int k = 0; k < chain->count; k++)
+        if (!chain->tied[k]) return (k + 1) % chain->count;
+    return -1;
+}
+
+/* Once around: tie groups that turn to the right. True when there was none. */
+static bool dem2di_chain_pool(dem2di_chain *chain, int first) {
+    int n = chain->count, from = first, last = (first + n - 1) % n;
+    bool none = true;
+    dem2d_vec sum = dem2di_vec(0, 0), before = chain->d[last];
+    for (int k = last; chain->tied[(k + n - 1) % n];) {
+        k = (k + n - 1) % n;
+        before = dem2di_add(before, chain->d[k]);
+    }
+    for (int i = 0; i < n; i++) {
+        int k = (first + i) % n;
+        sum = dem2di_add(sum, chain->d[k]);
+        if (chain->tied[k]) continue; /* also by the first group of this round */
+        if (dem2di_cross(before, sum) < 0) {
+            chain->tied[(from + n - 1) % n] = true;
+            none = false;
+            sum = dem2di_add(before, sum);
+        }
+        before = sum;
+        sum = dem2di_vec(0, 0);
+        from = (k + 1) % n;
+    }
+    return none;
+}
+
+/* One direction for a group: its points onto its chord. False when one of its differences is off
+   by more than joints and arcs that are smooth can make it, both ends together. */
+static bool dem2di_chain_align(dem2di_chain *chain, int from, int *end) {
+    int n = chain->count;
+    dem2d_vec along, shift = dem2di_vec(0, 0), sum = dem2di_chain_sum(chain, from, end);
+    double worst = 0;
+    if (!dem2di_unit(sum, &along)) return false;
+    for (int k = from, last = 0; !last; k = (k + 1) % n) {
+        double length = dem2di_length(chain->d[k]), off = fabs(dem2di_cross(along, chain->d[k]));
+        if (off > 4 * DEM2DI_SMOOTH * length + chain->limits.tiny ||
+            dem2di_dot(along, chain->d[k]) < -chain->limits.tiny)
+            return false;
+        if (length > 0) worst = dem2di_max(worst, off / length);
+        last = k == *end;
+    }
+    if (worst <= 4 * DBL_EPSILON) return true; /* as it is */
+    for (int k = from; k != *end; k = (k + 1) % n) {
+        dem2d_vec old = chain->d[k];
+        chain->d[k] = dem2di_scale(along, dem2di_max(0, dem2di_dot(old, along)));
+        shift = dem2di_add(shift, dem2di_sub(chain->d[k], old));
+        chain->moved = dem2di_max(chain->moved, dem2di_length(shift));
+        dem2d_vec *start = &chain->start[(k + 1) % n / 3];
+        if ((k + 1) % 3 == 0) *start = dem2di_add(*start, shift);
+    }
+    chain->d[*end] = dem2di_scale(along, dem2di_max(0, dem2di_dot(chain->d[*end], along)));
+    return true;
+}
+
+/* Rounds of ties: one does for errors of coordinates, which are few and apart. */
+#define DEM2DI_CHAIN_ROUNDS 64
+
+/* The control polygon convex and smooth. False when it is not so to the smoothness. */
+static bool dem2di_chain_repair(dem2di_chain *chain) {
+    int first, end;
+    dem2di_chain_tie(chain);
+    for (int round = 0;; round++) {
+        first = dem2di_chain_first(chain);
+        if (first < 0 || round == DEM2DI_CHAIN_ROUNDS) return false;
+        if (dem2di_chain_pool(chain, first)) break;
+    }
+    int from = first;
+    do {
+        if (!dem2di_chain_align(chain, from, &end)) return false;
+        from = (end + 1) % chain->count;
+    } while (from != first);
+    return true;
+}
+
+/* De Casteljau at t, in differences. */
+static void dem2di_arc_split(const dem2di_arc *arc, double t, dem2di_arc half[2]) {
+    double s = 1 - t;
+    dem2d_vec a = dem2di_along(dem2di_scale(arc->d0, s), t, arc->d1);
+    dem2d_vec b = dem2di_along(dem2di_scale(arc->d1, s), t, arc->d2);
+    dem2d_vec middle = dem2di_along(dem2di_scale(a, s), t, b);
+    half[0].start = arc->start;
+    half[0].d0 = dem2di_scale(arc->d0, t);
+    half[0].d1 = dem2di_scale(a, t);
+    half[0].d2 = dem2di_scale(middle, t);
+    half[1].start = dem2di_add(arc->start, dem2di_arc_way(&half[0]));
+    half[1].d0 = dem2di_scale(middle, s);
+    half[1].d1 = dem2di_scale(b, s);
+    half[1].d2 = dem2di_scale(arc->d2, s);
+}
+
+/* An arc that turns by more than a right angle as two, cut where it has turned by half. */
+static int dem2di_arc_parts(dem2di_chain *chain, const dem2di_arc *arc, dem2di_arc part[2]) {
+    dem2d_vec start, end, tangent;
+    part[0] = *arc;
+    if (!dem2di_arc_tangents(arc, chain->limits.rounding, &start, &end)) return 1;
+    if (dem2di_dot(start, end) >= -DEM2DI_SMOOTH ||
+        !dem2di_unit(dem2di_sub(dem2di_perp(start), dem2di_perp(end)), &tangent))
+        return 1;
+    dem2d_vec u = dem2di_vec(tangent.y, -tangent.x);
+    double t = dem2di_arc_parameter(dem2di_dot(arc->d0, u), dem2di_dot(arc->d1, u),
+                                    dem2di_dot(arc->d2, u));
+    dem2di_arc_split(arc, t, part);
+    for (int i = 0; i < 2; i++) { /* one that is tiny becomes a corner */
+        double length = dem2di_arc_length(&part[i]);
+        if (length > chain->limits.tiny) continue;
+        dem2d_vec way = dem2di_arc_way(&part[i]);
+        dem2d_vec *beside = i == 0 ? &part[1].d0 : &part[0].d2;
+        *beside = dem2di_add(*beside, way);
+        if (i == 0) part[1].start = part[0].start;
+        if (i == 1) part[1].start = dem2di_add(part[1].start, way);
+        part[i].d0 = part[i].d1 = part[i].d2 = dem2di_vec(0, 0);
+        chain->moved = dem2di_max(chain->moved, length);
+    }
+    return 2;
+}
+
+/* Of corners that follow each other one stays. */
+static int dem2di_join_corners(dem2di_arc *part, int count) {
+    int kept = 0;
+    for (int k = 0; k < count; k++) {
+        const dem2di_arc *next = &part[k + 1 < count ? k + 1 : 0];
+        if (dem2di_arc_length(&part[k]) > 0 || dem2di_arc_length(next) > 0) part[kept++] = part[k];
+    }
+    return kept;
+}
+
+/* The parts, up to three for each arc: curved arcs, straight ones, each as long as it goes, and
+   corners. Returns how many. */
+static int dem2di_chain_parts(dem2di_chain *chain, dem2di_arc *part) {
+    int arcs = chain->count / 3, first = 0, count = 0;
+    const bool *tied = chain->tied;
+    /* not in the middle of a straight line */
+    while (first < arcs && tied[3 * first] && tied[3 * first + 1] &&
+           tied[(3 * first + chain->count - 1) % chain->count])
+        first++;
+    bool goes_on = false;
+    for (int i = 0; i < arcs; i++) {
+        int k = (first + i) % arcs;
+        dem2di_arc arc;
+        arc.start = chain->start[k];
+        arc.d0 = chain->d[3 * k];
+        arc.d1 = chain->d[3 * k + 1];
+        arc.d2 = chain->d[3 * k + 2];
+        bool straight = tied[3 * k] && tied[3 * k + 1];
+        if (straight && goes_on) {
+            dem2di_arc *last = &part[count - 1];
+            dem2d_vec way = dem2di_add(dem2di_scale(last->d0, 3), dem2di_arc_way(&arc));
+            last->d0 = last->d1 = last->d2 = dem2di_scale(way, 1.0 / 3);
+        } else if (straight) {
+            arc.d0 = arc.d1 = arc.d2 = dem2di_scale(dem2di_arc_way(&arc), 1.0 / 3);
+            part[count++] = arc;
+        } else {
+            count += dem2di_arc_parts(chain, &arc, &part[count]);
+        }
+        goes_on = straight && tied[3 * k + 2];
+        if (tied[3 * k + 2]) continue;
+        memset(&part[count], 0, sizeof *part);
+        part[count++].start = chain->start[(k + 1) % arcs];
+    }
+    return dem2di_join_corners(part, count);
+}
+
+/* The parts of arcs that were checked: there is room for three times as many. */
+static dem2d_result dem2di_bezier_parts(const dem2d_env *env, const dem2di_arc *given, int count,
+                                        dem2di_limits limits, dem2di_arc *part, int *parts,
+                                        double *moved) {
+    dem2di_chain chain;
+    size_t n = (size_t)count, size = 4 * sizeof(dem2d_vec) + 3 * sizeof(bool);
+    chain.start = (dem2d_vec *)dem2di_allocate(env, n, size);
+    if (chain.start == NULL) return dem2di_fail(env, DEM2D_OUT_OF_MEMORY, -1, "%d arcs", count);
+    chain.d = chain.start + n;
+    chain.tied = (bool *)(void *)(chain.d + 3 * n);
+    chain.limits = limits;
+    chain.moved = 0;
+    bool good = dem2di_chain_take(&chain, given, count) && dem2di_chain_repair(&chain);
+    if (good) *parts = dem2di_chain_parts(&chain, part);
+    *moved = chain.moved;
+    dem2di_release(env, chain.start, n, size);
+    if (good) return DEM2D_OK;
+    return dem2di_fail(env, DEM2D_NOT_CONVEX, -1, "the arcs are not convex to a sine of %g",
+                       DEM2DI_SMOOTH);
+}
+
+/* Unit tangents where the parts end; those of straight arcs also where the part before ends, to the
+   bit, so that no support point is looked for on one. */
+static void dem2di_bezier_tangents(dem2d_shape *shape, double rounding) {
+    int n = shape->parts;
+    dem2d_vec start, unused;
+    for (int k = 0; k < n; k++)
+        (void)dem2di_arc_tangents(&shape->arcs[k], rounding, &start, &shape->ends[k]);
+    for (int k = 0; k < n; k++) {
+        int next = (k + 1) % n;
+        if (dem2di_arc_straight(&shape->arcs[next]))
+            shape->ends[k] = shape->ends[next];
+        else if (dem2di_arc_length(&shape->arcs[k]) == 0 &&
+                 dem2di_arc_tangents(&shape->arcs[next], rounding, &start, &unused))
+            shape->ends[k] = start;
+    }
+}
+
+/* How often the parts turn around: each turns by pi at most. */
+static int dem2di_bezier_turns(const dem2d_shape *shape) {
+    int turns = 0;
+    for (int k = 0; k < shape->parts; k++)
+        turns += !dem2di_upper(shape->ends[k]) &&
+                 dem2di_upper(shape->ends[k + 1 < shape->parts ? k + 1 : 0]);
+    return turns;
+}
+
+/* Everything about a polybezier that follows from its parts. */
+static void dem2di_finish_bezier(dem2d_shape *shape) {
     dem2di_arc_bounds bounds;
     bounds.outer = 0;
     bounds.inner = bounds.rho = HUGE_VAL;
@@ -3353,30 +3776,73 @@ static void dem2di_finish_bezier(dem2d_shape *shape, double size) {
     bounds.attained[1] = bounds.attained[2] = HUGE_VAL;
     /* 1e-9 of the size is below any tolerance of a contact; 40 halvings are beyond doubles */
     bounds.tolerance = 1e-9 * sqrt(shape->mass.area);
-    for (int k = 0; k < shape->count; k++) {
-        (void)dem2di_arc_tangents(&shape->arcs[k], rounding, &start, &shape->ends[k]);
-        dem2di_bound_arc(&bounds, &shape->arcs[k], 40);
-    }
-    shape->circumscribed = bounds.outer;
-    shape->inscribed = bounds.inner;
+    for (int k = 0; k < shape->parts; k++) dem2di_bound_arc(&bounds, &shape->arcs[k], 40);
+    shape->circumscribed = bounds.outer + shape->deviation;
+    shape->inscribed = dem2di_max(0, bounds.inner - shape->deviation);
     shape->rho_min = dem2di_finite(bounds.rho) ? bounds.rho : 0;
     shape->rho_max = 0;
-    for (int k = 0; k < shape->count; k++)
-        if (!dem2di_arc_straight(shape, &shape->arcs[k]))
-            shape->rho_max = dem2di_arc_rho_max(&shape->arcs[k], shape->rho_max);
     for (int k = 0; k < DEM2DI_FLOORS; k++) shape->floors[k] = HUGE_VAL;
-    for (int k = 0; k < shape->count; k++) dem2di_arc_floors(shape, &shape->arcs[k], 12);
+    for (int k = 0; k < shape->parts; k++) {
+        dem2d_vec before = shape->ends[(k + shape->parts - 1) % shape->parts];
+        const dem2di_arc *arc = &shape->arcs[k];
+        if (dem2di_arc_straight(arc)) continue;
+        if (dem2di_arc_length(arc) > 0) {
+            dem2di_arc_floors(shape, arc, 12);
+            shape->rho_max = dem2di_arc_rho_max(arc, shape->rho_max);
+        } else {
+            dem2di_lower_floors(shape, before, shape->ends[k], 0);
+        }
+    }
     for (int k = 0; k < DEM2DI_FLOORS; k++) /* a sector no arc has come to has no bound */
         if (!dem2di_finite(shape->floors[k])) shape->floors[k] = shape->rho_min;
     dem2di_join_floors(shape);
     dem2di_fill_sectors(shape);
-    shape->flat = dem2di_has_faces(shape);
+    dem2di_find_edges(shape);
+}
+
+/* Arcs about their centroid; its place before is the offset. */
+static dem2d_mass dem2di_bezier_centre(dem2di_arc *arcs, int count, dem2d_vec *offset) {
+    dem2d_mass mass;
+    *offset = dem2di_vec(0, 0);
+    for (int pass = 0; pass < 2; pass++) { /* the second makes the moments central */
+        mass = dem2di_bezier_mass(arcs, count);
+        for (int k = 0; k < count; k++) arcs[k].start = dem2di_sub(arcs[k].start, mass.centroid);
+        *offset = dem2di_add(*offset, mass.centroid);
+    }
+    mass.centroid = dem2di_vec(0, 0);
+    return mass;
+}
+
+/* A polybezier of arcs that were checked. `work` has room for three times as many. */
+static dem2d_result dem2di_bezier_make(const dem2d_env *env, dem2di_arc *arcs, int count,
+                                       dem2di_limits limits, dem2di_arc *work,
+                                       dem2d_shape **shape) {
+    int parts = 0;
+    double moved = 0;
+    dem2d_vec offset;
+    dem2d_mass mass = dem2di_bezier_centre(arcs, count, &offset);
+    dem2d_result result = dem2di_bezier_parts(env, arcs, count, limits, work, &parts, &moved);
+    if (result != DEM2D_OK) return result;
+    dem2d_shape *made = dem2di_shape_allocate(env, DEM2D_BEZIER, count, parts);
+    if (made == NULL) return DEM2D_OUT_OF_MEMORY;
+    memcpy(made->given, arcs, (size_t)count * sizeof *arcs);
+    memcpy(made->arcs, work, (size_t)parts * sizeof *work);
+    made->offset = offset;
+    made->mass = mass;
+    made->deviation = moved;
+    dem2di_bezier_tangents(made, limits.rounding);
+    if (dem2di_bezier_turns(made) != 1) {
+        dem2d_shape_destroy(made);
+        return dem2di_fail(env, DEM2D_NOT_CONVEX, -1, "the arcs do not turn exactly once");
+    }
+    dem2di_finish_bezier(made);
+    return dem2di_hand_out(made, shape);
 }
 
 DEM2D_API dem2d_result dem2d_shape_create_bezier(const dem2d_env *env, const dem2d_vec *control,
                                                  int arcs, dem2d_shape **shape) {
     if (shape == NULL) return dem2di_fail_null(env, "shape");
-    if (arcs < 2 || arcs > INT_MAX / 3)
+    if (arcs < 2 || arcs > INT_MAX / 12)
         return dem2di_fail(env, DEM2D_TOO_FEW_POINTS, -1, "arcs = %d, 2 needed", arcs);
     dem2d_result result = dem2di_check_points(env, "control", control, 3 * arcs, 6);
     if (result != DEM2D_OK) return result;
@@ -3386,17 +3852,17 @@ DEM2D_API dem2d_result dem2d_shape_create_bezier(const dem2d_env *env, const dem
     area = dem2di_twice_area(control, 3 * arcs);
     if (fabs(area) <= 8 * DBL_EPSILON * size * extent)
         return dem2di_fail(env, DEM2D_ZERO_AREA, -1, "control polygon's area %g", area / 2);
-    dem2d_shape *made =
-        dem2di_shape_allocate(env, DEM2D_BEZIER, arcs, dem2di_sectors_of(DEM2D_BEZIER, arcs));
-    if (made == NULL) return DEM2D_OUT_OF_MEMORY;
-    dem2di_arcs_from_control(control, arcs, area < 0, made->arcs);
-    result = dem2di_check_arcs(env, made->arcs, arcs, area < 0, size);
-    if (result != DEM2D_OK) {
-        dem2d_shape_destroy(made);
-        return result;
-    }
-    dem2di_finish_bezier(made, size);
-    return dem2di_hand_out(made, shape);
+    dem2di_limits limits;
+    limits.rounding = 8 * DBL_EPSILON * size;
+    limits.tiny = dem2di_max(DEM2DI_TINY * extent, 4 * limits.rounding); /* has a direction */
+    size_t n = (size_t)arcs, each = 4 * sizeof(dem2di_arc); /* the arcs, and work on their parts */
+    dem2di_arc *work = (dem2di_arc *)dem2di_allocate(env, n, each);
+    if (work == NULL) return dem2di_fail(env, DEM2D_OUT_OF_MEMORY, -1, "%d arcs", arcs);
+    dem2di_arcs_from_control(control, arcs, area < 0, work);
+    result = dem2di_check_arcs(env, work, arcs, area < 0, limits);
+    if (result == DEM2D_OK) result = dem2di_bezier_make(env, work, arcs, limits, work + n, shape);
+    dem2di_release(env, work, n, each);
+    return result;
 }
 
 /* Rounding of rho of a series: its bound is found to 2e-14 of the sum of terms, and each of the
@@ -3573,6 +4039,7 @@ DEM2D_API dem2d_result dem2d_shape_get(const dem2d_shape *shape, dem2d_shape_inf
     info->inscribed = shape->inscribed;
     info->rho_min = shape->rho_min;
     info->rho_max = shape->rho_max;
+    info->deviation = shape->deviation;
     info->equivalent = sqrt(shape->mass.area / DEM2DI_PI);
     info->bytes = shape->bytes;
     return DEM2D_OK;
@@ -3605,6 +4072,84 @@ static dem2d_vec dem2di_posed_support(const dem2d_shape *shape, const dem2d_pose
     return dem2di_scale(dem2di_turn(pose->rotation, s), pose->scale);
 }
 
+/* Are the arcs that the caller gave other ones than the parts that the kernel works with? */
+static bool dem2di_deviates(const dem2d_shape *shape) {
+    return shape->deviation > DEM2DI_ROUNDING * shape->circumscribed;
+}
+
+/* Where an arc of any form turns along a direction: 0, up to two parameters in order, and 1.
+   Returns how many. */
+static int dem2di_arc_stations(const dem2di_arc *arc, dem2d_vec u, double t[4]) {
+    double q0 = dem2di_dot(arc->d0, u), q1 = dem2di_dot(arc->d1, u), q2 = dem2di_dot(arc->d2, u);
+    double square = q1 * q1 - q0 * q2, root = square > 0 ? sqrt(square) : 0;
+    double sum = q1 > 0 ? q1 + root : q1 - root;  /* of like signs */
+    double part[2][2] = {{sum, -q2}, {q0, -sum}}; /* t over 1 - t, of both roots */
+    int count = 1;
+    t[0] = 0;
+    for (int i = 0; i < 2 && square > 0; i++) {
+        double at = part[i][0] / (part[i][0] + part[i][1]);
+        if (at > 0 && at < 1) t[count++] = at;
+    }
+    if (count == 3 && t[1] > t[2]) {
+        double first = t[2];
+        t[2] = t[1];
+        t[1] = first;
+    }
+    t[count++] = 1;
+    return count;
+}
+
+/* Support point of a template as it was given: all arcs are looked at where they deviate. */
+static dem2d_vec dem2di_given_support(const dem2d_shape *shape, dem2d_vec u, double *rho) {
+    dem2d_vec best = dem2di_support(shape, u, rho);
+    if (!dem2di_deviates(shape)) return best;
+    double most = -HUGE_VAL;
+    for (int k = 0; k < shape->count; k++) {
+        double t[4];
+        for (int i = dem2di_arc_stations(&shape->given[k], u, t) - 1; i >= 0; i--) {
+            dem2d_vec point = dem2di_arc_point(&shape->given[k], t[i]);
+            if (dem2di_dot(point, u) <= most) continue;
+            most = dem2di_dot(point, u);
+            best = point;
+        }
+    }
+    return best;
+}
+
+/* The same at a pose, relative to its position. */
+static dem2d_vec dem2di_posed_given(const dem2d_shape *shape, const dem2d_pose *pose, dem2d_vec u,
+                                    double *rho) {
+    dem2d_vec s = dem2di_given_support(shape, dem2di_turn_back(pose->rotation, u), rho);
+    if (rho != NULL) *rho *= pose->scale;
+    return dem2di_scale(dem2di_turn(pose->rotation, s), pose->scale);
+}
+
+/* From a point on the parts straight along u to the arcs that were given; 60 halvings of a
+   parameter are below its rounding. */
+static dem2d_vec dem2di_given_point(const dem2d_shape *shape, dem2d_vec u, dem2d_vec point) {
+    double place = dem2di_cross(u, point), height = -HUGE_VAL;
+    for (int k = 0; k < shape->count && dem2di_deviates(shape); k++) {
+        const dem2di_arc *arc = &shape->given[k];
+        double t[4];
+        int count = dem2di_arc_stations(arc, dem2di_perp(u), t);
+        for (int i = 0; i + 1 < count; i++) {
+            double low = t[i], high = t[i + 1];
+            if (!(dem2di_cross(u, dem2di_arc_point(arc, low)) <= place) ||
+                !(dem2di_cross(u, dem2di_arc_point(arc, high)) >= place))
+                continue; /* not there, or on the far side */
+            for (int j = 0; j < 60; j++) {
+                double middle = (low + high) / 2;
+                bool before = dem2di_cross(u, dem2di_arc_point(arc, middle)) < place;
+                *(before ? &low : &high) = middle;
+            }
+            height = dem2di_max(height, dem2di_dot(u, dem2di_arc_point(arc, low)));
+        }
+    }
+    /* beyond the last point across u there is nothing to go to */
+    double way = height - dem2di_dot(u, point);
+    return fabs(way) <= 2 * shape->deviation ? dem2di_along(point, way, u) : point;
+}
+
 DEM2D_API dem2d_result dem2d_shape_support(const dem2d_shape *shape, dem2d_pose pose,
                                            dem2d_vec direction, dem2d_support *support) {
     if (shape == NULL || support == NULL) return DEM2D_NULL_ARGUMENT;
@@ -3613,7 +4158,7 @@ DEM2D_API dem2d_result dem2d_shape_support(const dem2d_shape *shape, dem2d_pose 
     if (!dem2di_vec_finite(direction)) return DEM2D_NOT_FINITE;
     dem2d_vec u;
     if (!dem2di_unit(direction, &u)) return DEM2D_OUT_OF_RANGE;
-    dem2d_vec s = dem2di_posed_support(shape, &pose, u, &support->rho);
+    dem2d_vec s = dem2di_posed_given(shape, &pose, u, &support->rho);
     support->direction = u;
     support->value = dem2di_dot(s, u);
     support->point = dem2di_add(pose.position, s);
@@ -3627,7 +4172,7 @@ DEM2D_API dem2d_result dem2d_shape_aabb(const dem2d_shape *shape, dem2d_pose pos
     double extent[4]; /* along +x, +y, -x, -y */
     dem2d_vec u = dem2di_vec(1, 0);
     for (int i = 0; i < 4; i++) {
-        extent[i] = dem2di_dot(dem2di_posed_support(shape, &pose, u, NULL), u);
+        extent[i] = dem2di_dot(dem2di_posed_given(shape, &pose, u, NULL), u);
         u = dem2di_perp(u);
     }
     box->lower = dem2di_vec(pose.position.x - extent[2], pose.position.y - extent[3]);
@@ -3737,8 +4282,8 @@ static dem2di_tensor dem2di_second_bezier(const dem2d_shape *shape, dem2d_rot q)
     for (int k = 0; k < shape->count; k++)
         for (int i = 0; i < 6; i++) {
             double weight, t = dem2di_gauss_point(i, &weight);
-            dem2d_vec p = dem2di_turn_back(q, dem2di_arc_point(&shape->arcs[k], t));
-            dem2d_vec v = dem2di_turn_back(q, dem2di_arc_speed(&shape->arcs[k], t));
+            dem2d_vec p = dem2di_turn_back(q, dem2di_arc_point(&shape->given[k], t));
+            dem2d_vec v = dem2di_turn_back(q, dem2di_arc_speed(&shape->given[k], t));
             dem2di_tensor_add(&sum, 1.5 * weight * dem2di_cross(p, v) / 4, p, p);
         }
     return sum;
@@ -8005,15 +8550,16 @@ static bool dem2di_edges_solve(dem2di_pair *pair, const dem2di_feature *last, de
    uses: config, math, support, gjk, epa, edges
    ============================================================================================ */
 
-/* One look at h(u) = s(u).u and dh/du = s(u).perp(u). On the normal of a polygon's edge both ends
-   are kept: v[0] is the support from the clockwise side, v[1] from the other; elsewhere v[0]. */
+/* One look at h(u) = s(u).u and dh/du = s(u).perp(u). On the normal of an edge both ends are kept:
+   v[0] is the support from the clockwise side, v[1] from the other; elsewhere v[0]. */
 typedef struct dem2di_sight {
     dem2d_vec u;
     dem2di_vertex v[2];
     bool edge;
     double h, slope[2]; /* slopes on both sides */
     double rho[2];      /* of A and of B, apart from the edge */
-    int corner[2];      /* of the polygon, if the pair has one, for v[0] and v[1] */
+    int part[2][2];     /* of A and of B where they have edges, for v[0] and v[1] */
+    bool still;         /* at rest: nothing is known of what is beside it */
 } dem2di_sight;
 
 static inline void dem2di_see(dem2di_pair *pair, dem2d_vec u, dem2di_sight *sight) {
@@ -8026,85 +8572,187 @@ static inline void dem2di_see(dem2di_pair *pair, dem2d_vec u, dem2di_sight *sigh
     sight->slope[0] = sight->slope[1] = u.x * v->w.y - u.y * v->w.x;
 }
 
-/* The polygon of a pair that has one. */
-typedef struct dem2di_polygon {
+/* One shape of a pair: polygons and polybeziers with straight arcs have edges, whose normals no
+   step of Newton would hit. */
+typedef struct dem2di_member {
     const dem2d_shape *shape;
     dem2d_rot q;
     double scale;
-    bool first; /* it is A */
-} dem2di_polygon;
+    int own; /* 0 for A, 1 for B */
+} dem2di_member;
 
-static dem2di_polygon dem2di_polygon_of(const dem2di_pair *pair) {
-    dem2di_polygon p;
-    p.first = pair->a->type == DEM2D_POLYGON;
-    p.shape = p.first ? pair->a : pair->b;
-    p.q = p.first ? pair->ra : pair->rb;
-    p.scale = p.first ? pair->scale_a : pair->scale_b;
-    return p;
+static dem2di_member dem2di_member_of(const dem2di_pair *pair, int own) {
+    dem2di_member m;
+    m.own = own;
+    m.shape = own == 0 ? pair->a : pair->b;
+    m.q = own == 0 ? pair->ra : pair->rb;
+    m.scale = own == 0 ? pair->scale_a : pair->scale_b;
+    return m;
 }
 
-/* A direction of the pair in the polygon's own coordinates. */
-static dem2d_vec dem2di_polygon_view(const dem2di_polygon *p, dem2d_vec u) {
-    return dem2di_turn_back(p->q, p->first ? u : dem2di_negate(u));
+/* A direction of the pair in the coordinates of a member, and back. */
+static dem2d_vec dem2di_member_view(const dem2di_member *m, dem2d_vec u) {
+    return dem2di_turn_back(m->q, m->own == 0 ? u : dem2di_negate(u));
 }
 
-/* The same for a polygon and another shape: at corner `low`, or in u along the normal of the edge
-   from corner `low` to `high`. */
-static void dem2di_see_polygon(dem2di_pair *pair, const dem2di_polygon *p, dem2d_vec u, int low,
-                               int high, dem2di_sight *sight) {
-    const dem2d_shape *other = p->first ? pair->b : pair->a;
-    dem2d_rot q = p->first ? pair->rb : pair->ra;
-    double scale = p->first ? pair->scale_b : pair->scale_a, rho;
-    dem2d_vec v = p->first ? u : dem2di_negate(u);
-    dem2d_vec s = dem2di_support(other, dem2di_turn_back(q, dem2di_negate(v)), &rho);
-    s = dem2di_scale(dem2di_turn(q, s), scale);
-    sight->u = u;
-    sight->edge = low != high;
-    sight->corner[0] = low;
-    sight->corner[1] = high;
+static dem2d_vec dem2di_member_normal(const dem2di_member *m, int edge) {
+    dem2d_vec u = dem2di_turn(m->q, dem2di_right(m->shape->ends[edge]));
+    return m->own == 0 ? u : dem2di_negate(u);
+}
+
+/* The support of one member in u, at both ends of an edge (-1: none), else of a part. */
+static void dem2di_member_see(const dem2di_member *m, dem2d_vec u, int part, int edge,
+                              dem2di_sight *sight, dem2d_vec s[2]) {
+    const dem2d_shape *shape = m->shape;
+    double rho = shape->rounding;
+    dem2d_vec v = dem2di_member_view(m, u);
     for (int i = 0; i < 2; i++) {
-        if (i == 0 || sight->edge) {
-            dem2d_vec c = dem2di_turn(p->q, p->shape->corners[sight->corner[i]]);
-            c = dem2di_scale(dem2di_along(c, p->shape->rounding, v), p->scale);
-            dem2di_join(pair, p->first ? c : s, p->first ? s : c, &sight->v[i]);
+        sight->part[m->own][i] = part;
+        if (edge >= 0) {
+            s[i] = dem2di_edge_end(shape, edge, i == 1);
+            sight->part[m->own][i] = dem2di_edge_part(shape, edge, 2 * i - 1);
+        } else if (i == 1) {
+            s[1] = s[0];
+            continue;
+        } else if (shape->type == DEM2D_POLYGON) {
+            s[0] = shape->corners[part];
+        } else if (shape->type == DEM2D_BEZIER) {
+            s[0] = dem2di_arc_support(&shape->arcs[part], v, &rho);
+        } else {
+            s[0] = dem2di_support(shape, v, &rho);
         }
+        if (shape->type == DEM2D_POLYGON) s[i] = dem2di_along(s[i], rho, v);
+        s[i] = dem2di_scale(dem2di_turn(m->q, s[i]), m->scale);
+    }
+    sight->rho[m->own] = rho * m->scale;
+}
+
+/* A look at edges (-1: none) and parts of both. */
+static void dem2di_see_at(dem2di_pair *pair, const dem2di_member member[2], dem2d_vec u,
+                          const int part[2], const int edge[2], dem2di_sight *sight) {
+    dem2d_vec a[2], b[2];
+    sight->u = u;
+    sight->edge = edge[0] >= 0 || edge[1] >= 0;
+    dem2di_member_see(&member[0], u, part[0], edge[0], sight, a);
+    dem2di_member_see(&member[1], u, part[1], edge[1], sight, b);
+    for (int i = 0; i < 2; i++) {
+        if (i == 0 || sight->edge) dem2di_join(pair, a[i], b[i], &sight->v[i]);
         sight->slope[i] = dem2di_cross(u, sight->v[sight->edge ? i : 0].w);
     }
     sight->h = dem2di_dot(sight->v[0].w, u);
-    sight->rho[p->first ? 0 : 1] = p->shape->rounding * p->scale;
-    sight->rho[p->first ? 1 : 0] = rho * scale;
     pair->calls++;
 }
 
-static void dem2di_see_edge(dem2di_pair *pair, const dem2di_polygon *p, int edge,
+/* The part of a member that holds its support point in u; 0 when it has none. */
+static inline int dem2di_member_part(const dem2di_member *m, dem2d_vec u) {
+    if (!dem2di_has_parts(m->shape)) return 0;
+    return dem2di_part_find(m->shape, dem2di_member_view(m, u));
+}
+
+/* The edge beside a part whose normal is nearest to u, and the sine between them; -1 when there is
+   none in front. */
+static int dem2di_member_near(const dem2di_member *m, dem2d_vec u, int part, double *sine) {
+    int nearest = -1;
+    if (!m->shape->flat) return -1;
+    dem2d_vec v = dem2di_member_view(m, u);
+    for (int side = 1; side >= -1; side -= 2) {
+        int edge = dem2di_edge_beside(m->shape, part, side);
+        dem2d_vec along = m->shape->ends[edge];
+        double off = fabs(dem2di_dot(along, v));
+        if (!(off < *sine) || !(dem2di_cross(v, along) > 0)) continue;
+        *sine = off;
+        nearest = edge;
+    }
+    return nearest;
+}
+
+/* Normals as near as that (sine) are one: the faces of both are met together. */
+#define DEM2DI_PARALLEL (8 * DBL_EPSILON)
+
+/* A look along the normal of an edge of one member, with the other's if that is parallel. */
+static void dem2di_see_edge(dem2di_pair *pair, const dem2di_member member[2], int own, int found,
                             dem2di_sight *sight) {
-    dem2d_vec u = dem2di_turn(p->q, dem2di_right(p->shape->ends[edge]));
-    dem2di_see_polygon(pair, p, p->first ? u : dem2di_negate(u), edge,
-                       dem2di_around(p->shape->count, edge, 1), sight);
+    int part[2] = {0, 0}, edge[2] = {-1, -1}, other = 1 - own;
+    double parallel = DEM2DI_PARALLEL;
+    dem2d_vec u = dem2di_member_normal(&member[own], found);
+    edge[own] = found;
+    part[other] = dem2di_member_part(&member[other], u);
+    edge[other] = dem2di_member_near(&member[other], u, part[other], &parallel);
+    dem2di_see_at(pair, member, u, part, edge, sight);
 }
 
-static void dem2di_see_first(dem2di_pair *pair, const dem2di_polygon *p, dem2d_vec u,
+/* The first look: along the normal of an edge nearby, if there is one. */
+static void dem2di_see_first(dem2di_pair *pair, const dem2di_member member[2], dem2d_vec u,
                              dem2di_sight *sight) {
-    dem2d_vec v = dem2di_polygon_view(p, u);
-    int k = dem2di_polygon_corner(p->shape, v), before = dem2di_around(p->shape->count, k, -1);
-    double ahead = -dem2di_dot(p->shape->ends[k], v), back = dem2di_dot(p->shape->ends[before], v);
-    if (dem2di_min(ahead, back) < DEM2DI_SNAP)
-        dem2di_see_edge(pair, p, ahead < back ? k : before, sight);
+    static const int none[2] = {-1, -1};
+    int part[2], own = -1, found = -1;
+    double sine = DEM2DI_SNAP;
+    for (int i = 0; i < 2; i++) {
+        part[i] = dem2di_member_part(&member[i], u);
+        int edge = dem2di_member_near(&member[i], u, part[i], &sine);
+        if (edge >= 0) own = i, found = edge;
+    }
+    if (found >= 0)
+        dem2di_see_edge(pair, member, own, found, sight);
     else
-        dem2di_see_polygon(pair, p, u, k, k, sight);
+        dem2di_see_at(pair, member, u, part, none, sight);
 }
 
-/* From the corner seen last towards a direction: there if it is the same corner's, else along the
-   normal of the last edge on the way, which no Newton step would hit. */
-static void dem2di_see_towards(dem2di_pair *pair, const dem2di_polygon *p, dem2d_vec u,
+/* The last edge of a member passed on the way to one of its parts, turning to a side; -1: none. */
+static inline int dem2di_member_passed(const dem2di_member *m, int from, int to, int side) {
+    if (!m->shape->flat || from == to) return -1;
+    int edge = dem2di_edge_beside(m->shape, to, -side), n = m->shape->parts;
+    if (m->shape->type == DEM2D_POLYGON) return edge;
+    /* how far back are it and the start? */
+    int back = side * (to - edge), all = side * (to - from);
+    return back + (back < 0 ? n : 0) < all + (all < 0 ? n : 0) ? edge : -1;
+}
+
+/* The last edge of both on the way from the last look to u, where the parts are: -1 when there is
+   none. */
+static int dem2di_edge_passed(const dem2di_member member[2], dem2d_vec u, const int part[2],
+                              const dem2di_sight *sight, int *own) {
+    int side = dem2di_cross(sight->u, u) > 0 ? 1 : -1, found = -1;
+    dem2d_vec normal = sight->u;
+    for (int i = 0; i < 2; i++) {
+        int edge = dem2di_member_passed(&member[i], sight->part[i][0], part[i], side);
+        if (edge < 0) continue;
+        dem2d_vec n = dem2di_member_normal(&member[i], edge);
+        if (found >= 0 && side * dem2di_cross(normal, n) <= 0) continue;
+        normal = n;
+        found = edge;
+        *own = i;
+    }
+    return found;
+}
+
+/* From the last look towards a direction: there, or along the normal of the last edge on the way.
+ */
+static void dem2di_see_towards(dem2di_pair *pair, const dem2di_member member[2], dem2d_vec u,
                                dem2di_sight *sight) {
-    int k = dem2di_polygon_corner(p->shape, dem2di_polygon_view(p, u));
-    if (k == sight->corner[0])
-        dem2di_see_polygon(pair, p, u, k, k, sight);
+    static const int none[2] = {-1, -1};
+    int part[2], own = 0;
+    for (int i = 0; i < 2; i++) part[i] = dem2di_member_part(&member[i], u);
+    int found = dem2di_edge_passed(member, u, part, sight, &own);
+    if (found >= 0)
+        dem2di_see_edge(pair, member, own, found, sight);
     else
-        dem2di_see_edge(pair, p,
-                        dem2di_cross(sight->u, u) > 0 ? dem2di_around(p->shape->count, k, -1) : k,
-                        sight);
+        dem2di_see_at(pair, member, u, part, none, sight);
+}
+
+/* From an edge to its end on a side, beyond which the minimum is. */
+static void dem2di_leave_edge(const dem2di_pair *pair, int side, dem2di_sight *sight) {
+    sight->v[0] = sight->v[side];
+    sight->slope[0] = sight->slope[1] = sight->slope[side];
+    sight->edge = false;
+    for (int i = 0; i < 2; i++) {
+        const dem2d_shape *shape = i == 0 ? pair->a : pair->b;
+        bool met = sight->part[i][0] != sight->part[i][1]; /* this one's edge */
+        sight->part[i][0] = sight->part[i][1] = sight->part[i][side];
+        if (!met || shape->type != DEM2D_BEZIER) continue;
+        double scale = i == 0 ? pair->scale_a : pair->scale_b;
+        sight->rho[i] = scale * dem2di_arc_rho(&shape->arcs[sight->part[i][0]], side == 0 ? 1 : 0);
+    }
 }
 
 /* A descent: the directions between which the minimum is, and what was seen there. */
@@ -8140,10 +8788,11 @@ static bool dem2di_bracket_holds(const dem2di_bracket *bracket, dem2d_vec u) {
 }
 
 /* The next direction where Newton's has left the bracket: the normal of the chord of both ends,
-   which finds flat faces, or the middle. False when there is nothing between the ends. */
-static bool dem2di_bracket_next(dem2di_bracket *bracket, dem2d_vec *u) {
+   which finds flat faces, or the middle; at once the middle where Newton's steps are slow. False
+   when there is nothing between the ends. */
+static bool dem2di_bracket_next(dem2di_bracket *bracket, bool slow, dem2d_vec *u) {
     const dem2d_vec *end = bracket->end;
-    bracket->chord = bracket->seen[0] && bracket->seen[1] &&
+    bracket->chord = !slow && bracket->seen[0] && bracket->seen[1] &&
                      dem2di_unit(dem2di_right(dem2di_sub(bracket->at[1].w, bracket->at[0].w)), u) &&
                      dem2di_bracket_holds(bracket, *u);
     if (bracket->chord) return true;
@@ -8170,11 +8819,7 @@ static inline bool dem2di_at_rest(const dem2di_pair *pair, const dem2di_bracket 
                                   double angle, dem2di_sight *sight) {
     if (sight->edge) {
         if (sight->slope[0] <= 0 && sight->slope[1] >= 0) return true;
-        int side = sight->slope[1] < 0; /* the minimum is beyond this end */
-        sight->v[0] = sight->v[side];
-        sight->corner[0] = sight->corner[side];
-        sight->slope[0] = sight->slope[1] = sight->slope[side];
-        sight->edge = false;
+        dem2di_leave_edge(pair, sight->slope[1] < 0, sight);
     }
     double bend = sight->rho[0] + sight->rho[1] - sight->h, slope = sight->slope[0];
     if (dem2di_bends(pair, bend) && fabs(slope) <= angle * bend &&
@@ -8202,18 +8847,45 @@ static inline dem2d_vec dem2di_newton(const dem2di_sight *sight, double bend) {
     return dem2di_vec((ux - e * uy) * f, (uy + e * ux) * f);
 }
 
+/* May a face begin beside a direction without a sign of it? Of custom shapes nothing is known. */
+static bool dem2di_unseen(const dem2d_shape *shape) {
+    return shape->type == DEM2D_CUSTOM;
+}
+
+/* Is it known what is beside a rest, so far as Newton's last step turns? Not past an edge. Past the
+   end of an arc rho may be any, and before an edge that was seen it may grow without bound: the
+   rest must be nearer then (a thousandth of the angle), and is taken as it is. */
+static bool dem2di_step_known(const dem2di_member member[2], const dem2di_bracket *bracket,
+                              double angle, double bend, dem2di_sight *sight) {
+    int part[2], own = 0;
+    dem2d_vec u = dem2di_newton(sight, bend);
+    for (int i = 0; i < 2; i++) {
+        part[i] = dem2di_member_part(&member[i], u);
+        sight->still |= part[i] != sight->part[i][0];
+    }
+    if (!sight->still) return true;
+    int edge = dem2di_edge_passed(member, u, part, sight, &own);
+    if (edge >= 0) {
+        bool seen = bracket->known &&
+                    !dem2di_bracket_holds(bracket, dem2di_member_normal(&member[own], edge));
+        if (!seen || member[own].shape->type == DEM2D_POLYGON) return false;
+    }
+    return fabs(sight->slope[0]) <= 1e-3 * angle * bend;
+}
+
 /* Down from a direction to a local minimum of h, by Newton's step on the osculating circle,
    u <- (rho u - s)/|rho u - s|, kept inside a bracket. With `detect` the first direction that
    separates is enough. False when the cap comes first. */
 static bool dem2di_descend(dem2di_pair *pair, dem2d_vec u, double angle, int cap, bool detect,
                            dem2di_sight *sight, dem2di_search *search) {
     dem2di_bracket bracket;
-    bool mixed = pair->a->type == DEM2D_POLYGON || pair->b->type == DEM2D_POLYGON;
-    dem2di_polygon polygon;
+    bool parts = dem2di_has_parts(pair->a) || dem2di_has_parts(pair->b);
+    double turned[2] = {HUGE_VAL, HUGE_VAL}; /* by the last two steps of Newton */
+    dem2di_member member[2];
     bracket.known = bracket.seen[0] = bracket.seen[1] = bracket.chord = false;
-    if (mixed) {
-        polygon = dem2di_polygon_of(pair);
-        dem2di_see_first(pair, &polygon, u, sight);
+    if (parts) {
+        for (int i = 0; i < 2; i++) member[i] = dem2di_member_of(pair, i);
+        dem2di_see_first(pair, member, u, sight);
     } else {
         dem2di_see(pair, u, sight);
     }
@@ -8225,26 +8897,29 @@ static bool dem2di_descend(dem2di_pair *pair, dem2d_vec u, double angle, int cap
             search->normal.y = sight->u.y;
         }
         if (detect && sight->h < -DEM2DI_ROUNDING * pair->size) return true;
-        double rho = sight->rho[0] + sight->rho[1], bend = rho - sight->h;
-        if (dem2di_at_rest(pair, &bracket, angle, sight)) {
-            if (!mixed || sight->edge) return true;
-            /* the last step of Newton must not turn past an edge unseen */
-            u = dem2di_newton(sight, bend);
-            int k = dem2di_polygon_corner(polygon.shape, dem2di_polygon_view(&polygon, u));
-            if (k == sight->corner[0]) return true;
+        bool rest = dem2di_at_rest(pair, &bracket, angle, sight);
+        double bend = sight->rho[0] + sight->rho[1] - sight->h, slope = sight->slope[0];
+        if (rest) {
+            sight->still = dem2di_unseen(pair->a) || dem2di_unseen(pair->b);
+            if (!parts || sight->edge || dem2di_step_known(member, &bracket, angle, bend, sight))
+                return true;
         }
-        double slope = sight->slope[0];
         bool bends = dem2di_bends(pair, bend);
         /* a small step needs no bracket, unless it has not helped before */
         bool near = bends && fabs(slope) < 0.2 * bend && i < 4;
         bool outside = (bracket.known || !near) && !dem2di_bracket_cut(pair, sight, &bracket);
-        bool newton = bends && !outside;
+        /* where rho grows without bound Newton's step jumps to and fro: it has to halve in two */
+        double turn = bends ? fabs(slope) / bend : HUGE_VAL;
+        bool slow = bracket.known && bracket.seen[0] && bracket.seen[1] && turn > 0.5 * turned[0];
+        bool newton = bends && !outside && !slow;
+        turned[0] = turned[1];
+        turned[1] = turn;
         bracket.chord = false;
         if (newton) u = dem2di_newton(sight, bend);
         if (!newton || (bracket.known && !dem2di_bracket_holds(&bracket, u)))
-            if (!dem2di_bracket_next(&bracket, &u)) return false;
-        if (mixed)
-            dem2di_see_towards(pair, &polygon, u, sight);
+            if (!dem2di_bracket_next(&bracket, slow, &u)) return false;
+        if (parts)
+            dem2di_see_towards(pair, member, u, sight);
         else
             dem2di_see(pair, u, sight);
         /* an edge on the way to the chord's normal is not the chord */
@@ -8253,16 +8928,10 @@ static bool dem2di_descend(dem2di_pair *pair, dem2d_vec u, double angle, int cap
     return false;
 }
 
-/* May a face begin beside a direction without a sign of it? Of custom shapes nothing is known. */
-static bool dem2di_unseen(const dem2d_shape *shape) {
-    return shape->type == DEM2D_CUSTOM || (shape->type == DEM2D_BEZIER && shape->flat);
-}
-
 /* The minimum at rest: along an edge the foot of the origin; else Newton's last step, on the
    osculating circle, which leaves the square of its angle. Where a face may begin beside the last
    look there is no step. */
-static void dem2di_settle(const dem2di_pair *pair, const dem2di_sight *sight,
-                          dem2di_search *search) {
+static void dem2di_settle(const dem2di_sight *sight, dem2di_search *search) {
     const dem2di_vertex *v = sight->v;
     double ux = sight->u.x, uy = sight->u.y, slope = sight->slope[0];
     search->normal.x = ux;
@@ -8276,7 +8945,7 @@ static void dem2di_settle(const dem2di_pair *pair, const dem2di_sight *sight,
     }
     /* tan of the angle; for small e sine e, 1 - cosine and the fall of h, bend e^2/2, to e^4 */
     double e = -slope / (sight->rho[0] + sight->rho[1] - sight->h), fall = e * e / 2, half = 0.5;
-    if (dem2di_unseen(pair->a) || dem2di_unseen(pair->b)) e = fall = 0;
+    if (sight->still) e = fall = 0;
     double tangent = e;
     if (fall > 1e-8) { /* a tolerance above 1e-6 was asked for */
         double root = sqrt(1 + e * e);
@@ -8397,6 +9066,7 @@ static void dem2di_branch(dem2di_pair *pair, double tolerance, double angle, int
                           dem2di_search *search) {
     dem2di_polytope polytope;
     dem2d_vec end[2], u = search->normal;
+    (void)dem2di_unit(search->normal, &u); /* steps and warm starts let the length drift */
     polytope.vertices = polytope.edges = 0;
     polytope.arcs = true;
     search->upper = HUGE_VAL; /* the least value again, with its points */
@@ -8424,10 +9094,9 @@ static void dem2di_branch(dem2di_pair *pair, double tolerance, double angle, int
         last.lower = dem2di_min(last.upper, search->lower);
     } else {
         dem2di_sight sight;
-        if (!dem2di_descend(pair, search->normal, angle, cap, false, &sight, &last) ||
-            sight.h > search->upper + tolerance)
-            return;
-        dem2di_settle(pair, &sight, &last);
+        if (!dem2di_descend(pair, search->normal, angle, cap, false, &sight, &last)) return;
+        dem2di_settle(&sight, &last);
+        if (last.upper > search->upper + DEM2DI_ROUNDING * pair->size) return;
         /* what Newton's last step takes away was not attained: as unsure as what is below */
         last.upper = dem2di_max(last.upper, search->lower);
         last.lower = dem2di_min(search->lower, 2 * last.upper - sight.h);
@@ -8478,7 +9147,7 @@ static void dem2di_certified(dem2di_pair *pair, const dem2di_feature *last, dem2
             return;
         }
         if (rest) {
-            dem2di_settle(pair, &sight, search);
+            dem2di_settle(&sight, search);
             search->state = dem2di_judge(pair, search);
         }
         bool proved = rest && dem2di_certify(pair, &sight, absolute, search);
@@ -8534,16 +9203,14 @@ static inline int dem2di_polygon_face(const dem2d_shape *shape, dem2d_vec v, int
 
 /* The straight arc nearest to v, or -1. */
 static int dem2di_arc_face(const dem2d_shape *shape, dem2d_vec v) {
-    int n = shape->count, k = dem2di_sector_find(shape, v), nearest = -1;
+    int k = dem2di_sector_find(shape, v), nearest = -1;
     double least = DEM2DI_FLAT_ANGLE;
-    for (int i = n - 1; i <= n + 1; i++) {
-        const dem2di_arc *arc = &shape->arcs[(k + i) % n];
-        dem2d_vec way = dem2di_add(dem2di_add(arc->d0, arc->d1), arc->d2), along;
-        if (!dem2di_arc_straight(shape, arc)) continue;
-        if (!dem2di_unit(way, &along) || dem2di_cross(v, along) <= 0) continue;
-        if (!(fabs(dem2di_dot(along, v)) < least)) continue;
+    for (int side = -1; side <= 1; side += 2) {
+        int edge = dem2di_edge_beside(shape, k, side);
+        dem2d_vec along = shape->ends[edge];
+        if (!(dem2di_cross(v, along) > 0) || !(fabs(dem2di_dot(along, v)) < least)) continue;
         least = fabs(dem2di_dot(along, v));
-        nearest = (k + i) % n;
+        nearest = edge;
     }
     return nearest;
 }
@@ -8556,28 +9223,15 @@ static inline int dem2di_face_find(const dem2d_shape *shape, dem2d_vec v, int co
                                side);
 }
 
-/* The last face of a shape before one of its edges or arcs: the corner between is named by it. */
-static int dem2di_face_before(const dem2d_shape *shape, int face) {
-    int k = dem2di_around(shape->count, face, -1);
-    while (shape->type == DEM2D_BEZIER && k != face && !dem2di_arc_straight(shape, &shape->arcs[k]))
-        k = dem2di_around(shape->count, k, -1);
-    return k;
-}
-
 /* A face that was found, of a shape of a scale, seen from its centre. */
 static void dem2di_face_set(const dem2d_shape *shape, double scale, dem2d_vec v, int found,
                             dem2di_face *face) {
-    dem2d_vec from, way, support;
-    if (shape->type == DEM2D_POLYGON) {
-        from = shape->corners[found];
-        way = dem2di_sub(shape->corners[dem2di_around(shape->count, found, 1)], from);
+    dem2d_vec from = dem2di_edge_end(shape, found, false);
+    dem2d_vec way = dem2di_sub(dem2di_edge_end(shape, found, true), from), support;
+    if (shape->type == DEM2D_POLYGON)
         support = dem2di_along(from, dem2di_dot(v, way) > 0, way);
-    } else {
-        const dem2di_arc *arc = &shape->arcs[found];
-        from = arc->start;
-        way = dem2di_add(dem2di_add(arc->d0, arc->d1), arc->d2);
-        support = dem2di_bezier_support(shape, v, NULL);
-    }
+    else
+        support = dem2di_arc_support(&shape->arcs[dem2di_sector_find(shape, v)], v, NULL);
     double x0 = dem2di_cross(v, from), width = dem2di_cross(v, way);
     face->rise = dem2di_dot(v, way) / width;
     face->x0 = x0 * scale;
@@ -8588,9 +9242,10 @@ static void dem2di_face_set(const dem2d_shape *shape, double scale, dem2d_vec v,
     face->square = dem2di_dot(way, way) * (scale * scale);
     face->rounding = shape->rounding * scale;
     face->endless = false;
-    face->corner0 = 2 * dem2di_face_before(shape, found);
+    /* a corner between two faces is named by the one before it */
+    face->corner0 = 2 * dem2di_edge_beside(shape, dem2di_edge_part(shape, found, -1), -1);
     face->corner1 = 2 * found;
-    if (face->corner0 == face->corner1) face->corner0 += 2 * shape->count; /* the only face */
+    if (face->corner0 == face->corner1) face->corner0 += 2 * shape->parts; /* the only face */
 }
 
 /* B's face towards -u, seen along u from A's centre. */
@@ -8963,6 +9618,27 @@ static double dem2di_circle_contact(dem2d_vec d, double distance, double radii, 
     return radii - distance;
 }
 
+/* The witness points of a search on the shapes as they were given; the sign of the depth is known
+   beyond how far both may deviate. */
+static void dem2di_report_given(const dem2di_pair *pair, const dem2di_search *search,
+                                dem2d_contact *contact) {
+    double deviation = pair->a->deviation * pair->scale_a + pair->b->deviation * pair->scale_b;
+    contact->error += deviation;
+    if (contact->state != DEM2D_UNRESOLVED && fabs(search->upper) <= deviation) {
+        contact->state = DEM2D_TOUCHING;
+        contact->error += fabs(search->upper); /* and 0 is within it */
+    }
+    for (int i = 0; i < 2; i++) {
+        dem2di_member m = dem2di_member_of(pair, i);
+        dem2d_vec *witness = i == 0 ? &contact->point_a : &contact->point_b;
+        dem2d_vec u = i == 0 ? search->normal : dem2di_negate(search->normal);
+        dem2d_vec v = dem2di_turn_back(m.q, u), old = i == 0 ? search->a : search->b;
+        old = dem2di_scale(dem2di_turn_back(m.q, old), 1 / m.scale);
+        dem2d_vec way = dem2di_sub(dem2di_given_point(m.shape, v, old), old);
+        *witness = dem2di_along(*witness, m.scale * dem2di_dot(way, v), u);
+    }
+}
+
 static void dem2di_contact_report(const dem2di_pair *pair, const dem2di_search *search,
                                   const dem2d_pose *pose_a, const dem2d_pose *pose_b,
                                   bool skip_points, dem2d_contact *contact) {
@@ -8979,11 +9655,12 @@ static void dem2di_contact_report(const dem2di_pair *pair, const dem2di_search *
     contact->point_a.y = pose_a->position.y + search->a.y;
     contact->point_b.x = pose_b->position.x + search->b.x;
     contact->point_b.y = pose_b->position.y + search->b.y;
+    if (pair->a->deviation + pair->b->deviation > 0) dem2di_report_given(pair, search, contact);
     contact->point.x = (contact->point_a.x + contact->point_b.x) * 0.5;
     contact->point.y = (contact->point_a.y + contact->point_b.y) * 0.5;
     contact->count = 0;
     memset(contact->points, 0, sizeof contact->points);
-    if (search->state == DEM2D_SEPARATED || skip_points) return;
+    if (contact->state == DEM2D_SEPARATED || skip_points) return;
     contact->count = dem2di_pair_points(pair, search, contact->points);
     for (int i = 0; i < contact->count; i++)
         contact->points[i].position = dem2di_add(contact->points[i].position, pose_a->position);
@@ -9116,7 +9793,8 @@ DEM2D_API dem2d_result dem2d_wall_contact(const dem2d_shape *shape, dem2d_pose p
     if (!dem2di_vec_finite(point) || !dem2di_vec_finite(wall_normal)) return DEM2D_NOT_FINITE;
     dem2d_vec u, support;
     if (!dem2di_unit(dem2di_negate(wall_normal), &u)) return DEM2D_OUT_OF_RANGE;
-    double depth = dem2di_wall_depth(shape, &pose, point, u, &support);
+    support = dem2di_posed_given(shape, &pose, u, NULL);
+    double depth = dem2di_dot(dem2di_add(dem2di_sub(pose.position, point), support), u);
     double size =
         shape->circumscribed * pose.scale + fabs(dem2di_dot(dem2di_sub(pose.position, point), u));
     double rounding = DEM2DI_ROUNDING * size;
@@ -9851,9 +10529,9 @@ typedef struct dem2di_plan {
     bool turns; /* some particle is no circle: rotations matter, and pairs are skipped by travel */
     bool one_law; /* all particles are of one material: */
     int material;
-    bool joints;        /* two segments may meet */
-    bool full;          /* some law has a dashpot or rolling friction, or is the caller's: what the
-                           circles' batches do not know, so that all pairs have links and extras */
+    bool joints; /* two segments may meet */
+    bool full;   /* some law has a dashpot or rolling friction, or is the caller's: what the
+                    circles' batches do not know, so that all pairs have links and extras */
     bool friction_again, full_again; /* it is there for what the last list had of it: see
                                         dem2di_outlasts */
     bool faces;         /* contacts may have two points: by the rule, and some particle has faces */
@@ -10941,7 +11619,7 @@ static void dem2di_wall_place(dem2d_world *world, int slot, const dem2d_wall_des
 /* The line that segments are made of, when the first comes. The log knows if there is no memory. */
 static bool dem2di_line_make(dem2d_world *world, const dem2d_wall_desc *desc) {
     if (!desc->segment || world->line != NULL) return true;
-    dem2d_shape *line = dem2di_shape_allocate(&world->env, DEM2D_POLYGON, 2, 0);
+    dem2d_shape *line = dem2di_shape_allocate(&world->env, DEM2D_POLYGON, 2, 2);
     if (line == NULL) return false;
     for (int k = 0; k < 2; k++) {
         line->corners[k] = dem2di_vec(k - 0.5, 0);
@@ -14608,18 +15286,23 @@ static void dem2di_archive_custom(dem2di_archive *ar, dem2d_shape *shape) {
     shape->function_user = found->user;
 }
 
+static void dem2di_archive_arc(dem2di_archive *ar, dem2di_arc *arc) {
+    dem2di_archive_vec(ar, "arc", &arc->start);
+    dem2di_archive_vec(ar, "arc", &arc->d0);
+    dem2di_archive_vec(ar, "arc", &arc->d1);
+    dem2di_archive_vec(ar, "arc", &arc->d2);
+}
+
 /* What a shape's support points come from. The table of sectors and the multiples of a Fourier
    series follow from it with the same bits. */
 static void dem2di_archive_kernel(dem2di_archive *ar, dem2d_shape *shape) {
     for (int k = 0; shape->corners != NULL && k < shape->count; k++)
         dem2di_archive_vec(ar, "corner", &shape->corners[k]);
-    for (int k = 0; shape->arcs != NULL && k < shape->count; k++) {
-        dem2di_archive_vec(ar, "arc", &shape->arcs[k].start);
-        dem2di_archive_vec(ar, "arc", &shape->arcs[k].d0);
-        dem2di_archive_vec(ar, "arc", &shape->arcs[k].d1);
-        dem2di_archive_vec(ar, "arc", &shape->arcs[k].d2);
-    }
-    for (int k = 0; shape->ends != NULL && k < shape->count; k++)
+    for (int k = 0; shape->given != NULL && k < shape->count; k++)
+        dem2di_archive_arc(ar, &shape->given[k]);
+    for (int k = 0; shape->arcs != NULL && k < shape->parts; k++)
+        dem2di_archive_arc(ar, &shape->arcs[k]);
+    for (int k = 0; shape->ends != NULL && k < shape->parts; k++)
         dem2di_archive_vec(ar, "tangent", &shape->ends[k]);
     for (int n = 1; shape->blocks != NULL && n <= shape->count; n++) {
         double *a = &shape->blocks[(n - 1) / 4].a[(n - 1) % 4];
@@ -14632,22 +15315,24 @@ static void dem2di_archive_kernel(dem2di_archive *ar, dem2d_shape *shape) {
         dem2di_archive_finite(ar, "floor", &shape->floors[k]);
     if (!dem2di_archive_loaded(ar)) return;
     if (shape->sectors > 0) dem2di_fill_sectors(shape);
-    shape->flat = dem2di_has_faces(shape);
+    dem2di_find_edges(shape);
 }
 
 /* A shape, which is made when it is loaded. */
 static void dem2di_archive_shape(dem2di_archive *ar, const dem2d_env *env, dem2d_shape **shape) {
-    int type = *shape != NULL ? (int)(*shape)->type : 0,
-        count = *shape != NULL ? (*shape)->count : 0;
+    int type = *shape != NULL ? (int)(*shape)->type : 0;
+    int count = *shape != NULL ? (*shape)->count : 0;
     dem2di_archive_int(ar, "type", &type, 0, DEM2D_SHAPE_TYPE_COUNT - 1);
     dem2di_archive_count(ar, "count", &count, 2 * (int)sizeof(double));
+    int parts = *shape != NULL ? (*shape)->parts : type == DEM2D_POLYGON ? count : 0;
+    if (type == DEM2D_BEZIER) dem2di_archive_count(ar, "parts", &parts, 8 * (int)sizeof(double));
     if (dem2di_archive_loaded(ar)) {
         int least = type == DEM2D_POLYGON ? 3 : type == DEM2D_BEZIER ? 2 : 0;
         bool counts = least > 0 || type == DEM2D_FOURIER;
         dem2di_archive_expect(ar, count >= least && (counts || count == 0), "count of a shape");
+        dem2di_archive_expect(ar, parts >= (type == DEM2D_BEZIER ? 3 : 0), "parts of a shape");
         if (!dem2di_archive_good(ar)) return;
-        *shape = dem2di_shape_allocate(env, (dem2d_shape_type)type, count,
-                                       dem2di_sectors_of((dem2d_shape_type)type, count));
+        *shape = dem2di_shape_allocate(env, (dem2d_shape_type)type, count, parts);
         if (*shape == NULL) ar->result = DEM2D_OUT_OF_MEMORY; /* the log knows */
     }
     if (!dem2di_archive_good(ar)) return;
@@ -14659,6 +15344,7 @@ static void dem2di_archive_shape(dem2di_archive *ar, const dem2d_env *env, dem2d
     dem2di_archive_not_negative(ar, "inscribed", &s->inscribed);
     dem2di_archive_not_negative(ar, "rho_min", &s->rho_min);
     dem2di_archive_not_negative(ar, "rho_max", &s->rho_max);
+    if (s->type == DEM2D_BEZIER) dem2di_archive_not_negative(ar, "deviation", &s->deviation);
     dem2di_archive_positive(ar, "area", &s->mass.area);
     dem2di_archive_positive(ar, "polar_moment", &s->mass.polar_moment);
     dem2di_archive_vec(ar, "offset", &s->offset);
@@ -16162,6 +16848,9 @@ DEM2D_API dem2d_result dem2d_world_write_csv(const dem2d_world *world, const dem
             friction differ from those of 0.5.0); it goes by the step that was made, whatever has
             been set since. The ledger closes with dashpots at two points and where contacts open;
             it tells the turnover.
+            Polybeziers: arcs that turn by pi, straight and nearly straight ones, joints that are
+            smooth to seven digits only, and tiny arcs get right answers; dem2d_shape_info tells the
+            deviation.
      0.5.0  The two points of faces conserve energy between free polygons as well: each has a
             normal of its own and tells its energy. Snapshots of version 2.
      0.4.0  Dashpots by restitution, rolling friction, a caller's law, segment walls. Measures of
