@@ -71,6 +71,7 @@ typedef struct sample {
 static const sample samples[] = {
     SAMPLE("P1\n# bits\n4 3\n0 1 1 0\n1111\n0110\n"),
     SAMPLE("P2 3 2 # grey\n15\n0 7 15 15 8 0\n"),
+    SAMPLE("\xEF\xBB\xBF\"X\";y; z\n0,5;1;a\n2;\"3\";\n0;0;0\n0,5;1;a\n"),
     SAMPLE("P2\n2 2\n65535\n0 65535\n32768 1\n"),
     SAMPLE("P4\n10 2\n\xff\x40\x01\x80"),
     SAMPLE("P5 3 2 255\n\x00\x10\x20\xff\x80\x7f"),

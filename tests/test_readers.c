@@ -348,12 +348,48 @@ static void test_files(void **state) {
     }
 }
 
+/* --- options ---------------------------------------------------------------------------------- */
+
+static void test_crop(void **state) {
+    (void)state;
+    dem2d_image_desc search = default_search();
+    parse_crop("1, 20,300,0", &search);
+    assert_int_equal(search.crop_left, 1);
+    assert_int_equal(search.crop_top, 20);
+    assert_int_equal(search.crop_width, 300);
+    assert_int_equal(search.crop_height, 0);
+    assert_true(search.scale == 1 && search.threshold == 0 && !search.labels);
+}
+
+/* A star with deep notches is left out, unless a low coverage will do. */
+static void test_min_coverage(void **state) {
+    (void)state;
+    dem2d_vec points[10];
+    outline star = {points, 10, NULL};
+    template_set set = {NULL, 0, 0};
+    char name[] = "star";
+    star.name = name;
+    for (int i = 0; i < 10; i++) {
+        const dem2d_vec u = direction(0.6283185307179586 * i);
+        const double r = i % 2 ? 0.3 : 1;
+        points[i] = vec(r * u.x, r * u.y);
+    }
+    assert_false(add_fitted(&set, &star, 0.7, false));
+    assert_int_equal(set.count, 0);
+    assert_int_equal(set.outlines, 0);
+    assert_true(add_fitted(&set, &star, -10, false)); /* a coverage may be negative */
+    assert_int_equal(set.count, 2);
+    assert_int_equal(set.outlines, 1);
+    free_templates(&set);
+}
+
 int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(test_good_images),   cmocka_unit_test(test_bad_images),
         cmocka_unit_test(test_cut_images),    cmocka_unit_test(test_grey_levels),
         cmocka_unit_test(test_good_outlines), cmocka_unit_test(test_bad_outlines),
         cmocka_unit_test(test_long_numbers),  cmocka_unit_test(test_files),
+        cmocka_unit_test(test_crop),          cmocka_unit_test(test_min_coverage),
     };
     return cmocka_run_group_tests_name("readers", tests, NULL, NULL);
 }
