@@ -90,7 +90,9 @@ LIMITS
       concentric with the other), a search may reach its cap: the answer is then UNRESOLVED, with
       bounds a few 1e-4 of the size apart.
     * 32-bit x86 needs SSE2 (-msse2 -mfpmath=sse): the x87 rounds differently each time.
-    * -ffast-math is refused: it removes NaN checks and reorders sums.
+    * -ffast-math and its parts change results: -ffinite-math-only, -fassociative-math,
+      -freciprocal-math, -funsafe-math-optimizations. They are refused where the compiler tells of
+      them: gcc of all, clang of -ffast-math and -ffinite-math-only alone.
 
 QUICK START (examples/hello.c, the same bytes)
 
@@ -517,6 +519,10 @@ DETERMINISM
     order of the partner's id, so neither addresses nor storage order can change a bit. Not
     covered: clang -ffp-contract=fast on the command line, and 80-bit x87 arithmetic. Whether two
     runs are the same is told by dem2d_world_hash.
+    Your own arithmetic (positions and velocities you compute, support functions, contact laws) is
+    compiled by your flags: give -ffp-contract=off where its bits are to be the same as well. After
+    the implementation clang is back at the mode of the command line: a pragma of yours for
+    contraction belongs behind it.
     gcc does not inline across the header's floating-point region: calls into it stay calls.
 ================================================================================================
 */
@@ -1748,6 +1754,12 @@ DEM2D_API dem2d_result dem2d_world_write_csv(const dem2d_world *world, const dem
 
 #if defined(__FAST_MATH__)
 #error "dem2d.h: -ffast-math removes NaN checks and reorders sums; compile without it"
+#elif defined(__FINITE_MATH_ONLY__) && __FINITE_MATH_ONLY__ > 0
+#error "dem2d.h: -ffinite-math-only removes NaN checks; compile without it"
+#elif defined(__ASSOCIATIVE_MATH__)
+#error "dem2d.h: -fassociative-math reorders sums; compile without it"
+#elif defined(__RECIPROCAL_MATH__)
+#error "dem2d.h: -freciprocal-math rounds quotients twice; compile without it"
 #endif
 
 #include <float.h>
@@ -1765,8 +1777,7 @@ DEM2D_API dem2d_result dem2d_world_write_csv(const dem2d_world *world, const dem
 /* a * b + c must be two rounded operations everywhere, or runs differ between compilers. gcc 12
    forms fused a * b +- c from pairs of statements in its basic-block vectoriser even so. */
 #if defined(__clang__)
-#pragma float_control(push)
-#pragma clang fp contract(off)
+#pragma STDC FP_CONTRACT OFF
 #elif defined(__GNUC__)
 #pragma GCC push_options
 #pragma GCC optimize("fp-contract=off", "no-tree-slp-vectorize")
@@ -2993,7 +3004,8 @@ static dem2d_shape *dem2di_shape_allocate(const dem2d_env *env, dem2d_shape_type
     dem2di_shape_layout(&plan);
     dem2d_shape *shape = (dem2d_shape *)dem2di_allocate(env, 1, plan.bytes);
     if (shape == NULL) {
-        (void)dem2di_fail(env, DEM2D_OUT_OF_MEMORY, -1, "shape of %zu bytes", plan.bytes);
+        (void)dem2di_fail(env, DEM2D_OUT_OF_MEMORY, -1, "shape of %.0f bytes",
+                          (double)plan.bytes);
         return NULL;
     }
     memset((void *)shape, 0, plan.bytes);
@@ -7346,8 +7358,9 @@ static dem2d_result dem2di_fit_fourier(dem2di_fit *fit) {
     int order = fit->count;
     const dem2d_fit_desc *desc = fit->desc;
     size_t terms = (size_t)order + 1;
-    double *a = (double *)dem2di_allocate(fit->env, terms, 2 * sizeof *a), *b = a + terms;
+    double *a = (double *)dem2di_allocate(fit->env, terms, 2 * sizeof *a);
     if (a == NULL) return dem2di_fail(fit->env, DEM2D_OUT_OF_MEMORY, -1, "order %d", order);
+    double *b = a + terms;
     dem2d_result result = DEM2D_OK;
     dem2d_reduction_desc reduction = {DEM2D_SUFFICIENT, 0, 0};
     int steps = 0;
@@ -7470,8 +7483,9 @@ static double dem2di_polygon_objective(void *data, const double *x) {
 static dem2d_result dem2di_fit_polygon(dem2di_fit *fit) {
     int n = fit->outline.hull_count, m = fit->count;
     size_t room = 2 * (size_t)(n > m ? n : m);
-    double *x = (double *)dem2di_allocate(fit->env, room, 2 * sizeof *x), *steps = x + room;
+    double *x = (double *)dem2di_allocate(fit->env, room, 2 * sizeof *x);
     if (x == NULL) return dem2di_fail(fit->env, DEM2D_OUT_OF_MEMORY, -1, "%d corners", n);
+    double *steps = x + room;
     dem2d_vec *corners = fit->outline.hull;
     if (n < m) { /* the hull itself has fewer corners */
         fit->count = m = n;
@@ -9388,6 +9402,13 @@ static void dem2di_second_forces(double square, double depth, dem2di_second *end
     end->slide = by_share * by_width * end->side * (end->base ? 1 : -1);
 }
 
+/* No second point: all of it is 0, so are its energy and force. */
+static dem2di_second dem2di_second_none(void) {
+    dem2di_second none;
+    memset(&none, 0, sizeof none);
+    return none;
+}
+
 /* The second point of two faces on a side, if it takes more energy than the one known so far: of
    three corners that touch two count, and the energy is steady where the third takes over. */
 static void dem2di_second_try(const dem2di_face *a, const dem2di_face *b, double depth, double size,
@@ -9438,13 +9459,12 @@ static void dem2di_one_point(dem2d_vec position, double depth, dem2d_vec u,
     point->corner = -1;
 }
 
-/* The second point of an overlapping pair, on either side; its energy is 0 when there is none. */
+/* The second point of an overlapping pair, on either side; `best` stays as it is without one. */
 static void dem2di_pair_second(const dem2di_pair *pair, const dem2di_search *search,
                                dem2di_second *best) {
     const int *corner = search->feature.corner;
     dem2d_vec u = search->normal;
     dem2d_vec va = dem2di_turn_back(pair->ra, u), vb = dem2di_turn_back(pair->rb, dem2di_negate(u));
-    best->energy = 0;
     for (int side = -1; side <= 1; side += 2) {
         int found_a = dem2di_face_find(pair->a, va, corner[0], side), found_b = -1;
         if (found_a >= 0) found_b = dem2di_face_find(pair->b, vb, corner[1], -side);
@@ -9468,9 +9488,9 @@ static void dem2di_pair_second(const dem2di_pair *pair, const dem2di_search *sea
 /* Contact points of an overlapping pair, from A's centre: how many. */
 static int dem2di_pair_points(const dem2di_pair *pair, const dem2di_search *search,
                               dem2d_contact_point points[2]) {
-    dem2di_second second;
     dem2d_vec u = search->normal;
     if (pair->a->flat && pair->b->flat) {
+        dem2di_second second = dem2di_second_none();
         dem2di_pair_second(pair, search, &second);
         if (second.energy > 0) {
             dem2di_two_points(&second, search->upper, u, points);
@@ -9490,8 +9510,7 @@ static int dem2di_wall_points(const dem2d_shape *shape, dem2d_rot q, double scal
     double size = 2 * shape->circumscribed * scale;
     dem2d_vec v = dem2di_turn_back(q, u);
     dem2di_face face, wall = {-size, size, 0, surface, surface, 0, size * size, 0, -1, -1, true};
-    dem2di_second second;
-    second.energy = 0;
+    dem2di_second second = dem2di_second_none();
     for (int side = -1; side <= 1 && shape->flat; side += 2) {
         int found = dem2di_face_find(shape, v, -1, side);
         if (found < 0) continue;
@@ -14974,6 +14993,8 @@ typedef struct dem2di_writer {
     void *user;
     FILE *file;
     bool good;
+    int sign_length; /* of the locale's decimal sign */
+    char sign[MB_LEN_MAX];
 } dem2di_writer;
 
 static void dem2di_put_bytes(dem2di_writer *writer, const char *bytes, size_t count) {
@@ -14982,6 +15003,17 @@ static void dem2di_put_bytes(dem2di_writer *writer, const char *bytes, size_t co
         writer->good = fwrite(bytes, 1, count, writer->file) == count;
     else
         writer->good = writer->write(writer->user, bytes, count);
+}
+
+/* Finds the decimal sign of printf: what stands between the digits of 0.5. In some locales it is
+   not a comma, and has two bytes. */
+static void dem2di_writer_find_sign(dem2di_writer *writer) {
+    char half[MB_LEN_MAX + 3];
+    int length = snprintf(half, sizeof half, "%.1f", 0.5) - 2;
+    writer->sign_length = 0;
+    if (length < 1 || length > MB_LEN_MAX) return;
+    writer->sign_length = length;
+    memcpy(writer->sign, half + 1, (size_t)length);
 }
 
 /* Ready to write to a callback or a file, of which one must be given. */
@@ -14994,6 +15026,7 @@ static dem2d_result dem2di_writer_open(const dem2d_env *env, dem2d_write_fn *wri
     writer->user = user;
     writer->file = path != NULL ? fopen(path, append ? "ab" : "wb") : NULL;
     writer->good = path == NULL || writer->file != NULL;
+    dem2di_writer_find_sign(writer);
     return writer->good ? DEM2D_OK : dem2di_fail(env, DEM2D_IO, -1, "could not open %s", path);
 }
 
@@ -15923,7 +15956,8 @@ static dem2d_result dem2di_source_grow(dem2di_source *source, size_t size) {
     size_t longer = source->size + more;
     unsigned char *bytes = (unsigned char *)dem2di_allocate(env, longer, 1);
     if (bytes == NULL)
-        return dem2di_fail(env, DEM2D_OUT_OF_MEMORY, -1, "snapshot of %zu bytes", size);
+        return dem2di_fail(env, DEM2D_OUT_OF_MEMORY, -1, "snapshot of %.0f bytes",
+                           (double)size);
     if (source->size > 0) memcpy(bytes, source->bytes, source->size);
     dem2d_result result = dem2di_source_take(source, bytes + source->size, more);
     dem2di_release(env, source->bytes, source->size, 1);
@@ -16023,8 +16057,21 @@ static void dem2di_put(dem2di_writer *writer, const char *text) {
     dem2di_put_bytes(writer, text, strlen(text));
 }
 
-/* Short text with numbers in it. A locale may write them with a decimal comma, which becomes a
-   point: a comma that is meant goes through dem2di_put. */
+/* Puts text with a point for each decimal sign of the locale. */
+static void dem2di_put_points(dem2di_writer *writer, const char *text, int length) {
+    int sign = writer->sign_length, begin = 0;
+    for (int i = 0; sign > 0 && i + sign <= length; i++) {
+        if (memcmp(text + i, writer->sign, (size_t)sign) != 0) continue;
+        dem2di_put_bytes(writer, text + begin, (size_t)(i - begin));
+        dem2di_put_bytes(writer, ".", 1);
+        begin = i + sign;
+        i = begin - 1;
+    }
+    dem2di_put_bytes(writer, text + begin, (size_t)(length - begin));
+}
+
+/* Short text with numbers in it, the same in every locale. The decimal sign may be a comma there: a
+   comma that is meant goes through dem2di_put. */
 DEM2DI_PRINTF(2, 3)
 static void dem2di_print(dem2di_writer *writer, const char *format, ...) {
     char text[512];
@@ -16037,9 +16084,7 @@ static void dem2di_print(dem2di_writer *writer, const char *format, ...) {
         writer->good = false;
         return;
     }
-    for (int i = 0; i < length; i++)
-        if (text[i] == ',') text[i] = '.';
-    dem2di_put_bytes(writer, text, (size_t)length);
+    dem2di_put_points(writer, text, length);
 }
 
 /* All digits of a number: it reads back as the same bits. */
@@ -16809,7 +16854,7 @@ DEM2D_API dem2d_result dem2d_world_write_csv(const dem2d_world *world, const dem
 #endif
 
 #if defined(__clang__)
-#pragma float_control(pop)
+#pragma STDC FP_CONTRACT DEFAULT
 #elif defined(__GNUC__)
 #pragma GCC pop_options
 #endif
@@ -16851,6 +16896,9 @@ DEM2D_API dem2d_result dem2d_world_write_csv(const dem2d_world *world, const dem
             Polybeziers: arcs that turn by pi, straight and nearly straight ones, joints that are
             smooth to seven digits only, and tiny arcs get right answers; dem2d_shape_info tells the
             deviation.
+            Numbers in files have a decimal point in every locale. Parts of -ffast-math are refused
+            where the compiler tells of them. After the implementation clang is back at the
+            contraction of its command line, on every target.
      0.5.0  The two points of faces conserve energy between free polygons as well: each has a
             normal of its own and tells its energy. Snapshots of version 2.
      0.4.0  Dashpots by restitution, rolling friction, a caller's law, segment walls. Measures of

@@ -130,7 +130,15 @@ combination() {
     readme) sources='readme' ;;
     mixed) sources='main' ;; # main in C++, the implementation in C
     fast-math)
-        refused "$compile -ffast-math $out/implementation.$end -o $work/refused.o"
+        refused "$compile $out/implementation.$end -o $work/refused.o" "${level#-f}"
+        return
+        ;;
+    contraction)
+        contraction "$compiler" "$standard" "$level" "$work"
+        return
+        ;;
+    windows)
+        $compile "$out/implementation.$end" -o "$work/implementation.o"
         return
         ;;
     esac
@@ -148,14 +156,64 @@ combination() {
     if [ "$kind" = two-files ]; then exports "$work/implementation.o" || return 1; fi
 }
 
-# The compiler must say no, and the reason must be the header's own.
+# The compiler must say no, and the reason must be the header's own. What -funsafe-math-optimizations
+# brings with it is told by another name.
 refused() {
+    name=$2
+    [ "$name" = unsafe-math-optimizations ] && name=associative-math
     if text=$($1 2>&1); then
-        echo 'compiled with -ffast-math'
+        echo "compiled with -f$2"
         return 1
     fi
     echo "$text"
-    echo "$text" | grep -i 'error' | grep -q -i 'fast-math'
+    echo "$text" | grep -i 'error' | grep -q "dem2d.h: -f$name"
+}
+
+# The lines of the header that set clang's contraction, and set it back, on all of its targets: no
+# warning; off between them; behind them as before, whatever the command line says.
+contraction() {
+    sources=$4/contraction.${2%%[0-9]*}
+    {
+        echo 'double before(double a, double b, double c);'
+        echo 'double inside(double a, double b, double c);'
+        echo 'double after(double a, double b, double c);'
+        echo 'double before(double a, double b, double c) { return a * b + c; }'
+        pragma_lines 1
+        echo 'double inside(double a, double b, double c) { return a * b + c; }'
+        pragma_lines 2
+        echo 'double after(double a, double b, double c) { return a * b + c; }'
+    } > "$sources"
+    for target in x86_64-linux-gnu i686-linux-gnu aarch64-linux-gnu arm-linux-gnueabihf riscv32 \
+        riscv64 wasm32 mips mips64 powerpc powerpc64le s390x sparc64; do
+        case $2 in c++*) language=c++ ;; *) language=c ;; esac
+        "$1" "--target=$target" -x "$language" "-std=$2" "-ffp-contract=$3" -O1 $warnings \
+            -S -emit-llvm "$sources" -o "$sources.ll" || return 1
+        awk -v mode="$3" -v target="$target" '
+            /^define/ { name = $0 ~ /before/ ? "before" : $0 ~ /inside/ ? "inside" : "after" }
+            /^declare/ { name = "" }
+            / fmul | fadd |fmuladd/ {
+                gsub(/%[^ ,)]*|[ ,=]+/, " ")
+                body[name] = body[name] $0
+            }
+            END {
+                fused["on"] = "fmuladd"
+                fused["fast"] = "contract"
+                fused["off"] = "fmul double"
+                print target, mode, "before", body["before"], "inside", body["inside"]
+                if (body["before"] != body["after"]) print "after:", body["after"]
+                exit !(body["before"] == body["after"] && body["before"] ~ fused[mode] &&
+                       body["inside"] ~ / fmul double/ && body["inside"] ~ / fadd double/)
+            }' "$sources.ll" || return 1
+    done
+}
+
+# The first or second block of the header that sets contraction: from `#if` to `#endif`.
+pragma_lines() {
+    awk -v wanted="$1" '
+        /^#if defined\(__clang__\)$/ { block = ""; on = 1 }
+        on { block = block $0 "\n" }
+        on && /^#endif/ { on = 0; if (block ~ /FP_CONTRACT|float_control/ && ++n == wanted) printf "%s", block }
+    ' ../dem2d.h
 }
 
 # Names that a linker sees begin with dem2d_.
@@ -198,9 +256,25 @@ for compiler in gcc clang g++ clang++; do
         esac
         case $standard in
         c99 | c++11)
-            for kind in one-file static fast-math; do
+            for kind in one-file static; do
                 echo "$kind $compiler $standard -O0" >> "$list"
             done
+            echo "static $compiler $standard -O2" >> "$list"
+            for part in fast-math finite-math-only; do
+                echo "fast-math $compiler $standard -f$part" >> "$list"
+            done
+            case $compiler in
+            clang*)
+                for mode in on off fast; do
+                    echo "contraction $compiler $standard $mode" >> "$list"
+                done
+                ;;
+            g*) # only gcc tells of these
+                for part in unsafe-math-optimizations reciprocal-math; do
+                    echo "fast-math $compiler $standard -f$part" >> "$list"
+                done
+                ;;
+            esac
             [ "$compiler$standard" = g++c++11 ] && command -v gcc > /dev/null &&
                 echo "mixed g++ c++11 -O0" >> "$list"
             [ "$standard" = c99 ] && [ -s "$out/readme.c" ] &&
@@ -209,6 +283,13 @@ for compiler in gcc clang g++ clang++; do
         esac
     done
 done
+
+mingw=x86_64-w64-mingw32-gcc
+if command -v "$mingw" > /dev/null; then
+    echo "windows $mingw c99 -O0" >> "$list"
+else
+    echo "skip  $mingw is not installed"
+fi
 
 # --- workers: each takes the next line that no other has taken ----------------------------------
 

@@ -11,8 +11,6 @@ void inside_scatter(dem2d_world *world, bool scattered);
 void inside_renew_list(dem2d_world *world);
 /* Write to a file that is open for reading only; the result of closing it. */
 dem2d_result inside_write_in_vain(const char *path, bool *good);
-/* A text with a locale's decimal comma, a comma that is meant, and a number; was all taken? */
-bool inside_print_commas(dem2d_write_fn write, void *user);
 
 #ifdef DEM2D_IMPLEMENTATION
 
@@ -29,19 +27,12 @@ void inside_renew_list(dem2d_world *world) {
 }
 
 dem2d_result inside_write_in_vain(const char *path, bool *good) {
-    dem2di_writer writer = {NULL, NULL, fopen(path, "rb"), true};
+    dem2di_writer writer;
+    memset(&writer, 0, sizeof writer);
+    writer.file = fopen(path, "rb"), writer.good = true;
     dem2di_put(&writer, "a");
     *good = writer.good;
     return dem2di_writer_close(NULL, path, &writer);
-}
-
-bool inside_print_commas(dem2d_write_fn write, void *user) {
-    dem2di_writer writer = {write, NULL, NULL, true};
-    writer.user = user;
-    dem2di_print(&writer, "%s", "0,5");
-    dem2di_put(&writer, ",");
-    dem2di_put_number(&writer, -0.1);
-    return writer.good;
 }
 
 #endif /* DEM2D_IMPLEMENTATION */

@@ -6,6 +6,7 @@
 
 #include <float.h>
 #include <limits.h>
+#include <locale.h>
 
 /* --- a scene of all that there is ------------------------------------------------------------ */
 
@@ -438,12 +439,33 @@ static void test_scale_bar(void **state) {
     }
 }
 
-/* A decimal comma of a locale becomes a point; commas that are meant stay. */
-static void test_decimal_comma(void **state) {
+/* Files are the same where the decimal sign is a comma, or has two bytes. The Makefile makes these
+   locales where the system has their sources. */
+static void test_locales(void **state) {
     (void)state;
-    sink *out = sink_start(100, INT_MAX);
-    assert_true(inside_print_commas(take, out));
-    assert_string_equal(out->text, "0.5,-0.10000000000000001");
+    static const char *const names[] = {"de_DE.UTF-8", "ps_AF.UTF-8"};
+    static char plain[SINK_ROOM];
+    char half[32];
+    scene s;
+    make_scene(&s, NULL);
+    fill_scene(&s, 12);
+    step(&s, 300);
+    for (int k = 0; k < COUNT_OF(names); k++) {
+        if (!setlocale(LC_NUMERIC, names[k])) {
+            print_message("skipped: no locale %s\n", names[k]);
+            continue;
+        }
+        snprintf(half, sizeof half, "%.1f", 0.5);
+        assert_string_not_equal(half, "0.5");
+        for (int i = 0; i < COUNT_OF(writers); i++) {
+            setlocale(LC_NUMERIC, "C");
+            strcpy(plain, text_of(writers[i], s.world));
+            setlocale(LC_NUMERIC, names[k]);
+            assert_string_equal(text_of(writers[i], s.world), plain);
+        }
+        setlocale(LC_NUMERIC, "C");
+    }
+    dem2d_world_destroy(s.world);
 }
 
 /* --- histories ------------------------------------------------------------------------------- */
@@ -1149,7 +1171,7 @@ int main(void) {
         cmocka_unit_test(test_null_arguments),
         cmocka_unit_test(test_output_changes_nothing),
         cmocka_unit_test(test_scale_bar),
-        cmocka_unit_test(test_decimal_comma),
+        cmocka_unit_test(test_locales),
         cmocka_unit_test(test_csv),
         cmocka_unit_test(test_chain_width),
         cmocka_unit_test(test_view),
