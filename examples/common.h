@@ -950,6 +950,7 @@ static inline dem2d_shape *fitted_template(const outline *o, dem2d_shape_type mo
     fit.model = model;
     fit.count = count;
     fit.method = method;
+    fit.unbounded = method == DEM2D_FIT_SWARM; // as in the papers
     dem2d_shape *shape;
     need(dem2d_outline_fit(example_env(), o->points, o->count, &fit, &shape, &report),
          STATUS_BAD_INPUT, o->name);
