@@ -216,7 +216,8 @@ HOW TO
     get one from a grain dem2d_outline_fit: any model, by count or by coverage, with a report.
                          The papers' steps one by one: dem2d_fourier_fit, dem2d_fourier_reduce,
                          dem2d_bezier_fit.
-    get one from a photo dem2d_image_outlines, then dem2d_outline_fit for each outline.
+    get one from a photo dem2d_image_outlines, then dem2d_outline_fit for each outline. Label masks
+                         of other programs: labels. Frames and scale bars: crop_*, ignore_frame.
     draw one at random   dem2d_fourier_virtual, then dem2d_shape_create_fourier.
     measure a grain      dem2d_outline_measure; two of them: dem2d_outline_compare.
     test two shapes      dem2d_pair_overlap (yes or no), dem2d_pair_distance (gap, witness
@@ -1638,9 +1639,9 @@ typedef struct dem2d_load_desc {
     const dem2d_env *env;            ///< memory and log, copied; NULL for malloc, free, silence
 } dem2d_load_desc;
 
-/// Hash of what the next step depends on and can be seen: settings, steps, materials, how they
-/// meet, templates, particles, walls, contacts and their springs. In the order of ids, doubles by
-/// their bits (0 and -0 differ): the same for any threads, memory, skins, compiler and machine.
+/// Hash of what the next step depends on and can be seen: settings, steps, time, materials, how
+/// they meet, templates, particles, walls, contacts and their springs. In the order of ids, doubles
+/// by their bits (0 and -0 differ): the same for any threads, memory, skins, compiler and machine.
 /// Not in it: counters, the list of pairs, callbacks, ids that are free. 0 for NULL.
 DEM2D_API uint64_t dem2d_world_hash(const dem2d_world *world);
 /// Write all of a world to desc->write, or to a file when path is not NULL; the file is written as
