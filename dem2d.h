@@ -14289,9 +14289,10 @@ static dem2d_result dem2di_step(dem2d_world *world) {
                            "particle %d would get a state that is not finite",
                            world->bodies[slot].index);
     for (int j = 0; j < world->wall_count; j++)
-        if (world->walls[j].alive && !dem2di_vec_finite(world->wall_next[j].point))
+        if (world->walls[j].alive && !(dem2di_vec_finite(world->wall_next[j].point) &&
+                                       dem2di_finite(world->wall_next[j].drift)))
             return dem2di_fail(&world->env, DEM2D_STATE, j,
-                               "wall %d would get a place that is not finite", j);
+                               "wall %d would get a place or a speed that is not finite", j);
     const dem2di_ledger ledger = world->ledger;
     if (ledger.kept) dem2di_book_contacts(world); /* nothing fails from here on */
     double path = dem2di_motion_pass(world);
