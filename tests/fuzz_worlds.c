@@ -14,10 +14,9 @@ static int64_t met[WITH_COUNT][WITH_COUNT];
 
 /* Two that can't be used together. */
 static bool exclusive(int a, int b) {
-    static const int never[][2] = {
-        {WITH_LAW, WITH_TWO_POINTS},       {WITH_TWO_POINTS, WITH_ONE_POINT},
-        {WITH_TWO_POINTS, WITH_AREA},      {WITH_ONE_POINT, WITH_AREA},
-        {WITH_AREA, WITH_SEGMENT},         {WITH_AREA, WITH_CHAIN}};
+    static const int never[][2] = {{WITH_LAW, WITH_TWO_POINTS},  {WITH_TWO_POINTS, WITH_ONE_POINT},
+                                   {WITH_TWO_POINTS, WITH_AREA}, {WITH_ONE_POINT, WITH_AREA},
+                                   {WITH_AREA, WITH_SEGMENT},    {WITH_AREA, WITH_CHAIN}};
     for (size_t k = 0; k < sizeof never / sizeof *never; k++)
         if (never[k][0] == a && never[k][1] == b) return true;
     return false;
@@ -55,9 +54,8 @@ static void tell(uint64_t seed, int64_t index) {
     static world_script s;
     world_make_script(seed, index, &s);
     printf("time step %g, %d steps, gravity %g, damping %g %g, skin %g, solver %d, faces %d%s\n",
-           s.desc.time_step, s.steps, s.desc.gravity.y, s.desc.local_damping,
-           s.desc.global_damping, s.desc.skin, (int)s.desc.solver, (int)s.desc.faces,
-           s.law ? ", caller's law" : "");
+           s.desc.time_step, s.steps, s.desc.gravity.y, s.desc.local_damping, s.desc.global_damping,
+           s.desc.skin, (int)s.desc.solver, (int)s.desc.faces, s.law ? ", caller's law" : "");
     for (int i = 0; i < s.material_count; i++)
         printf("material %d: kn %g kt %g friction %g damping %g rolling %g\n", i,
                s.materials[i].normal_stiffness, s.materials[i].tangential_stiffness,

@@ -10,13 +10,14 @@
                                                       searches of others may start elsewhere)
        scaled     units that are powers of two        the same bits
        mirrored, turned by 90 degrees, added in       to rounding, as long as rounding does not
-       another order                                  grow: measured by a run that is pushed a little
+       another order                                  grow: measured by a run that is pushed a
+   little
 
    and the run itself against sums: contact forces on every particle and wall, momentum, motion.
-   Not compared to rounding: the contact-area rule, whose outlines start elsewhere in a mirror image,
-   and whose normal is noise where one grain is inside another. Ties, as of a box upright on a wall,
-   end a comparison: the push decides them otherwise.
-   Include it after dem2d.h and inside.h. */
+   Not compared to rounding: the contact-area rule, whose outlines start elsewhere in a mirror
+   image, and whose normal is noise where one grain is inside another. Ties, as of a box upright on
+   a wall, end a comparison: the push decides them otherwise. Include it after dem2d.h and inside.h.
+ */
 #ifndef RANDOM_WORLDS_H
 #define RANDOM_WORLDS_H
 
@@ -76,12 +77,12 @@ enum {
 };
 
 static const char *const world_features[WITH_COUNT] = {
-    "dashpot",  "rolling", "caller's law", "two points", "one point", "area",         "GJK, EPA",
-    "servo",    "moving",  "turned wall",  "segment",    "chain",     "driven",       "fixed",
-    "added",    "removed", "moved",        "walls come", "set_pair",  "time step",    "gravity",
-    "damping",  "refused", "skin",         "ledger",     "new list",  "no memory",    "snapshot",
-    "threads",  "queries", "circle",       "ellipse",    "polygon",   "polybezier",   "Fourier",
-    "custom"};
+    "dashpot",  "rolling",   "caller's law", "two points",  "one point", "area",
+    "GJK, EPA", "servo",     "moving",       "turned wall", "segment",   "chain",
+    "driven",   "fixed",     "added",        "removed",     "moved",     "walls come",
+    "set_pair", "time step", "gravity",      "damping",     "refused",   "skin",
+    "ledger",   "new list",  "no memory",    "snapshot",    "threads",   "queries",
+    "circle",   "ellipse",   "polygon",      "polybezier",  "Fourier",   "custom"};
 
 /* --- sizes: of radii and forces of 1 -----------------------------------------------------------
  */
@@ -184,7 +185,8 @@ static world_shape world_make_polygon(world_random *r) {
     s.count = 3 + world_below(r, 5);
     if (world_once_in(r, 2)) s.rounding = world_uniform(r, 0.05, 0.3);
     for (int i = 0; i < s.count; i++) {
-        const double angle = phase + 6.283185307179586 * (i + world_uniform(r, -0.2, 0.2)) / s.count;
+        const double angle =
+            phase + 6.283185307179586 * (i + world_uniform(r, -0.2, 0.2)) / s.count;
         s.points[i] = world_vec(cos(angle), flat * sin(angle));
     }
     if (!world_once_in(r, 3)) return s;
@@ -197,8 +199,8 @@ static world_shape world_make_polygon(world_random *r) {
 /* A box of straight arcs with round corners, or an oval of four arcs. */
 static world_shape world_make_bezier(world_random *r) {
     static const signed char box[MOST_POINTS][2] = {
-        {-3, -5}, {-1, -5}, {1, -5}, {3, -5}, {4, -5}, {5, -4}, {5, -3},  {5, -1},
-        {5, 1},   {5, 3},   {5, 4},  {4, 5},  {3, 5},  {1, 5},  {-1, 5},  {-3, 5},
+        {-3, -5}, {-1, -5}, {1, -5}, {3, -5}, {4, -5},  {5, -4},  {5, -3},  {5, -1},
+        {5, 1},   {5, 3},   {5, 4},  {4, 5},  {3, 5},   {1, 5},   {-1, 5},  {-3, 5},
         {-4, 5},  {-5, 4},  {-5, 3}, {-5, 1}, {-5, -1}, {-5, -3}, {-5, -4}, {-4, -5}};
     static const signed char axis[5][2] = {{1, 0}, {0, 1}, {-1, 0}, {0, -1}, {1, 0}};
     const double x = world_uniform(r, 0.1, 0.2), y = world_uniform(r, 0.1, 0.2);
@@ -274,9 +276,7 @@ static dem2d_particle_desc world_make_grain(world_random *r, const world_script 
     g.scale = world_once_in(r, 3) ? 1 : world_uniform(r, 0.8, 1.2);
     g.shape.index = (uint32_t)world_below(r, s->shape_count);
     g.material = world_material(r, s);
-    g.motion = world_once_in(r, 6)   ? DEM2D_FIXED
-               : world_once_in(r, 6) ? DEM2D_DRIVEN
-                                     : DEM2D_FREE;
+    g.motion = world_once_in(r, 6) ? DEM2D_FIXED : world_once_in(r, 6) ? DEM2D_DRIVEN : DEM2D_FREE;
     g.position.x = 1.5 * (place % 3) + world_uniform(r, -0.15, 0.15);
     g.position.y = 0.7 + 1.45 * (double)(place / 3) + world_uniform(r, -0.15, 0.15);
     const bool deep = world_once_in(r, 8), upright = world_once_in(r, 4);
@@ -325,9 +325,9 @@ static void world_make_walls(world_random *r, world_script *s) {
         const int links = 1 + world_below(r, 3);
         dem2d_vec from = world_vec(-1.5, world_uniform(r, -0.2, 0.2));
         for (int i = 0; i < links; i++) {
-            const dem2d_vec to = world_vec(-1.5 + 6.0 * (i + 1) / links,
-                                           world_once_in(r, 3) ? from.y
-                                                               : world_uniform(r, -0.3, 0.3));
+            const dem2d_vec to =
+                world_vec(-1.5 + 6.0 * (i + 1) / links,
+                          world_once_in(r, 3) ? from.y : world_uniform(r, -0.3, 0.3));
             s->walls[s->wall_count++] = world_make_segment(r, s, from, to);
             from = to;
         }
@@ -452,7 +452,8 @@ typedef struct world_view {
     double push; /* of places, relative to the grains */
 } world_view;
 
-/* Of a custom shape, a circle moved along a line: radius, half the line, and which axis it is on. */
+/* Of a custom shape, a circle moved along a line: radius, half the line, and which axis it is on.
+ */
 typedef struct world_stadium {
     double radius, half;
     int upright;
@@ -480,7 +481,8 @@ typedef struct world_run {
     dem2d_shape_id shapes[MOST_SHAPES];
     dem2d_particle_id grains[MOST_GRAINS]; /* generation 0: not there */
     dem2d_wall_id walls[MOST_WALLS];
-    double time_step, local_damping, global_damping; /* as they are set now, in the script's units */
+    double time_step, local_damping,
+        global_damping; /* as they are set now, in the script's units */
     dem2d_vec gravity;
     world_stadium stadium;
     int fail_at, blocks; /* allocations until one fails, 0: none does; in use */
@@ -845,8 +847,8 @@ static void world_refuse(world_run *run, const dem2d_pair_desc *pair, int a, int
     const dem2d_result result = dem2d_world_step(w, 1, &done);
     if (result != DEM2D_OK && dem2d_world_hash(w) != before)
         world_fault(run, "a refused step changes the hash");
-    if (done != (result == DEM2D_OK)) world_fault(run, "%d steps done: %s", done,
-                                                  dem2d_result_text(result));
+    if (done != (result == DEM2D_OK))
+        world_fault(run, "%d steps done: %s", done, dem2d_result_text(result));
     world_must(run, dem2d_world_set_time_step(w, run->time_step * unit), "set_time_step");
     if (result == DEM2D_OK)
         run->spoiled = true;
@@ -904,18 +906,17 @@ static void world_event_apply(world_run *run, const world_event *e) {
         world_met(run, WITH_REMOVED);
     } else if (e->kind == EVENT_MOVE) {
         const dem2d_vec to = world_map(v, e->at, world_length(v));
-        world_must(run,
-                   dem2d_world_move_particle(run->world, *id, to, e->angle * world_sense(v)),
+        world_must(run, dem2d_world_move_particle(run->world, *id, to, e->angle * world_sense(v)),
                    "move_particle");
         world_met(run, WITH_MOVED);
     } else {
         const double go = e->motion == DEM2D_FIXED ? 0 : 1;
         const dem2d_vec to = world_map(v, world_vec(go * e->at.x, go * e->at.y), world_speed(v));
-        world_must(run,
-                   dem2d_world_drive_particle(run->world, *id, e->motion, to,
-                                              go * e->angle * world_sense(v) /
-                                                  world_power(v->time)),
-                   "drive_particle");
+        world_must(
+            run,
+            dem2d_world_drive_particle(run->world, *id, e->motion, to,
+                                       go * e->angle * world_sense(v) / world_power(v->time)),
+            "drive_particle");
     }
 }
 
@@ -971,17 +972,15 @@ static void world_see(world_run *run, world_sight *sight) {
     sight->hash = dem2d_world_hash(run->world);
 }
 
-enum {
-    SIGHT_NUMBERS = MOST_GRAINS * GRAIN_NUMBERS + MOST_WALLS * WALL_NUMBERS + ENERGY_NUMBERS
-};
+enum { SIGHT_NUMBERS = MOST_GRAINS * GRAIN_NUMBERS + MOST_WALLS * WALL_NUMBERS + ENERGY_NUMBERS };
 
 /* One number of a sight, and its name. */
 static double world_number(const world_sight *s, int k, char name[32]) {
-    static const char *const of_grain[GRAIN_NUMBERS] = {"x",  "y",  "cos",     "sin",     "vx",
-                                                        "vy", "spin", "force x", "force y", "torque"};
+    static const char *const of_grain[GRAIN_NUMBERS] = {
+        "x", "y", "cos", "sin", "vx", "vy", "spin", "force x", "force y", "torque"};
     static const char *const of_wall[WALL_NUMBERS] = {"x", "y", "vx", "vy", "force x", "force y"};
-    static const char *const of_energy[ENERGY_NUMBERS] = {"translational", "rotational", "normal",
-                                                          "tangential",    "rolling",    "potential"};
+    static const char *const of_energy[ENERGY_NUMBERS] = {
+        "translational", "rotational", "normal", "tangential", "rolling", "potential"};
     if (k < MOST_GRAINS * GRAIN_NUMBERS) {
         const int i = k / GRAIN_NUMBERS, n = k % GRAIN_NUMBERS;
         if (name != NULL) snprintf(name, 32, "grain %d %s", i, of_grain[n]);
@@ -1104,10 +1103,10 @@ static void world_check_grain(world_run *run, int i, const world_before *before,
     const dem2d_particle_info *was = &before->grain[i];
     dem2d_particle_info is;
     world_must(run, dem2d_world_get_particle(run->world, run->grains[i], &is), "get_particle");
-    const double size = sums->size[i];
+    const double size = sums->size[i], far = 4 + fabs(before->at[i].x) + fabs(before->at[i].y);
     if (!world_is_rounding(is.force.x - sums->grain[i].x, size) ||
         !world_is_rounding(is.force.y - sums->grain[i].y, size) ||
-        !world_is_rounding(is.torque - sums->torque[i], 4 * size))
+        !world_is_rounding(is.torque - sums->torque[i], far * size))
         world_fault(run, "forces of the contacts are not the force on grain %d", i);
     if (is.motion == DEM2D_FIXED) world_met(run, WITH_FIXED);
     if (is.motion == DEM2D_DRIVEN) world_met(run, WITH_DRIVEN);
@@ -1120,8 +1119,8 @@ static void world_check_grain(world_run *run, int i, const world_before *before,
                             size / is.mass + fabs(g.x)) ||
                !world_moves(run, was->velocity.y, is.velocity.y, is.force.y / is.mass + g.y,
                             size / is.mass + fabs(g.y)) ||
-               !world_moves(run, was->angular_velocity, is.angular_velocity,
-                            is.torque / is.inertia, 4 * size / is.inertia)) {
+               !world_moves(run, was->angular_velocity, is.angular_velocity, is.torque / is.inertia,
+                            4 * size / is.inertia)) {
         world_fault(run, "grain %d does not move as the forces on it say", i);
     }
 }
@@ -1484,7 +1483,8 @@ static bool world_check(uint64_t seed, int64_t index, unsigned without, uint64_t
         const int seen = world_show(&s, v, other, features, fault);
         if (fault[0] != 0 || (v->disturbed && !s.exact_lists)) continue;
         if (v->mirrored || v->turned || v->reordered)
-            world_compare_near(v, s.exact, plain, pushed, other, seen < steps ? seen : steps, fault);
+            world_compare_near(v, s.exact, plain, pushed, other, seen < steps ? seen : steps,
+                               fault);
         else
             world_compare_exact(v, plain, other, seen < steps ? seen : steps,
                                 v->length == 0 && !v->disturbed, fault);
