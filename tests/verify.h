@@ -543,7 +543,7 @@ HELPER dem2d_box inside(const packing *p) {
 HELPER void fill(packing *p, int count, const bool kinds[KINDS], const char *path, double smallest,
                  double largest) {
     const dem2d_image_desc search = default_search();
-    template_set set = load_templates(path, &search, 0);
+    template_set set = load_templates(path, &search, 0, false);
     grain *grains = get_memory(NULL, (size_t)count, sizeof *grains);
     memset(grains, 0, (size_t)count * sizeof *grains);
     for (int i = 0; i < count; i++) {
