@@ -222,6 +222,20 @@ static inline void progress_end(progress *p) {
     p->dirty = false;
 }
 
+/* ---- medians ---- */
+
+static inline int compare_numbers(const void *a, const void *b) {
+    const double x = *(const double *)a, y = *(const double *)b;
+    return (x > y) - (x < y);
+}
+
+/* The upper one of two in the middle. Sorts the values; NaN without any. */
+static inline double median(double *values, int count) {
+    if (count <= 0) return (double)NAN;
+    qsort(values, (size_t)count, sizeof *values, compare_numbers);
+    return values[count / 2];
+}
+
 /* ---- random numbers ---- */
 
 /* 64 random bits (splitmix64): a counter stepped by 2^64 / golden ratio, then mixed. */
