@@ -3005,8 +3005,7 @@ static dem2d_shape *dem2di_shape_allocate(const dem2d_env *env, dem2d_shape_type
     dem2di_shape_layout(&plan);
     dem2d_shape *shape = (dem2d_shape *)dem2di_allocate(env, 1, plan.bytes);
     if (shape == NULL) {
-        (void)dem2di_fail(env, DEM2D_OUT_OF_MEMORY, -1, "shape of %.0f bytes",
-                          (double)plan.bytes);
+        (void)dem2di_fail(env, DEM2D_OUT_OF_MEMORY, -1, "shape of %.0f bytes", (double)plan.bytes);
         return NULL;
     }
     memset((void *)shape, 0, plan.bytes);
@@ -8888,17 +8887,32 @@ static bool dem2di_step_known(const dem2di_member member[2], const dem2di_bracke
     return fabs(sight->slope[0]) <= 1e-3 * angle * bend;
 }
 
+/* The same of a pair without edges. A step of a length s (as the witness points go) past the end of
+   an arc leaves the outline by at most s^2/(2 rho): below the default tolerance it does no harm. */
+static inline bool dem2di_step_smooth(const dem2di_pair *pair, double angle, double bend,
+                                      dem2di_sight *sight) {
+    double r = dem2di_min(pair->a->rho_min * pair->scale_a, pair->b->rho_min * pair->scale_b);
+    double slope = sight->slope[0];
+    if (slope * slope <= 1e-10 * r * pair->size) return true;
+    dem2d_vec u = dem2di_newton(sight, bend);
+    for (int i = 0; i < 2; i++) {
+        dem2di_member m = dem2di_member_of(pair, i);
+        sight->still |= dem2di_member_part(&m, u) != dem2di_member_part(&m, sight->u);
+    }
+    return !sight->still || fabs(slope) <= 1e-3 * angle * bend;
+}
+
 /* Down from a direction to a local minimum of h, by Newton's step on the osculating circle,
    u <- (rho u - s)/|rho u - s|, kept inside a bracket. With `detect` the first direction that
    separates is enough. False when the cap comes first. */
 static bool dem2di_descend(dem2di_pair *pair, dem2d_vec u, double angle, int cap, bool detect,
                            dem2di_sight *sight, dem2di_search *search) {
     dem2di_bracket bracket;
-    bool parts = dem2di_has_parts(pair->a) || dem2di_has_parts(pair->b);
+    bool edges = pair->a->flat || pair->b->flat;
     double turned[2] = {HUGE_VAL, HUGE_VAL}; /* by the last two steps of Newton */
     dem2di_member member[2];
     bracket.known = bracket.seen[0] = bracket.seen[1] = bracket.chord = false;
-    if (parts) {
+    if (edges) {
         for (int i = 0; i < 2; i++) member[i] = dem2di_member_of(pair, i);
         dem2di_see_first(pair, member, u, sight);
     } else {
@@ -8916,7 +8930,9 @@ static bool dem2di_descend(dem2di_pair *pair, dem2d_vec u, double angle, int cap
         double bend = sight->rho[0] + sight->rho[1] - sight->h, slope = sight->slope[0];
         if (rest) {
             sight->still = dem2di_unseen(pair->a) || dem2di_unseen(pair->b);
-            if (!parts || sight->edge || dem2di_step_known(member, &bracket, angle, bend, sight))
+            if (sight->edge) return true;
+            if (edges ? dem2di_step_known(member, &bracket, angle, bend, sight)
+                      : dem2di_step_smooth(pair, angle, bend, sight))
                 return true;
         }
         bool bends = dem2di_bends(pair, bend);
@@ -8933,7 +8949,7 @@ static bool dem2di_descend(dem2di_pair *pair, dem2d_vec u, double angle, int cap
         if (newton) u = dem2di_newton(sight, bend);
         if (!newton || (bracket.known && !dem2di_bracket_holds(&bracket, u)))
             if (!dem2di_bracket_next(&bracket, slow, &u)) return false;
-        if (parts)
+        if (edges)
             dem2di_see_towards(pair, member, u, sight);
         else
             dem2di_see(pair, u, sight);
@@ -15958,8 +15974,7 @@ static dem2d_result dem2di_source_grow(dem2di_source *source, size_t size) {
     size_t longer = source->size + more;
     unsigned char *bytes = (unsigned char *)dem2di_allocate(env, longer, 1);
     if (bytes == NULL)
-        return dem2di_fail(env, DEM2D_OUT_OF_MEMORY, -1, "snapshot of %.0f bytes",
-                           (double)size);
+        return dem2di_fail(env, DEM2D_OUT_OF_MEMORY, -1, "snapshot of %.0f bytes", (double)size);
     if (source->size > 0) memcpy(bytes, source->bytes, source->size);
     dem2d_result result = dem2di_source_take(source, bytes + source->size, more);
     dem2di_release(env, source->bytes, source->size, 1);
