@@ -8,7 +8,9 @@
 #include "dem2d.h"
 #include "snapshot_scenes.h"
 
+#if !defined(__wasi__)
 #include <pthread.h>
+#endif
 
 enum { LARGE_GRAINS = 300, LARGE_STEPS = 30, THREADS = 3 };
 
@@ -21,6 +23,16 @@ typedef struct share {
     int begin, end;
 } share;
 
+#if defined(__wasi__) /* without threads: the last share first */
+static void run_shared(void *user, dem2d_phase phase, int count, dem2d_task_fn *task,
+                       void *context) {
+    (void)user, (void)phase;
+    for (int i = THREADS - 1; i >= 0; i--) {
+        const int begin = count * i / THREADS, end = count * (i + 1) / THREADS;
+        if (begin < end) task(context, begin, end);
+    }
+}
+#else
 static void *do_share(void *context) {
     const share *own = (const share *)context;
     if (own->begin < own->end) own->task(own->context, own->begin, own->end);
@@ -40,6 +52,7 @@ static void run_shared(void *user, dem2d_phase phase, int count, dem2d_task_fn *
     }
     for (int i = 0; i < THREADS; i++) pthread_join(threads[i], NULL);
 }
+#endif
 
 /* --- memory from the top down, never given back --------------------------------------------------
  */
