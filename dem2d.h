@@ -254,6 +254,9 @@ HOW TO
                          follows; dem2d_world_histogram for polar diagrams.
     look in ParaView     dem2d_world_write_vtp, a file for each part and time; dem2d_pvd_write
                          makes a series of them. Colour grains by any of their arrays.
+    keep it private      define DEM2D_STATIC beside DEM2D_IMPLEMENTATION: all functions are static,
+                         and those that are not called are left out. One pair query takes about a
+                         second to compile and 50 kB (gcc 12, -O2).
     keep a history       dem2d_world_write_csv after every so many steps, append but the first.
 
 DIFFERENCES FROM THE PAPERS (same: as printed; corrected: the print has a slip; improved: the
