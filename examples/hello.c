@@ -12,8 +12,8 @@ static void check(dem2d_result result) {
 
 int main(void) {
     dem2d_world_desc scene = {0};
-    scene.time_step = 1e-4;    // s
-    scene.gravity.y = -9.81;   // m/s2
+    scene.time_step = 1e-4;  // s
+    scene.gravity.y = -9.81; // m/s2
     scene.local_damping = 0.3; // brakes free fall too: to 0.7 g
     dem2d_world *world;
     check(dem2d_world_create(&scene, &world));

@@ -8,11 +8,8 @@ int main(void) { // a hundred discs fall on a floor; each call returns a dem2d_r
     dem2d_particle_id grain;
     dem2d_wall_id ground;
     dem2d_shape *disc;
-    dem2d_material_desc material = {.density = 2700,
-                                    .normal_stiffness = 1e7,
-                                    .friction = 0.5,
-                                    .tangential_stiffness = 5e6,
-                                    .damping_ratio = 0.2};
+    dem2d_material_desc material = {.density = 2700, .normal_stiffness = 1e7, .friction = 0.5,
+                                    .tangential_stiffness = 5e6, .damping_ratio = 0.2};
     dem2d_world_create(&(dem2d_world_desc){.time_step = 1e-4, .gravity = {0, -9.81}}, &world);
     dem2d_world_add_material(world, &material, &stone);
     dem2d_world_add_wall(world, &(dem2d_wall_desc){.material = stone, .normal = {0, 1}}, &ground);
