@@ -10527,6 +10527,8 @@ typedef struct dem2di_push {
    What the scene has no use for is not there. */
 typedef struct dem2di_list {
     dem2di_key *keys;                   /* count; a < 0 when the contact was forgotten */
+    bool *touched; /* circles: may the two have touched at the last force pass? Until one is made
+                      with this list: see dem2di_touched */
     int discs, pairs, count;            /* where the kinds end */
     double *shear, *next_shear;         /* circles with friction: the tangential springs */
     dem2di_link *links, *next_links;    /* all but circles: of contact i at i - discs */
@@ -10722,6 +10724,7 @@ typedef enum dem2di_group {
     DEM2DI_TRAVELS,
     DEM2DI_MADE,
     DEM2DI_WALLS,
+    DEM2DI_KEYS,
     DEM2DI_SPRINGS,
     DEM2DI_LINKS,
     DEM2DI_ENDS,
@@ -10758,6 +10761,10 @@ static int dem2di_columns_of(dem2d_world *w, dem2di_group group, int **capacity,
         DEM2DI_COLUMN(w->wall_before);
         DEM2DI_COLUMN(w->wall_now);
         DEM2DI_COLUMN(w->wall_next);
+    } else if (group == DEM2DI_KEYS) {
+        *capacity = &w->list.keys_capacity;
+        DEM2DI_COLUMN(w->list.keys);
+        DEM2DI_COLUMN(w->list.touched);
     } else if (group == DEM2DI_SPRINGS) {
         *capacity = &w->list.springs_capacity;
         DEM2DI_COLUMN(w->list.shear);
@@ -10803,8 +10810,7 @@ static bool dem2di_list_reserve(dem2d_world *world, const dem2di_plan *plan, int
     int others = count - discs;
     /* the old ones are read once more */
     if (list->count - list->discs > others) others = list->count - list->discs;
-    return dem2di_array_reserve(world, (void **)&list->keys, &list->keys_capacity, count,
-                                sizeof *list->keys) &&
+    return dem2di_group_reserve(world, DEM2DI_KEYS, count, true) &&
            dem2di_group_reserve(world, DEM2DI_SPRINGS, plan->friction ? discs : 0, true) &&
            dem2di_group_reserve(world, DEM2DI_LINKS, others, true) &&
            dem2di_group_reserve(world, DEM2DI_ENDS, plan->faces ? others : 0, true) &&
@@ -10837,7 +10843,6 @@ DEM2D_API void dem2d_world_destroy(dem2d_world *world) {
     dem2di_release(env, w->used_laws, side * side, sizeof *w->laws);
     for (int group = 0; group < DEM2DI_GROUPS; group++)
         dem2di_group_release(w, (dem2di_group)group);
-    dem2di_release(env, w->list.keys, (size_t)w->list.keys_capacity, sizeof *w->list.keys);
     dem2di_release(env, w->list.incident, (size_t)w->list.incident_capacity,
                    sizeof *w->list.incident);
     dem2di_release(env, w->scratch, (size_t)w->scratch_capacity, DEM2DI_LINE);
@@ -11284,15 +11289,16 @@ static void dem2di_forget(dem2d_world *world, int slot) {
     world->ledger.edited = true;
 }
 
-/* Contacts of a fixed particle with others that are fixed are forgotten. */
+/* Contacts of a fixed particle with walls and with others that are fixed are forgotten: no list has
+   them. */
 static void dem2di_forget_fixed(dem2d_world *world, int slot) {
     const dem2di_list *list = &world->list;
     for (int k = list->first[slot]; k < list->first[slot + 1]; k++) {
         int contact = list->incident[k] / 2;
-        if (contact >= list->pairs || list->keys[contact].a < 0) continue;
+        if (contact == list->count || list->keys[contact].a < 0) continue;
         dem2di_key *key = &list->keys[contact];
-        if (world->bodies[key->a].motion == DEM2D_FIXED &&
-            world->bodies[key->b].motion == DEM2D_FIXED)
+        if (contact >= list->pairs || (world->bodies[key->a].motion == DEM2D_FIXED &&
+                                       world->bodies[key->b].motion == DEM2D_FIXED))
             key->a = -1;
     }
 }
@@ -11404,6 +11410,15 @@ static double dem2di_spring_at(const dem2d_world *world, int contact, bool next)
     return world->plan.friction ? (next ? list->next_shear : list->shear)[contact] : 0;
 }
 
+/* May the two of a listed contact have touched at the last force pass? Circles that overlap in the
+   states of that pass did not, where one has come or was put there since, or both were fixed. They
+   are listed by a new list, with which no pass has been made when its step is refused. */
+static inline bool dem2di_touched(const dem2d_world *world, int contact) {
+    const dem2di_list *list = &world->list;
+    if (contact >= list->discs) return list->links[contact - list->discs].depth > 0;
+    return world->steps > world->listed_at || list->touched[contact];
+}
+
 /* A listed contact then, and the contact point from B's centre (with walls 0); false when it is
    closed. Of two circles only the tangential spring is kept, the rest follows from the positions
    with the same bits. */
@@ -11432,7 +11447,7 @@ static bool dem2di_link_at(const dem2d_world *world, int contact, bool next, dem
     link->shear = dem2di_spring_at(world, contact, next);
     link->budget = 0;
     *arm_b = dem2di_scale(round.normal, -round.arm_b);
-    return round.depth > 0;
+    return round.depth > 0 && (next || dem2di_touched(world, contact));
 }
 
 /* The second point of a contact, beside its link; NULL where no contact has two. */
@@ -12125,7 +12140,8 @@ typedef struct dem2di_build {
     dem2di_grid grid;
     int *count[DEM2DI_KINDS]; /* of each particle's finds; then where they go */
     int total[DEM2DI_KINDS];
-    dem2di_key *keys;              /* as in the list */
+    dem2di_key *keys;              /* as in the list, */
+    bool *touched;                 /* too */
     dem2di_order *touches, *spare; /* wall and id of particle; slot */
     int incident;                  /* entries that the particles have together */
 } dem2di_build;
@@ -12358,6 +12374,7 @@ static void dem2di_recall(const dem2di_build *build, int place) {
     int discs = build->total[DEM2DI_DISCS], pairs = discs + build->total[DEM2DI_OTHERS];
     int old = dem2di_listed(world, key, place >= pairs), at = old - list->discs;
     if (place < discs) {
+        build->touched[place] = old >= 0 && dem2di_touched(world, old);
         if (build->plan.friction)
             list->next_shear[place] = old >= 0 ? dem2di_spring_at(world, old, false) : 0;
         return;
@@ -12366,7 +12383,7 @@ static void dem2di_recall(const dem2di_build *build, int place) {
     memset(link, 0, sizeof *link);
     if (old >= 0 && at < 0) { /* of circles, which are among the others from now on */
         dem2d_vec arm_b;
-        (void)dem2di_link_at(world, old, false, link, &arm_b);
+        if (!dem2di_link_at(world, old, false, link, &arm_b)) memset(link, 0, sizeof *link);
     }
     bool kept = old >= 0 && at >= 0;
     if (kept) *link = list->links[at];
@@ -12501,8 +12518,8 @@ static void dem2di_loads_clear(dem2d_world *world) {
 /* Scratch memory for the search, and then for what it found. */
 static bool dem2di_build_cut(dem2di_build *build) {
     dem2d_world *world = build->world;
-    size_t n = (size_t)build->grid.count, walls = (size_t)build->total[DEM2DI_TOUCHES],
-           total = walls;
+    size_t n = (size_t)build->grid.count, walls = (size_t)build->total[DEM2DI_TOUCHES];
+    size_t discs = (size_t)build->total[DEM2DI_DISCS], total = walls;
     for (int kind = 0; kind < DEM2DI_TOUCHES; kind++) total += (size_t)build->total[kind];
     for (int pass = 0; pass < 2; pass++) {
         dem2di_cutter cutter = {pass == 0 ? NULL : world->scratch, 0};
@@ -12514,6 +12531,7 @@ static bool dem2di_build_cut(dem2di_build *build) {
         for (int kind = 0; kind < DEM2DI_KINDS; kind++)
             build->count[kind] = (int *)dem2di_cut(&cutter, n, sizeof(int));
         build->keys = (dem2di_key *)dem2di_cut(&cutter, total, sizeof *build->keys);
+        build->touched = (bool *)dem2di_cut(&cutter, discs, sizeof *build->touched);
         build->touches = (dem2di_order *)dem2di_cut(&cutter, walls, sizeof *build->touches);
         build->spare = (dem2di_order *)dem2di_cut(&cutter, walls, sizeof *build->spare);
         size_t step = dem2di_loads_bytes(world, total, walls);
@@ -12569,6 +12587,8 @@ static void dem2di_build_finish(dem2di_build *build) {
     list->pairs = list->discs + build->total[DEM2DI_OTHERS];
     list->count = list->pairs + build->total[DEM2DI_TOUCHES];
     if (list->count > 0) memcpy(list->keys, build->keys, (size_t)list->count * sizeof *list->keys);
+    if (list->discs > 0)
+        memcpy(list->touched, build->touched, (size_t)list->discs * sizeof *list->touched);
     dem2di_loads_clear(world);
     if (world->plan.turns != build->plan.turns) dem2di_reorient(world, build->plan.turns);
     world->plan = build->plan;
@@ -15830,6 +15850,7 @@ static void dem2di_archive_memory(dem2di_archive *ar, const dem2d_world *w, int 
     if (list->keys[contact].a < 0) return;
     if (contact < list->discs) {
         if (w->plan.friction) dem2di_archive_finite(ar, "shear", &list->shear[contact]);
+        if (w->steps == w->listed_at) dem2di_archive_bool(ar, "touched", &list->touched[contact]);
         return;
     }
     dem2di_link *link = &list->links[contact - list->discs];
@@ -16896,8 +16917,10 @@ DEM2D_API dem2d_result dem2d_world_write_csv(const dem2d_world *world, const dem
             refused (DEM2D_CROSSING).
             Servo walls know the dashpots of their contacts and the next step of the particles: they
             hold their stress for every damping ratio, and those that face each other come to rest.
-            A step that is refused keeps the moments of a law that has just lost rolling friction.
-            Snapshots of version 3.
+            A step that is refused keeps the moments of a law that has just lost rolling friction,
+            and shows no contact of circles that have come or been moved since the last force pass.
+            A particle that becomes fixed loses its contacts with walls at once. Snapshots of
+            version 3.
             Polybeziers are fitted with a radius of curvature of at most 20 of the size (max_radius,
             unbounded) and straight arcs along straight edges; shapes and fits tell the greatest.
             Every snapshot that was written can be read, also when segments have parted or met since
