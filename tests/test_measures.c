@@ -663,14 +663,20 @@ static void make_pairs(dem2d_world *world, int count, const second_order a[4]) {
         const double d = depth * around(a[NORMAL], t), length = around(a[BRANCHES], t);
         const double shear =
             -kn * depth * a[TANGENTIAL].coefficient * sin(2 * (t - a[TANGENTIAL].direction));
-        const double slip = -shear / kt / time_step, other = k % 2 == 0 ? 1 : -1;
+        const double mean = -shear / kt / time_step, other = k % 2 == 0 ? 1 : -1;
+        double slip =
+            mean; /* at the step's end; at its beginning the cosine of its turn times that */
+        for (int i = 0; i < 30; i++)
+            slip = 2 * mean / (1 + 1 / hypot(1, slip * time_step / length));
         const dem2d_vec n = direction(t), at = vec(4 * (k % 20), 4 * (k / 20));
         const dem2d_vec next = vec(at.x + other * length * n.x, at.y + other * length * n.y);
         add(world, disc, material, at, (length + d) * 0.4, 0, DEM2D_DRIVEN);
-        const dem2d_particle_id id =
-            add(world, disc, material, next, (length + d) * 0.6, 0, DEM2D_DRIVEN);
-        assert_ok(dem2d_world_drive_particle(world, id, DEM2D_DRIVEN,
-                                             vec(-n.y * slip * other, n.x * slip * other), 0));
+        dem2d_particle_desc moves = {0}; /* as it was half a step before */
+        dem2d_particle_id id;
+        moves.shape = disc, moves.material = material, moves.motion = DEM2D_DRIVEN;
+        moves.scale = (length + d) * 0.6, moves.position = next;
+        moves.velocity = vec(-n.y * slip * other, n.x * slip * other);
+        assert_ok(dem2d_world_add_particle(world, &moves, &id));
     }
     step(world, 1);
 }
