@@ -685,7 +685,8 @@ typedef struct dem2d_shape_info {
     double circumscribed;  ///< m, radius of the bounding circle about the centroid
     double inscribed;      ///< m, radius of the inscribed circle about the centroid
     double rho_min;        ///< m, lower bound of the radius of curvature; 0 with corners
-    double rho_max;        ///< m, upper bound of it, edges and straight arcs apart; custom: 0
+    double rho_max;        ///< m, upper bound of it, edges and straight arcs apart; HUGE_VAL where
+                           ///< an arc is flat at a point; custom: 0
     double deviation;      ///< m, of a polybezier: contacts may be off by so much; in their error
     double equivalent; ///< m, radius of the circle of equal area ([P] equivalent size: twice it)
     size_t bytes;      ///< memory of the template
@@ -716,15 +717,16 @@ DEM2D_API dem2d_result dem2d_shape_create_ellipse(const dem2d_env *env, double a
 /// DUPLICATE_POINT, NOT_CONVEX, ZERO_AREA, OUT_OF_RANGE.
 DEM2D_API dem2d_result dem2d_shape_create_polygon(const dem2d_env *env, const dem2d_vec *points,
                                                   int count, double rounding, dem2d_shape **shape);
-/// Closed chain of cubic Bezier arcs: control[3 * arcs], arc i uses points 3i .. 3i + 3 (cyclic).
-/// arcs >= 2; each arc convex, turning by at most pi, neighbours with one tangent (G1), one turn
-/// in all: to a sine of 1e-6, as coordinates written with seven digits have it. Contacts then work
-/// with arcs that are convex and smooth, and straight where they are so to the rounding that kinks
-/// and dents show; how far these are from the given ones is the `deviation` of dem2d_shape_info,
-/// and part of every error. Mass, outline, box, dem2d_shape_support and dem2d_wall_contact are of
-/// the given arcs. Arcs below 6e-14 of the size are corners and may turn in any way. Clockwise is
-/// turned. Errors: NOT_FINITE, TOO_FEW_POINTS, NOT_CONVEX, NOT_SMOOTH, DUPLICATE_POINT (an arc that
-/// is a point), ZERO_AREA. ([P] sec. 2; M3 = M4 = 0 allowed.)
+/// Closed chain of cubic Bezier arcs: control[3 * arcs], arc i uses points 3i .. 3i + 3 (cyclic);
+/// 2 <= arcs <= INT_MAX / 12. Each arc is convex and turns by at most pi, neighbours have one
+/// tangent (G1), all arcs together make one turn: to a sine of 1e-6, as coordinates written with
+/// seven digits have it. Contacts work with arcs that are made exactly convex and smooth, and
+/// straight where they are so to the rounding that kinks and dents show; how far these are from the
+/// given ones is the `deviation` of dem2d_shape_info, and part of every error. Mass, outline, box,
+/// dem2d_shape_support and dem2d_wall_contact are of the given arcs. Arcs below 6e-14 of the size
+/// are corners and may turn in any way. Clockwise input is turned. Errors: NOT_FINITE,
+/// TOO_FEW_POINTS (also too many arcs), NOT_CONVEX, NOT_SMOOTH, DUPLICATE_POINT (an arc that is a
+/// point), ZERO_AREA, OUT_OF_MEMORY. ([P] sec. 2; M3 = M4 = 0 allowed.)
 DEM2D_API dem2d_result dem2d_shape_create_bezier(const dem2d_env *env, const dem2d_vec *control,
                                                  int arcs, dem2d_shape **shape);
 /// Support function p(t) = a[0]/2 + sum over n = 1..order of a[n] cos nt + b[n] sin nt; a and b
@@ -1021,7 +1023,7 @@ DEM2D_API dem2d_result dem2d_fourier_virtual(const dem2d_virtual_desc *desc, int
 /// What is known of a pair.
 typedef enum dem2d_contact_state {
     DEM2D_SEPARATED,   ///< a gap, above rounding
-    DEM2D_TOUCHING,    ///< gap or overlap within rounding of the sizes
+    DEM2D_TOUCHING,    ///< gap or overlap within rounding of the sizes, or deviations of both
     DEM2D_PENETRATING, ///< an overlap, above rounding
     DEM2D_UNRESOLVED   ///< the cap of iterations was reached; depth and error are still bounds
 } dem2d_contact_state;
@@ -2566,15 +2568,8 @@ static double dem2di_floor_between(const dem2d_shape *shape, dem2d_vec from, dem
     return least;
 }
 
-/* One of two values without a branch, where which one can't be predicted. */
-static inline double dem2di_either(bool first, double a, double b) {
-    double value[2];
-    value[0] = b;
-    value[1] = a;
-    return value[first];
-}
-
-/* Index one step (+1 or -1) from k around a polygon, likewise. */
+/* Index one step (+1 or -1) from k around a polygon, without a branch, where it can't be
+   predicted. */
 static inline int dem2di_around(int count, int k, int step) {
     k += step;
     return k + count * ((k < 0) - (k == count));
@@ -3854,11 +3849,15 @@ static dem2d_result dem2di_bezier_make(const dem2d_env *env, dem2di_arc *arcs, i
     return dem2di_hand_out(made, shape);
 }
 
+/* Twice around three parts for each arc is the longest way of an index: half of an int. */
+#define DEM2DI_MAX_ARCS (INT_MAX / 12)
+
 DEM2D_API dem2d_result dem2d_shape_create_bezier(const dem2d_env *env, const dem2d_vec *control,
                                                  int arcs, dem2d_shape **shape) {
     if (shape == NULL) return dem2di_fail_null(env, "shape");
-    if (arcs < 2 || arcs > INT_MAX / 12)
-        return dem2di_fail(env, DEM2D_TOO_FEW_POINTS, -1, "arcs = %d, 2 needed", arcs);
+    if (arcs < 2 || arcs > DEM2DI_MAX_ARCS)
+        return dem2di_fail(env, DEM2D_TOO_FEW_POINTS, -1, "arcs = %d, from 2 to %d", arcs,
+                           DEM2DI_MAX_ARCS);
     dem2d_result result = dem2di_check_points(env, "control", control, 3 * arcs, 6);
     if (result != DEM2D_OK) return result;
     double area = 0, size = dem2di_coordinate_size(control, 3 * arcs), extent = 0;
@@ -4079,11 +4078,8 @@ static dem2d_result dem2di_check_pose(dem2d_pose *pose) {
     return DEM2D_OK;
 }
 
-/* Support point at a pose, relative to its position. */
-static dem2d_vec dem2di_posed_support(const dem2d_shape *shape, const dem2d_pose *pose, dem2d_vec u,
-                                      double *rho) {
-    dem2d_vec s = dem2di_support(shape, dem2di_turn_back(pose->rotation, u), rho);
-    if (rho != NULL) *rho *= pose->scale;
+/* A support point of a template at a pose, relative to its position. */
+static dem2d_vec dem2di_at_pose(const dem2d_pose *pose, dem2d_vec s) {
     return dem2di_scale(dem2di_turn(pose->rotation, s), pose->scale);
 }
 
@@ -4136,7 +4132,7 @@ static dem2d_vec dem2di_posed_given(const dem2d_shape *shape, const dem2d_pose *
                                     double *rho) {
     dem2d_vec s = dem2di_given_support(shape, dem2di_turn_back(pose->rotation, u), rho);
     if (rho != NULL) *rho *= pose->scale;
-    return dem2di_scale(dem2di_turn(pose->rotation, s), pose->scale);
+    return dem2di_at_pose(pose, s);
 }
 
 /* From a point on the parts straight along u to the arcs that were given; 60 halvings of a
@@ -9816,11 +9812,10 @@ DEM2D_API dem2d_result dem2d_pair_contact(const dem2d_shape *a, dem2d_pose pose_
 }
 
 /* Overlap of a shape at a pose with the half-plane below `point`, whose outward unit normal is
-   -u: the support point along u, relative to the shape's centre. */
-static double dem2di_wall_depth(const dem2d_shape *shape, const dem2d_pose *pose, dem2d_vec point,
-                                dem2d_vec u, dem2d_vec *support) {
-    *support = dem2di_posed_support(shape, pose, u, NULL);
-    return dem2di_dot(dem2di_add(dem2di_sub(pose->position, point), *support), u);
+   -u, by the support point along u, relative to the shape's centre. */
+static double dem2di_wall_depth(const dem2d_pose *pose, dem2d_vec point, dem2d_vec u,
+                                dem2d_vec support) {
+    return dem2di_dot(dem2di_add(dem2di_sub(pose->position, point), support), u);
 }
 
 DEM2D_API dem2d_result dem2d_wall_contact(const dem2d_shape *shape, dem2d_pose pose,
@@ -9833,7 +9828,7 @@ DEM2D_API dem2d_result dem2d_wall_contact(const dem2d_shape *shape, dem2d_pose p
     dem2d_vec u, support;
     if (!dem2di_unit(dem2di_negate(wall_normal), &u)) return DEM2D_OUT_OF_RANGE;
     support = dem2di_posed_given(shape, &pose, u, NULL);
-    double depth = dem2di_dot(dem2di_add(dem2di_sub(pose.position, point), support), u);
+    double depth = dem2di_wall_depth(&pose, point, u, support);
     double size =
         shape->circumscribed * pose.scale + fabs(dem2di_dot(dem2di_sub(pose.position, point), u));
     double rounding = DEM2DI_ROUNDING * size;
@@ -13369,7 +13364,9 @@ static int dem2di_plane_geometry(const dem2d_world *world, int a, int wall, dem2
     if (!(link->depth > 0)) return 0;
     if (shape->type != DEM2D_CIRCLE) {
         dem2d_pose pose = dem2di_pose_of(world, world->now, a);
-        link->depth = dem2di_wall_depth(shape, &pose, point, u, &support);
+        dem2d_vec own = dem2di_support(shape, dem2di_turn_back(pose.rotation, u), NULL);
+        support = dem2di_at_pose(&pose, own);
+        link->depth = dem2di_wall_depth(&pose, point, u, support);
         count->calls++;
         if (!(link->depth > 0)) return 0;
     }
@@ -15046,13 +15043,13 @@ static void dem2di_put_bytes(dem2di_writer *writer, const char *bytes, size_t co
         writer->good = writer->write(writer->user, bytes, count);
 }
 
-/* Finds the decimal sign of printf: what stands between the digits of 0.5. In some locales it is
-   not a comma, and has two bytes. */
+/* Finds the decimal sign of printf, between the digits of 0.5: in some locales a comma, in others
+   a sign of two bytes. A point, which needs no change, counts as none. */
 static void dem2di_writer_find_sign(dem2di_writer *writer) {
     char half[MB_LEN_MAX + 3];
     int length = snprintf(half, sizeof half, "%.1f", 0.5) - 2;
     writer->sign_length = 0;
-    if (length < 1 || length > MB_LEN_MAX) return;
+    if (length < 1 || length > MB_LEN_MAX || half[1] == '.') return;
     writer->sign_length = length;
     memcpy(writer->sign, half + 1, (size_t)length);
 }
@@ -15417,7 +15414,8 @@ static void dem2di_archive_shape(dem2di_archive *ar, const dem2d_env *env, dem2d
     dem2di_archive_positive(ar, "circumscribed", &s->circumscribed);
     dem2di_archive_not_negative(ar, "inscribed", &s->inscribed);
     dem2di_archive_not_negative(ar, "rho_min", &s->rho_min);
-    dem2di_archive_not_negative(ar, "rho_max", &s->rho_max);
+    dem2di_archive_bits(ar, &s->rho_max); /* infinite where an arc is flat at a point */
+    dem2di_archive_expect(ar, s->rho_max >= 0, "rho_max of a shape");
     if (s->type == DEM2D_BEZIER) dem2di_archive_not_negative(ar, "deviation", &s->deviation);
     dem2di_archive_positive(ar, "area", &s->mass.area);
     dem2di_archive_positive(ar, "polar_moment", &s->mass.polar_moment);
@@ -15494,9 +15492,13 @@ static void dem2di_archive_wall_state(dem2di_archive *ar, dem2di_wall_state *sta
     dem2di_archive_vec(ar, "velocity", &state->velocity);
     dem2di_archive_vec(ar, "force", &state->force);
     dem2di_archive_finite(ar, "drift", &state->drift);
-    dem2di_archive_bits(ar, &state->backing.stiffness); /* sums may overflow */
-    dem2di_archive_bits(ar, &state->backing.impedance);
-    dem2di_archive_bits(ar, &state->backing.mass);
+    dem2di_backing *backing = &state->backing;
+    dem2di_archive_bits(ar, &backing->stiffness); /* sums may overflow */
+    dem2di_archive_bits(ar, &backing->impedance);
+    dem2di_archive_bits(ar, &backing->mass);
+    dem2di_archive_expect(
+        ar, backing->stiffness >= 0 && backing->impedance >= 0 && backing->mass >= 0,
+        "what a servo wall pushed against");
 }
 
 /* Of an open contact, beside its normal and depth. */

@@ -1167,6 +1167,31 @@ static void test_strange_law(void **state) {
     free(bytes.bytes);
 }
 
+/* An arc that is flat at a point has an infinite radius of curvature there. */
+static void test_flat_arc(void **state) {
+    (void)state;
+    const double k = 0.5522847498; /* arcs of a circle, but for the first */
+    const dem2d_vec control[12] = {{1, 0},  {1, 0.5}, {1, 1},   {0, 1},  {-k, 1}, {-1, k},
+                                   {-1, 0}, {-1, -k}, {-k, -1}, {0, -1}, {k, -1}, {1, -k}};
+    dem2d_shape *shape;
+    dem2d_shape_info info;
+    dem2d_shape_id id;
+    dem2d_world_desc desc = {0};
+    dem2d_world *world;
+    test_env env;
+    test_env_init(&env);
+    desc.time_step = 1e-4, desc.env = &env.env;
+    assert_ok(dem2d_shape_create_bezier(&env.env, control, 4, &shape));
+    assert_ok(dem2d_shape_get(shape, &info));
+    assert_true(info.rho_max == HUGE_VAL);
+    assert_ok(dem2d_world_create(&desc, &world));
+    assert_ok(dem2d_world_add_shape(world, shape, &id));
+    dem2d_shape_destroy(shape);
+    check_resume(world, false, 1);
+    dem2d_world_destroy(world);
+    assert_clean(&env);
+}
+
 static void test_arguments(void **state) {
     (void)state;
     scene_bytes bytes = small_snapshot(SCENE_CIRCLES);
@@ -1216,7 +1241,7 @@ int main(void) {
         cmocka_unit_test(test_memory_fails),   cmocka_unit_test(test_files),
         cmocka_unit_test(test_custom),         cmocka_unit_test(test_law),
         cmocka_unit_test(test_joint_moves),    cmocka_unit_test(test_strange_law),
-        cmocka_unit_test(test_arguments),
+        cmocka_unit_test(test_arguments),      cmocka_unit_test(test_flat_arc),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }
