@@ -78,21 +78,26 @@ LIMITS
     * Doubles only. At most 2^30 particles, and as many listed contacts. Sizes and coordinates are
       best within 1e-60 to 1e60.
     * Rotations of a step are right to angle^5/120: a particle should not turn by more than 0.01.
-    * One that moves or turns by more than its inscribed radius in a step may pass through others.
-      That is looked for when the list of pairs is renewed: dem2d_stats.fast_motion, one message.
+    * A particle that moves or turns by more than its inscribed radius in a step may pass through
+      others. dem2d_stats.fast_motion counts the neighbour lists that found one; the log is told of
+      the first.
     * A custom support function that is not convex can't be detected; contacts are then wrong.
-    * Two points carry a contact of faces, by forces that come from an energy. Their moment jumps
-      where the deeper end changes sides while less than an eighth of the shorter face is common, or
-      the overlap is deeper than half of that face times the angle to its neighbour (a 64-gon's: at
-      0.5 % of its radius). Sharp corners jump anyway: their steps are of first order. Off the free
-      end of a segment a face loses a little energy, or wins it.
+    * Where faces meet, two points carry the contact, by forces that come from an energy. Their
+      moment jumps where the deeper end changes sides while the common part is shorter than an
+      eighth of the shorter face, or the overlap is deeper than half of that face times the angle to
+      its neighbour (a 64-gon's: at 0.5 % of its radius). Sharp corners jump anyway: their steps are
+      of first order. Energy is not exactly conserved when an edge slides past the free end of a
+      segment wall.
+    * DEM2D_CONTACT_AREA is for shallow overlaps: its depth and normal mean nothing when one grain
+      lies inside another.
     * Where the support value hardly changes with the direction (bodies of constant width, one
       concentric with the other), a search may reach its cap: the answer is then UNRESOLVED, with
       bounds a few 1e-4 of the size apart.
-    * 32-bit x86 needs SSE2 (-msse2 -mfpmath=sse): the x87 rounds differently each time.
+    * 32-bit x86 needs SSE2 (-msse2 -mfpmath=sse): x87 results depend on which values stay in
+      registers.
     * -ffast-math and its parts change results: -ffinite-math-only, -fassociative-math,
-      -freciprocal-math, -funsafe-math-optimizations. They are refused where the compiler tells of
-      them: gcc of all, clang of -ffast-math and -ffinite-math-only alone.
+      -freciprocal-math, -funsafe-math-optimizations. The header refuses those that the compiler
+      tells it of: gcc tells of all, clang of -ffast-math and -ffinite-math-only alone.
 
 QUICK START (examples/hello.c, the same bytes)
 
@@ -175,10 +180,10 @@ CONCEPTS
                 long enough to outweigh the cone of directions that the inscribed discs leave.
                 By form: circles, and edges and corners of two polygons. By polytope: branch and
                 bound over arcs of directions, for what is left.
-    Face        Where two edges meet (polygons, straight arcs, walls) two points carry the
-                contact, the ends of the common part, each with its own depth and the whole kn;
-                the second with less where little is common. Their forces are the slope of an
-                energy, and come and go steadily: so energy is conserved, and piles come to rest.
+    Face        Where two edges meet (polygons, straight arcs, walls) two points carry the contact:
+                the ends of the common part, each with its own depth and the whole kn, the second
+                with less where the common part is short. Their forces are the gradient of an energy
+                and grow from zero, so that energy is conserved and piles come to rest.
     Wall        A half-plane: its normal points into the grains. Or a segment, which has two sides;
                 a chain of them counts once at its joints. A wall stands still, moves at a velocity,
                 or is servo-controlled to a stress.
@@ -186,29 +191,32 @@ CONCEPTS
                 materials have one; never attractive. Along the tangent an incremental spring kt,
                 at most friction times the normal force ([F] eq. 8-10). Against rolling a spring
                 as well, if they have rolling friction. Or a law of your own.
-    Sliding     One rule for all pairs: the tangential spring moves by the mean, over the step that
-                was made, of the sliding velocity at its beginning and at its end: with the step's
-                velocities, and normal and arms as they were then and are now. In the first step of
-                a contact those of the end. It goes by what was done: a time step or velocities that
-                are set in the middle of a contact hold from the next move on.
-    Skipping    A pair found apart by a gap is not looked at again before its particles have
-                moved and turned that far together. Of two circles a look costs less than that.
-    List        Pairs nearer than their skins are listed; the list is renewed when a particle's path
-                is as long as its skin. Skins are tuned to the motion: what a list costs is weighed
-                against what the pairs cost that it lists in vain; a fast particle has a wider one.
+    Sliding     One rule for all pairs: the tangential spring stretches by the mean sliding velocity
+                over the step that was made. The mean is that of its beginning and its end, with the
+                velocities of that step and with the normal and arms of each. In the first step of a
+                contact the end alone counts. A time step or velocity that you set in the middle of
+                a contact holds from the next move on.
+    Skipping    A pair with a known gap is not collided again until its particles have moved and
+                turned by that gap together. Circle pairs skip this test: it costs more than the
+                contact itself.
+    List        The neighbour list (Verlet list) has the pairs that are nearer than their skins. It
+                is rebuilt when a particle has moved as far as its skin. Skins are tuned to the
+                motion: the cost of rebuilding against the cost of listed pairs that are apart. A
+                fast particle gets a wider skin.
     Step        Positions are at step n, velocities half a step earlier (leapfrog). Contacts,
-                forces, energies and stresses are those of the last force pass: at the positions
-                before the last move. Kinetic energy is the mean of the two half steps around it.
-    Ledger      Forces act for half a step before and half a step after their pass, and their work
-                is booked so: until a contact opens, each point's dashpot at its own point. What is
-                stored and dissipated less what was put in is the closure. Its measure is the
-                turnover: what has gone from one account to another, half the sum of the absolute
-                changes of all accounts in each step.
+                forces, energies and stresses are those of the last force evaluation ("force pass"):
+                at the positions before the last move. Kinetic energy is the mean of the two half
+                steps around it.
+    Ledger      A force acts for half a step before and half a step after its evaluation, and the
+                ledger books its work so: until a contact opens, the work of each dashpot at its own
+                point. Closure is what is stored and dissipated less what was put in. Compare it
+                with the turnover, what has gone from one account to another: half the sum of the
+                absolute changes of all accounts in each step.
     Damping     local (Cundall): each force component reduced by alpha |F| sign(v).
                 global viscous: v <- ((1 - xi dt/2) v + dt F/m) / (1 + xi dt/2).
     Stress      Compression positive, strains too.
-    Measures    Queries and writers tell of the last force pass and change nothing; asked for
-                between any two steps, the run goes on to the same bits.
+    Measures    Queries and writers describe the last force evaluation. They never change the
+                simulation: it goes on to the same bits whether they are called or not.
 
 HOW TO
     make a shape         dem2d_shape_create_*; give it to a world with dem2d_world_add_shape
@@ -228,8 +236,8 @@ HOW TO
                          by DEM2D_FIT_REDUCTION and DEM2D_FIT_SWARM, unbounded; local_damping = 0.7
                          ([P]) or global_damping = 0.7 ([F]). examples/biaxial.c --papers is their
                          test.
-    choose a time step   dem2d_world_time_step_bounds on a settled scene. The world checks it
-                         whenever it renews its list of pairs.
+    choose a time step   dem2d_world_time_step_bounds on a settled scene. The world checks its time
+                         step whenever it rebuilds its neighbour list.
     lose energy          damping_ratio of the materials, from dem2d_damping_ratio(restitution);
                          rolling_friction for grains that should not roll; else friction, damping.
     use a law of yours   dem2d_world_desc.law: it gets depth, speeds and what it kept.
@@ -284,8 +292,10 @@ open)
         are relative to the sizes. Improved: DEM2D_CERTIFIED proves the least depth by Newton's
         steps, in two to four support calls.
     [P] sec. 3.2, fig. 4a, 4b: contact point               DEM2D_ONE_POINT
-        same. Improved: DEM2D_TWO_POINTS where faces meet; the middle of two faces jumps with the
-        last bit of the angle and does not conserve energy. At a wall it takes the foot point.
+        same: the middle of both witness points; at a wall, of support point and foot point.
+        Improved: DEM2D_TWO_POINTS where faces meet, as the middle of two faces jumps with the last
+        bit of the angle and does not conserve energy. At a wall DEM2D_TWO_POINTS takes the foot
+        point: the wall is rigid, all of the overlap is the grain's.
     [P] sec. 4 steps 1-5: templates by particle swarm      DEM2D_FIT_SWARM
         same steps, when unbounded. Chosen: birds, moves, constriction, pixels; joints that share
         a corner of the hull are moved off it. Improved: a bound of the radius of curvature, with
@@ -304,8 +314,10 @@ open)
         same, and DEM2D_HISTOGRAM_NORMAL, _ALONG_BRANCH, _NORMAL_FORCE, _TANGENTIAL_FORCE.
     [P] sec. 5.3: servo control                            DEM2D_WALL_SERVO
         chosen: see dem2d_wall_desc.
-    [P] damping 0.7: dem2d_world_desc.local_damping (PFC's, Cundall's). [F] damping 0.7, velocity
-        based: dem2d_world_desc.global_damping, 1/s (Andrade and others 2012). Same.
+    [P] damping 0.7                                        dem2d_world_desc.local_damping
+        same (PFC's, Cundall's).
+    [F] damping 0.7, velocity based                        dem2d_world_desc.global_damping
+        same, 1/s (Andrade and others 2012).
     [F] eq. 1-4: support function, support point           dem2d_shape_create_fourier
         same. Improved: the centroid is the origin; a1 = b1 = 0 puts the Steiner point there.
     [F] eq. 5: p'' + p >= 0                                dem2d_fourier_convexity
@@ -316,11 +328,12 @@ open)
         same. Improved: DEM2D_EXACT; the condition is far too strict.
     [F] sec. 2.3: fit by least squares, reduction          dem2d_fourier_fit, dem2d_fourier_reduce
         corrected: the tolerance 1e-6 is a length; here it is relative to a0. Chosen: the factor
-0.9. Improved: DEM2D_FIT_CONSTRAINED, the constrained minimum that [F] leaves to the future. [F]
-sec. 3.1: the radius as a Fourier series           dem2d_radial_compare for comparison only. [F] eq.
-8-10: contact law                              dem2d_material_desc corrected: eq. 9 caps one sign;
-here -mu F_n <= F_t <= mu F_n. Beyond: dashpots, rolling friction (eq. 10: none), laws of the
-caller.
+        0.9. Improved: DEM2D_FIT_CONSTRAINED, the constrained minimum that [F] leaves to the future.
+    [F] sec. 3.1: the radius as a Fourier series           dem2d_radial_compare
+        for comparison only: it is no shape here.
+    [F] eq. 8-10: contact law                              dem2d_material_desc
+        corrected: eq. 9 caps one sign; here -mu F_n <= F_t <= mu F_n. Chosen: the step's sliding
+        velocity, see Sliding. Beyond: dashpots, rolling friction (eq. 10: none), your own law.
 
 OPTIONS (zero means: physical zero for physical fields; "library default" where one is given)
     struct                  field                 unit   default    range
@@ -479,13 +492,14 @@ THREADS
     particles: any thread system will do (examples/threads_posix.c, threads_openmp.c). Blocks write
     only what is their own and sums are taken in the order of ids, so that the number of threads,
     and who does what, can't change a bit. Left to one thread are short loops over all particles
-    when the list is renewed, and the sums of the forces on walls. Custom support functions are
-    called by those threads; allocation and log only by the one that called the step.
+    when the list is rebuilt, the sums of the forces on walls, and the speeds of servo walls. Custom
+    support functions and laws are called by those threads (a law for a servo wall's speed also by
+    the one that called the step); allocation and log only by the one that called the step.
 
 COSTS (instructions per circle and step of a settled bed with 2.2 contacts each, gcc -O2, by
-`make -C tests bench-cost`; what is not there is decided when the list is renewed and costs nothing)
+`make -C tests bench-cost`; what is not there is decided when the list is rebuilt: it costs nothing)
     circles under gravity, no friction, no damping      296    53 without a contact
-    the list renewed once in 100 steps                  +30
+    the list rebuilt once in 100 steps                  +30
     friction and its history                           +175
     spinning without friction                           +24
     local damping                                       +26
@@ -497,7 +511,7 @@ COSTS (instructions per circle and step of a settled bed with 2.2 contacts each,
     the ledger of energies                             +1850   else nothing
     a dashpot, rolling friction, a law of your own     +1080   circles are then as other shapes
     a pair of circles listed but apart                   75    as much as one in contact: no branch
-    another pair listed but apart, surely so             70    of the 700 to 2000 that a look costs
+    another pair listed but apart, surely so             70    colliding it costs 700 to 2000
     a region without particles, a pair of fixed ones      0
 
 MEMORY
@@ -505,8 +519,8 @@ MEMORY
     is allocated in a step once the list of pairs has stopped growing; dem2d_world_stats tells the
     bytes in use. Give capacities to reserve beforehand. A circle takes about 400 bytes with its
     contacts if particle_capacity is given, else up to a half more; another shape 300 bytes more for
-    each pair that is listed. Particles are now and then
-    sorted in memory by their place in space; ids, orders and results do not change by it.
+    each pair that is listed. Particles are now and then sorted in memory by their place in space;
+    ids, orders and results do not change by it.
 
 SNAPSHOTS
     dem2d_world_save writes all that later steps and queries depend on, the list of pairs and the
@@ -16909,41 +16923,38 @@ DEM2D_API dem2d_result dem2d_world_write_csv(const dem2d_world *world, const dem
    >>licence  Changes and licence
 
    CHANGES
-     0.6.0  DEM2D_GJK_EPA in a world is the papers' way, whole: every pair anew in every step,
-            circles too, from the line of centres. DEM2D_ONE_POINT takes the middle at walls, too.
-            dem2d_contact tells EPA's residual. The manual lists what differs from the papers;
-            the swarm's settings are fields of dem2d_fit_desc; a histogram of branch directions.
-            The long axis of a template (dem2d_shape_axis) is exact for every model. Pictures of two
-            bytes per pixel, label masks, a region of interest, thresholds and grains in spite of
-            frames. Warnings reach the log as DEM2D_WARNING. Outlines that cross themselves are
-            refused (DEM2D_CROSSING).
+     0.6.0  Runs differ from those of 0.5.0 with friction between circles, dashpots, polybeziers,
+            two contact points with friction, and servo walls. Snapshots of version 3.
+            Papers: the manual lists what differs from each of their equations and steps. A world
+            with DEM2D_GJK_EPA takes every pair anew in every step, circles too, from the line of
+            centres; DEM2D_ONE_POINT takes the middle at walls, too. dem2d_contact.residual is
+            EPA's; the swarm's settings are in dem2d_fit_desc; DEM2D_HISTOGRAM_ALONG_BRANCH.
+            Polybeziers: right answers for arcs that turn by pi, straight, nearly straight and tiny
+            arcs, and joints that are smooth to seven digits only, whose repair dem2d_shape_info
+            tells (deviation). Fits have a radius of curvature of at most 20 times the size
+            (max_radius, unbounded) and straight arcs along straight edges; shapes and fits tell
+            the greatest. The bounds of the time step count the rocking stiffness of flat surfaces.
+            Contacts: each of two points keeps its spring at its corner, whichever grain has the
+            lower id (dem2d_contact_point.corner). Polygons that a longer segment cuts through along
+            one of their edges are no longer missed.
+            Sliding: one rule for all pairs, the mean over the step that was made, whatever time
+            step and velocities have been set since. The ledger closes with dashpots at two points
+            and where contacts open, and tells the turnover.
             Servo walls know the dashpots of their contacts and the next step of the particles: they
             hold their stress for every damping ratio, and those that face each other come to rest.
-            A step that is refused keeps the moments of a law that has just lost rolling friction,
-            and shows no contact of circles that have come or been moved since the last force pass.
-            A particle that becomes fixed loses its contacts with walls at once. Snapshots of
-            version 3.
-            Polybeziers are fitted with a radius of curvature of at most 20 of the size (max_radius,
-            unbounded) and straight arcs along straight edges; shapes and fits tell the greatest.
-            Every snapshot that was written can be read, also when segments have parted or met since
-            the list was made; whether two segments are joined is seen in every step.
-            Each of two contact points keeps its spring at its corner (dem2d_contact_point.corner),
-            whichever grain has the lower id.
-            dem2d_stats.time sums the time steps; histories have it. SVG: a view, half-planes beside
-            the grains, fixed and driven grains, chains no wider than grains; desc may be NULL, as
-            that of dem2d_world_load.
-            The bounds of the time step count the rocking stiffness of flat surfaces under a force.
-            Polygons cut through by a longer segment along one of their edges are no longer missed.
-            One rule for the sliding velocity, the mean of the step, of circles too (their runs with
-            friction differ from those of 0.5.0); it goes by the step that was made, whatever has
-            been set since. The ledger closes with dashpots at two points and where contacts open;
-            it tells the turnover.
-            Polybeziers: arcs that turn by pi, straight and nearly straight ones, joints that are
-            smooth to seven digits only, and tiny arcs get right answers; dem2d_shape_info tells the
-            deviation.
-            Numbers in files have a decimal point in every locale. Parts of -ffast-math are refused
-            where the compiler tells of them. After the implementation clang is back at the
-            contraction of its command line, on every target.
+            Worlds: every snapshot that was written can be read, also when segments have parted or
+            met since the list was built. Joints of segments are found in every step. A step that is
+            refused keeps the moments of a law that has just lost its rolling friction, and a servo
+            wall never gets a speed that is not finite. dem2d_stats.time sums the time steps.
+            Pictures and outlines: two bytes per pixel, label masks, a region of interest,
+            thresholds and grains in spite of frames. Outlines that cross themselves are refused
+            (DEM2D_CROSSING). The long axis of a template is exact for every model.
+            Writers: an SVG picture has a view, half-planes beside the grains, marks of fixed and
+            driven grains, and chains no wider than grains. Numbers have a decimal point in every
+            locale. desc may be NULL in dem2d_world_write_svg and dem2d_world_load.
+            Log and compilers: warnings have the result DEM2D_WARNING. The header refuses the parts
+            of -ffast-math that the compiler tells it of. After the implementation clang is back at
+            the contraction of its command line, on every target.
      0.5.0  The two points of faces conserve energy between free polygons as well: each has a
             normal of its own and tells its energy. Snapshots of version 2.
      0.4.0  Dashpots by restitution, rolling friction, a caller's law, segment walls. Measures of
