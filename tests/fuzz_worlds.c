@@ -99,7 +99,7 @@ int main(int argc, char **argv) {
         char fault[FAULT_ROOM];
         uint64_t features;
         int view = 0;
-        if (!world_check(seed, i, 0, &features, fault)) {
+        if (!world_check(seed, i, &features, fault)) {
             const size_t length = strcspn(fault, ":");
             while (view < WORLD_VIEWS && (strlen(world_views[view].name) != length ||
                                           strncmp(world_views[view].name, fault, length) != 0))
