@@ -107,6 +107,7 @@ int main(int argc, char **argv) {
             failed++;
             if (++by_view[view] <= TOLD || only >= 0)
                 printf("seed %llu world %lld: %s\n", (unsigned long long)seed, (long long)i, fault);
+            fflush(stdout);
         }
         count_pairs(features);
     }

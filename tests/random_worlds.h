@@ -13,7 +13,8 @@
        another order                                  grow: measured by a run that is pushed a
    little
 
-   and the run itself against sums: contact forces on every particle and wall, momentum, motion.
+   and the run itself against sums: contact forces on every particle and wall, momentum, motion;
+   and, of circles and half-planes, energies, see world_check_ledger.
    Not compared to rounding: the contact-area rule, whose outlines start elsewhere in a mirror
    image, and whose normal is noise where one grain is inside another. Ties, as of a box upright on
    a wall, end a comparison: the push decides them otherwise. Include it after dem2d.h and inside.h.
@@ -485,6 +486,7 @@ typedef struct world_run {
     dem2d_wall_id walls[MOST_WALLS];
     double time_step, local_damping,
         global_damping; /* as they are set now, in the script's units */
+    double longest_step; /* that was made */
     dem2d_vec gravity;
     world_stadium stadium;
     int fail_at, blocks; /* allocations until one fails, 0: none does; in use */
@@ -1171,6 +1173,39 @@ static void world_check_sums(world_run *run, const world_before *before) {
         world_fault(run, "momentum is not conserved");
 }
 
+/* Circles and half-planes alone, where normals do not jump; the mass of the lightest. */
+static bool world_is_smooth(const world_script *s, double *lightest) {
+    *lightest = HUGE_VAL;
+    for (int i = 0; i < s->grain_count; i++) {
+        const world_shape *shape = &s->shapes[s->grains[i].shape.index];
+        const double radius = shape->size[0] * s->grains[i].scale;
+        const double density = s->materials[s->grains[i].material.index].density;
+        if (shape->type != DEM2D_CIRCLE) return false;
+        *lightest = fmin(*lightest, density * 3.141592653589793 * radius * radius);
+    }
+    for (int j = 0; j < s->walls_at_first; j++)
+        if (s->walls[j].segment) return false;
+    for (int k = 0; k < s->event_count; k++)
+        if (s->events[k].kind == EVENT_ADD_WALL && s->events[k].wall.segment) return false;
+    return s->desc.faces != DEM2D_CONTACT_AREA;
+}
+
+/* A contact that opens or closes within a step is booked as if at its end: at most k (v dt)^2/2 is
+   missing, (w dt)^2 of the energy m v^2/2, with w^2 = k/m; a grain has at most about four contacts
+   at a time. The ledger closes to that part of what has been turned over and still moves. */
+static void world_check_ledger(world_run *run) {
+    const double dt = run->longest_step, stiffest = 4e4; /* of world_make_pair */
+    double lightest;
+    dem2d_ledger l;
+    if (!run->script->desc.ledger || !world_is_smooth(run->script, &lightest)) return;
+    world_must(run, dem2d_world_ledger(run->world, &l), "ledger");
+    const double part = 4 * (stiffest / lightest) * (dt * dt);
+    const double rounding = 1e-12 * world_stiff;
+    if (!(fabs(l.closure) <= part * (l.turnover + fabs(l.kinetic)) + rounding))
+        world_fault(run, "the ledger does not close: %.3g of %.3g turned over", l.closure,
+                    l.turnover);
+}
+
 /* --- what a run does between its steps ---------------------------------------------------------
  */
 
@@ -1371,7 +1406,10 @@ static int world_perform(world_run *run, world_sight sights[MOST_STEPS]) {
         world_look_before(run, &before);
         sights[step].result = world_step(run);
         world_see(run, &sights[step]);
-        if (v->sums && sights[step].result == DEM2D_OK) world_check_sums(run, &before);
+        if (!v->sums || sights[step].result != DEM2D_OK) continue;
+        run->longest_step = fmax(run->longest_step, run->time_step);
+        world_check_sums(run, &before);
+        world_check_ledger(run);
     }
     world_end(run);
     if (run->fault[0] != 0) {
