@@ -6922,8 +6922,8 @@ static void dem2di_plan_fit(dem2di_bezier_plan *plan) {
 }
 
 /* Hull edges that may become straight arcs, the longest first: those of a fifth of the size and
-   more; as many as may be. An arc of 20 times the size along a shorter one loses less than 1e-5 of
-   the grain's area, L^3/(12 rho). Returns how many. */
+   more; as many as there is room for, at least one. An arc of 20 times the size along a shorter one
+   loses less than 1e-5 of the grain's area, L^3/(12 rho). Returns how many. */
 static int dem2di_find_sides(const dem2di_outline *outline, dem2di_straight *sides, int room) {
     int count = 0;
     for (int k = 0; k < outline->hull_count; k++) {
@@ -6960,8 +6960,9 @@ static bool dem2di_plan_better(const dem2di_bezier_plan *a, const dem2di_bezier_
 /* The plan with no side, then with more and more of them, the longest first; the best is kept. */
 static void dem2di_plan_search(dem2di_bezier_plan *plan, dem2di_bezier_plan *spare,
                                dem2di_straight *found, dem2di_straight *sides) {
-    int room = plan->arcs - 3;
-    int count = plan->rho_max < HUGE_VAL ? dem2di_find_sides(plan->outline, found, room) : 0;
+    int room = plan->arcs - 3, count = 0;
+    if (plan->rho_max < HUGE_VAL && room > 0)
+        count = dem2di_find_sides(plan->outline, found, room);
     for (int straight = 0; straight <= count; straight++) {
         dem2di_sort_sides(found, straight, sides);
         if (straight > 0 &&
@@ -16383,10 +16384,12 @@ static void dem2di_draw_chains(const dem2d_world *world, const dem2di_view *view
     for (int wall = 0; wall < 2; wall++) {
         walk = dem2di_tour_start(wall == 1);
         while (dem2di_tour_next(world, &walk)) {
-            int a = world->list.keys[walk.contact].a;
-            dem2d_vec start = world->before[a].x, end = dem2di_add(start, walk.branch);
+            const dem2di_key *key = &world->list.keys[walk.contact];
+            dem2d_vec start = world->before[key->a].x, end = dem2di_add(start, walk.branch);
             double most = dem2di_drawn_radius(world, view, &walk);
-            if (dem2di_off_view(world, view, a)) continue;
+            if (dem2di_off_view(world, view, key->a) &&
+                (walk.walls || dem2di_off_view(world, view, key->b)))
+                continue;
             dem2di_draw_line(dem2di_pixel(view, start), dem2di_pixel(view, end),
                              dem2di_min(walk.link.force * unit, most), writer);
         }

@@ -113,16 +113,22 @@ static void check(page *p, bool holds, const char *claim, const char *format, ..
     p->failed += !holds;
 }
 
+/* A row that is judged in words. */
+static void judge(page *p, const char *source, bool holds, const char *claim, const char *format,
+                  va_list arguments) {
+    put_words(p, source, claim, holds ? AGREES : DIFFERS, format, arguments);
+    p->judged++;
+    p->differ += !holds;
+}
+
 /* A finding of a paper that any grains show: judged, and the exit status is 1 if it differs. */
 PAGE_PRINTF(5, 6)
 static void finding(page *p, const char *source, bool holds, const char *claim, const char *format,
                     ...) {
     va_list arguments;
     va_start(arguments, format);
-    put_words(p, source, claim, holds ? AGREES : DIFFERS, format, arguments);
+    judge(p, source, holds, claim, format, arguments);
     va_end(arguments);
-    p->judged++;
-    p->differ += !holds;
     p->checks++;
     p->failed += !holds;
 }
@@ -133,10 +139,8 @@ static void compare(page *p, const char *source, bool holds, const char *claim, 
                     ...) {
     va_list arguments;
     va_start(arguments, format);
-    put_words(p, source, claim, holds ? AGREES : DIFFERS, format, arguments);
+    judge(p, source, holds, claim, format, arguments);
     va_end(arguments);
-    p->judged++;
-    p->differ += !holds;
 }
 
 /* A number that a paper prints, its band, and what came out here: in the default way and, unless
