@@ -12433,8 +12433,9 @@ static void dem2di_fill_task(void *context, int begin, int end) {
                     key->b = turned ? a : b;
                     dem2di_recall(build, (int)(key - build->keys));
                 }
-            (void)dem2di_find_walls(world, &build->grid.discs[i], i,
-                                    build->touches + build->count[DEM2DI_TOUCHES][i]);
+            const int *walls = &build->count[DEM2DI_TOUCHES][i];
+            if (*walls < (i + 1 < build->grid.count ? walls[1] : build->total[DEM2DI_TOUCHES]))
+                (void)dem2di_find_walls(world, &build->grid.discs[i], i, build->touches + *walls);
         }
         world->tallies[block].spread = spread;
     }
