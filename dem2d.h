@@ -496,23 +496,23 @@ THREADS
     support functions and laws are called by those threads (a law for a servo wall's speed also by
     the one that called the step); allocation and log only by the one that called the step.
 
-COSTS (instructions per circle and step of a settled bed with 2.2 contacts each, gcc -O2, by
+COSTS (instructions per circle and step of a settled bed with 2.0 contacts each, gcc -O2, by
 `make -C tests bench-cost`; what is not there is decided when the list is rebuilt: it costs nothing)
-    circles under gravity, no friction, no damping      296    53 without a contact
-    the list rebuilt once in 100 steps                  +30
-    friction and its history                           +175
-    spinning without friction                           +24
-    local damping                                       +26
-    global damping                                      +26
-    gravity                                              +2
-    fixed particles, walls, segments, parallel_for       +1    when there are but touch nothing
-    polygons for a tenth of the circles                 +600
-    energy and stress asked for in every step          +1800   else nothing
-    the ledger of energies                             +1850   else nothing
-    a dashpot, rolling friction, a law of your own     +1080   circles are then as other shapes
-    a pair of circles listed but apart                   75    as much as one in contact: no branch
-    another pair listed but apart, surely so             70    colliding it costs 700 to 2000
-    a region without particles, a pair of fixed ones      0
+    circles, no friction, no damping                     307    53 without a contact
+    the list rebuilt once in 100 steps                   +30
+    friction and its history                            +157
+    spinning without friction                            +24
+    local damping                                        +10
+    global damping                                       +26
+    gravity                                               +3
+    fixed particles, walls, segments, parallel_for        +1    when there are but touch nothing
+    polygons for a tenth of the circles                 +521
+    energy and stress asked for in every step          +1810    else nothing
+    the ledger of energies                             +1791    else nothing
+    a dashpot, rolling friction, a law of your own     +1239    circles are then as other shapes
+    a pair of circles listed but apart                    75    as much as one in contact: no branch
+    another pair listed but apart, surely so              70    colliding it costs 700 to 2000
+    a region without particles, a pair of fixed ones       0
 
 MEMORY
     All of it comes through dem2d_env (malloc and free by default); release gets the size. Nothing
