@@ -1002,10 +1002,10 @@ typedef struct dem2d_fit_report {
 } dem2d_fit_report;
 
 /// Fit a template to an outline, convex or not. Errors: NULL_ARGUMENT, TOO_FEW_POINTS, NOT_FINITE,
-/// CROSSING (see dem2d_outline_measure), ZERO_AREA, OUT_OF_RANGE (count, coverage, a method of
-/// another model), NOT_REACHED (no count up to 64 has the coverage), OUT_OF_MEMORY. A bound of the
-/// radius of curvature that the arcs cannot have is no error: report->max_radius says what came
-/// out. report may be NULL.
+/// CROSSING (see dem2d_outline_measure), ZERO_AREA, OUT_OF_RANGE (a field outside its range, a
+/// method of another model), NOT_REACHED (no count up to 64 has the coverage), OUT_OF_MEMORY. A
+/// bound of the radius of curvature that the arcs cannot have is no error: report->max_radius says
+/// what came out. report may be NULL.
 DEM2D_API dem2d_result dem2d_outline_fit(const dem2d_env *env, const dem2d_vec *points, int count,
                                          const dem2d_fit_desc *desc, dem2d_shape **shape,
                                          dem2d_fit_report *report);
@@ -1166,7 +1166,7 @@ typedef enum dem2d_face_rule {
 
 /// Part of a step that parallel work belongs to, for profiles.
 typedef enum dem2d_phase {
-    DEM2D_PHASE_LIST,     ///< candidate pairs, when they are renewed; the time step check
+    DEM2D_PHASE_LIST,     ///< candidate pairs, when the list is rebuilt; the time step check
     DEM2D_PHASE_CONTACTS, ///< geometry and forces of the listed contacts
     DEM2D_PHASE_MOTION,   ///< sums of forces per particle, new velocities and positions
     DEM2D_PHASE_COUNT
@@ -1292,8 +1292,8 @@ typedef struct dem2d_particle_info {
     dem2d_material_id material; ///< material
     dem2d_motion motion;        ///< free, fixed or driven
     dem2d_pose pose;            ///< now
-    dem2d_vec velocity;         ///< m/s, half a step before the pose
-    double angular_velocity;    ///< rad/s
+    dem2d_vec velocity;         ///< m/s, half a step before the pose, or as it has been set since
+    double angular_velocity;    ///< rad/s, likewise
     dem2d_vec force;            ///< N/m, sum of contacts in the last force pass (no gravity)
     double torque;              ///< N, likewise, about the centroid
     double mass;                ///< kg/m
@@ -1350,7 +1350,7 @@ typedef struct dem2d_wall_info {
     dem2d_vec normal;           ///< unit, towards the grains; of a segment to its left
     bool segment;               ///< from point to end
     dem2d_vec end;              ///< m, now; of a half-plane the point
-    dem2d_vec velocity;         ///< m/s, half a step before the point
+    dem2d_vec velocity;         ///< m/s, of a servo wall half a step before the point; else as set
     dem2d_vec force;            ///< N/m, of the particles on the wall in the last force pass
     double length;              ///< m, at the last force pass; 0 when neither length nor spans
     double stress;              ///< Pa, -force . normal / length; 0 when there is no length
@@ -1378,7 +1378,7 @@ typedef struct dem2d_stats {
     double time;           ///< s, the sum of their time steps
     int64_t list_rebuilds; ///< of the pair list
     int64_t support_calls; ///< in all steps
-    int64_t looks; ///< at pairs with overlapping bounding circles, not skipped, in all steps
+    int64_t looks; ///< collisions of pairs whose bounding circles overlap, not skipped, all steps
     int64_t gaps;  ///< looks that found them apart
     int64_t proofs[DEM2D_PROOF_COUNT]; ///< of the other looks, by what proves them
     int64_t not_converged;             ///< contacts whose search reached its cap, in all steps
@@ -1741,17 +1741,16 @@ DEM2D_API dem2d_result dem2d_world_write_svg(const dem2d_world *world, const dem
 /// material, motion, contacts (walls not counted), velocity (mean of the half steps),
 /// angular_velocity, angle, mass, radius (equivalent), stress (3 x 3); of contacts: a, b, wall
 /// (indices, or -1), points, normal, force (on B), position, normal_force, tangential_force,
-/// moment, depth;
-/// of walls: id, mode, velocity (mean of the half steps), force, stress.
+/// moment, depth; of walls: id, mode, velocity (mean of the half steps), force, stress.
 DEM2D_API dem2d_result dem2d_world_write_vtp(const dem2d_world *world, const dem2d_vtp_desc *desc,
                                              const char *path);
 /// Write a collection of files that make a series in time. env (may be NULL) gets the messages.
 DEM2D_API dem2d_result dem2d_pvd_write(const dem2d_env *env, const dem2d_pvd_desc *desc,
                                        const char *path);
-/// Write a row: step, time (dem2d_stats), translational, rotational,
-/// normal, tangential, rolling, potential (dem2d_energy), kinetic_ratio, mean_speed, max_speed,
-/// unbalanced (dem2d_equilibrium), coordination, coordination_loaded, rattlers (dem2d_packing),
-/// contacts, wall_contacts, max_overlap, then the caller's columns.
+/// Write a row: step, time (dem2d_stats), translational, rotational, normal, tangential, rolling,
+/// potential (dem2d_energy), kinetic_ratio, mean_speed, max_speed, unbalanced (dem2d_equilibrium),
+/// coordination, coordination_loaded, rattlers (dem2d_packing), contacts, wall_contacts,
+/// max_overlap, then the caller's columns.
 DEM2D_API dem2d_result dem2d_world_write_csv(const dem2d_world *world, const dem2d_csv_desc *desc,
                                              const char *path);
 
