@@ -3390,13 +3390,13 @@ static bool dem2di_turns_left(dem2d_vec a, dem2d_vec b, double rounding) {
 
 /* Convex, turning left by at most pi, within the smoothness: every turn of the control polygon is
    to the left, and so is the whole turn. */
-static bool dem2di_arc_convex(const dem2di_arc *arc, dem2d_vec start, dem2d_vec end,
-                              double rounding) {
-    double slack = dem2di_turn_slack(dem2di_length(arc->d0), dem2di_length(arc->d2), rounding);
+static bool dem2di_arc_convex(const dem2di_arc *arc, double rounding) {
+    const dem2d_vec *start = dem2di_arc_side(arc, rounding, false);
+    const dem2d_vec *end = dem2di_arc_side(arc, rounding, true);
+    double slack = dem2di_turn_slack(dem2di_length(*start), dem2di_length(*end), rounding);
     return dem2di_turns_left(arc->d0, arc->d1, rounding) &&
            dem2di_turns_left(arc->d1, arc->d2, rounding) &&
-           dem2di_cross(arc->d0, arc->d2) >= -slack &&
-           dem2di_cross(start, end) >= -2 * DEM2DI_SMOOTH;
+           dem2di_cross(*start, *end) >= -2 * slack; /* of two turns */
 }
 
 /* Is a joint smooth? `kink` gets the sine between the tangents. */
@@ -3416,12 +3416,11 @@ static dem2d_result dem2di_check_arcs(const dem2d_env *env, const dem2di_arc *ar
     for (int k = 0; k < count; k++) {
         int place = reversed ? count - 1 - k : k; /* in the caller's numbering */
         const dem2di_arc *arc = &arcs[k];
-        dem2d_vec start, end;
         double kink;
-        if (!dem2di_arc_tangents(arc, limits.rounding, &start, &end))
+        if (dem2di_arc_side(arc, limits.rounding, false) == NULL)
             return dem2di_fail(env, DEM2D_DUPLICATE_POINT, place, "arc %d is a point", place);
         bool tiny = dem2di_arc_length(arc) <= limits.tiny;
-        if (!tiny && !dem2di_arc_convex(arc, start, end, limits.rounding))
+        if (!tiny && !dem2di_arc_convex(arc, limits.rounding))
             return dem2di_fail(env, DEM2D_NOT_CONVEX, place, "arc %d is not convex", place);
         if (reversed) place = (count - k) % count;
         if (!tiny && dem2di_arc_length(before) > limits.tiny &&
@@ -8879,13 +8878,31 @@ static bool dem2di_unseen(const dem2d_shape *shape) {
     return shape->type == DEM2D_CUSTOM;
 }
 
+/* A rest that is taken as it is must be nearer: a thousandth of the angle, and where shapes are
+   nearly straight also of a circle of their size. */
+static inline bool dem2di_rest_near(const dem2di_pair *pair, double angle, double bend,
+                                    const dem2di_sight *sight) {
+    return fabs(sight->slope[0]) <= 1e-3 * angle * dem2di_min(bend, pair->size);
+}
+
+/* May Newton's last step end where rho is so large that h is higher there by more than what the
+   angle leaves? By rho e^2/2 at most. */
+static inline bool dem2di_step_rises(const dem2di_pair *pair, double angle, double bend,
+                                     const dem2di_sight *sight) {
+    double most = pair->a->rho_max * pair->scale_a + pair->b->rho_max * pair->scale_b;
+    double step = sight->slope[0] / (angle * bend);
+    return !(step * step * most <= 2 * pair->size);
+}
+
 /* Is it known what is beside a rest, so far as Newton's last step turns? Not past an edge. Past the
    end of an arc rho may be any, and before an edge that was seen it may grow without bound: the
-   rest must be nearer then (a thousandth of the angle), and is taken as it is. */
-static bool dem2di_step_known(const dem2di_member member[2], const dem2di_bracket *bracket,
-                              double angle, double bend, dem2di_sight *sight) {
+   rest is taken as it is. */
+static bool dem2di_step_known(const dem2di_pair *pair, const dem2di_member member[2],
+                              const dem2di_bracket *bracket, double angle, double bend,
+                              dem2di_sight *sight) {
     int part[2], own = 0;
     dem2d_vec u = dem2di_newton(sight, bend);
+    sight->still |= dem2di_step_rises(pair, angle, bend, sight);
     for (int i = 0; i < 2; i++) {
         part[i] = dem2di_member_part(&member[i], u);
         sight->still |= part[i] != sight->part[i][0];
@@ -8897,7 +8914,7 @@ static bool dem2di_step_known(const dem2di_member member[2], const dem2di_bracke
                     !dem2di_bracket_holds(bracket, dem2di_member_normal(&member[own], edge));
         if (!seen || member[own].shape->type == DEM2D_POLYGON) return false;
     }
-    return fabs(sight->slope[0]) <= 1e-3 * angle * bend;
+    return dem2di_rest_near(pair, angle, bend, sight);
 }
 
 /* The same of a pair without edges. A step of a length s (as the witness points go) past the end of
@@ -8906,13 +8923,15 @@ static inline bool dem2di_step_smooth(const dem2di_pair *pair, double angle, dou
                                       dem2di_sight *sight) {
     double r = dem2di_min(pair->a->rho_min * pair->scale_a, pair->b->rho_min * pair->scale_b);
     double slope = sight->slope[0];
-    if (slope * slope <= 1e-10 * r * pair->size) return true;
+    bool rises = dem2di_step_rises(pair, angle, bend, sight);
+    if (!rises && slope * slope <= 1e-10 * r * pair->size) return true;
     dem2d_vec u = dem2di_newton(sight, bend);
+    sight->still |= rises;
     for (int i = 0; i < 2; i++) {
         dem2di_member m = dem2di_member_of(pair, i);
         sight->still |= dem2di_member_part(&m, u) != dem2di_member_part(&m, sight->u);
     }
-    return !sight->still || fabs(slope) <= 1e-3 * angle * bend;
+    return !sight->still || dem2di_rest_near(pair, angle, bend, sight);
 }
 
 /* Down from a direction to a local minimum of h, by Newton's step on the osculating circle,
@@ -8944,7 +8963,7 @@ static bool dem2di_descend(dem2di_pair *pair, dem2d_vec u, double angle, int cap
         if (rest) {
             sight->still = dem2di_unseen(pair->a) || dem2di_unseen(pair->b);
             if (sight->edge) return true;
-            if (edges ? dem2di_step_known(member, &bracket, angle, bend, sight)
+            if (edges ? dem2di_step_known(pair, member, &bracket, angle, bend, sight)
                       : dem2di_step_smooth(pair, angle, bend, sight))
                 return true;
         }
@@ -9085,24 +9104,69 @@ static bool dem2di_certify(const dem2di_pair *pair, const dem2di_sight *sight, d
     return true;
 }
 
-/* Points on both shapes for the least value met. Bounds to a tolerance fix its direction to about
-   the root of it: the supports of two directions so far to both sides enclose the foot, at the
-   ends of a face if there is one. They are moved along the normal to the depth. */
-static void dem2di_branch_foot(dem2di_pair *pair, double tolerance, dem2di_search *search) {
-    dem2di_vertex v[2];
-    dem2d_vec u = search->normal;
-    double angle = sqrt(tolerance / pair->size);
-    for (int i = 0; i < 2; i++) {
-        dem2d_vec side = dem2di_along(u, i == 0 ? -angle : angle, dem2di_perp(u));
-        (void)dem2di_unit(side, &side);
-        dem2di_minkowski(pair, side, NULL, &v[i]);
+/* A direction seen by the descent below, how steeply h falls on in the sense of that, and h. */
+typedef struct dem2di_foothold {
+    dem2d_vec u;
+    dem2di_vertex v;
+    double h, slope;
+} dem2di_foothold;
+
+static bool dem2di_foothold_at(dem2di_pair *pair, dem2d_vec way, int turn, dem2di_foothold *f) {
+    if (!dem2di_unit(way, &f->u)) return false;
+    dem2di_minkowski(pair, f->u, NULL, &f->v);
+    f->h = dem2di_dot(f->v.w, f->u);
+    f->slope = turn * dem2di_cross(f->u, f->v.w);
+    return true;
+}
+
+/* From the least value met down to a minimum beside it, by halves to rounding: for outlines on
+   which Newton's steps do not come to rest. h falls at `near` and is above it, or rises, at `far`:
+   there is a minimum between. The supports of two directions as near as rounding are the ends of a
+   face, or of so short an arc that its chord is on the outline (length x angle / 8). */
+static void dem2di_branch_foot(dem2di_pair *pair, dem2di_search *search) {
+    const double rounding = DEM2DI_ROUNDING * pair->size;
+    dem2di_foothold near, far, at;
+    if (!dem2di_foothold_at(pair, search->normal, 1, &near)) return;
+    int turn = near.slope < 0 ? 1 : -1;
+    near.slope *= turn;
+    far = near;
+    bool between = false;
+    for (double angle = 4 * DBL_EPSILON; angle < 1 && !between; angle *= 8) {
+        dem2d_vec way = dem2di_along(near.u, turn * angle, dem2di_perp(near.u));
+        if (!dem2di_foothold_at(pair, way, turn, &far)) return;
+        between = far.slope >= 0 || far.h > near.h + rounding;
+        if (!between) near = far;
     }
-    if (dem2di_cross(u, v[0].w) > 0 || dem2di_cross(u, v[1].w) < 0) return;
-    dem2di_witness(search, &v[0], &v[1]);
-    dem2d_vec w = dem2di_sub(dem2di_sub(search->a, search->b), pair->d);
-    double lift = (search->upper - dem2di_dot(w, u)) / 2;
-    search->a = dem2di_along(search->a, lift, u);
-    search->b = dem2di_along(search->b, -lift, u);
+    while (between && dem2di_foothold_at(pair, dem2di_add(near.u, far.u), turn, &at)) {
+        bool last = turn * dem2di_cross(near.u, far.u) <= 2 * DBL_EPSILON;
+        *(at.slope >= 0 || at.h > near.h + rounding ? &far : &near) = at;
+        if (last) break;
+    }
+    search->normal = near.h < far.h ? near.u : far.u;
+    search->upper = dem2di_min(near.h, far.h);
+    search->lower = dem2di_min(search->lower, search->upper);
+    dem2di_witness(search, &near.v, &far.v);
+}
+
+/* From the least value met down to rest, as exactly as shapes allow. */
+static bool dem2di_branch_rest(dem2di_pair *pair, double tolerance, double angle, int cap,
+                               dem2di_search *search) {
+    dem2di_sight sight;
+    dem2di_search last = *search;
+    if (dem2di_has_core(pair->a) && dem2di_has_core(pair->b)) {
+        (void)dem2di_edges_solve(pair, NULL, search->normal, true, &last);
+        if (last.upper > search->upper + tolerance) return false;
+        last.lower = dem2di_min(last.upper, search->lower);
+    } else {
+        if (!dem2di_descend(pair, search->normal, angle, cap, false, &sight, &last)) return false;
+        dem2di_settle(&sight, &last);
+        if (last.upper > search->upper + DEM2DI_ROUNDING * pair->size) return false;
+        /* what Newton's last step takes away was not attained: as unsure as what is below */
+        last.upper = dem2di_max(last.upper, search->lower);
+        last.lower = dem2di_min(search->lower, 2 * last.upper - sight.h);
+    }
+    *search = last;
+    return true;
 }
 
 /* Branch and bound over arcs of directions, from the least value met so far; then down to rest. */
@@ -9129,25 +9193,12 @@ static void dem2di_branch(dem2di_pair *pair, double tolerance, double angle, int
         dem2di_polytope_close(pair, &polytope);
     }
     dem2di_epa(pair, &polytope, tolerance, cap, search);
-    dem2di_branch_foot(pair, tolerance, search);
-    if (search->state == DEM2D_UNRESOLVED) return;
-    dem2di_search last = *search;
-    if (dem2di_has_core(pair->a) && dem2di_has_core(pair->b)) {
-        (void)dem2di_edges_solve(pair, NULL, search->normal, true, &last);
-        if (last.upper > search->upper + tolerance) return;
-        last.lower = dem2di_min(last.upper, search->lower);
-    } else {
-        dem2di_sight sight;
-        if (!dem2di_descend(pair, search->normal, angle, cap, false, &sight, &last)) return;
-        dem2di_settle(&sight, &last);
-        if (last.upper > search->upper + DEM2DI_ROUNDING * pair->size) return;
-        /* what Newton's last step takes away was not attained: as unsure as what is below */
-        last.upper = dem2di_max(last.upper, search->lower);
-        last.lower = dem2di_min(search->lower, 2 * last.upper - sight.h);
-    }
-    last.proof = DEM2D_BY_POLYTOPE;
-    last.state = dem2di_judge(pair, &last);
-    *search = last;
+    bool unresolved = search->state == DEM2D_UNRESOLVED;
+    if (unresolved || !dem2di_branch_rest(pair, tolerance, angle, cap, search))
+        dem2di_branch_foot(pair, search);
+    if (unresolved) return;
+    search->proof = DEM2D_BY_POLYTOPE;
+    search->state = dem2di_judge(pair, search);
 }
 
 /* Looks that a warm start gets: two for the normal of the last step, and some for a corner passed
