@@ -3465,7 +3465,8 @@ typedef struct dem2di_chain {
     bool *tied; /* does d[k] have the direction of d[k + 1]? */
     dem2di_limits limits;
     double noise; /* m, rounding of the coordinates as kinks and dents show it */
-    double moved; /* m, greatest way of a point */
+    /* m, greatest ways of a point: onto corners for tiny arcs, onto chords, onto corners for parts */
+    double cornered, aligned, parted;
 } dem2di_chain;
 
 /* The first difference at an end of an arc that is not tiny. */
@@ -3485,7 +3486,7 @@ static void dem2di_chain_corner(dem2di_chain *chain, int before, int after, dem2
     *end = dem2di_add(*end, half);
     chain->start[after] = dem2di_sub(chain->start[after], half);
     chain->tied[3 * before + 2] = false;
-    chain->moved = dem2di_max(chain->moved, length);
+    chain->cornered = dem2di_max(chain->cornered, length / 2); /* to the middle of its chord */
 }
 
 /* The arcs that are not tiny, from the first of them on. False when they are less than two. */
@@ -3531,13 +3532,14 @@ static void dem2di_chain_listen(dem2di_chain *chain) {
     }
 }
 
-/* Is the arc from difference k on straight, and in line with its joints: to the smoothness, and to
-   four times the rounding of the coordinates? The greatest of a few errors is seldom below a
-   quarter of another. */
+/* Is the arc from difference k on straight, and in line with all that is tied to its ends: to the
+   smoothness, and to four times the rounding of the coordinates? The greatest of a few errors is
+   seldom below a quarter of another. */
 static bool dem2di_chain_straight(const dem2di_chain *chain, int k) {
-    int n = chain->count, before = (k + n - 1) % n, after = (k + 3) % n;
-    int from = chain->tied[before] ? before : k, last = chain->tied[k + 2] ? after : k + 2;
+    int n = chain->count, from = k, last = k + 2, left = n - 3;
     double rounding = chain->limits.rounding;
+    for (; left > 0 && chain->tied[(from + n - 1) % n]; left--) from = (from + n - 1) % n;
+    for (; left > 0 && chain->tied[last]; left--) last = (last + 1) % n;
     dem2d_vec along, sum = chain->d[last], at = dem2di_vec(0, 0);
     for (int i = from; i != last; i = (i + 1) % n) sum = dem2di_add(sum, chain->d[i]);
     if (!dem2di_unit(sum, &along)) return false;
@@ -3552,16 +3554,17 @@ static bool dem2di_chain_straight(const dem2di_chain *chain, int k) {
     return true;
 }
 
-/* Tie what is straight, and what is too short to have a direction to what is beside it. */
+/* Tie what is too short to have a direction to what is beside it, and what is straight. */
 static void dem2di_chain_tie(dem2di_chain *chain) {
     double rounding = chain->limits.rounding;
     dem2di_chain_listen(chain);
     for (int k = 0; k < chain->count; k += 3) {
         const dem2d_vec *d = &chain->d[k];
-        bool straight = dem2di_chain_straight(chain, k), none = dem2di_length(d[1]) <= rounding;
-        chain->tied[k] = straight || none || dem2di_length(d[0]) <= rounding;
-        chain->tied[k + 1] = straight || dem2di_length(d[2]) <= rounding;
+        chain->tied[k] = dem2di_length(d[0]) <= rounding || dem2di_length(d[1]) <= rounding;
+        chain->tied[k + 1] = dem2di_length(d[2]) <= rounding;
     }
+    for (int k = 0; k < chain->count; k += 3)
+        if (dem2di_chain_straight(chain, k)) chain->tied[k] = chain->tied[k + 1] = true;
 }
 
 /* The sum of a group from a difference on; `end` is its last. */
@@ -3626,7 +3629,7 @@ static bool dem2di_chain_align(dem2di_chain *chain, int from, int *end) {
         dem2d_vec old = chain->d[k];
         chain->d[k] = dem2di_scale(along, dem2di_max(0, dem2di_dot(old, along)));
         shift = dem2di_add(shift, dem2di_sub(chain->d[k], old));
-        chain->moved = dem2di_max(chain->moved, dem2di_length(shift));
+        chain->aligned = dem2di_max(chain->aligned, dem2di_length(shift));
         dem2d_vec *start = &chain->start[(k + 1) % n / 3];
         if ((k + 1) % 3 == 0) *start = dem2di_add(*start, shift);
     }
@@ -3691,7 +3694,7 @@ static int dem2di_arc_parts(dem2di_chain *chain, const dem2di_arc *arc, dem2di_a
         if (i == 0) part[1].start = part[0].start;
         if (i == 1) part[1].start = dem2di_add(part[1].start, way);
         part[i].d0 = part[i].d1 = part[i].d2 = dem2di_vec(0, 0);
-        chain->moved = dem2di_max(chain->moved, length);
+        chain->parted = dem2di_max(chain->parted, length);
     }
     return 2;
 }
@@ -3753,10 +3756,10 @@ static dem2d_result dem2di_bezier_parts(const dem2d_env *env, const dem2di_arc *
     chain.d = chain.start + n;
     chain.tied = (bool *)(void *)(chain.d + 3 * n);
     chain.limits = limits;
-    chain.moved = 0;
+    chain.cornered = chain.aligned = chain.parted = 0;
     bool good = dem2di_chain_take(&chain, given, count) && dem2di_chain_repair(&chain);
     if (good) *parts = dem2di_chain_parts(&chain, part);
-    *moved = chain.moved;
+    *moved = chain.cornered + chain.aligned + chain.parted;
     dem2di_release(env, chain.start, n, size);
     if (good) return DEM2D_OK;
     return dem2di_fail(env, DEM2D_NOT_CONVEX, -1, "the arcs are not convex to a sine of %g",
