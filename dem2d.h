@@ -3465,7 +3465,7 @@ typedef struct dem2di_chain {
     bool *tied; /* does d[k] have the direction of d[k + 1]? */
     dem2di_limits limits;
     double noise; /* m, rounding of the coordinates as kinks and dents show it */
-    /* m, greatest ways of a point: onto corners for tiny arcs, onto chords, onto corners for parts */
+    /* m, greatest ways of a point: to corners of tiny arcs, onto chords, to corners of parts */
     double cornered, aligned, parted;
 } dem2di_chain;
 
@@ -4150,30 +4150,36 @@ static dem2d_vec dem2di_posed_given(const dem2d_shape *shape, const dem2d_pose *
     return dem2di_at_pose(pose, s);
 }
 
-/* From a point on the parts straight along u to the arcs that were given; 60 halvings of a
-   parameter are below its rounding. */
+/* From a point on the parts, where u is normal, straight along u to the hull of the arcs that were
+   given: between support points of directions to both sides, halved to rounding. Beyond the last
+   one (beside a corner) there is nothing along u: to that support point. */
 static dem2d_vec dem2di_given_point(const dem2d_shape *shape, dem2d_vec u, dem2d_vec point) {
-    double place = dem2di_cross(u, point), height = -HUGE_VAL;
-    for (int k = 0; k < shape->count && dem2di_deviates(shape); k++) {
-        const dem2di_arc *arc = &shape->given[k];
-        double t[4];
-        int count = dem2di_arc_stations(arc, dem2di_perp(u), t);
-        for (int i = 0; i + 1 < count; i++) {
-            double low = t[i], high = t[i + 1];
-            if (!(dem2di_cross(u, dem2di_arc_point(arc, low)) <= place) ||
-                !(dem2di_cross(u, dem2di_arc_point(arc, high)) >= place))
-                continue; /* not there, or on the far side */
-            for (int j = 0; j < 60; j++) {
-                double middle = (low + high) / 2;
-                bool before = dem2di_cross(u, dem2di_arc_point(arc, middle)) < place;
-                *(before ? &low : &high) = middle;
-            }
-            height = dem2di_max(height, dem2di_dot(u, dem2di_arc_point(arc, low)));
+    double place = dem2di_cross(u, point), at[2];
+    dem2d_vec end[2], s[2], way, v;
+    int beyond = 0;
+    if (!dem2di_deviates(shape)) return point;
+    for (double angle = 4 * DEM2DI_SMOOTH; angle < 1; angle *= 8) {
+        for (int i = 0; i < 2; i++) {
+            way = dem2di_along(u, i == 0 ? -angle : angle, dem2di_perp(u));
+            end[i] = dem2di_unit(way, &v) ? v : u;
+            s[i] = dem2di_given_support(shape, end[i], NULL);
+            at[i] = dem2di_cross(u, s[i]);
         }
+        beyond = (place > at[1]) - (place < at[0]);
+        if (beyond == 0) break;
     }
-    /* beyond the last point across u there is nothing to go to */
-    double way = height - dem2di_dot(u, point);
-    return fabs(way) <= 2 * shape->deviation ? dem2di_along(point, way, u) : point;
+    if (beyond != 0) return s[beyond > 0];
+    /* 60 halvings are below rounding */
+    for (int i = 0; i < 60 && dem2di_cross(end[0], end[1]) > 2 * DBL_EPSILON; i++) {
+        if (!dem2di_unit(dem2di_add(end[0], end[1]), &v)) break;
+        way = dem2di_given_support(shape, v, NULL);
+        int side = dem2di_cross(u, way) >= place;
+        end[side] = v;
+        s[side] = way;
+        at[side] = dem2di_cross(u, way);
+    }
+    double t = at[1] > at[0] ? (place - at[0]) / (at[1] - at[0]) : 0;
+    return dem2di_along(s[0], t, dem2di_sub(s[1], s[0]));
 }
 
 DEM2D_API dem2d_result dem2d_shape_support(const dem2d_shape *shape, dem2d_pose pose,
@@ -9734,11 +9740,10 @@ static void dem2di_report_given(const dem2di_pair *pair, const dem2di_search *se
     for (int i = 0; i < 2; i++) {
         dem2di_member m = dem2di_member_of(pair, i);
         dem2d_vec *witness = i == 0 ? &contact->point_a : &contact->point_b;
-        dem2d_vec u = i == 0 ? search->normal : dem2di_negate(search->normal);
-        dem2d_vec v = dem2di_turn_back(m.q, u), old = i == 0 ? search->a : search->b;
+        dem2d_vec v = dem2di_member_view(&m, search->normal), old = i == 0 ? search->a : search->b;
         old = dem2di_scale(dem2di_turn_back(m.q, old), 1 / m.scale);
         dem2d_vec way = dem2di_sub(dem2di_given_point(m.shape, v, old), old);
-        *witness = dem2di_along(*witness, m.scale * dem2di_dot(way, v), u);
+        *witness = dem2di_along(*witness, m.scale, dem2di_turn(m.q, way));
     }
 }
 
@@ -16988,7 +16993,8 @@ DEM2D_API dem2d_result dem2d_world_write_csv(const dem2d_world *world, const dem
             EPA's; the swarm's settings are in dem2d_fit_desc; DEM2D_HISTOGRAM_ALONG_BRANCH.
             Polybeziers: right answers for arcs that turn by pi, straight, nearly straight and tiny
             arcs, and joints that are smooth to seven digits only, whose repair dem2d_shape_info
-            tells (deviation). Fits have a radius of curvature of at most 20 times the size
+            tells (deviation). Witness points are on the outline to 1e-10 of the size; where arcs
+            are not quite convex, on its hull. Fits have a radius of curvature of at most 20 times the size
             (max_radius, unbounded) and straight arcs along straight edges; shapes and fits tell
             the greatest. The bounds of the time step count the rocking stiffness of flat surfaces.
             Contacts: each of two points keeps its spring at its corner, whichever grain has the

@@ -713,13 +713,13 @@ static real outline_room(const pair *p, dem2d_vec point) {
     return OUTLINE_TOLERANCE * pair_size(p) + place_rounding(p, point);
 }
 
-/* The witness points lie on the outlines, to `more` than that. */
-CASE_HELPER const char *outline_flaw(const pair *p, const dem2d_contact *c, real more) {
+/* The witness points lie on the outlines. */
+CASE_HELPER const char *outline_flaw(const pair *p, const dem2d_contact *c) {
     const spot u = spot_unit(spot_from(c->normal)), v = spot_make(-u.x, -u.y);
-    if (!on_outline(p->a, &p->pose_a, c->point_a, u, outline_room(p, c->point_a) + more))
+    if (!on_outline(p->a, &p->pose_a, c->point_a, u, outline_room(p, c->point_a)))
         return "a witness point is not on A's outline";
     if (p->b != NULL &&
-        !on_outline(p->b, &p->pose_b, c->point_b, v, outline_room(p, c->point_b) + more))
+        !on_outline(p->b, &p->pose_b, c->point_b, v, outline_room(p, c->point_b)))
         return "a witness point is not on B's outline";
     return NULL;
 }
@@ -819,20 +819,19 @@ CASE_HELPER wall wall_draw(const pair *p, dice *d) {
     return w;
 }
 
-/* The contact of a shape and a wall: depth by the support point, that point in its place, to `more`
-   than on smooth outlines. */
-CASE_HELPER const char *wall_flaw(const pair *p, const wall *w, const dem2d_contact *c, real more) {
+/* The contact of a shape and a wall: depth by the support point, that point in its place. */
+CASE_HELPER const char *wall_flaw(const pair *p, const wall *w, const dem2d_contact *c) {
     const pair half = {p->a, NULL, p->pose_a, {w->point, {1, 0}, 1}};
     const spot u = spot_unit(spot_make(-(real)w->normal.x, -(real)w->normal.y));
     const real depth = pair_value(&half, u), rounding = place_rounding(&half, w->point);
     const truth t = {depth, depth, u};
     const char *flaw = bound_flaw(&half, c, &t, CASE_TOLERANCE, 1e-6L);
     if (flaw == NULL) flaw = state_flaw(&half, c, &t);
-    if (flaw == NULL) flaw = outline_flaw(&half, c, more);
+    if (flaw == NULL) flaw = outline_flaw(&half, c);
     if (flaw != NULL) return flaw;
     const spot a = spot_less(spot_from(c->point_a), spot_from(w->point));
     const spot b = spot_less(spot_from(c->point_b), spot_from(w->point));
-    const real own = outline_room(&half, c->point_a) + more;
+    const real own = outline_room(&half, c->point_a);
     if (!(hypotl(c->normal.x - u.x, c->normal.y - u.y) <= 16 * DBL_EPSILON))
         return "the normal is not the wall's";
     if (!(fabsl(spot_dot(a, u) - depth) <= own)) return "the witness point is not the deepest";
@@ -942,7 +941,7 @@ static const char *const check_names[CHECKS] = {"made",   "mass",    "bound", "s
                                                 "box",    "wall",    "world"};
 
 typedef struct row {
-    int64_t drawn, refused, pairs, states[4], unproved, rough, flaws[CHECKS];
+    int64_t drawn, refused, pairs, states[4], unproved, flaws[CHECKS];
 } row;
 
 /* What is wrong, with what, how often, and the first pair. */
@@ -1081,13 +1080,6 @@ static dem2d_contact_desc draw_desc(dice *d) {
     return desc;
 }
 
-/* Where joints bend, or arcs turn back, by more than rounding, a shape is not known better than by
-   that: the answer says so in its error, and witness points may be off by as much. Counted as
-   `rough` where that is more than of other outlines. */
-static real kink_room(const dem2d_contact *c, real kink, real size) {
-    return kink > 1e-12L ? fminl(c->error, kink * size) : 0;
-}
-
 static void check_contact(campaign *all, const grain *g, const pair *p, real kink,
                           const dem2d_contact_desc *desc) {
     dem2d_contact c;
@@ -1102,9 +1094,7 @@ static void check_contact(campaign *all, const grain *g, const pair *p, real kin
     report(all, g, STATE, p, &c, state_flaw(p, &c, &t));
     report(all, g, UNRESOLVED, p, &c, unresolved_flaw(p, &c, &t, tolerance));
     if (c.state == DEM2D_UNRESOLVED) return; /* bounds, and nothing else, are promised */
-    const real more = kink_room(&c, kink, pair_size(p));
-    if (more > 0 && outline_flaw(p, &c, 0) != NULL) r->rough++;
-    report(all, g, OUTLINE, p, &c, outline_flaw(p, &c, more));
+    report(all, g, OUTLINE, p, &c, outline_flaw(p, &c));
     const real value = pair_value(p, spot_unit(spot_from(c.normal)));
     report(all, g, NORMAL, p, &c, normal_flaw(p, &c, value, tolerance, depth_slack(p)));
     report(all, g, PLACE, p, &c, place_flaw(p, &c, tolerance));
@@ -1117,7 +1107,7 @@ static void check_wall(campaign *all, const grain *g, const pair *p, real kink, 
     report(all, g, BOX, &half, NULL, box_flaw(p));
     if (dem2d_wall_contact(p->a->shape, p->pose_a, w.point, w.normal, &c) != DEM2D_OK)
         case_broken("a wall was refused");
-    report(all, g, WALL, &half, &c, wall_flaw(p, &w, &c, kink_room(&c, g->kink, pair_size(&half))));
+    report(all, g, WALL, &half, &c, wall_flaw(p, &w, &c));
     if (dice_below(d, WORLDS) == 0)
         report(all, g, WORLD, p, NULL, world_flaw(p, &w, dice_scale(d, 0.1, 10), kink));
 }

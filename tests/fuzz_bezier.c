@@ -18,26 +18,26 @@ static campaign all;
 /* --- summary --------------------------------------------------------------------------------- */
 
 static void print_row(const char *kind, const char *how, const row *r) {
-    printf("%-16s%-9s%8lld%8lld%9lld%8lld%8lld%8lld%6lld%6lld%6lld |", kind, how,
+    printf("%-16s%-9s%8lld%8lld%9lld%8lld%8lld%8lld%6lld%6lld |", kind, how,
            (long long)r->drawn, (long long)r->refused, (long long)r->pairs,
            (long long)r->states[DEM2D_SEPARATED], (long long)r->states[DEM2D_TOUCHING],
            (long long)r->states[DEM2D_PENETRATING], (long long)r->states[DEM2D_UNRESOLVED],
-           (long long)r->unproved, (long long)r->rough);
+           (long long)r->unproved);
     for (int k = 0; k < CHECKS; k++) printf("%8lld", (long long)r->flaws[k]);
     printf("\n");
 }
 
 static void add_row(row *sum, const row *r) {
     sum->drawn += r->drawn, sum->refused += r->refused, sum->pairs += r->pairs;
-    sum->unproved += r->unproved, sum->rough += r->rough;
+    sum->unproved += r->unproved;
     for (int k = 0; k < 4; k++) sum->states[k] += r->states[k];
     for (int k = 0; k < CHECKS; k++) sum->flaws[k] += r->flaws[k];
 }
 
 static void print_summary(void) {
     row total = {0}, ways[WRITTEN] = {{0}};
-    printf("%-16s%-9s%8s%8s%9s%8s%8s%8s%6s%6s%6s |", "kind", "written", "drawn", "refused", "pairs",
-           "apart", "touch", "overlap", "unres", "open", "rough");
+    printf("%-16s%-9s%8s%8s%9s%8s%8s%8s%6s%6s |", "kind", "written", "drawn", "refused", "pairs",
+           "apart", "touch", "overlap", "unres", "open");
     for (int k = 0; k < CHECKS; k++) printf("%8s", check_names[k]);
     printf("\n");
     for (int k = 0; k < CURVES; k++) {
@@ -52,8 +52,7 @@ static void print_summary(void) {
     for (int i = 0; i < WRITTEN; i++) print_row("all", written_names[i], &ways[i]);
     print_row("all", "", &total);
     printf("refused: at creation. unres: unresolved. open: the oracle's own proof ends above 1e-16 "
-           "of the size. rough: witness points more than 1e-10 of the size off outlines that have "
-           "kinks, within the error. Right of the bar: failures.\n");
+           "of the size. Right of the bar: failures.\n");
     for (const flaw_count *f = all.flaws; f < &all.flaws[FLAWS] && f->text != NULL; f++)
         printf("%9lld  %s, %s, with %s: %s (fuzz_bezier 1 %llu %llu)\n", (long long)f->count,
                curve_names[f->curve], written_names[f->written],
