@@ -9113,6 +9113,11 @@ static bool dem2di_certify(const dem2di_pair *pair, const dem2di_sight *sight, d
     return true;
 }
 
+/* How far the parts of both may be from the arcs that were given. */
+static double dem2di_pair_deviation(const dem2di_pair *pair) {
+    return pair->a->deviation * pair->scale_a + pair->b->deviation * pair->scale_b;
+}
+
 /* A direction seen by the descent below, how steeply h falls on in the sense of that, and h. */
 typedef struct dem2di_foothold {
     dem2d_vec u;
@@ -9133,7 +9138,8 @@ static bool dem2di_foothold_at(dem2di_pair *pair, dem2d_vec way, int turn, dem2d
    there is a minimum between. The supports of two directions as near as rounding are the ends of a
    face, or of so short an arc that its chord is on the outline (length x angle / 8). */
 static void dem2di_branch_foot(dem2di_pair *pair, dem2di_search *search) {
-    const double rounding = DEM2DI_ROUNDING * pair->size;
+    /* values are no surer than the shapes */
+    const double rounding = DEM2DI_ROUNDING * pair->size + dem2di_pair_deviation(pair);
     dem2di_foothold near, far, at;
     if (!dem2di_foothold_at(pair, search->normal, 1, &near)) return;
     int turn = near.slope < 0 ? 1 : -1;
@@ -9157,19 +9163,22 @@ static void dem2di_branch_foot(dem2di_pair *pair, dem2di_search *search) {
     dem2di_witness(search, &near.v, &far.v);
 }
 
-/* From the least value met down to rest, as exactly as shapes allow. */
+/* From the least value met down to rest, as exactly as shapes allow: not higher by more than the
+   tolerance, and with the sign that is sure. */
 static bool dem2di_branch_rest(dem2di_pair *pair, double tolerance, double angle, int cap,
                                dem2di_search *search) {
+    double rounding = DEM2DI_ROUNDING * pair->size, most = search->upper + tolerance;
+    if (search->upper < -rounding) most = dem2di_min(most, -rounding);
     dem2di_sight sight;
     dem2di_search last = *search;
     if (dem2di_has_core(pair->a) && dem2di_has_core(pair->b)) {
         (void)dem2di_edges_solve(pair, NULL, search->normal, true, &last);
-        if (last.upper > search->upper + tolerance) return false;
+        if (last.upper > most) return false;
         last.lower = dem2di_min(last.upper, search->lower);
     } else {
         if (!dem2di_descend(pair, search->normal, angle, cap, false, &sight, &last)) return false;
         dem2di_settle(&sight, &last);
-        if (last.upper > search->upper + DEM2DI_ROUNDING * pair->size) return false;
+        if (last.upper > most) return false;
         /* what Newton's last step takes away was not attained: as unsure as what is below */
         last.upper = dem2di_max(last.upper, search->lower);
         last.lower = dem2di_min(search->lower, 2 * last.upper - sight.h);
@@ -9731,7 +9740,7 @@ static double dem2di_circle_contact(dem2d_vec d, double distance, double radii, 
    beyond how far both may deviate. */
 static void dem2di_report_given(const dem2di_pair *pair, const dem2di_search *search,
                                 dem2d_contact *contact) {
-    double deviation = pair->a->deviation * pair->scale_a + pair->b->deviation * pair->scale_b;
+    double deviation = dem2di_pair_deviation(pair);
     contact->error += deviation;
     if (contact->state != DEM2D_UNRESOLVED && fabs(search->upper) <= deviation) {
         contact->state = DEM2D_TOUCHING;
