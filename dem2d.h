@@ -17003,9 +17003,10 @@ DEM2D_API dem2d_result dem2d_world_write_csv(const dem2d_world *world, const dem
             Polybeziers: right answers for arcs that turn by pi, straight, nearly straight and tiny
             arcs, and joints that are smooth to seven digits only, whose repair dem2d_shape_info
             tells (deviation). Witness points are on the outline to 1e-10 of the size; where arcs
-            are not quite convex, on its hull. Fits have a radius of curvature of at most 20 times the size
-            (max_radius, unbounded) and straight arcs along straight edges; shapes and fits tell
-            the greatest. The bounds of the time step count the rocking stiffness of flat surfaces.
+            are not quite convex, on its hull. Fits have a radius of curvature of at most 20 times
+            the size (max_radius, unbounded) and straight arcs along straight edges; shapes and fits
+            tell the greatest. The bounds of the time step count the rocking stiffness of flat
+            surfaces.
             Contacts: each of two points keeps its spring at its corner, whichever grain has the
             lower id (dem2d_contact_point.corner). Polygons that a longer segment cuts through along
             one of their edges are no longer missed.
