@@ -1187,7 +1187,7 @@ typedef void dem2d_parallel_fn(void *user, dem2d_phase phase, int count, dem2d_t
 typedef struct dem2d_material_desc {
     double density;              ///< kg/m2 (kg/m3 per metre of thickness), > 0
     double normal_stiffness;     ///< N/m, > 0
-    double tangential_stiffness; ///< N/m, >= 0
+    double tangential_stiffness; ///< N/m, >= 0; 0: no friction, nor against rolling
     double friction;             ///< coefficient, >= 0
     double damping_ratio;        ///< of the normal dashpot, >= 0: see dem2d_damping_ratio
     double rolling_friction;     ///< coefficient, >= 0
@@ -1196,7 +1196,7 @@ typedef struct dem2d_material_desc {
 /// How two materials meet.
 typedef struct dem2d_pair_desc {
     double normal_stiffness;     ///< N/m, > 0
-    double tangential_stiffness; ///< N/m, >= 0
+    double tangential_stiffness; ///< N/m, >= 0; 0: no friction, nor against rolling
     double friction;             ///< coefficient, >= 0
     /// Of the normal dashpot, >= 0: its force is 2 zeta sqrt(m kn) times the closing speed, with m
     /// the reduced mass of the two. Spring and dashpot together never pull.
@@ -11147,6 +11147,16 @@ static inline dem2d_pair_desc *dem2di_law(const dem2d_world *world, int a, int b
     return &world->laws[a * world->laws_side + b];
 }
 
+/* How two materials meet from now on. Without a tangential spring there is no friction, nor against
+   rolling, whose spring is made of it: springs that a law before it has left would stay. A caller's
+   law gets the numbers as they are. */
+static void dem2di_law_set(dem2d_world *world, int a, int b, const dem2d_pair_desc *desc) {
+    dem2d_pair_desc law = *desc;
+    if (!(law.tangential_stiffness > 0) && world->law == NULL)
+        law.friction = law.rolling_friction = 0;
+    *dem2di_law(world, a, b) = *dem2di_law(world, b, a) = law;
+}
+
 /* How the two of a listed contact meet; B is a particle or a wall. */
 static inline const dem2d_pair_desc *dem2di_law_of(const dem2d_world *world, int contact) {
     const dem2di_key *key = &world->list.keys[contact];
@@ -11208,9 +11218,10 @@ DEM2D_API dem2d_result dem2d_world_add_material(dem2d_world *world, const dem2d_
         return dem2di_out_of_memory(world, "a material");
     world->materials[slot] = *desc;
     world->material_count++;
-    for (int i = 0; i <= slot; i++)
-        *dem2di_law(world, i, slot) = *dem2di_law(world, slot, i) =
-            dem2di_mix(&world->materials[i], desc);
+    for (int i = 0; i <= slot; i++) {
+        const dem2d_pair_desc law = dem2di_mix(&world->materials[i], desc);
+        dem2di_law_set(world, i, slot, &law);
+    }
     id->index = (uint32_t)slot;
     id->generation = 1;
     return DEM2D_OK;
@@ -11223,8 +11234,7 @@ DEM2D_API dem2d_result dem2d_world_set_pair(dem2d_world *world, dem2d_material_i
     if (!dem2di_material_lives(world, b)) return dem2di_stale(world, "material", b.index);
     dem2d_result result = dem2di_check_law(&world->env, desc);
     if (result != DEM2D_OK) return result;
-    *dem2di_law(world, (int)a.index, (int)b.index) = *desc;
-    *dem2di_law(world, (int)b.index, (int)a.index) = *desc;
+    dem2di_law_set(world, (int)a.index, (int)b.index, desc);
     world->list_stale = true; /* so that the time step is checked */
     world->ledger.edited = true;
     return DEM2D_OK;
@@ -12297,9 +12307,8 @@ static dem2di_plan dem2di_plan_make(const dem2d_world *world) {
         for (int b = 0; b < world->material_count; b++) {
             const dem2d_pair_desc *law = dem2di_law(world, a, b);
             if (!used[a] || !(used[b] || met[b])) continue;
-            bool rolls = law->rolling_friction > 0 && law->tangential_stiffness > 0;
-            plan.friction = plan.friction || (law->friction > 0 && law->tangential_stiffness > 0);
-            plan.full = plan.full || rolls || law->damping_ratio > 0;
+            plan.friction = plan.friction || law->friction > 0;
+            plan.full = plan.full || law->rolling_friction > 0 || law->damping_ratio > 0;
         }
     plan.joints = dem2di_may_join(world);
     plan.full = plan.full || world->law != NULL;
@@ -13250,7 +13259,7 @@ static void dem2di_full_load(const dem2d_world *world, int i, int from, dem2d_ve
         dem2di_law_apply(law, meeting.slip, dt, list->links[from].shear, link);
         extra->viscous[0] = link->force - spring;
     }
-    if (law->rolling_friction > 0 && law->tangential_stiffness > 0)
+    if (law->rolling_friction > 0)
         extra->moment = dem2di_rolling(law, dem2di_reduced_radius(world, i), meeting.turning, dt,
                                        link->force, list->extras[from].moment);
 }
@@ -15658,6 +15667,7 @@ static void dem2di_hash_contacts(dem2di_archive *ar, const dem2d_world *w, bool 
         dem2di_archive_int(ar, "b", &b, 0, INT_MAX);
         dem2di_archive_vec(ar, "normal", &walk.link.normal);
         dem2di_archive_finite(ar, "depth", &walk.link.depth);
+        if (walk.link.shear == 0) walk.link.shear = 0; /* not -0: springs may be there or not */
         dem2di_archive_hold(ar, &walk.link);
         dem2di_archive_law(ar, &law);
         const dem2di_extra *beside = dem2di_extra_at(w, walk.contact, false);
@@ -17018,7 +17028,10 @@ DEM2D_API dem2d_result dem2d_world_write_csv(const dem2d_world *world, const dem
             Worlds: every snapshot that was written can be read, also when segments have parted or
             met since the list was built. Joints of segments are found in every step. A step that is
             refused keeps the moments of a law that has just lost its rolling friction, and a servo
-            wall never gets a speed that is not finite. dem2d_stats.time sums the time steps.
+            wall never gets a speed that is not finite. Circles put on each other show no contact
+            before a force pass has found it; a particle that becomes fixed loses its contacts with
+            walls at once; a law without a tangential spring keeps no tangential force of the law
+            before it. dem2d_stats.time sums the time steps.
             Pictures and outlines: two bytes per pixel, label masks, a region of interest,
             thresholds and grains in spite of frames. Outlines that cross themselves are refused
             (DEM2D_CROSSING). The long axis of a template is exact for every model.

@@ -492,7 +492,7 @@ typedef struct world_run {
     int fail_at, blocks; /* allocations until one fails, 0: none does; in use */
     char *fault;         /* the first thing that does not hold */
     uint64_t *features;  /* that were met */
-    bool spoiled;        /* a step that should have been refused was taken */
+    bool spoiled;        /* a step that should have been refused was taken: all flies apart */
 } world_run;
 
 enum { FAULT_ROOM = 256 };
@@ -1397,12 +1397,8 @@ static int world_perform(world_run *run, world_sight sights[MOST_STEPS]) {
             world_event_apply(run, &s->events[next]);
         if (v->saved && world_once_in(&run->random, 6)) world_interrupt(run);
         if (v->asked && world_once_in(&run->random, 6)) world_ask_and_fail(run);
-        if (v->disturbed) {
-            run->spoiled = false;
-            world_disturb(run);
-            if (run->spoiled) break;
-        }
-        if (run->fault[0] != 0) break;
+        if (v->disturbed) world_disturb(run);
+        if (run->spoiled || run->fault[0] != 0) break;
         world_look_before(run, &before);
         sights[step].result = world_step(run);
         world_see(run, &sights[step]);
@@ -1518,9 +1514,11 @@ static bool world_check(uint64_t seed, int64_t index, uint64_t *features, char f
     fault[0] = 0;
     world_make_script(seed, index, &s);
     *features = world_uses(&s);
-    const int steps = world_show(&s, &world_plain, plain, features, fault);
-    for (int k = 0; k < 2 && fault[0] == 0; k++)
-        (void)world_show(&s, &world_pushes[k], pushed[k], features, fault);
+    int steps = world_show(&s, &world_plain, plain, features, fault);
+    for (int k = 0; k < 2 && fault[0] == 0; k++) {
+        const int seen = world_show(&s, &world_pushes[k], pushed[k], features, fault);
+        if (seen < steps) steps = seen;
+    }
     for (int i = 0; i < WORLD_VIEWS && fault[0] == 0; i++) {
         const world_view *v = &world_views[i];
         const int seen = world_show(&s, v, other, features, fault);

@@ -255,6 +255,39 @@ static void test_refused_law(void **state) {
     assert_memory_equal(&last[0], &last[1], sizeof last[0]);
 }
 
+/* A law that keeps its friction but loses the tangential spring leaves no force of the spring that
+   was, by the circles' kernel or the others', nor after a step that is refused. */
+static void test_lost_spring(void **state) {
+    (void)state;
+    dem2d_world_desc desc = quiet_desc();
+    desc.skip_time_step_check = false;
+    for (int kernel = 0; kernel < 2; kernel++) {
+        desc.solver = kernel == 0 ? DEM2D_CERTIFIED : DEM2D_GJK_EPA;
+        const scene s = open_scene(&desc, 1e5, 0.5);
+        const dem2d_pair_desc bare = {1e5, 0, 0.5, 0, 0.1};
+        dem2d_particle_id ids[2];
+        ids[0] = add(&s, 0, 1, 0, 0, 0);
+        ids[1] = add(&s, 0, 1, 1.5, 1.3, -0.3);
+        assert_ok(dem2d_world_step(s.world, 50, NULL));
+        view v = look(s.world, ids);
+        assert_int_equal(v.count, 1);
+        assert_true(v.contacts[0].tangential_force != 0);
+        assert_ok(dem2d_world_set_pair(s.world, s.material, s.material, &bare));
+        for (int k = 0; k < 4; k++) {
+            assert_ok(dem2d_world_step(s.world, 1, NULL));
+            v = look(s.world, ids);
+            assert_int_equal(v.count, 1);
+            assert_true(v.contacts[0].tangential_force == 0);
+            assert_ok(dem2d_world_set_time_step(s.world, 1e3));
+            const uint64_t hash = dem2d_world_hash(s.world);
+            assert_result(dem2d_world_step(s.world, 1, NULL), DEM2D_TIME_STEP);
+            assert_int_equal(dem2d_world_hash(s.world), hash);
+            assert_ok(dem2d_world_set_time_step(s.world, desc.time_step));
+        }
+        dem2d_world_destroy(s.world);
+    }
+}
+
 /* A step that would not end finite fails after it has renewed the list: the next one still knows
    the laws of its contacts. */
 static void test_refused_state(void **state) {
@@ -458,7 +491,8 @@ int main(void) {
         cmocka_unit_test(test_clouds),        cmocka_unit_test(test_far_crawl),
         cmocka_unit_test(test_crowds),        cmocka_unit_test(test_least_skin),
         cmocka_unit_test(test_same_bits),     cmocka_unit_test(test_refused_law),
-        cmocka_unit_test(test_refused_state), cmocka_unit_test(test_rotations),
+        cmocka_unit_test(test_lost_spring),   cmocka_unit_test(test_refused_state),
+        cmocka_unit_test(test_rotations),
         cmocka_unit_test(test_angles),        cmocka_unit_test(test_deep_lever),
         cmocka_unit_test(test_fast),          cmocka_unit_test(test_falls_fast),
         cmocka_unit_test(test_fast_custom),
