@@ -9082,6 +9082,14 @@ static bool dem2di_outweighs(const dem2di_pair *pair, const dem2di_sight *sight,
     return false;
 }
 
+/* How far the ends of a face are below its support value: a chord across a curved outline is taken
+   for a face where that is within rounding, and the minimum may be as much lower. */
+static inline double dem2di_face_gap(const dem2di_sight *sight) {
+    if (!sight->edge) return 0;
+    double first = dem2di_dot(sight->v[0].w, sight->u), last = dem2di_dot(sight->v[1].w, sight->u);
+    return dem2di_max(0, sight->h - dem2di_min(first, last));
+}
+
 /* Is the minimum at rest the least of all? With r <= rho everywhere, r - |s - r u| <= depth (A
    minus B eroded by r is convex, and its distance from the origin bounds the depth); else the
    boundary beside it must outweigh the cone: a right angle to each side of d, which does for
@@ -9094,7 +9102,7 @@ static bool dem2di_certify(const dem2di_pair *pair, const dem2di_sight *sight, d
     double floor[2], allowed = sight->edge ? 0 : tolerance;
     dem2d_vec end[2];
     if (r > h && square <= 2 * tolerance * (r - h)) {
-        search->lower = search->upper - square / (2 * (r - h));
+        search->lower = search->upper - dem2di_face_gap(sight) - square / (2 * (r - h));
         search->proof = DEM2D_BY_RADIUS;
         return true;
     }
@@ -9108,7 +9116,7 @@ static bool dem2di_certify(const dem2di_pair *pair, const dem2di_sight *sight, d
           dem2di_outweighs(pair, sight, 0, floor[0], end[0], 1, allowed) &&
           dem2di_outweighs(pair, sight, 1, floor[1], end[1], 1, allowed)))
         return false;
-    search->lower = search->upper - allowed;
+    search->lower = search->upper - dem2di_face_gap(sight) - allowed;
     search->proof = DEM2D_BY_ARC;
     return true;
 }
