@@ -9322,24 +9322,24 @@ static inline int dem2di_polygon_face(const dem2d_shape *shape, dem2d_vec v, int
     return sine[other] < 1 ? edge[other] : -1;
 }
 
-/* The straight arc nearest to v, or -1. */
-static int dem2di_arc_face(const dem2d_shape *shape, dem2d_vec v) {
-    int k = dem2di_sector_find(shape, v), nearest = -1;
-    double least = DEM2DI_FLAT_ANGLE;
-    for (int side = -1; side <= 1; side += 2) {
-        int edge = dem2di_edge_beside(shape, k, side);
-        dem2d_vec along = shape->ends[edge];
-        if (!(dem2di_cross(v, along) > 0) || !(fabs(dem2di_dot(along, v)) < least)) continue;
-        least = fabs(dem2di_dot(along, v));
-        nearest = edge;
+/* Of the straight arcs beside the arc at v the one on a side, or -1: as with edges, so that a face
+   which turns away gives way to the next where both hold the same energy. */
+static int dem2di_arc_face(const dem2d_shape *shape, dem2d_vec v, int side) {
+    int k = dem2di_sector_find(shape, v), edge[2];
+    double sine[2];
+    for (int i = 0; i < 2; i++) {
+        edge[i] = dem2di_edge_beside(shape, k, i ? -side : side);
+        dem2d_vec along = shape->ends[edge[i]];
+        sine[i] = dem2di_cross(v, along) > 0 ? fabs(dem2di_dot(along, v)) : 1;
     }
-    return nearest;
+    int other = sine[1] < DEM2DI_ALONG && sine[1] < sine[0];
+    return sine[other] < DEM2DI_FLAT_ANGLE ? edge[other] : -1;
 }
 
 /* The edge or arc of a shape that is its face towards v on a side, or -1; of a polygon, beside a
    corner that is known or -1. */
 static inline int dem2di_face_find(const dem2d_shape *shape, dem2d_vec v, int corner, int side) {
-    if (shape->type != DEM2D_POLYGON) return dem2di_arc_face(shape, v);
+    if (shape->type != DEM2D_POLYGON) return dem2di_arc_face(shape, v, side);
     return dem2di_polygon_face(shape, v, corner < 0 ? dem2di_polygon_corner(shape, v) : corner,
                                side);
 }
@@ -17027,7 +17027,8 @@ DEM2D_API dem2d_result dem2d_world_write_csv(const dem2d_world *world, const dem
             surfaces.
             Contacts: each of two points keeps its spring at its corner, whichever grain has the
             lower id (dem2d_contact_point.corner). Polygons that a longer segment cuts through along
-            one of their edges are no longer missed.
+            one of their edges are no longer missed. Two points on straight arcs keep their energy
+            where one arc turns away and the next takes over.
             Sliding: one rule for all pairs, the mean over the step that was made, whatever time
             step and velocities have been set since. The ledger closes with dashpots at two points
             and where contacts open, and tells the turnover.

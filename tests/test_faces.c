@@ -770,6 +770,55 @@ static void test_points_conserve(void **state) {
     assert_true(off < twos / 500);
 }
 
+/* A polygon inscribed in the unit circle, sides of 0.1 and 0.2 in turn, with small round corners:
+   straight arcs that differ by 0.16 rad. */
+static dem2d_shape *unequal_sides(void) {
+    enum { SIDES = 40 };
+    dem2d_vec corner[SIDES], control[6 * SIDES];
+    const double pair = 4 * (double)TEST_PI / SIDES, cut = 0.02;
+    for (int i = 0; i < SIDES; i++) {
+        const double t = pair * (i / 2 + (i % 2 ? 1.0 / 3 : 0));
+        corner[i] = vec(cos(t), sin(t));
+    }
+    for (int i = 0; i < SIDES; i++) {
+        const dem2d_vec from = corner[i], to = corner[(i + 1) % SIDES];
+        const dem2d_vec next = corner[(i + 2) % SIDES];
+        const double side = hypot(to.x - from.x, to.y - from.y);
+        const double other = hypot(next.x - to.x, next.y - to.y);
+        const double c[6] = {cut / side, 1.0 / 3, 2.0 / 3, 1 - cut / side, 1 - cut / side / 3, 0};
+        for (int k = 0; k < 5; k++)
+            control[6 * i + k] =
+                vec(from.x + c[k] * (to.x - from.x), from.y + c[k] * (to.y - from.y));
+        control[6 * i + 5] = vec(to.x + cut / other / 3 * (next.x - to.x),
+                                 to.y + cut / other / 3 * (next.y - to.y));
+    }
+    dem2d_shape *shape;
+    assert_ok(dem2d_shape_create_bezier(NULL, control, 2 * SIDES, &shape));
+    return shape;
+}
+
+/* Where one straight arc turns away and the next takes over, the energy does not jump: it changes
+   by no more than the force of both points does over the way of the longer side. */
+static void test_next_straight_arc(void **state) {
+    (void)state;
+    enum { STEPS = 20000 };
+    dem2d_shape *b = unequal_sides();
+    const double turn = 2 * (double)TEST_PI / STEPS;
+    double q[WAYS] = {0}, force[WAYS], energy, last = 0, worst = 0;
+    int twos = 0;
+    q[Y] = reach(shapes[BOX], dem2d_pose_make(0, 0, 0, 1), vec(0, 1)) + 0.96;
+    for (int i = 0; i <= STEPS; i++) {
+        q[TURN_B] = i * turn;
+        twos += energy_of(shapes[BOX], b, q, &energy, force);
+        const double most = hypot(force[X], force[Y]) * 0.2 * turn;
+        if (i > 0) worst = fmax(worst, fabs(energy - last) / most);
+        last = energy;
+    }
+    assert_true(twos > STEPS / 2);
+    assert_true(worst < 1);
+    dem2d_shape_destroy(b);
+}
+
 /* --- scenes ---------------------------------------------------------------------------------- */
 
 typedef struct scene {
@@ -1871,6 +1920,7 @@ int main(void) {
         cmocka_unit_test(test_points_of_images),
         cmocka_unit_test(test_points_of_a_pair),
         cmocka_unit_test(test_points_conserve),
+        cmocka_unit_test(test_next_straight_arc),
         cmocka_unit_test(test_box_at_rest),
         cmocka_unit_test(test_box_on_box),
         cmocka_unit_test(test_stack_at_rest),
