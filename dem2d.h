@@ -88,8 +88,6 @@ LIMITS
       its neighbour (a 64-gon's: at 0.5 % of its radius). Sharp corners jump anyway: their steps are
       of first order. Energy is not exactly conserved when an edge slides past the free end of a
       segment wall.
-    * DEM2D_CONTACT_AREA is for shallow overlaps: its depth and normal mean nothing when one grain
-      lies inside another.
     * Where the support value hardly changes with the direction (bodies of constant width, one
       concentric with the other), a search may reach its cap: the answer is then UNRESOLVED, with
       bounds a few 1e-4 of the size apart.
@@ -436,7 +434,7 @@ OPTIONS (zero means: physical zero for physical fields; "library default" where 
     dem2d_wall_desc         material              -      none       a material of this world
     dem2d_wall_desc         point                 m      0          finite
     dem2d_wall_desc         normal                -      none       not zero; normalised
-    dem2d_wall_desc         segment               -      false      not with CONTACT_AREA
+    dem2d_wall_desc         segment               -      false
     dem2d_wall_desc         end                   m      0          finite, of segments not point
     dem2d_wall_desc         velocity              m/s    0          finite; MOVING only
     dem2d_wall_desc         stress                Pa     0          finite; SERVO only
@@ -1160,7 +1158,6 @@ typedef enum dem2d_face_rule {
     /// The papers' rule: one point, the middle of both witness points ([P] fig. 4a); at a wall, the
     /// middle of support point and foot point (fig. 4b). The other rules take the foot point there.
     DEM2D_ONE_POINT,
-    DEM2D_CONTACT_AREA, ///< energy kn area^2 / (2 length^2): conservative, slow, no closed form
     DEM2D_FACE_RULE_COUNT
 } dem2d_face_rule;
 
@@ -1366,7 +1363,7 @@ typedef struct dem2d_contact_info {
     dem2d_vec point;         ///< m, contact point; of two the centre of normal force
     dem2d_vec branch;        ///< m, centre of A to centre of B (wall: to the contact point)
     int points;              ///< that carry the force: 1, or 2 where two faces meet
-    double depth;            ///< m, overlap; by area: area over width
+    double depth;            ///< m, overlap
     double normal_force;     ///< N/m, on B along the normal; >= 0 but by a caller's law
     double tangential_force; ///< N/m, on B along the normal turned by +90 degrees
     double moment;           ///< N, on B, against rolling
@@ -9636,72 +9633,6 @@ static int dem2di_wall_points(const dem2d_shape *shape, dem2d_rot q, double scal
     return 1;
 }
 
-/* The overlap of two convex polygons, for the contact-area rule. Its boundary comes from both. */
-typedef struct dem2di_overlap {
-    dem2d_vec point; /* a corner of the overlap */
-    bool own;        /* the edge that leaves it is part of A's boundary */
-} dem2di_overlap;
-
-/* Keep what is left of the line through p along `along` (Sutherland and Hodgman); the new edge is
-   not A's. Returns the number of corners in `kept`: at most one more than before, or where a custom
-   shape is not convex what there is room for. */
-static int dem2di_overlap_cut(const dem2di_overlap *corners, int count, dem2d_vec p,
-                              dem2d_vec along, dem2di_overlap *kept, int room) {
-    int left = 0;
-    for (int i = 0; i < count && left + 2 <= room; i++) {
-        const dem2di_overlap *a = &corners[i], *b = &corners[i + 1 < count ? i + 1 : 0];
-        double ha = dem2di_cross(along, dem2di_sub(a->point, p));
-        double hb = dem2di_cross(along, dem2di_sub(b->point, p));
-        if (ha >= 0) kept[left++] = *a;
-        if ((ha >= 0) == (hb >= 0)) continue;
-        kept[left] = *a;
-        kept[left].point = dem2di_along(a->point, ha / (ha - hb), dem2di_sub(b->point, a->point));
-        if (ha >= 0) kept[left].own = false;
-        left++;
-    }
-    return left;
-}
-
-/* Area of the overlap; sum over A's part of its boundary of the edges, and of edge . middle; its
-   centroid. With F per area, the force on B is F times the sum turned by -90 degrees, and its
-   moment about the origin -F times the second sum. */
-static double dem2di_overlap_sums(const dem2di_overlap *corners, int count, dem2d_vec *edges,
-                                  double *moment, dem2d_vec *centroid) {
-    double twice = 0;
-    dem2d_vec first = dem2di_vec(0, 0), origin = corners[0].point;
-    *edges = first;
-    *moment = 0;
-    for (int i = 0; i < count; i++) {
-        dem2d_vec p = corners[i].point, q = corners[i + 1 < count ? i + 1 : 0].point;
-        dem2d_vec edge = dem2di_sub(q, p);
-        double part = dem2di_cross(dem2di_sub(p, origin), dem2di_sub(q, origin));
-        twice += part;
-        first =
-            dem2di_along(first, part / 3, dem2di_sub(dem2di_add(p, q), dem2di_scale(origin, 2)));
-        if (!corners[i].own) continue;
-        *edges = dem2di_add(*edges, edge);
-        *moment += dem2di_dot(edge, dem2di_add(p, q)) / 2;
-    }
-    *centroid = twice > 0 ? dem2di_along(origin, 1 / twice, first) : origin;
-    return twice / 2;
-}
-
-/* What the contact-area rule needs of an overlap: area over width as its depth, the normal across
-   the chord between the crossings, and a point on the force's line. False when there is none. */
-static bool dem2di_overlap_contact(const dem2di_overlap *corners, int count, double *area,
-                                   double *width, dem2d_vec *normal, dem2d_vec *point) {
-    dem2d_vec edges, centroid;
-    double moment;
-    if (count < 3) return false;
-    *area = dem2di_overlap_sums(corners, count, &edges, &moment, &centroid);
-    *width = dem2di_length(edges);
-    if (!(*area > 0) || !(*width > 0)) return false;
-    *normal = dem2di_vec(edges.y / *width, -edges.x / *width);
-    *point = dem2di_along(dem2di_scale(*normal, dem2di_dot(centroid, *normal)), moment / *width,
-                          dem2di_perp(*normal));
-    return true;
-}
-
 /* ============================================================================================
    >>contact  Contact of two shapes, of a shape and a wall
    uses: config, math, memory, support, shapes, gjk, epa, edges, minimum, faces
@@ -10537,8 +10468,6 @@ typedef struct dem2di_template {
     dem2d_shape *shape; /* NULL: free slot */
     uint32_t generation;
     int users;
-    int corners;        /* contact-area rule: of the polygon that stands for the shape */
-    dem2d_vec *outline; /* that many */
 } dem2di_template;
 
 /* What does not change while a particle lives, but for its motion. */
@@ -10763,8 +10692,7 @@ struct dem2d_world {
     dem2di_push *pushes;                 /* room for the contacts of a servo wall; in scratch */
     char *scratch; /* what only a step or only the building of the list needs */
     dem2di_tally *tallies;
-    dem2di_overlap *overlap; /* contact-area rule: for each block twice what one overlap may have */
-    int scratch_capacity, tally_capacity, overlap_capacity, overlap_size;
+    int scratch_capacity, tally_capacity;
 };
 
 /* The world's own environment counts what is in use and hands on to the caller's. */
@@ -10908,20 +10836,11 @@ static dem2d_result dem2di_out_of_memory(const dem2d_world *world, const char *w
     return dem2di_fail(&world->env, DEM2D_OUT_OF_MEMORY, -1, "no memory for %s", what);
 }
 
-static void dem2di_template_clear(const dem2d_env *env, dem2di_template *place) {
-    if (place->shape == NULL) return;
-    dem2di_release(env, place->outline, (size_t)place->corners, sizeof *place->outline);
-    dem2d_shape_destroy(place->shape);
-    place->shape = NULL;
-    place->outline = NULL;
-    place->corners = 0;
-}
-
 DEM2D_API void dem2d_world_destroy(dem2d_world *world) {
     if (world == NULL) return;
     dem2d_world *w = world;
     const dem2d_env *env = &w->env;
-    for (int i = 0; i < w->template_count; i++) dem2di_template_clear(env, &w->templates[i]);
+    for (int i = 0; i < w->template_count; i++) dem2d_shape_destroy(w->templates[i].shape);
     size_t side = (size_t)w->laws_side;
     dem2d_shape_destroy(w->line);
     dem2di_release(env, w->templates, (size_t)w->template_capacity, sizeof *w->templates);
@@ -10934,7 +10853,6 @@ DEM2D_API void dem2d_world_destroy(dem2d_world *world) {
                    sizeof *w->list.incident);
     dem2di_release(env, w->scratch, (size_t)w->scratch_capacity, DEM2DI_LINE);
     dem2di_release(env, w->tallies, (size_t)w->tally_capacity, sizeof *w->tallies);
-    dem2di_release(env, w->overlap, (size_t)w->overlap_capacity, sizeof *w->overlap);
     dem2d_env user = w->user_env;
     dem2di_release(&user, w, 1, sizeof *w);
 }
@@ -11058,32 +10976,6 @@ static dem2d_result dem2di_stale(const dem2d_world *w, const char *kind, uint32_
     return dem2di_fail(&w->env, DEM2D_STALE_ID, (int)(index & INT_MAX), "no such %s", kind);
 }
 
-/* Corners of the polygon that stands for a curved shape in the contact-area rule, whose energy is
-   what is conserved: its edges bulge by R pi^2/(2 n^2) = 5e-6 R, little against any overlap. */
-#define DEM2DI_AREA_CORNERS 1024
-
-/* The polygon of a template, and how much scratch the overlap of any two takes. */
-static bool dem2di_template_outline(dem2d_world *world, const dem2d_shape *shape,
-                                    dem2di_template *place) {
-    bool sharp = shape->type == DEM2D_POLYGON && shape->rounding == 0;
-    int count = sharp ? shape->count : DEM2DI_AREA_CORNERS, most = count;
-    if (!sharp && shape->count > count / 2 && shape->type != DEM2D_FOURIER)
-        most = count = 2 * shape->count;
-    for (int i = 0; i < world->template_count; i++)
-        if (world->templates[i].corners > most) most = world->templates[i].corners;
-    dem2d_vec *outline = (dem2d_vec *)dem2di_allocate(&world->env, (size_t)count, sizeof *outline);
-    if (outline == NULL) return false;
-    if (4 * most + 8 > world->overlap_size) world->overlap_size = 4 * most + 8;
-    for (int i = 0; i < count; i++) outline[i] = dem2di_outline_point(shape, i, count);
-    /* of the shape's own area: on the mean its boundary, not within it by 1e-4 of its size, which
-       counts against an overlap */
-    double twice = dem2di_twice_area(outline, count), grow = sqrt(2 * shape->mass.area / twice);
-    for (int i = 0; i < count; i++) outline[i] = dem2di_scale(outline[i], grow);
-    place->outline = outline;
-    place->corners = count;
-    return true;
-}
-
 DEM2D_API dem2d_result dem2d_world_add_shape(dem2d_world *world, const dem2d_shape *shape,
                                              dem2d_shape_id *id) {
     if (world == NULL || shape == NULL || id == NULL) return DEM2D_NULL_ARGUMENT;
@@ -11095,10 +10987,6 @@ DEM2D_API dem2d_result dem2d_world_add_shape(dem2d_world *world, const dem2d_sha
     dem2d_shape *copy = dem2di_shape_copy(&world->env, shape);
     if (copy == NULL) return DEM2D_OUT_OF_MEMORY;
     dem2di_template *place = &world->templates[slot];
-    if (world->faces == DEM2D_CONTACT_AREA && !dem2di_template_outline(world, copy, place)) {
-        dem2d_shape_destroy(copy);
-        return dem2di_out_of_memory(world, "an outline");
-    }
     place->shape = copy;
     place->generation++;
     place->users = 0;
@@ -11115,7 +11003,8 @@ DEM2D_API dem2d_result dem2d_world_remove_shape(dem2d_world *world, dem2d_shape_
     if (place->users > 0)
         return dem2di_fail(&world->env, DEM2D_IN_USE, (int)id.index, "shape of %d particles",
                            place->users);
-    dem2di_template_clear(&world->env, place);
+    dem2d_shape_destroy(place->shape);
+    place->shape = NULL;
     return DEM2D_OK;
 }
 
@@ -11703,8 +11592,6 @@ static dem2d_result dem2di_check_spans(const dem2d_world *world, const dem2d_wal
 
 static dem2d_result dem2di_check_segment(const dem2d_world *world, const dem2d_wall_desc *desc) {
     const dem2d_env *env = &world->env;
-    if (world->faces == DEM2D_CONTACT_AREA)
-        return dem2di_fail(env, DEM2D_OUT_OF_RANGE, -1, "segment: not with the contact-area rule");
     double length = dem2di_length(dem2di_sub(desc->end, desc->point));
     if (length > 0 && dem2di_finite(length)) return DEM2D_OK;
     return dem2di_fail(env, DEM2D_OUT_OF_RANGE, -1, "end: segment of length %g", length);
@@ -11992,23 +11879,12 @@ static int dem2di_contact_blocks(int discs, int count) {
     return dem2di_blocks(discs, DEM2DI_BLOCK) + dem2di_blocks(count - discs, DEM2DI_BLOCK_OTHERS);
 }
 
-/* Room for what the blocks find, and for the overlaps of the contact-area rule: one for each block
-   that may run at the same time. */
+/* Room for what the blocks find. */
 static bool dem2di_tallies_reserve(dem2d_world *world, int discs, int count) {
     int blocks = dem2di_contact_blocks(discs, count);
-    int others = world->parallel_for != NULL ? dem2di_contact_blocks(0, count - discs) : 1;
-    if (world->overlap_size > 0 && others > INT_MAX / world->overlap_size) return false;
     int bodies = dem2di_blocks(world->body_count, DEM2DI_BLOCK);
     return dem2di_array_reserve(world, (void **)&world->tallies, &world->tally_capacity,
-                                blocks > bodies ? blocks : bodies, sizeof *world->tallies) &&
-           dem2di_array_reserve(world, (void **)&world->overlap, &world->overlap_capacity,
-                                others * world->overlap_size, sizeof *world->overlap);
-}
-
-/* Of a block of contacts that are not of circles. */
-static dem2di_overlap *dem2di_overlap_scratch(const dem2d_world *world, int block) {
-    if (world->parallel_for == NULL || world->overlap == NULL) return world->overlap;
-    return world->overlap + (size_t)block * (size_t)world->overlap_size;
+                                blocks > bodies ? blocks : bodies, sizeof *world->tallies);
 }
 
 /* What was next becomes the present. */
@@ -12286,7 +12162,7 @@ static bool dem2di_may_join(const dem2d_world *world) {
 
 /* Do two circles take the kernel of circles? It knows friction and the closed form, and no more. */
 static bool dem2di_has_disc_kernel(const dem2d_world *world, const dem2di_plan *plan) {
-    return world->solver == DEM2D_CERTIFIED && world->faces != DEM2D_CONTACT_AREA && !plan->full;
+    return world->solver == DEM2D_CERTIFIED && !plan->full;
 }
 
 /* Is a feature that the scene no longer needs there for one list more: what its contacts had of it
@@ -13108,7 +12984,7 @@ static int dem2di_shapes_look(const dem2d_world *world, dem2di_pair *pair, const
     return 1;
 }
 
-/* Two circles that overlap, among the others for the full law or the contact-area rule. */
+/* Two circles that overlap, among the others for the full law. */
 static int dem2di_round_geometry(const dem2di_state *a, const dem2di_state *b, dem2di_link *link,
                                  dem2d_contact_point points[2], dem2di_count *count) {
     dem2di_round round = dem2di_round_make(dem2di_disc_line(a, b), a->radius, b->radius, 1);
@@ -13175,7 +13051,7 @@ static inline void dem2di_link_load(const dem2d_world *world, int i, int from,
                               &list->ends[from], &list->next_ends[at], link);
         return;
     }
-    if (world->faces != DEM2D_CONTACT_AREA) link->force = law->normal_stiffness * link->depth;
+    link->force = law->normal_stiffness * link->depth;
     dem2di_law_apply(law, slip, world->made_step, list->links[from].shear, link);
 }
 
@@ -13263,8 +13139,7 @@ static void dem2di_full_load(const dem2d_world *world, int i, int from, dem2d_ve
         dem2di_law_apply_ends(law, meeting.slip, dt, force, &list->links[from], &list->ends[from],
                               &list->next_ends[at], link);
     } else {
-        double spring =
-            world->faces == DEM2D_CONTACT_AREA ? link->force : law->normal_stiffness * link->depth;
+        double spring = law->normal_stiffness * link->depth;
         link->force = dem2di_damped(spring, dem2di_dashpot(law, meeting.mass), meeting.closing);
         dem2di_law_apply(law, meeting.slip, dt, list->links[from].shear, link);
         extra->viscous[0] = link->force - spring;
@@ -13272,87 +13147,6 @@ static void dem2di_full_load(const dem2d_world *world, int i, int from, dem2d_ve
     if (law->rolling_friction > 0)
         extra->moment = dem2di_rolling(law, dem2di_reduced_radius(world, i), meeting.turning, dt,
                                        link->force, list->extras[from].moment);
-}
-
-static dem2d_vec dem2di_outline_corner(const dem2d_world *world, int body, int i) {
-    const dem2di_body *b = &world->bodies[body];
-    dem2d_vec p = world->templates[b->shape_index].outline[i];
-    return dem2di_scale(dem2di_turn(world->now[body].q, p), b->scale);
-}
-
-/* Corners of a body's polygon that are within `depth` of its farthest along u, and one more to each
-   side: the first, counted cyclically, and how many. */
-static int dem2di_outline_range(const dem2d_world *world, int body, dem2d_vec u, double depth,
-                                int *first) {
-    const dem2di_body *b = &world->bodies[body];
-    const dem2di_template *place = &world->templates[b->shape_index];
-    dem2d_vec v = dem2di_turn_back(world->now[body].q, u);
-    int n = place->corners, best = 0, low = 0, high = 0;
-    double most = -HUGE_VAL;
-    for (int i = 0; i < n; i++) {
-        double height = dem2di_dot(place->outline[i], v);
-        if (!(height > most)) continue;
-        most = height;
-        best = i;
-    }
-    double level = most - depth / b->scale;
-    while (high < n - 1 && dem2di_dot(place->outline[(best + high) % n], v) >= level) high++;
-    while (low < n - 1 - high && dem2di_dot(place->outline[(best + n - low) % n], v) >= level)
-        low++;
-    *first = (best + n - low) % n;
-    return low + high + 1;
-}
-
-/* The overlap of two bodies, or of one and a wall (b negative), from A's centre: A's corners near
-   the contact, cut by B's edges there. The contact's normal and depth tell where that is: all of
-   the overlap is within the depth of the farthest corners of both. */
-static int dem2di_overlap_of(const dem2d_world *world, int a, int b, const dem2di_link *link,
-                             dem2d_vec d, dem2di_overlap *scratch, dem2di_overlap **corners) {
-    int first, cuts = 1, start = 0;
-    /* the polygons, grown to the shapes' areas, may stick out of them a little */
-    double depth = link->depth + 2e-3 * world->now[a].radius;
-    if (b >= 0) depth += 2e-3 * world->now[b].radius;
-    dem2d_vec u = link->normal;
-    dem2di_overlap *from = scratch, *to = from + world->overlap_size / 2;
-    int count = dem2di_outline_range(world, a, u, depth, &first);
-    int n = world->templates[world->bodies[a].shape_index].corners;
-    for (int i = 0; i < count; i++) {
-        from[i].point = dem2di_outline_corner(world, a, (first + i) % n);
-        from[i].own = true;
-    }
-    if (b >= 0) {
-        cuts = dem2di_outline_range(world, b, dem2di_negate(u), depth, &start);
-        n = world->templates[world->bodies[b].shape_index].corners;
-        if (cuts < n) cuts--; /* edges between the corners, or all around */
-    }
-    for (int i = 0; i < cuts && count >= 3; i++) {
-        dem2d_vec p = d, along = dem2di_negate(dem2di_perp(u));
-        if (b >= 0) {
-            p = dem2di_outline_corner(world, b, (start + i) % n);
-            along = dem2di_sub(dem2di_outline_corner(world, b, (start + i + 1) % n), p);
-            p = dem2di_add(p, d);
-        }
-        count = dem2di_overlap_cut(from, count, p, along, to, world->overlap_size / 2);
-        dem2di_overlap *swap = from;
-        from = to;
-        to = swap;
-    }
-    *corners = from;
-    return count;
-}
-
-/* The contact-area rule (Feng, Owen 2004): energy kn area^2/(2 L^2), with L the mean equivalent
-   radius, so that kn keeps its unit; its gradient is the force kn area width/L^2 across the chord
-   between the crossings of both boundaries. Depth is area/width: the energy is half force times
-   depth. */
-static void dem2di_area_load(const dem2d_world *world, const dem2d_pair_desc *law, int a, int b,
-                             const dem2di_overlap *corners, int count, dem2di_link *link) {
-    double area, width, length = dem2di_equivalent(world, a);
-    if (b >= 0) length = (length + dem2di_equivalent(world, b)) / 2;
-    link->depth = -1;
-    if (!dem2di_overlap_contact(corners, count, &area, &width, &link->normal, &link->point)) return;
-    link->depth = area / width;
-    link->force = law->normal_stiffness * (area / length) * (width / length);
 }
 
 /* Points of a contact into its link, and beside it when there are two. */
@@ -13365,16 +13159,6 @@ static inline void dem2di_link_place(const dem2di_list *list, int at, int count,
     }
     link->point.x = points[0].position.x;
     link->point.y = points[0].position.y;
-}
-
-/* The contact-area rule for contact i, whose point and normal are known; B is at d. */
-static void dem2di_area_apply(const dem2d_world *world, int i, int b, dem2d_vec d,
-                              const dem2d_pair_desc *law, dem2di_overlap *scratch) {
-    dem2di_link *link = &world->list.next_links[i - world->list.discs];
-    int a = world->list.keys[i].a;
-    dem2di_overlap *overlap;
-    int corners = dem2di_overlap_of(world, a, b, link, d, scratch, &overlap);
-    dem2di_area_load(world, law, a, b, overlap, corners, link);
 }
 
 static inline void dem2di_load_set(const dem2d_world *world, int at, dem2di_load load) {
@@ -13409,8 +13193,7 @@ static inline void dem2di_clear_beside(const dem2d_world *world, int at) {
 }
 
 /* Geometry and force of one listed pair that is not of two circles. */
-static void dem2di_pair_look(const dem2d_world *world, int i, dem2di_overlap *scratch,
-                             dem2di_count *count) {
+static void dem2di_pair_look(const dem2d_world *world, int i, dem2di_count *count) {
     const dem2di_list *list = &world->list;
     int a = list->keys[i].a, b = list->keys[i].b, at = i - list->discs;
     const dem2di_link *last = &list->links[at];
@@ -13435,11 +13218,6 @@ static void dem2di_pair_look(const dem2d_world *world, int i, dem2di_overlap *sc
     const dem2d_pair_desc *law = dem2di_law_of(world, i);
     dem2d_vec d = dem2di_centre_line(sa->x, sb->x);
     dem2di_link_place(list, at, found, points);
-    if (world->faces == DEM2D_CONTACT_AREA) {
-        dem2di_no_loads(world, i);
-        dem2di_area_apply(world, i, b, d, law, scratch);
-        if (!(link->depth > 0)) return;
-    }
     dem2d_vec arm_b = dem2di_sub(link->point, d);
     if (world->plan.full) {
         dem2di_full_load(world, i, at, arm_b, found == 2);
@@ -13516,18 +13294,11 @@ static int dem2di_segment_geometry(const dem2d_world *world, int a, int wall,
 }
 
 /* Force of a contact with a wall whose geometry is known. */
-static void dem2di_touch_force(const dem2d_world *world, int i, int from, dem2di_overlap *scratch,
-                               dem2di_count *count) {
+static void dem2di_touch_force(const dem2d_world *world, int i, int from, dem2di_count *count) {
     const dem2di_list *list = &world->list;
-    int a = list->keys[i].a, j = list->keys[i].b, at = i - list->discs;
-    const dem2di_state *state = &world->now[a];
-    const dem2di_wall_state *wall = &world->wall_now[j];
-    dem2di_link *link = &list->next_links[at];
+    dem2di_link *link = &list->next_links[i - list->discs];
     const dem2d_pair_desc *law = dem2di_law_of(world, i);
     bool two = dem2di_ends_at(world, i, true) != NULL;
-    if (world->faces == DEM2D_CONTACT_AREA)
-        dem2di_area_apply(world, i, -1, dem2di_sub(wall->point, state->x), law, scratch);
-    if (!(link->depth > 0)) return;
     if (world->faces == DEM2D_ONE_POINT) /* [P] fig. 4b: from the foot point to the middle */
         link->point = dem2di_along(link->point, link->depth / 2, link->normal);
     dem2d_vec foot = dem2di_vec(0, 0); /* walls do not turn */
@@ -13540,8 +13311,7 @@ static void dem2di_touch_force(const dem2d_world *world, int i, int from, dem2di
 
 /* The same as for a pair, for a particle and a wall. Where segments are joined, forces come after
    all of the geometry. */
-static void dem2di_touch_look(const dem2d_world *world, int i, dem2di_overlap *scratch,
-                              dem2di_count *count) {
+static void dem2di_touch_look(const dem2d_world *world, int i, dem2di_count *count) {
     const dem2di_list *list = &world->list;
     int a = list->keys[i].a, j = list->keys[i].b, at = i - list->discs;
     const dem2di_link *last = &list->links[at];
@@ -13555,7 +13325,7 @@ static void dem2di_touch_look(const dem2d_world *world, int i, dem2di_overlap *s
                         : dem2di_plane_geometry(world, a, j, link, points, count);
     if (found == 0) return;
     dem2di_link_place(list, at, found, points);
-    if (!segment || !world->plan.joints) dem2di_touch_force(world, i, at, scratch, count);
+    if (!segment || !world->plan.joints) dem2di_touch_force(world, i, at, count);
 }
 
 /* --- joints of segments: of two contacts at the same place one is left -------------------------
@@ -13670,7 +13440,7 @@ static void dem2di_settle_joints(const dem2d_world *world, dem2di_count *count) 
                 dem2di_clear_beside(world, i - list->discs);
             continue;
         }
-        dem2di_touch_force(world, i, dem2di_joint_source(world, i), NULL, count);
+        dem2di_touch_force(world, i, dem2di_joint_source(world, i), count);
     }
 }
 
@@ -13690,12 +13460,11 @@ static void dem2di_contact_task(void *context, int begin, int end) {
         }
         int first = list->discs + (block - discs) * DEM2DI_BLOCK_OTHERS;
         int last = dem2di_block_end(first, DEM2DI_BLOCK_OTHERS, list->count);
-        dem2di_overlap *scratch = dem2di_overlap_scratch(world, block - discs);
         for (int i = first; i < last; i++)
             if (i < list->pairs)
-                dem2di_pair_look(world, i, scratch, count);
+                dem2di_pair_look(world, i, count);
             else
-                dem2di_touch_look(world, i, scratch, count);
+                dem2di_touch_look(world, i, count);
     }
 }
 
@@ -13714,14 +13483,6 @@ static void dem2di_contact_pass(dem2d_world *world, dem2di_count *count) {
     dem2di_run(world, DEM2D_PHASE_CONTACTS, blocks, dem2di_contact_task, world);
     for (int k = 0; k < blocks; k++) dem2di_count_add(count, &world->tallies[k].count);
     if (world->plan.joints) dem2di_settle_joints(world, count);
-}
-
-/* Of a contact of one point. By area the force kn A w/L^2 rises as kn w^2/L^2 and with the width w
-   itself, which for crossing corners (w as the depth, A as its square) adds half of that. */
-static double dem2di_stiffness_of(const dem2d_world *world, const dem2d_pair_desc *law,
-                                  const dem2di_link *link) {
-    if (world->faces != DEM2D_CONTACT_AREA) return law->normal_stiffness;
-    return link->depth > 0 ? 1.5 * link->force / link->depth : 0;
 }
 
 /* Part of the normal stiffness that the two points carry together. */
@@ -13867,7 +13628,7 @@ static dem2di_push dem2di_push_make(const dem2d_world *world, int contact, dem2d
         double offset = ends->weight[0] * ends->offset[0] + ends->weight[1] * ends->offset[1];
         arm = dem2di_along(arm, offset / weight, dem2di_perp(link->normal));
     }
-    double stiffness = weight * dem2di_stiffness_of(world, law, link);
+    double stiffness = weight * law->normal_stiffness;
     double elastic = stiffness * world->time_step;
     double impedance = elastic + weight * dem2di_dashpot(law, mass);
     if (extra != NULL) spring -= extra->viscous[0] + extra->viscous[1];
@@ -14168,7 +13929,7 @@ static double dem2di_contact_height(const dem2d_world *world, int slot, const de
 static double dem2di_rocking(const dem2d_world *world, int contact, int side, bool next,
                              const dem2di_link *link, bool greatest) {
     const dem2di_list *list = &world->list;
-    if (contact < list->discs || world->faces == DEM2D_CONTACT_AREA) return 0;
+    if (contact < list->discs) return 0;
     const dem2di_key *key = &list->keys[contact];
     const dem2di_state *states = dem2di_states_at(world, next);
     int slot = side ? key->b : key->a, other = side ? key->a : key->b;
@@ -14205,7 +13966,7 @@ static void dem2di_stiffness_sum(const dem2d_world *world, int slot, bool next,
                       world->bodies[key->b].motion == DEM2D_FREE;
         bool sticks = world->law == NULL && fabs(link.shear) < law->friction * link.force;
         bool rubs = law->friction > 0 || world->law != NULL;
-        double kn = dem2di_stiffness_of(world, law, &link), kt = law->tangential_stiffness;
+        double kn = law->normal_stiffness, kt = law->tangential_stiffness;
         dem2d_vec arm = side ? arm_b : link.point, t = dem2di_perp(link.normal);
         for (int bound = 0; bound < 2; bound++) {
             double f = bound == 1 && shared ? 2 : 1;
@@ -14236,7 +13997,7 @@ static void dem2di_stiffest_meet(const dem2d_world *world, dem2di_stiffest *so_f
     so_far->at[bound] = slot;
 }
 
-/* kn + kt of any two materials; by area the stiffness depends on the overlap. */
+/* kn + kt of any two materials. */
 static double dem2di_greatest_stiffness(const dem2d_world *world) {
     double greatest = 0;
     for (int a = 0; a < world->material_count; a++)
@@ -14244,7 +14005,7 @@ static double dem2di_greatest_stiffness(const dem2d_world *world) {
             const dem2d_pair_desc *law = dem2di_law(world, a, b);
             greatest = dem2di_max(greatest, law->normal_stiffness + law->tangential_stiffness);
         }
-    return world->faces == DEM2D_CONTACT_AREA ? HUGE_VAL : greatest;
+    return greatest;
 }
 
 /* No eigenvalue of a particle is above the sum of the traces of its contacts. Of two circles a
@@ -15540,8 +15301,6 @@ static void dem2di_archive_templates(dem2di_archive *ar, dem2d_world *w) {
         dem2di_archive_bool(ar, "there", &there);
         if (!there || !dem2di_archive_good(ar)) continue;
         dem2di_archive_shape(ar, &w->env, &place->shape);
-        if (dem2di_archive_loaded(ar) && w->faces == DEM2D_CONTACT_AREA)
-            (void)dem2di_archive_room(ar, dem2di_template_outline(w, place->shape, place));
     }
 }
 
@@ -17030,7 +16789,8 @@ DEM2D_API dem2d_result dem2d_world_write_csv(const dem2d_world *world, const dem
             Contacts: each of two points keeps its spring at its corner, whichever grain has the
             lower id (dem2d_contact_point.corner). Polygons that a longer segment cuts through along
             one of their edges are no longer missed. Two points on straight arcs keep their energy
-            where one arc turns away and the next takes over.
+            where one arc turns away and the next takes over. DEM2D_CONTACT_AREA is gone: two points
+            conserve energy at a hundredth of its cost.
             Sliding: one rule for all pairs, the mean over the step that was made, whatever time
             step and velocities have been set since. The ledger closes with dashpots at two points
             and where contacts open, and tells the turnover.

@@ -37,7 +37,7 @@ static const char usage[] =
     "  --wall-friction   keep friction 0.2 at the walls after settling, as the papers do\n"
     "  --gravity         keep gravity after settling: the papers do not say\n"
     "  --solver NAME     of contacts: certified or gjk (GJK and EPA) (certified)\n"
-    "  --faces RULE      forces where faces meet: two (points), one, or area (two)\n"
+    "  --faces RULE      forces where faces meet: two (points) or one (two)\n"
     "  --papers          the papers' way: GJK and EPA for every pair in every step, circles too,\n"
     "                    one contact point, templates by their fits, friction at the walls\n"
     "  --grains PATH     bezier and fs grains from an image (PBM, PGM), an outline (CSV, first\n"
@@ -49,7 +49,7 @@ static const char usage[] =
     "  --pairs           also pairs.csv: support calls of GJK and EPA's residuals for all near\n"
     "                    pairs of the settled state\n"
     "  --ledger          keep the ledger of energies: its columns in history.csv, and a check\n"
-    "                    that it closes; --quick keeps it unless --faces are one or area\n"
+    "                    that it closes; --quick keeps it unless --faces are one\n"
     "  --vtk             also particles.pvd and contacts.pvd with 40 frames in vtk/, for ParaView\n"
     "  --quick           a small, hasty run of 8000 steps with wider bands for the checks\n"
     "  --help            this text\n"
@@ -111,7 +111,7 @@ static const char *const option_names[OPTIONS] = {
 static options parse_options(int count, char **arguments) {
     static const char *const dampings[] = {"local", "global"};
     static const char *const solvers[] = {"certified", "gjk"};
-    static const char *const rules[] = {"two", "one", "area"};
+    static const char *const rules[] = {"two", "one"};
     options o = {0};
     o.seed = 1;
     o.stiffness = STIFFNESS_OF_PAPERS;
@@ -133,7 +133,7 @@ static options parse_options(int count, char **arguments) {
         if (which == WALL_FRICTION) o.wall_friction = true;
         if (which == GRAVITY) o.gravity = true;
         if (which == SOLVER) o.solver = parse_name(name, value, solvers, 2);
-        if (which == FACES) o.faces = parse_name(name, value, rules, 3);
+        if (which == FACES) o.faces = parse_name(name, value, rules, 2);
         if (which == PAPERS) o.papers = true;
         if (which == GRAINS) o.grains = value;
         if (which == CROP) parse_crop(value, &o.search);

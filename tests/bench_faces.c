@@ -1,4 +1,4 @@
-/* bench_faces [--quick] - what the three rules for contacts of faces do to the energy, and what
+/* bench_faces [--quick] - what the two rules for contacts of faces do to the energy, and what
    they cost.
 
    A box rocks on a floor; 64 grains (sharp polygons, rounded ones, ellipses, Fourier series) fly
@@ -33,8 +33,7 @@ enum { POLYGONS, ROUNDED, ELLIPSES, SERIES, KINDS };
 
 static const char *const kind_names[KINDS] = {"sharp polygons", "rounded polygons", "ellipses",
                                               "Fourier series"};
-static const char *const rule_names[DEM2D_FACE_RULE_COUNT] = {"two points", "one point",
-                                                              "contact area"};
+static const char *const rule_names[DEM2D_FACE_RULE_COUNT] = {"two points", "one point"};
 
 static void check(dem2d_result result, const char *what) {
     if (result == DEM2D_OK) return;

@@ -15,10 +15,8 @@
 
    and the run itself against sums: contact forces on every particle and wall, momentum, motion;
    and, of circles and half-planes, energies, see world_check_ledger.
-   Not compared to rounding: the contact-area rule, whose outlines start elsewhere in a mirror
-   image, and whose normal is noise where one grain is inside another. Ties, as of a box upright on
-   a wall, end a comparison: the push decides them otherwise. Include it after dem2d.h and inside.h.
- */
+   Ties, as of a box upright on a wall, end a comparison: the push decides them otherwise. Include
+   it after dem2d.h and inside.h. */
 #ifndef RANDOM_WORLDS_H
 #define RANDOM_WORLDS_H
 
@@ -48,7 +46,6 @@ enum {
     WITH_LAW,
     WITH_TWO_POINTS,
     WITH_ONE_POINT,
-    WITH_AREA,
     WITH_GJK,
     WITH_SERVO,
     WITH_MOVING,
@@ -78,12 +75,11 @@ enum {
 };
 
 static const char *const world_features[WITH_COUNT] = {
-    "dashpot",  "rolling",   "caller's law", "two points",  "one point", "area",
-    "GJK, EPA", "servo",     "moving",       "turned wall", "segment",   "chain",
-    "driven",   "fixed",     "added",        "removed",     "moved",     "walls come",
-    "set_pair", "time step", "gravity",      "damping",     "refused",   "skin",
-    "ledger",   "new list",  "no memory",    "snapshot",    "threads",   "queries",
-    "circle",   "ellipse",   "polygon",      "polybezier",  "Fourier",   "custom"};
+    "dashpot", "rolling",     "caller's law", "two points", "one point",  "GJK, EPA", "servo",
+    "moving",  "turned wall", "segment",      "chain",      "driven",     "fixed",    "added",
+    "removed", "moved",       "walls come",   "set_pair",   "time step",  "gravity",  "damping",
+    "refused", "skin",        "ledger",       "new list",   "no memory",  "snapshot", "threads",
+    "queries", "circle",      "ellipse",      "polygon",    "polybezier", "Fourier",  "custom"};
 
 /* --- sizes: of radii and forces of 1 -----------------------------------------------------------
  */
@@ -318,9 +314,8 @@ static dem2d_wall_desc world_make_segment(world_random *r, const world_script *s
 /* A floor, of segments or a half-plane; sides, of which one may be a segment; a lid, whose length
    may be the distance of the sides. */
 static void world_make_walls(world_random *r, world_script *s) {
-    const bool area = s->desc.faces == DEM2D_CONTACT_AREA;
     const double tilt = world_once_in(r, 3) ? 0 : world_uniform(r, -0.2, 0.2);
-    if (area || world_once_in(r, 2)) {
+    if (world_once_in(r, 2)) {
         s->walls[s->wall_count++] = world_make_wall(r, s, 0, 0, -tilt, 1);
     } else {
         const int links = 1 + world_below(r, 3);
@@ -344,7 +339,7 @@ static void world_make_walls(world_random *r, world_script *s) {
     }
     s->wall_count++;
     s->walls_at_first = s->wall_count;
-    if (area || s->wall_count == MOST_WALLS) return;
+    if (s->wall_count == MOST_WALLS) return;
     s->walls[s->wall_count++] = /* comes later, if it is called for */
         world_make_segment(r, s, world_vec(world_uniform(r, 0, 1), world_uniform(r, 1, 2)),
                            world_vec(world_uniform(r, 2, 3), world_uniform(r, 1, 2)));
@@ -413,8 +408,6 @@ static void world_make_script(uint64_t seed, int64_t index, world_script *s) {
     if (world_once_in(r, 4)) s->desc.skin = world_uniform(r, 0.001, 0.3);
     if (world_once_in(r, 8)) s->desc.solver = DEM2D_GJK_EPA;
     if (world_once_in(r, 8)) s->desc.faces = DEM2D_ONE_POINT;
-    /* takes a hundred times as long: a quarter of the time for one world in fifty */
-    if (world_once_in(r, 50)) s->desc.faces = DEM2D_CONTACT_AREA;
     s->desc.skip_time_step_check = world_once_in(r, 4);
     s->desc.ledger = world_once_in(r, 2);
     s->desc.contact_tolerance = WORLD_TOLERANCE;
@@ -425,7 +418,6 @@ static void world_make_script(uint64_t seed, int64_t index, world_script *s) {
     s->exact_lists = true;
     s->exact = WORLD_PUSH;
     if (s->desc.solver == DEM2D_GJK_EPA) s->exact = WORLD_SEARCHED;
-    if (s->desc.faces == DEM2D_CONTACT_AREA) s->exact = HUGE_VAL;
     for (int i = 0; i < s->material_count; i++) s->materials[i] = world_make_material(r);
     for (int i = 0; i < s->shape_count; i++) {
         int type = world_below(r, DEM2D_SHAPE_TYPE_COUNT);
@@ -1187,7 +1179,7 @@ static bool world_is_smooth(const world_script *s, double *lightest) {
         if (s->walls[j].segment) return false;
     for (int k = 0; k < s->event_count; k++)
         if (s->events[k].kind == EVENT_ADD_WALL && s->events[k].wall.segment) return false;
-    return s->desc.faces != DEM2D_CONTACT_AREA;
+    return true;
 }
 
 /* A contact that opens or closes within a step is booked as if at its end: at most k (v dt)^2/2 is
@@ -1490,14 +1482,13 @@ static int world_show(const world_script *s, const world_view *view, world_sight
 
 /* What the script itself makes use of. */
 static uint64_t world_uses(const world_script *s) {
-    static const int rules[] = {WITH_COUNT, WITH_ONE_POINT, WITH_AREA};
     uint64_t uses = (uint64_t)1 << WITH_THREADS, one = 1;
     for (int i = 0; i < s->material_count; i++) {
         if (s->materials[i].damping_ratio > 0) uses |= one << WITH_DASHPOT;
         if (s->materials[i].rolling_friction > 0) uses |= one << WITH_ROLLING;
     }
     if (s->law) uses |= one << WITH_LAW;
-    if (s->desc.faces != DEM2D_TWO_POINTS) uses |= one << rules[s->desc.faces];
+    if (s->desc.faces == DEM2D_ONE_POINT) uses |= one << WITH_ONE_POINT;
     if (s->desc.solver == DEM2D_GJK_EPA) uses |= one << WITH_GJK;
     if (s->desc.skin > 0) uses |= one << WITH_SKIN;
     if (s->desc.ledger) uses |= one << WITH_LEDGER;

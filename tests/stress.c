@@ -609,9 +609,8 @@ static void case_speed(void) {
 
 /* Two of a kind, nine tenths of their size in each other, are let go. Kinetic energy when they are
    apart, of that in the contact at first. */
-static double released(int kind, int variant, double angle, dem2d_face_rule faces) {
+static double released(int kind, int variant, double angle) {
     dem2d_world_desc d = {0};
-    d.faces = faces;
     const double mass = glass.density * PI;
     d.time_step = contact_time(mass, glass.normal_stiffness, true) / 400;
     scene s = make_scene(&d, &glass);
@@ -655,23 +654,21 @@ static void heap(void) {
 }
 
 /* The row of a kind: the worst of all templates and some directions. */
-static void overlap_row(int kind, dem2d_face_rule faces, double allowed) {
+static void overlap_row(int kind, double allowed) {
     char name[64], criterion[64];
     double least = HUGE_VAL, most = 0;
     for (int variant = 0; variant < VARIANTS; variant++)
         for (int k = 0; k < 6; k++) {
-            const double ratio = released(kind, variant, 0.1 + k, faces);
+            const double ratio = released(kind, variant, 0.1 + k);
             least = fmin(least, ratio), most = fmax(most, ratio);
         }
-    snprintf(name, sizeof name, "overlap 90 %%: %s%s", kind_names[kind],
-             faces == DEM2D_CONTACT_AREA ? ", by area" : "");
+    snprintf(name, sizeof name, "overlap 90 %%: %s", kind_names[kind]);
     snprintf(criterion, sizeof criterion, "at most %g of the elastic energy", allowed);
     row(most < allowed, name, criterion, "%.4f to %.4f", least, most);
 }
 
 static void case_overlap(void) {
-    for (int kind = 0; kind < KINDS; kind++) overlap_row(kind, DEM2D_TWO_POINTS, 1.01);
-    overlap_row(SHARP, DEM2D_CONTACT_AREA, 1.01);
+    for (int kind = 0; kind < KINDS; kind++) overlap_row(kind, 1.01);
     heap();
 }
 
@@ -1088,7 +1085,6 @@ static void case_exchange(void) {
 typedef struct squeeze_case {
     const char *name;
     int kind; /* -1: all */
-    dem2d_face_rule faces;
     double damping;
     int side; /* grains in a row */
 } squeeze_case;
@@ -1101,7 +1097,7 @@ static void squeeze(const squeeze_case *c) {
     const double r = 0.02, cell = 2.6 * r, mass = glass.density * PI * r * r, side = c->side * cell;
     const double speed = 2e-4 * r * sqrt(glass.normal_stiffness / mass); /* slow against waves */
     d.time_step = contact_time(mass, glass.normal_stiffness, true) / 100;
-    d.faces = c->faces, d.local_damping = c->damping;
+    d.local_damping = c->damping;
     scene s = make_scene(&d, &glass);
     for (int i = 0; i < c->side * c->side; i++) {
         const int kind = c->kind >= 0 ? c->kind : i % KINDS;
@@ -1150,15 +1146,14 @@ static void squeeze(const squeeze_case *c) {
 
 static void case_squeeze(void) {
     static const squeeze_case list[] = {
-        {"squeeze: discs", DISC, DEM2D_TWO_POINTS, 0, 12},
-        {"squeeze: ellipses", ELLIPSE, DEM2D_TWO_POINTS, 0, 12},
-        {"squeeze: polybeziers", BEZIER, DEM2D_TWO_POINTS, 0, 8},
-        {"squeeze: Fourier series", SERIES, DEM2D_TWO_POINTS, 0, 8},
-        {"squeeze: rounded polygons", ROUNDED, DEM2D_TWO_POINTS, 0, 8},
-        {"squeeze: polygons", SHARP, DEM2D_TWO_POINTS, 0, 8},
-        {"squeeze: polygons, by area", SHARP, DEM2D_CONTACT_AREA, 0, 6},
-        {"squeeze: all kinds", -1, DEM2D_TWO_POINTS, 0, 12},
-        {"squeeze: all kinds, damped", -1, DEM2D_TWO_POINTS, 0.3, 12},
+        {"squeeze: discs", DISC, 0, 12},
+        {"squeeze: ellipses", ELLIPSE, 0, 12},
+        {"squeeze: polybeziers", BEZIER, 0, 8},
+        {"squeeze: Fourier series", SERIES, 0, 8},
+        {"squeeze: rounded polygons", ROUNDED, 0, 8},
+        {"squeeze: polygons", SHARP, 0, 8},
+        {"squeeze: all kinds", -1, 0, 12},
+        {"squeeze: all kinds, damped", -1, 0.3, 12},
     };
     for (int i = 0; i < COUNT_OF(list); i++)
         if (!quick || i != 1) squeeze(&list[i]);

@@ -1,5 +1,5 @@
 /* Where two faces meet: the two points of a contact and that nothing jumps, closed forms of resting
-   and tipping boxes, energy, the area rule, friction at both points, what the world reports of
+   and tipping boxes, energy, friction at both points, what the world reports of
    them, and that pairs which were skipped are never late.
 
    Jumps of the normal at true ties of the least depth (a corner that can leave by two sides) are no
@@ -1131,51 +1131,7 @@ static void test_rocking_box(void **state) {
     assert_true(one > 10 * bounds[1]); /* the papers' rule does not fall with the step */
 }
 
-/* --- the area rule --------------------------------------------------------------------------- */
-
-enum { OUTLINE = 1500 };
-
-/* Part of a convex polygon on the left of the line from a along d. */
-static int clip(const dem2d_vec *in, int count, dem2d_vec a, dem2d_vec d, dem2d_vec *out) {
-    int kept = 0;
-    for (int i = 0; i < count; i++) {
-        const dem2d_vec p = in[i], q = in[(i + 1) % count];
-        const double hp = cross(d, sub(p, a)), hq = cross(d, sub(q, a));
-        if (hp >= 0) out[kept++] = p;
-        if ((hp > 0 && hq < 0) || (hp < 0 && hq > 0)) {
-            const double t = hp / (hp - hq);
-            out[kept++] = vec(p.x + t * (q.x - p.x), p.y + t * (q.y - p.y));
-        }
-    }
-    return kept;
-}
-
-static int outline(const dem2d_shape *shape, dem2d_pose pose, dem2d_vec *points) {
-    const dem2d_shape_info info = facts(shape);
-    const bool sharp = info.type == DEM2D_POLYGON && info.rounding == 0;
-    const int count = sharp ? info.count : OUTLINE;
-    assert_ok(dem2d_shape_outline(shape, pose, count, points));
-    return count;
-}
-
-/* Common area of A and B, or of A and the half-plane y < 0: polygons exactly, others by theirs of
-   1500 points, short by 2e-6 of the size squared times the width of the common part. */
-static double common_area(const dem2d_shape *a, dem2d_pose pa, const dem2d_shape *b,
-                          dem2d_pose pb) {
-    static dem2d_vec room[2][2 * OUTLINE + 8], edge[OUTLINE];
-    int count = outline(a, pa, room[0]), now = 0;
-    const int edges = b ? outline(b, pb, edge) : 1;
-    for (int i = 0; i < edges && count > 0; i++, now = !now) {
-        const dem2d_vec from = b ? edge[i] : vec(0, 0);
-        const dem2d_vec along = b ? sub(edge[(i + 1) % edges], from) : vec(-1, 0);
-        count = clip(room[now], count, from, along, room[!now]);
-    }
-    double twice = 0;
-    for (int i = 0; i < count; i++)
-        twice +=
-            cross(sub(room[now][i], room[now][0]), sub(room[now][(i + 1) % count], room[now][0]));
-    return twice / 2;
-}
+/* --- one force pass -------------------------------------------------------------------------- */
 
 typedef struct probe {
     double energy;
@@ -1209,54 +1165,6 @@ static probe force_pass(dem2d_face_rule rule, const dem2d_shape *a, const dem2d_
     return p;
 }
 
-/* Minus the slope of the energy along coordinate k of body i: x, y, angle. */
-static double pull(const dem2d_shape *a, const dem2d_pose *pa, const dem2d_shape *b,
-                   const dem2d_pose *pb, int i, int k, double h) {
-    double e[2];
-    for (int side = 0; side < 2; side++) {
-        dem2d_pose p[2] = {*pa, *pb};
-        const double by = side ? h : -h, angle = dem2d_rot_angle(p[i].rotation);
-        if (k == 0) p[i].position.x += by;
-        if (k == 1) p[i].position.y += by;
-        if (k == 2) p[i].rotation = dem2d_rot_make(angle + by);
-        e[side] = force_pass(DEM2D_CONTACT_AREA, a, &p[0], b, &p[1]).energy;
-    }
-    return (e[0] - e[1]) / (2 * h);
-}
-
-/* Forces and torques of a pass by differences of the energy over +-h, relative to the force. */
-static void check_slopes(int i, int j, const dem2d_pose *pa, const dem2d_pose *pb, double h,
-                         double tolerance) {
-    const dem2d_shape *a = shapes[i], *b = j < 0 ? NULL : shapes[j];
-    const probe p = force_pass(DEM2D_CONTACT_AREA, a, pa, b, pb);
-    const double scale = length(p.force[0]);
-    for (int body = 0; body < (b ? 2 : 1); body++)
-        for (int k = 0; k < 3; k++) {
-            const dem2d_vec f = p.force[body];
-            const double got = k == 0 ? f.x : k == 1 ? f.y : p.torque[body];
-            const double slope = pull(a, pa, b, pb, body, k, h);
-            if (!(p.count == 1 && scale > 0 && fabs(got - slope) <= tolerance * scale))
-                print_error("%s on %s, body %d, coordinate %d; A at %.17g %.17g turned by %.17g\n",
-                            names[i], b ? names[j] : "wall", body, k, pa->position.x,
-                            pa->position.y, dem2d_rot_angle(pa->rotation));
-            assert_int_equal(p.count, 1);
-            assert_true(scale > 0);
-            assert_within(got, slope, tolerance * scale);
-        }
-}
-
-/* The energy by the common area of this file, and its slopes. */
-static void check_area(int i, int j, const dem2d_pose *pa, const dem2d_pose *pb, double by_area,
-                       double by_slope) {
-    const dem2d_shape *a = shapes[i], *b = j < 0 ? NULL : shapes[j];
-    const probe p = force_pass(DEM2D_CONTACT_AREA, a, pa, b, pb);
-    const double area = common_area(a, *pa, b, *pb), ra = facts(a).equivalent;
-    const double size = b ? (ra + facts(b).equivalent) / 2 : ra;
-    assert_int_equal(p.count, 1);
-    assert_near(p.energy, KN * area * area / (2 * size * size), by_area);
-    check_slopes(i, j, pa, pb, 1e-5, by_slope);
-}
-
 /* B beside A in some direction at some angle, pushed in along the normal by a depth. */
 static void place_pair(test_random *random, int i, int j, double depth, dem2d_pose *pa,
                        dem2d_pose *pb) {
@@ -1268,114 +1176,6 @@ static void place_pair(test_random *random, int i, int j, double depth, dem2d_po
     assert_ok(dem2d_pair_distance(shapes[i], *pa, shapes[j], *pb, NULL, &c));
     pb->position.x += (c.depth - depth) * c.normal.x;
     pb->position.y += (c.depth - depth) * c.normal.y;
-}
-
-static void test_area_of_polygons(void **state) {
-    (void)state;
-    static const int kinds[] = {BOX, SMALL, HEXAGON, TRIANGLE, QUAD, GON64};
-    test_random random = {11};
-    for (int i = 0; i < 40; i++) {
-        const int a = kinds[test_below(&random, 6)], b = kinds[test_below(&random, 6)];
-        dem2d_pose pa, pb;
-        place_pair(&random, a, b, test_uniform(&random, 0.01, 0.06), &pa, &pb);
-        check_area(a, b, &pa, &pb, 1e-9, 1e-4);
-    }
-}
-
-static void test_area_of_smooth_pairs(void **state) {
-    (void)state;
-    static const int kinds[] = {DISC, OVAL, LOBES, EGG, CUSTOM, ROUNDED, STADIUM, BOX};
-    test_random random = {12};
-    for (int i = 0; i < COUNT_OF(kinds); i++)
-        for (int j = i == COUNT_OF(kinds) - 1; j < COUNT_OF(kinds); j += 3) {
-            dem2d_pose pa, pb;
-            if (kinds[i] == BOX && kinds[j] == BOX) continue;
-            place_pair(&random, kinds[i], kinds[j], test_uniform(&random, 0.05, 0.08), &pa, &pb);
-            check_area(kinds[i], kinds[j], &pa, &pb, 1e-3, 1e-4);
-        }
-}
-
-static void test_area_of_walls(void **state) {
-    (void)state;
-    test_random random = {13};
-    for (int i = 0; i < SHAPES; i++) {
-        const bool sharp =
-            facts(shapes[i]).type == DEM2D_POLYGON && i != ROUNDED && i != ROUNDED_SMALL;
-        const double angle = test_uniform(&random, -3, 3);
-        dem2d_pose pose = dem2d_pose_make(0.3, 0, angle, 1);
-        pose.position.y = reach(shapes[i], pose, vec(0, -1)) - 0.05;
-        check_area(i, -1, &pose, &pose, sharp ? 1e-9 : 1e-3, 1e-4);
-    }
-}
-
-/* Shallow overlaps, where a smooth shape's own polygon has few corners: the force is still the
-   slope of the energy, and none is missed. Where a corner comes in, the width sets in at another
-   rate, which differences over a thousandth of the depth see as a quarter of that. */
-static void test_area_of_shallow_contacts(void **state) {
-    (void)state;
-    test_random random = {14};
-    for (int i = 0; i < 1500; i++) {
-        const int a = i % SHAPES, b = test_below(&random, SHAPES);
-        const double depth = exp(test_uniform(&random, log(1e-4), log(1e-2)));
-        dem2d_pose pa = dem2d_pose_make(0.3, 0, test_uniform(&random, -3, 3), 1), pb = pa;
-        pa.position.y = reach(shapes[a], pa, vec(0, -1)) - depth;
-        check_slopes(a, -1, &pa, &pa, 1e-3 * depth, 2e-3);
-        if (i % 4) continue;
-        place_pair(&random, a, b, depth, &pa, &pb);
-        check_slopes(a, b, &pa, &pb, 1e-3 * depth, 2e-3);
-    }
-}
-
-/* Two bodies meet without friction; b < 0: one and the floor. Loss of energy over the energy. */
-static double bounce_loss(int a, int b, double offset, double time_step) {
-    dem2d_world_desc desc = basic_desc(time_step);
-    desc.faces = DEM2D_CONTACT_AREA, desc.gravity.y = 0;
-    const scene s = b < 0 ? floor_scene(&desc, 0, 0) : make_scene(&desc, 0, 0);
-    const double gap = 1e-3, angle = 0.3 + offset;
-    dem2d_pose pa = dem2d_pose_make(0, 0, angle, 1), pb = dem2d_pose_make(offset, 0, 0.7, 1);
-    pa.position.y = reach(shapes[a], pa, vec(0, -1)) + gap;
-    const dem2d_particle_id id = add(&s, shapes[a], DEM2D_FREE, 0, pa.position.y, angle);
-    assert_ok(dem2d_world_drive_particle(s.world, id, DEM2D_FREE, vec(0, -0.5), 0));
-    if (b >= 0) {
-        pb.position.y = -reach(shapes[b], pb, vec(0, 1));
-        add(&s, shapes[b], DEM2D_FREE, offset, pb.position.y, 0.7);
-    }
-    bool met = false;
-    double first = 0;
-    for (int i = 0; i < (int)(2 / time_step); i++) {
-        step(&s, 1);
-        const dem2d_energy e = energy(&s);
-        const bool open = contacts(&s, NULL, 0) > 0;
-        if (i == 0) first = total(&e);
-        if (met && !open) {
-            dem2d_world_destroy(s.world);
-            return fabs(total(&e) / first - 1);
-        }
-        met = met || open;
-    }
-    print_error("%s and %d, offset %g: no bounce\n", names[a], b, offset);
-    fail();
-    return 1;
-}
-
-/* Conservative: the loss is that of the leapfrog and falls with the square of the step. */
-static void test_area_bounce(void **state) {
-    (void)state;
-    static const int rows[][2] = {{BOX, BOX},     {QUAD, HEXAGON}, {GON64, TRIANGLE}, {BOX, -1},
-                                  {TRIANGLE, -1}, {OVAL, BOX},     {LOBES, EGG},      {EGG, -1}};
-    double worst[2] = {0, 0};
-    for (int fine_step = 0; fine_step < 2; fine_step++)
-        for (int i = 0; i < COUNT_OF(rows); i++)
-            for (int k = 0; k < 3; k++) {
-                const double dt = fine_step ? 5e-5 : 2e-4;
-                const double loss = bounce_loss(rows[i][0], rows[i][1], 0.13 * k - 0.1, dt);
-                if (loss > 1e-3) print_error("%s, other %d\n", names[rows[i][0]], rows[i][1]);
-                assert_between(loss, 0, 1e-3);
-                worst[fine_step] = fmax(worst[fine_step], loss);
-            }
-    print_message("area rule, 24 bounces: loss %.3g, with a quarter of the step %.3g\n", worst[0],
-                  worst[1]);
-    assert_true(worst[1] < worst[0] / 8);
 }
 
 /* --- friction -------------------------------------------------------------------------------- */
@@ -1715,7 +1515,6 @@ typedef struct gas {
     scene s;
     dem2d_particle_id ids[GRAINS];
     const dem2d_shape *shape[GRAINS];
-    dem2d_face_rule faces;
 } gas;
 
 /* Grains of all types fly about in a box of 2.4 m. */
@@ -1725,7 +1524,6 @@ static gas make_gas(dem2d_solver solver, dem2d_face_rule faces) {
     gas g;
     desc.solver = solver, desc.faces = faces, desc.gravity.y = 0;
     g.s = make_scene(&desc, 0, 0);
-    g.faces = faces;
     for (int i = 0; i < 4; i++) {
         const dem2d_vec normal = turn(vec(0, 1), i * 90 * DEGREE);
         add_wall(&g.s, vec(1.2 - 1.2 * normal.x, 1.2 - 1.2 * normal.y), normal);
@@ -1776,8 +1574,7 @@ static int step_and_compare(const gas *g) {
         if (list[i].b.generation == 0) continue; /* a wall */
         double *expected = &depth[list[i].a.index][list[i].b.index];
         assert_true(*expected > -unsure);
-        if (g->faces != DEM2D_CONTACT_AREA) /* its depth is area over width */
-            assert_within(list[i].depth, *expected, 1e-9);
+        assert_within(list[i].depth, *expected, 1e-9);
         *expected = 0; /* met */
     }
     for (int i = 0; i < GRAINS; i++)
@@ -1812,8 +1609,7 @@ static void test_no_contact_is_late(void **state) {
         int steps;
     } rows[] = {{DEM2D_CERTIFIED, DEM2D_TWO_POINTS, 3000},
                 {DEM2D_GJK_EPA, DEM2D_TWO_POINTS, 1000},
-                {DEM2D_CERTIFIED, DEM2D_ONE_POINT, 500},
-                {DEM2D_CERTIFIED, DEM2D_CONTACT_AREA, 500}};
+                {DEM2D_CERTIFIED, DEM2D_ONE_POINT, 500}};
     for (int row = 0; row < COUNT_OF(rows); row++) {
         const gas g = make_gas(rows[row].solver, rows[row].faces);
         test_random random = {41};
@@ -1928,11 +1724,6 @@ int main(void) {
         cmocka_unit_test(test_block_slides),
         cmocka_unit_test(test_block_topples),
         cmocka_unit_test(test_rocking_box),
-        cmocka_unit_test(test_area_of_polygons),
-        cmocka_unit_test(test_area_of_smooth_pairs),
-        cmocka_unit_test(test_area_of_walls),
-        cmocka_unit_test(test_area_of_shallow_contacts),
-        cmocka_unit_test(test_area_bounce),
         cmocka_unit_test(test_shear_at_rest),
         cmocka_unit_test(test_shear_from_two_to_one),
         cmocka_unit_test(test_shear_over_a_corner),

@@ -323,7 +323,6 @@ static const life_desc lives[] = {
      .only = -1,
      .smooth = true,
      .blocks = true},
-    {.name = "contact area, in blocks", .faces = DEM2D_CONTACT_AREA, .only = 4, .blocks = true},
     {.name = "capacities given, a thin skin", .only = -1, .capacity = 16, .skin = 0.01},
     {.name = "the full law, segments, a ledger",
      .only = -1,

@@ -16,7 +16,6 @@ static scene scenes[] = {
     {.name = "discs by the full law", .discs = true, .full = true},
     {.name = "all shapes by the full law", .full = true},
     {.name = "one point", .full = true, .chain = true, .faces = DEM2D_ONE_POINT},
-    {.name = "contact area", .full = true, .faces = DEM2D_CONTACT_AREA},
     {.name = "springs and friction on a chain", .chain = true},
     {.name = "the full law on a chain", .full = true, .chain = true},
     {.name = "a caller's law on a chain", .law = true, .chain = true},
@@ -223,7 +222,7 @@ static void run(const scene *s, int power, numbers *n) {
     int contacts = 0;
     n->count = 0, n->power = power;
     for (int i = 0; i < 3; i++) {
-        assert_ok(dem2d_world_step(world, s->faces == DEM2D_CONTACT_AREA ? 300 : 800, NULL));
+        assert_ok(dem2d_world_step(world, 800, NULL));
         put_measures(n, world, size);
         put_particles(n, world);
         contacts += put_contacts(n, world);

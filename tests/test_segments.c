@@ -282,14 +282,6 @@ static void test_moves(void **state) {
     assert_ok(dem2d_world_remove_wall(world, lid_id));
     assert_ok(dem2d_world_step(world, 10, NULL));
     dem2d_world_destroy(world);
-    dem2d_world_desc desc = {0};
-    desc.time_step = 1e-5, desc.faces = DEM2D_CONTACT_AREA;
-    const dem2d_material_desc stone = {2700, KN, KN, 0.3, 0, 0};
-    assert_ok(dem2d_world_create(&desc, &world));
-    assert_ok(dem2d_world_add_material(world, &stone, &material));
-    moving.material = material, moving.end = vec(0, 0);
-    assert_result(dem2d_world_add_wall(world, &moving, &lid_id), DEM2D_OUT_OF_RANGE);
-    dem2d_world_destroy(world);
 }
 
 /* Regular polygons cut through by a longer segment along two of their edges: the overlap is that of

@@ -299,10 +299,9 @@ static bool change_scene(snapshot_scene *s, int which) {
                                            : which == 18 ? &rolling
                                                          : &rough));
         return true;
-    case 20: /* segments come, move and go; not with the contact-area rule */
+    case 20: /* segments come, move and go */
     case 21:
     case 22:
-        if (w->faces == DEM2D_CONTACT_AREA) return true;
         wall.material = s->stone, wall.segment = true;
         wall.point = vec(0.02, 0.2), wall.end = vec(0.15, 0.001 * which);
         if (which == 20) assert_ok(dem2d_world_add_wall(w, &wall, &s->chain[0]));
