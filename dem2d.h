@@ -72,31 +72,32 @@ WHAT IT IS
 
 WHAT IT DOES NOT DO
     3D; concave grains (a later version joins convex parts); bonded or breaking grains; fluids;
-    heat; its own threads, files of grains, windows, random numbers or clocks.
+    heat. It has no threads, windows, random numbers, clocks or formats for grains of its own.
 
 LIMITS
     * Doubles only. At most 2^30 particles, and as many listed contacts. Sizes and coordinates are
       best within 1e-60 to 1e60.
-    * Rotations of a step are right to angle^5/120: a particle should not turn by more than 0.01.
+    * The rotation of a step has an error of angle^5/120: a particle should not turn by more than
+      0.01 in a step.
     * A particle that moves or turns by more than its inscribed radius in a step may pass through
-      others. dem2d_stats.fast_motion counts the neighbour lists that found one; the log is told of
-      the first.
+      others. dem2d_stats.fast_motion counts the list rebuilds that found such a particle; the log
+      gets the first one.
     * A custom support function that is not convex can't be detected; contacts are then wrong.
-    * Where faces meet, two points carry the contact, by forces that come from an energy. Their
-      moment jumps where the deeper end changes sides while the common part is shorter than an
-      eighth of the shorter face, or the overlap is deeper than half of that face times the angle to
-      its neighbour (a 64-gon's: at 0.5 % of its radius). Sharp corners jump anyway: their steps are
-      of first order. Energy is not exactly conserved when an edge slides past the free end of a
-      segment wall.
+    * Where two faces meet, two points carry the contact, and their forces follow from an energy.
+      The moment jumps when the deeper point changes sides, in two cases: the common part is shorter
+      than an eighth of the shorter face, or the overlap is above half the length of that face times
+      the angle to the next face (for a regular 64-gon: 0.5 % of its radius). At sharp corners the
+      normal jumps too: time steps are of first order there. Energy is not exactly conserved when
+      an edge slides past the free end of a segment wall.
     * Where the support value hardly changes with the direction (bodies of constant width, one
-      concentric with the other), a search may reach its cap: the answer is then UNRESOLVED, with
-      bounds a few 1e-4 of the size apart.
+      concentric with the other), a search may reach its limit of iterations. The state is then
+      DEM2D_UNRESOLVED, and the bounds are a few 1e-4 of the size apart.
     * 32-bit x86 needs SSE2 (-msse2 -mfpmath=sse): x87 results depend on which values stay in
       registers.
     * -ffast-math and its parts change results: -ffinite-math-only, -fassociative-math,
-      -freciprocal-math, -funsafe-math-optimizations. The header refuses those that the compiler
-      tells it of: gcc tells of all, clang of -ffast-math and -ffinite-math-only alone.
-
+      -freciprocal-math, -funsafe-math-optimizations. The header does not compile with them where
+      the compiler defines a macro for them: gcc does for all, clang for -ffast-math and
+      -ffinite-math-only.
 QUICK START (examples/hello.c, the same bytes)
 
     // Thirty grains of three shapes fall into a box and come to rest.
@@ -161,113 +162,137 @@ QUICK START (examples/hello.c, the same bytes)
 CONCEPTS
     Units       SI per metre of thickness: mass kg/m, force N/m, stress Pa, stiffness N/m per m.
                 Any consistent units do; no length, area or force is built in.
-    Angles      Radians, counter-clockwise. Outlines are counter-clockwise; clockwise is turned.
+    Angles      Radians, counter-clockwise. Outlines run counter-clockwise; clockwise input is
+                reversed.
     Support     For a unit direction u the support point s(u) is the point of the shape farthest
                 along u, h(u) = s.u the support value, rho(u) the radius of curvature there (0 at
-                a corner). Of the points of an edge one end is taken.
+                a corner). If u is normal to an edge, s(u) is one end of that edge.
     Template    A shape is created once, recentred on its centroid, and used at many poses. A
-                pose is position of the centroid, rotation, and a size scale.
+                pose is the position of the centroid, a rotation, and a scale factor.
     Contact     The normal points from A to B. depth = min over u of h_A(u) + h_B(-u) - d.u with
                 d the vector from A's centre to B's; positive is overlap, negative a gap. The
-                true depth is within `error` of depth: that is proved, see below.
-    Proof       Certified contacts descend to a minimum of h by Newton's steps on the osculating
-                circle and then show that no other is lower. By radius: where the depth is below
-                the least radius of curvature r, h - r is the support value of a convex body, so
-                one stationary value below r is the least of all; a direction with h < 0 proves a
-                gap. By arc: the boundary beside the contact, from tables of least radii, is
-                long enough to outweigh the cone of directions that the inscribed discs leave.
-                By form: circles, and edges and corners of two polygons. By polytope: branch and
-                bound over arcs of directions, for what is left.
+                true depth differs from it by `error` at most. This bound is proved:
+    Proof       Certified contacts find a minimum of h by Newton's steps on the osculating circle,
+                then prove that no other minimum is lower. BY_RADIUS: where the depth is below the
+                least radius of curvature r, h - r is the support value of a convex body, so a
+                stationary value below r is the least of all; and a direction with h < 0 proves a
+                gap. BY_ARC: tables of least radii of curvature show that h stays above the minimum
+                in all directions that the inscribed circles leave open (a cone about d). BY_FORM:
+                closed form for circles, and for edges and corners of two polygons. BY_POLYTOPE:
+                branch and bound over arcs of directions, for all other cases.
     Face        Where two edges meet (polygons, straight arcs, walls) two points carry the contact:
-                the ends of the common part, each with its own depth and the whole kn, the second
-                with less where the common part is short. Their forces are the gradient of an energy
-                and grow from zero, so that energy is conserved and piles come to rest.
-    Wall        A half-plane: its normal points into the grains. Or a segment, which has two sides;
-                a chain of them counts once at its joints. A wall stands still, moves at a velocity,
-                or is servo-controlled to a stress.
-    Force       On B along the normal at each contact point: kn depth, and a dashpot if the
+                the ends of the common part. Each has its own depth and the full stiffness kn; the
+                second has less where the common part is short. Their forces are the gradient of an
+                energy and grow from zero, so that energy is conserved and piles come to rest.
+    Wall        A half-plane: its normal points into the grains. Or a segment, which has two sides.
+                Segments may form a chain: a particle at a joint of two segments has one contact.
+                A wall stands still, moves at a velocity, or is servo-controlled to a stress.
+    Force       On B, along the normal at each contact point: kn times depth, and a dashpot if the
                 materials have one; never attractive. Along the tangent an incremental spring kt,
-                at most friction times the normal force ([F] eq. 8-10). Against rolling a spring
-                as well, if they have rolling friction. Or a law of your own.
-    Sliding     One rule for all pairs: the tangential spring stretches by the mean sliding velocity
-                over the step that was made. The mean is that of its beginning and its end, with the
-                velocities of that step and with the normal and arms of each. In the first step of a
-                contact the end alone counts. A time step or velocity that you set in the middle of
-                a contact holds from the next move on.
+                limited to friction times the normal force ([F] eq. 8-10). A rolling spring resists
+                relative rotation if the materials have rolling friction. A law of your own can
+                replace all of these.
+    Sliding     For all pairs, the tangential spring stretches by the sliding velocity of the last
+                step times the time step. The sliding velocity is the mean of its values with the
+                normal and arms at the beginning and at the end of the step, both with the
+                velocities of that step. In the first step of a contact only the end is used. A time
+                step or velocity that you change during a contact takes effect with the next move.
     Skipping    A pair with a known gap is not collided again until its particles have moved and
                 turned by that gap together. Circle pairs skip this test: it costs more than the
                 contact itself.
-    List        The neighbour list (Verlet list) has the pairs that are nearer than their skins. It
-                is rebuilt when a particle has moved as far as its skin. Skins are tuned to the
-                motion: the cost of rebuilding against the cost of listed pairs that are apart. A
-                fast particle gets a wider skin.
+    List        The neighbour list (Verlet list) holds the pairs that are nearer than the sum of
+                their skins. It is rebuilt when a particle has moved as far as its skin. Skins are
+                tuned to the motion: thick skins list more pairs that are apart, thin ones cause
+                more rebuilds. A fast particle gets a thicker skin.
     Step        Positions are at step n, velocities half a step earlier (leapfrog). Contacts,
                 forces, energies and stresses are those of the last force evaluation ("force pass"):
                 at the positions before the last move. Kinetic energy is the mean of the two half
                 steps around it.
-    Ledger      A force acts for half a step before and half a step after its evaluation, and the
-                ledger books its work so: until a contact opens, the work of each dashpot at its own
-                point. Closure is what is stored and dissipated less what was put in. Compare it
-                with the turnover, what has gone from one account to another: half the sum of the
-                absolute changes of all accounts in each step.
+    Ledger      A force acts from half a step before its evaluation to half a step after, and the
+                ledger counts its work over that time; the work of each dashpot at its own contact
+                point, until the contact opens. The closure is stored and dissipated energy less
+                what was put in. Compare it with the turnover, the energy that has gone from one
+                account to another: half the sum of the absolute changes of all accounts in each
+                step.
     Damping     local (Cundall): each force component reduced by alpha |F| sign(v).
                 global viscous: v <- ((1 - xi dt/2) v + dt F/m) / (1 + xi dt/2).
     Stress      Compression positive, strains too.
     Measures    Queries and writers describe the last force evaluation. They never change the
-                simulation: it goes on to the same bits whether they are called or not.
+                simulation: results have the same bits with and without them.
 
 HOW TO
-    make a shape         dem2d_shape_create_*; give it to a world with dem2d_world_add_shape
-                         (the world keeps a copy: destroy yours at any time).
-    get one from a grain dem2d_outline_fit: any model, by count or by coverage, with a report.
+    make a shape         dem2d_shape_create_*, or dem2d_shape_create_custom with a support function
+                         of yours. Give it to a world with dem2d_world_add_shape: the world keeps a
+                         copy, so destroy yours at any time.
+    inspect a shape      dem2d_shape_get (size, radii of curvature), dem2d_shape_mass,
+                         dem2d_shape_axis (long axis); at a pose: dem2d_shape_aabb (bounding box),
+                         dem2d_shape_contains, dem2d_shape_support, dem2d_shape_outline.
+    place a shape        dem2d_pose_make, dem2d_rot_make; back to an angle: dem2d_rot_angle.
+    fit a grain          dem2d_outline_fit: any model, by count or by coverage, with a report.
                          The papers' steps one by one: dem2d_fourier_fit, dem2d_fourier_reduce,
                          dem2d_bezier_fit.
-    get one from a photo dem2d_image_outlines, then dem2d_outline_fit for each outline. Label masks
-                         of other programs: labels. Frames and scale bars: crop_*, ignore_frame.
+    fit a photo          dem2d_image_outlines, then for each i below dem2d_outline_set_count:
+                         dem2d_outline_set_get and dem2d_outline_fit; dem2d_outline_set_destroy.
+                         Label masks of other programs: labels. Frames and scale bars: crop_*,
+                         ignore_frame. The threshold alone: dem2d_image_threshold.
     draw one at random   dem2d_fourier_virtual, then dem2d_shape_create_fourier.
-    measure a grain      dem2d_outline_measure; two of them: dem2d_outline_compare.
+    measure a grain      dem2d_outline_measure; its hull: dem2d_polygon_hull, its mass:
+                         dem2d_polygon_mass; two outlines: dem2d_outline_compare.
     test two shapes      dem2d_pair_overlap (yes or no), dem2d_pair_distance (gap, witness
-                         points), dem2d_pair_contact (gap or depth, normal, contact point).
-                         Pass the last normal as desc.start when the pair has moved little, and
-                         skip_points if the contact points are not needed.
+                         points), dem2d_pair_contact (gap or depth, normal, contact point);
+                         a shape and a half-plane: dem2d_wall_contact. Pass the last normal as
+                         desc.start when the pair has moved little, and skip_points if the contact
+                         points are not needed.
     repeat the papers    dem2d_world_desc.solver = DEM2D_GJK_EPA, faces = DEM2D_ONE_POINT; templates
                          by DEM2D_FIT_REDUCTION and DEM2D_FIT_SWARM, unbounded; local_damping = 0.7
-                         ([P]) or global_damping = 0.7 ([F]). examples/biaxial.c --papers is their
-                         test.
+                         ([P]) or global_damping = 0.7 ([F]). Example: examples/biaxial.c --papers.
     choose a time step   dem2d_world_time_step_bounds on a settled scene. The world checks its time
                          step whenever it rebuilds its neighbour list.
     lose energy          damping_ratio of the materials, from dem2d_damping_ratio(restitution);
                          rolling_friction for grains that should not roll; else friction, damping.
-    use a law of yours   dem2d_world_desc.law: it gets depth, speeds and what it kept.
+    use a law of yours   dem2d_world_desc.law: it gets the depth, the velocities at the contact and
+                         the state it stored in the step before.
     change how two       dem2d_world_set_pair: stiffnesses, friction, damping ratio and rolling
-      materials meet     friction of a pair; friction 0, for one, makes a wall smooth.
-    build a hopper       walls with segment: chains of them count once at their joints.
-    follow the energy    dem2d_world_desc.ledger, then dem2d_world_ledger: what gravity, walls and
-                         you put in, where it went, and by how much the sum is wrong.
+      materials meet     friction of a pair. With friction 0, for example, a wall is smooth.
+    change a world       Between steps: dem2d_world_set_gravity, dem2d_world_set_damping,
+                         dem2d_world_set_time_step, dem2d_world_set_wall (where, how fast, stress);
+                         dem2d_world_drive_particle (velocity, motion), dem2d_world_move_particle.
+    remove from a world  dem2d_world_remove_particle, dem2d_world_remove_wall,
+                         dem2d_world_remove_shape.
+    read a world         dem2d_world_particles for the ids, dem2d_world_get_particle for the state
+                         of one, dem2d_world_shape for its template; dem2d_world_get_wall;
+                         dem2d_world_contacts for contact points and forces; dem2d_world_stats for
+                         counters and time.
+    build a hopper       walls with segment: where two meet, a particle has one contact.
+    follow the energy    dem2d_world_energy for what is stored. dem2d_world_desc.ledger, then
+                         dem2d_world_ledger: what gravity, walls and you put in, where it went, and
+                         the error of the sum.
     hold a stress        a wall with mode DEM2D_WALL_SERVO, stress, max_speed (no default: how fast
                          it may follow), and a length: constant or the distance between two other
                          walls. Its normal points to the grains it presses on; so does a
                          segment's, which grains may touch from both sides.
-    stop and go on       dem2d_world_save, dem2d_world_load: to the same bits as without a stop.
+    stop and go on       dem2d_world_save, dem2d_world_load: the run continues to the same bits.
     compare two runs     dem2d_world_hash after as many steps.
     draw                 dem2d_world_write_svg, or dem2d_shape_outline for your own pictures.
     measure a sample     dem2d_world_stress with the sample's area (of one grain:
                          dem2d_world_particle_stress), then dem2d_stress_principal for p and q;
-                         dem2d_strain of its sides; dem2d_world_porosity of a box inside it.
+                         dem2d_strain of its sides; dem2d_world_porosity of a box inside it;
+                         dem2d_world_packing: coordination number, overlaps, rattlers.
     tell it is at rest   dem2d_world_equilibrium: unbalanced below 1e-3, a small kinetic_ratio.
     load it slowly       dem2d_world_inertial_number below 1e-3.
-    see why it is strong dem2d_world_fabric: anisotropies of contacts and forces, and the q/p that
-                         follows; dem2d_world_histogram for polar diagrams.
+    explain its strength dem2d_world_fabric: anisotropies of contacts and forces, and the q/p that
+                         they predict; dem2d_world_histogram for polar diagrams.
     look in ParaView     dem2d_world_write_vtp, a file for each part and time; dem2d_pvd_write
                          makes a series of them. Colour grains by any of their arrays.
+    keep a history       dem2d_world_write_csv after every so many steps, with append from the
+                         second row on.
     keep it private      define DEM2D_STATIC beside DEM2D_IMPLEMENTATION: all functions are static,
-                         and those that are not called are left out. One pair query takes about a
+                         and the compiler drops those you do not call. One pair query takes about a
                          second to compile and 50 kB (gcc 12, -O2).
-    keep a history       dem2d_world_write_csv after every so many steps, append but the first.
-
-DIFFERENCES FROM THE PAPERS (same: as printed; corrected: the print has a slip; improved: the
-default does better, and the paper's way is there too if it is named; chosen: the paper leaves it
-open)
+    check the version    dem2d_version() == DEM2D_VERSION: header and implementation agree.
+DIFFERENCES FROM THE PAPERS (same: as printed; corrected: the printed form has an error; improved:
+the default does better, and the paper's method is available where it is named; chosen: the paper
+leaves it open)
     [P] fig. 1, eq. 1-2: cubic arcs with common tangents   dem2d_shape_create_bezier
         same. Neighbours have to share a tangent, each arc has to be convex.
     [P] eq. 3-8: support point and its parameter           dem2d_shape_support
@@ -285,19 +310,19 @@ open)
         same. Chosen: the first direction is the line of centres, or the caller's.
     [P] eq. 13, sec. 3.2, fig. 5: depth by EPA             dem2d_pair_contact, DEM2D_GJK_EPA
         corrected: v has to be a unit vector. Corrected: the printed residual, |W| less the least
-        distance of an edge, is told (dem2d_contact.residual), but does not stop EPA: where an edge
-        of two polygons is met it does not vanish. W.v less that distance does. Chosen: tolerances
-        are relative to the sizes. Improved: DEM2D_CERTIFIED proves the least depth by Newton's
-        steps, in two to four support calls.
+        distance of an edge, is reported (dem2d_contact.residual), but does not stop EPA: it does
+        not vanish where the minimum is on an edge of two polygons. W.v less that distance does.
+        Chosen: tolerances are relative to the sizes. Improved: DEM2D_CERTIFIED finds the least
+        depth by Newton's steps and proves it, in two to four support calls.
     [P] sec. 3.2, fig. 4a, 4b: contact point               DEM2D_ONE_POINT
         same: the middle of both witness points; at a wall, of support point and foot point.
-        Improved: DEM2D_TWO_POINTS where faces meet, as the middle of two faces jumps with the last
-        bit of the angle and does not conserve energy. At a wall DEM2D_TWO_POINTS takes the foot
-        point: the wall is rigid, all of the overlap is the grain's.
+        Improved: DEM2D_TWO_POINTS where faces meet, because the middle of two parallel faces jumps
+        with the last bit of the angle and does not conserve energy. At a wall DEM2D_TWO_POINTS
+        takes the foot point: the wall is rigid, so that the grain has all of the deformation.
     [P] sec. 4 steps 1-5: templates by particle swarm      DEM2D_FIT_SWARM
         same steps, when unbounded. Chosen: birds, moves, constriction, pixels; joints that share
-        a corner of the hull are moved off it. Improved: a bound of the radius of curvature, with
-        straight arcs; dem2d_bezier_fit and DEM2D_FIT_AREA minimise the exact area of the
+        a corner of the hull are moved away from it. Improved: a bound of the radius of curvature,
+        with straight arcs; dem2d_bezier_fit and DEM2D_FIT_AREA minimise the exact area of the
         symmetric difference.
     [P] sec. 5.1: accuracy score; [F] sec. 3.1: percent coverage     dem2d_outline_compare
         same (coverage, a fraction), by exact areas instead of pixels.
@@ -477,25 +502,26 @@ OPTIONS (zero means: physical zero for physical fields; "library default" where 
 ERRORS
     Functions that can fail return a dem2d_result; dem2d_result_text gives its text. Outputs are
     written only on success, and a failing call leaves everything as it was. The log callback of
-    the environment gets the particulars: which field, which value, which index; also warnings, as
-    DEM2D_WARNING, though the call succeeds. A step that fails (non-finite state, no memory, time
-    step too long) leaves the world before that step.
+    the environment gets the details: which field, which value, which index. It also gets warnings
+    (DEM2D_WARNING) of calls that succeed. A step that fails (non-finite state, no memory, time
+    step too long) leaves the world as it was before that step.
     Contact queries return a state and never a guess: DEM2D_UNRESOLVED comes with the bounds that
     were reached.
 
 THREADS
-    No globals. Different worlds and shapes may be used by different threads at once; of one world
-    only one call at a time, queries included. A world starts no threads, but hands all work that
-    takes time to desc.parallel_for, if there is one, in blocks of some hundred contacts or
-    particles: any thread system will do (examples/threads_posix.c, threads_openmp.c). Blocks write
-    only what is their own and sums are taken in the order of ids, so that the number of threads,
-    and who does what, can't change a bit. Left to one thread are short loops over all particles
-    when the list is rebuilt, the sums of the forces on walls, and the speeds of servo walls. Custom
-    support functions and laws are called by those threads (a law for a servo wall's speed also by
-    the one that called the step); allocation and log only by the one that called the step.
+    No globals. Different threads may use different worlds and shapes at once; of one world only one
+    call at a time, queries included. A world starts no threads, but passes all work that takes time
+    to desc.parallel_for, if there is one, in blocks of some hundred contacts or particles: any
+    thread system will do (examples/threads_posix.c, threads_openmp.c). A block writes only its own
+    results, and sums are taken in the order of ids. So neither the number of threads nor the
+    distribution of the blocks can change a bit. One thread does the short loops over all particles
+    when the list is rebuilt, the sums of the forces on walls, and the speeds of servo walls. All
+    threads call custom support functions and laws (the calling thread also calls a law for the
+    speed of a servo wall); only the thread that called the step allocates and writes to the log.
 
 COSTS (instructions per circle and step of a settled bed with 2.0 contacts each, gcc -O2, by
-`make -C tests bench-cost`; what is not there is decided when the list is rebuilt: it costs nothing)
+`make -C tests bench-cost`; a feature that the scene does not use costs nothing: which features are
+in use is decided when the list is rebuilt)
     circles, no friction, no damping                     307    53 without a contact
     the list rebuilt once in 100 steps                   +30
     friction and its history                            +157
@@ -503,42 +529,42 @@ COSTS (instructions per circle and step of a settled bed with 2.0 contacts each,
     local damping                                        +10
     global damping                                       +26
     gravity                                               +3
-    fixed particles, walls, segments, parallel_for        +1    when there are but touch nothing
+    fixed particles, walls, segments, parallel_for        +1    present, but nothing touches them
     polygons for a tenth of the circles                 +521
-    energy and stress asked for in every step          +1810    else nothing
-    the ledger of energies                             +1791    else nothing
-    a dashpot, rolling friction, a law of your own     +1239    circles are then as other shapes
-    a pair of circles listed but apart                    75    as much as one in contact: no branch
-    another pair listed but apart, surely so              70    colliding it costs 700 to 2000
+    energy and stress queried in every step            +1810
+    the ledger of energies                             +1791
+    a dashpot, rolling friction, a law of your own     +1239    circles then take the general path
+    a pair of circles listed but apart                    75    same as in contact: no branch
+    another pair listed but apart, known gap              70    colliding it costs 700 to 2000
     a region without particles, a pair of fixed ones       0
 
 MEMORY
-    All of it comes through dem2d_env (malloc and free by default); release gets the size. Nothing
-    is allocated in a step once the list of pairs has stopped growing; dem2d_world_stats tells the
-    bytes in use. Give capacities to reserve beforehand. A circle takes about 400 bytes with its
-    contacts if particle_capacity is given, else up to a half more; another shape 300 bytes more for
-    each pair that is listed. Particles are now and then sorted in memory by their place in space;
-    ids, orders and results do not change by it.
+    All memory comes through dem2d_env (malloc and free by default); release gets the size. A step
+    allocates nothing once the neighbour list has stopped growing; dem2d_world_stats gives the bytes
+    in use. Capacities reserve memory at creation. A circle takes about 400 bytes with its contacts
+    if particle_capacity is given, else up to a half more; another shape 300 bytes more for each
+    listed pair. Particles are now and then sorted in memory by their place in space; this changes
+    no id, no order and no result.
 
 SNAPSHOTS
-    dem2d_world_save writes all that later steps and queries depend on, the list of pairs and the
-    order in memory too; dem2d_world_load goes on to the same bits, on whatever machine and with
-    whatever threads. Not in it: capacities, the environment, parallel_for. Support functions are
-    found by the tags of custom shapes. A file of another version is refused, not converted: keep
-    the header that wrote it. Damage is found by a checksum before anything is made of the bytes,
-    and all numbers have to be in their ranges; that is no protection from forgery.
+    dem2d_world_save writes all that later steps and queries depend on, with the neighbour list and
+    the order in memory; dem2d_world_load continues to the same bits, on any machine and with any
+    number of threads. Not saved: capacities, the environment, parallel_for. The tags of custom
+    shapes identify their support functions. A file of another version is refused, not converted:
+    keep the header that wrote it. A checksum detects damage before the bytes are used, and every
+    number is checked for its range; this does not protect from forgery.
 
 DETERMINISM
     Same input, same bits: on gcc and clang, C and C++, -O0 to -O3, with or without FMA hardware
     (contraction is off inside this header). Steps use only + - * / and sqrt; sine, cosine and
     arctangent are the header's own. A pair is (lower id, higher id) and forces are summed in the
     order of the partner's id, so neither addresses nor storage order can change a bit. Not
-    covered: clang -ffp-contract=fast on the command line, and 80-bit x87 arithmetic. Whether two
-    runs are the same is told by dem2d_world_hash.
+    covered: clang -ffp-contract=fast on the command line, and 80-bit x87 arithmetic. Compare two
+    runs by dem2d_world_hash.
     Your own arithmetic (positions and velocities you compute, support functions, contact laws) is
-    compiled by your flags: give -ffp-contract=off where its bits are to be the same as well. After
-    the implementation clang is back at the mode of the command line: a pragma of yours for
-    contraction belongs behind it.
+    compiled with your flags: give -ffp-contract=off if its bits have to be the same as well. The
+    implementation ends by setting clang's contraction to the mode of the command line: put a
+    contraction pragma of yours after it.
     gcc does not inline across the header's floating-point region: calls into it stay calls.
 ================================================================================================
 */
@@ -612,27 +638,27 @@ typedef struct dem2d_vec {
     double y; ///< second component
 } dem2d_vec;
 
-/// Rotation as cosine and sine; {1, 0} turns by nothing.
+/// Rotation as cosine and sine; {1, 0} is no rotation.
 typedef struct dem2d_rot {
     double c; ///< cosine
     double s; ///< sine
 } dem2d_rot;
 
-/// Where a shape is: its points x become position + scale * (rotation of x).
+/// Where a shape is: its point x goes to position + scale * (rotation applied to x).
 typedef struct dem2d_pose {
     dem2d_vec position; ///< of the centroid, m
-    dem2d_rot rotation; ///< a unit pair
+    dem2d_rot rotation; ///< cosine and sine; normalised where a pose is taken
     double scale;       ///< size factor, > 0
 } dem2d_pose;
 
-/// Memory and messages. NULL wherever one is taken means malloc, free and silence.
+/// Memory and messages. Where a function takes an environment, NULL means malloc, free and no log.
 typedef struct dem2d_env {
     void *user;                                 ///< handed to the callbacks
-    void *(*allocate)(void *user, size_t size); ///< as malloc; used if release is there too
-    /// As free, with the size that was asked for; without both, malloc and free are used.
+    void *(*allocate)(void *user, size_t size); ///< like malloc; used only if release is set too
+    /// Like free, with the size that was asked for. If one of the two is NULL: malloc and free.
     void (*release)(void *user, void *memory, size_t size);
-    /// Particulars of an error, or of a warning (DEM2D_WARNING, which no function returns); index
-    /// is the offending point, arc or object, or -1.
+    /// Gets the details of an error, or of a warning (DEM2D_WARNING, which no function returns);
+    /// index is the offending point, arc or object, or -1.
     void (*log)(void *user, dem2d_result result, int index, const char *text);
 } dem2d_env;
 
@@ -654,7 +680,7 @@ DEM2D_API dem2d_pose dem2d_pose_make(double x, double y, double angle, double sc
 /// A convex template about its centroid. Opaque; not changed after creation.
 typedef struct dem2d_shape dem2d_shape;
 
-/// What a shape is made of.
+/// Models of a shape.
 typedef enum dem2d_shape_type {
     DEM2D_CIRCLE,  ///< radius
     DEM2D_ELLIPSE, ///< two half axes
@@ -672,34 +698,34 @@ typedef struct dem2d_mass {
     double polar_moment; ///< m4, about the centroid
 } dem2d_mass;
 
-/// Support function of a custom shape: the point farthest along the unit direction, in the shape's
-/// own coordinates. If rho is not NULL, the radius of curvature there is stored in it.
+/// Support function of a custom shape: returns the point farthest along the unit direction (m), in
+/// the shape's own coordinates. If rho is not NULL, it stores the radius of curvature there (m).
 typedef dem2d_vec dem2d_support_fn(void *user, dem2d_vec direction, double *rho);
 
 /// Custom shape.
 typedef struct dem2d_custom_desc {
     dem2d_support_fn *support; ///< convex support function; required
-    void *user;                ///< handed to it
+    void *user;                ///< passed to support
     double rho_min;            ///< m, a lower bound of the radius of curvature; 0 if unknown
-    double inscribed;          ///< m, radius of a disc about the centroid inside; 0 if unknown
-    dem2d_mass mass;           ///< if area > 0, taken as given; otherwise from outline points
-    int outline_points;        ///< for the mass, 0 for 1000
-    int tag;                   ///< stands for the function in snapshots: see dem2d_load_desc
+    double inscribed;          ///< m, radius of a circle about the centroid inside; 0 if unknown
+    dem2d_mass mass;           ///< taken as given if area > 0; else from points of the outline
+    int outline_points;        ///< number of these points; 0 for 1000
+    int tag;                   ///< identifies support in snapshots: see dem2d_load_desc
 } dem2d_custom_desc;
 
 /// What a shape is, as a template (scale 1, about its centroid).
 typedef struct dem2d_shape_info {
     dem2d_shape_type type; ///< which model
-    int count;             ///< vertices, arcs or order; 0 otherwise
+    int count;             ///< number of vertices or arcs, or order of the series; else 0
     double rounding;       ///< m, rounding radius of a polygon
     dem2d_mass mass;       ///< exact; the centroid is 0
     dem2d_vec offset;      ///< m, centroid of the data given at creation
     double circumscribed;  ///< m, radius of the bounding circle about the centroid
     double inscribed;      ///< m, radius of the inscribed circle about the centroid
     double rho_min;        ///< m, lower bound of the radius of curvature; 0 with corners
-    double rho_max;        ///< m, upper bound of it, edges and straight arcs apart; HUGE_VAL where
-                           ///< an arc is flat at a point; custom: 0
-    double deviation;      ///< m, of a polybezier: contacts may be off by so much; in their error
+    double rho_max;        ///< m, upper bound of it without edges and straight arcs; HUGE_VAL if an
+                           ///< arc is flat at a point; custom: 0
+    double deviation;      ///< m, polybezier: distance of the contact arcs from the given ones
     double equivalent; ///< m, radius of the circle of equal area ([P] equivalent size: twice it)
     size_t bytes;      ///< memory of the template
 } dem2d_shape_info;
@@ -710,118 +736,128 @@ typedef struct dem2d_box {
     dem2d_vec upper; ///< greatest x and y
 } dem2d_box;
 
-/// Answer of a support query in the direction asked for, normalised.
+/// Answer to a support query.
 typedef struct dem2d_support {
     dem2d_vec point;     ///< m, farthest point
-    dem2d_vec direction; ///< the unit direction
+    dem2d_vec direction; ///< the direction asked for, normalised
     double value;        ///< m, point . direction, relative to the pose's position
     double rho;          ///< m, radius of curvature at the point; 0 at a corner
 } dem2d_support;
 
-/// Circle. radius > 0. Errors: NOT_FINITE, ZERO_AREA (radius 0), OUT_OF_RANGE (negative).
+/// Circle with a radius > 0 (m). *shape is the caller's, to be released by dem2d_shape_destroy; so
+/// for all shapes. Errors of all: NULL_ARGUMENT, OUT_OF_MEMORY, OUT_OF_RANGE (also sizes whose
+/// area or polar moment is not a normal number). Also: NOT_FINITE, ZERO_AREA (radius 0).
 DEM2D_API dem2d_result dem2d_shape_create_circle(const dem2d_env *env, double radius,
                                                  dem2d_shape **shape);
-/// Ellipse with half axes a along x and b along y, both > 0. Errors as for a circle.
+/// Ellipse with half axes a along x and b along y, both > 0 (m). Errors as for a circle.
 DEM2D_API dem2d_result dem2d_shape_create_ellipse(const dem2d_env *env, double a, double b,
                                                   dem2d_shape **shape);
-/// Convex polygon of count >= 3 points, grown by a rounding radius >= 0. Clockwise input is turned,
-/// points on an edge (to rounding) are dropped. Errors: NOT_FINITE, TOO_FEW_POINTS,
-/// DUPLICATE_POINT, NOT_CONVEX, ZERO_AREA, OUT_OF_RANGE.
+/// Convex polygon of count >= 3 points (m), grown by a rounding radius >= 0 (m). Clockwise input is
+/// reversed, points on an edge (within rounding errors) are dropped. Errors: NOT_FINITE,
+/// TOO_FEW_POINTS, DUPLICATE_POINT, NOT_CONVEX, ZERO_AREA, OUT_OF_RANGE (negative rounding).
 DEM2D_API dem2d_result dem2d_shape_create_polygon(const dem2d_env *env, const dem2d_vec *points,
                                                   int count, double rounding, dem2d_shape **shape);
-/// Closed chain of cubic Bezier arcs: control[3 * arcs], arc i uses points 3i .. 3i + 3 (cyclic);
-/// 2 <= arcs <= INT_MAX / 12. Each arc is convex and turns by at most pi, neighbours have one
-/// tangent (G1), all arcs together make one turn: to a sine of 1e-6, as coordinates written with
-/// seven digits have it. Contacts work with arcs that are made exactly convex and smooth, and
-/// straight where they are so to the rounding that kinks and dents show; how far these are from the
-/// given ones is the `deviation` of dem2d_shape_info, and part of every error. Mass, outline, box,
-/// dem2d_shape_support and dem2d_wall_contact are of the given arcs. Arcs below 6e-14 of the size
-/// are corners and may turn in any way. Clockwise input is turned. Errors: NOT_FINITE,
-/// TOO_FEW_POINTS (also too many arcs), NOT_CONVEX, NOT_SMOOTH, DUPLICATE_POINT (an arc that is a
-/// point), ZERO_AREA, OUT_OF_MEMORY. ([P] sec. 2; M3 = M4 = 0 allowed.)
+/// Closed chain of cubic Bezier arcs ([P] sec. 2): control[3 * arcs] (m), arc i uses the points
+/// 3i .. 3i + 3 (cyclic); 2 <= arcs <= INT_MAX / 12. Each arc has to be convex and to turn by at
+/// most pi, neighbours share a tangent (G1), and all arcs together make one turn; a sine of 1e-6 is
+/// allowed, the precision of coordinates with seven digits. M3 = M4 = 0 is allowed. Arcs shorter
+/// than 6e-14 of the size count as corners and may turn in any way. Clockwise input is reversed.
+///
+/// Contacts use repaired arcs: exactly convex and smooth, and straight where the given arc is
+/// straight within the rounding of its coordinates. Their distance from the given arcs is the
+/// `deviation` of dem2d_shape_info; the error of every contact includes it. Mass, outline, bounding
+/// box, dem2d_shape_support and dem2d_wall_contact use the given arcs. Errors: NOT_FINITE,
+/// TOO_FEW_POINTS (also too many arcs), NOT_CONVEX, NOT_SMOOTH, DUPLICATE_POINT (all control points
+/// of an arc coincide), ZERO_AREA.
 DEM2D_API dem2d_result dem2d_shape_create_bezier(const dem2d_env *env, const dem2d_vec *control,
                                                  int arcs, dem2d_shape **shape);
-/// Support function p(t) = a[0]/2 + sum over n = 1..order of a[n] cos nt + b[n] sin nt; a and b
-/// have order + 1 elements, b[0] is not read. p + p'' must nowhere be negative. Errors:
-/// NOT_FINITE, OUT_OF_RANGE (order < 0), ZERO_AREA, NEGATIVE_CURVATURE. ([F] sec. 2)
+/// Support function p(t) = a[0]/2 + sum over n = 1..order of a[n] cos nt + b[n] sin nt ([F]
+/// sec. 2); a and b (m) have order + 1 elements, b[0] is not read; order 0 to 2^20. The radius of
+/// curvature p + p'' must nowhere be negative. Errors: NOT_FINITE, OUT_OF_RANGE (order), ZERO_AREA
+/// (a[0] not above 0), NEGATIVE_CURVATURE.
 DEM2D_API dem2d_result dem2d_shape_create_fourier(const dem2d_env *env, const double *a,
                                                   const double *b, int order, dem2d_shape **shape);
-/// The caller's support function. Its bounding circle comes from four calls, mass from
-/// outline points unless given. Errors: NOT_FINITE, OUT_OF_RANGE, ZERO_AREA.
+/// The caller's support function. The bounding circle follows from four calls of it; the mass, if
+/// it is not given, from the polygon through outline points. Errors: NOT_FINITE, OUT_OF_RANGE,
+/// ZERO_AREA.
 DEM2D_API dem2d_result dem2d_shape_create_custom(const dem2d_env *env,
                                                  const dem2d_custom_desc *desc,
                                                  dem2d_shape **shape);
 /// Release a shape; NULL is allowed.
 DEM2D_API void dem2d_shape_destroy(dem2d_shape *shape);
-/// Facts about a template.
+/// Model, mass and sizes of a template. Errors: NULL_ARGUMENT.
 DEM2D_API dem2d_result dem2d_shape_get(const dem2d_shape *shape, dem2d_shape_info *info);
-/// Support point in any finite direction but zero, of any length. Errors: NOT_FINITE,
-/// OUT_OF_RANGE (zero direction, scale not above 0).
+/// Support point in a finite direction of any length but 0. Errors: NULL_ARGUMENT, NOT_FINITE,
+/// OUT_OF_RANGE (zero direction, zero rotation, scale not above 0).
 DEM2D_API dem2d_result dem2d_shape_support(const dem2d_shape *shape, dem2d_pose pose,
                                            dem2d_vec direction, dem2d_support *support);
-/// Axis-aligned bounding box at a pose (exact: four support values).
+/// Axis-aligned bounding box at a pose (m), exact: four support values. Errors: NULL_ARGUMENT,
+/// NOT_FINITE, OUT_OF_RANGE (pose).
 DEM2D_API dem2d_result dem2d_shape_aabb(const dem2d_shape *shape, dem2d_pose pose, dem2d_box *box);
-/// count >= 3 points on the boundary, counter-clockwise: smooth shapes by uniform directions,
-/// polybeziers by uniform parameter, polygons by corners and, with points to spare, equal parts of
-/// edges (rounded ones of the rounding). Errors: TOO_FEW_POINTS, NOT_FINITE, OUT_OF_RANGE.
+/// count >= 3 points on the boundary (m), counter-clockwise. Smooth shapes: uniform directions;
+/// polybeziers: uniform parameter; polygons: the corners, further points divide the edges equally
+/// (of rounded polygons the circular arcs). Errors: NULL_ARGUMENT, TOO_FEW_POINTS, NOT_FINITE,
+/// OUT_OF_RANGE (pose).
 DEM2D_API dem2d_result dem2d_shape_outline(const dem2d_shape *shape, dem2d_pose pose, int count,
                                            dem2d_vec *points);
 /// Direction of the long axis of a template (rad, in (-pi/2, pi/2], from x) and the ratio >= 1 of
-/// its greater to its smaller radius of gyration; 0 and 1 when it has no axis (circles, regular
-/// polygons). Exact to rounding, of custom shapes to 1e-4. (A needle that lies askew has its width
-/// only to the rounding of its length: 1e-15 times the ratio, relative.)
+/// its greater to its smaller radius of gyration; 0 and 1 if it has no long axis (circles, regular
+/// polygons). Exact up to rounding errors, for custom shapes to 1e-4. (The ratio of a needle that
+/// is not parallel to x or y has a relative error of 1e-15 times the ratio.) Errors: NULL_ARGUMENT.
 DEM2D_API dem2d_result dem2d_shape_axis(const dem2d_shape *shape, double *angle, double *ratio);
 
 /* ============================================================================================
    >>api-mass  Area, centroid, polar moment
    ============================================================================================ */
 
-/// Of a simple polygon of count >= 3 points, either orientation, about its centroid ([P] eq.
-/// 10-11 with the missing - m |c|^2). Errors: TOO_FEW_POINTS, NOT_FINITE, ZERO_AREA.
+/// Mass of a simple polygon of count >= 3 points (m), either orientation, about its centroid ([P]
+/// eq. 10-11 with the missing - m |c|^2). Errors: NULL_ARGUMENT, TOO_FEW_POINTS, NOT_FINITE,
+/// ZERO_AREA.
 DEM2D_API dem2d_result dem2d_polygon_mass(const dem2d_vec *points, int count, dem2d_mass *mass);
-/// Of a template, exact to round-off (custom shapes: as created).
+/// Mass of a template, exact up to rounding errors (custom shapes: as created). Errors:
+/// NULL_ARGUMENT.
 DEM2D_API dem2d_result dem2d_shape_mass(const dem2d_shape *shape, dem2d_mass *mass);
-/// Of a template by the polygon through count >= 3 outline points ([P] eq. 10-11): the error
-/// falls as 1/count^2. Allocates nothing.
+/// Mass of a template from the polygon through count >= 3 outline points ([P] eq. 10-11): the error
+/// falls as 1/count^2. Allocates nothing. Errors: NULL_ARGUMENT, TOO_FEW_POINTS.
 DEM2D_API dem2d_result dem2d_shape_mass_interpolated(const dem2d_shape *shape, int count,
                                                      dem2d_mass *mass);
 
 /* ============================================================================================
-   >>api-outlines  Outlines of grains: from pixels, and what can be measured of them
+   >>api-outlines  Outlines of grains: from pixels, and their measures
    ============================================================================================ */
 
-/// Grains in a picture of one or two bytes per pixel, row 0 on top: what is darker (or brighter)
-/// than a threshold, or what has a label.
+/// A picture of grains with one or two bytes per pixel, row 0 on top. Grains are darker (or
+/// brighter) than a threshold, or have a label.
 typedef struct dem2d_image_desc {
-    const uint8_t *pixels;    ///< height rows of width values; required, or
-    const uint16_t *pixels16; ///< the same of two bytes each; not both
+    const uint8_t *pixels;    ///< height rows of width values; either this
+    const uint16_t *pixels16; ///< or this, with two bytes each, is required
     int width;                ///< px, 1 to 2^15
     int height;               ///< px, 1 to 2^15
     int stride;               ///< px from row to row; 0 for width
-    int crop_left;            ///< px, columns left out; the region of interest begins there
-    int crop_top;             ///< px, rows left out
-    int crop_width;           ///< px, of the region; 0 for all that is right of crop_left
-    int crop_height;          ///< px, of the region; 0 for all that is below crop_top
-    bool labels;              ///< values name grains, 0 is ground: what segmentation tools write
+    int crop_left;            ///< px, columns left of the region of interest
+    int crop_top;             ///< px, rows above it
+    int crop_width;           ///< px, width of the region; 0 for all right of crop_left
+    int crop_height;          ///< px, height of the region; 0 for all below crop_top
+    bool labels;              ///< values are grain numbers, 0 is background (a label mask)
     int threshold;            ///< grains are darker than this, from 1; 0 finds it (Otsu)
-    bool ignore_frame;        ///< a frame along the region's border has no say in the threshold
-    bool bright;              ///< grains are not darker than the threshold instead
+    bool ignore_frame;        ///< find the threshold without a frame along the region's border
+    bool bright;              ///< grains have values from the threshold on instead
     int min_pixels;           ///< smaller grains are dropped; 0 for 16
-    int max_pixels;           ///< larger ones too; 0 for no limit
+    int max_pixels;           ///< larger grains are dropped; 0 for no limit
     bool keep_border;         ///< keep grains that touch the region's border
     double scale;             ///< m per pixel, > 0
 } dem2d_image_desc;
 
-/// One outline of a set; points belong to the set.
+/// One outline of a set; valid until the set is destroyed.
 typedef struct dem2d_outline {
     const dem2d_vec *points; ///< m, simple, counter-clockwise; y up
-    int count;               ///< of points
-    int pixels;              ///< of the grain, holes filled
-    int row;                 ///< of its topmost pixel
-    int column;              ///< of the leftmost pixel in that row
+    int count;               ///< number of points
+    int pixels;              ///< number of pixels of the grain, holes filled
+    int row;                 ///< row of its topmost pixel
+    int column;              ///< column of the leftmost pixel in that row
 } dem2d_outline;
 
-/// Outlines found in a picture, by topmost, then leftmost pixel. Opaque.
+/// Outlines found in a picture, sorted by row, then column. Opaque.
 typedef struct dem2d_outline_set dem2d_outline_set;
 
 /// Measures of an outline.
@@ -835,41 +871,43 @@ typedef struct dem2d_outline_info {
     double circularity;         ///< 4 pi area / perimeter^2
     double solidity;            ///< area / area of the hull
     double roundness;           ///< Wadell: mean radius of corners / inscribed radius
-    double inscribed;           ///< m, radius of the greatest circle inside
+    double inscribed;           ///< m, radius of the largest inscribed circle
     dem2d_vec inscribed_at;     ///< m, its centre
-    double circumscribed;       ///< m, radius of the least circle around
+    double circumscribed;       ///< m, radius of the smallest enclosing circle
     dem2d_vec circumscribed_at; ///< m, its centre
 } dem2d_outline_info;
 
 /// How two outlines differ.
 typedef struct dem2d_difference {
     double coverage;  ///< 1 - area / area of the reference ([F] percent coverage, [P] accuracy
-                      ///< score, as a fraction); negative for strangers
+                      ///< score, as a fraction); negative if they hardly overlap
     double area;      ///< m2, of the symmetric difference
-    double hausdorff; ///< m, greatest distance of a corner of one from the other's boundary
+    double hausdorff; ///< m, greatest distance of a point of one from the other's boundary
 } dem2d_difference;
 
-/// Otsu's threshold of a picture's region: grains (or ground) are the values below it; 0 for a
-/// region of one value. With ignore_frame the region's border is taken to be a frame: of three
-/// classes of values (Otsu's, too) the one that most of the border has, as far as it is connected
-/// with the border, is left out. Errors: NULL_ARGUMENT, OUT_OF_RANGE (also labels), OUT_OF_MEMORY.
+/// Otsu's threshold of a picture's region: grains (or the background) have values below it; 0 for a
+/// region of one value. ignore_frame leaves out a frame: the values are divided into three classes
+/// (Otsu), the class of most border pixels is the frame's, and pixels of this class that are
+/// connected with the border do not count. Errors: NULL_ARGUMENT, OUT_OF_RANGE (also labels),
+/// OUT_OF_MEMORY.
 DEM2D_API dem2d_result dem2d_image_threshold(const dem2d_image_desc *desc, int *threshold);
 /// Outlines of the grains in a picture: threshold, 4-connected components, holes filled, boundary
 /// by linear interpolation between pixel centres. The centre of the pixel in row r, column c is at
-/// ((c + 0.5) scale, (height - r - 0.5) scale), with or without a crop. A set may be empty, as that
-/// of a picture of one value is.
+/// ((c + 0.5) scale, (height - r - 0.5) scale), with or without a crop. The set may be empty, for
+/// example if the picture has one value only.
 ///
-/// What lies in a hole of a grain belongs to it. What lies in a hole of a component that is dropped
-/// (border, max_pixels) is looked at as if that were not there. So is what lies in a frame: a
-/// component that fills 9/10 of its box if its holes are filled and less than a quarter of that by
-/// itself, encloses more than a quarter of the region, and has other grains inside.
+/// All that lies in a hole of a grain belongs to the grain. A component that is dropped (border,
+/// max_pixels) does not hide what lies in its holes: that is searched as if the component were
+/// absent. The same holds for a frame: a component that fills 9/10 of its bounding box with its
+/// holes and less than a quarter of that without, encloses more than a quarter of the region, and
+/// has other grains inside.
 ///
 /// Labels: grains with different labels may touch; a grain in a hole of another is a grain of its
-/// own, and counts for the other as well. A label in two places is two grains (segmentation
-/// tools count on from 0 when a byte is full).
+/// own, and its pixels count for the other as well. A label in two places makes two grains
+/// (segmentation tools restart from 0 when a byte is full).
 ///
-/// The log is warned (DEM2D_WARNING) of frames, of a grain that fills the region like the ground
-/// inside a frame, of labels in two places, and told why an empty set is empty. Errors:
+/// The log gets warnings (DEM2D_WARNING) of frames, of a grain that fills its box like the
+/// background inside a frame, of labels in two places, and the reason if the set is empty. Errors:
 /// NULL_ARGUMENT, OUT_OF_RANGE, NOT_FINITE, OUT_OF_MEMORY.
 DEM2D_API dem2d_result dem2d_image_outlines(const dem2d_env *env, const dem2d_image_desc *desc,
                                             dem2d_outline_set **set);
@@ -880,13 +918,14 @@ DEM2D_API dem2d_result dem2d_outline_set_get(const dem2d_outline_set *set, int i
                                              dem2d_outline *outline);
 /// Release a set; NULL is allowed.
 DEM2D_API void dem2d_outline_set_destroy(dem2d_outline_set *set);
-/// Measures of an outline, either orientation. It may touch itself, but no two edges may cross, and
-/// it must wind around each point once or not at all. Errors: NULL_ARGUMENT, TOO_FEW_POINTS,
-/// NOT_FINITE, CROSSING (the log names two edges and the place), ZERO_AREA, OUT_OF_MEMORY.
+/// Measures of an outline of count >= 3 points (m), either orientation. It may touch itself, but no
+/// two edges may cross, and it must wind around each point once or not at all. Errors:
+/// NULL_ARGUMENT, TOO_FEW_POINTS, NOT_FINITE, CROSSING (the log names two edges and the place),
+/// ZERO_AREA, OUT_OF_MEMORY.
 DEM2D_API dem2d_result dem2d_outline_measure(const dem2d_env *env, const dem2d_vec *points,
                                              int count, dem2d_outline_info *info);
-/// Difference of two outlines, exact but for rounding. Of one that crosses itself a place is inside
-/// that is wound around an odd number of times. Errors as above, without CROSSING.
+/// Difference of two outlines (m), exact up to rounding errors. The inside of an outline that
+/// crosses itself follows from the even-odd rule. Errors as above, without CROSSING.
 DEM2D_API dem2d_result dem2d_outline_compare(const dem2d_env *env, const dem2d_vec *reference,
                                              int reference_count, const dem2d_vec *other,
                                              int other_count, dem2d_difference *difference);
@@ -902,10 +941,10 @@ typedef enum dem2d_convexity_test {
     DEM2D_NO_TEST     ///< leave the series as it is
 } dem2d_convexity_test;
 
-/// Reduction of FS coefficients until the shape is convex.
+/// Reduction of FS coefficients until the shape is convex ([F] sec. 2.3).
 typedef struct dem2d_reduction_desc {
-    dem2d_convexity_test test; ///< when to stop
-    double factor;             ///< on the highest pair left, inside (0, 1); 0 for 0.9
+    dem2d_convexity_test test; ///< stop when this test holds
+    double factor;             ///< multiplies the highest pair (a_n, b_n), in (0, 1); 0 for 0.9
     double tolerance;          ///< of a0: smaller pairs become 0; 0 for 1e-6
 } dem2d_reduction_desc;
 
@@ -913,118 +952,122 @@ typedef struct dem2d_reduction_desc {
 typedef struct dem2d_convexity {
     double sufficient_margin; ///< m, a0/2 - sum (n^2 - 1) |c_n|: >= 0 proves convexity
     double rho_min_lower;     ///< m, rigorous lower bound of the least radius of curvature
-    double rho_min_upper;     ///< m, a value of rho that is attained (to rounding)
+    double rho_min_upper;     ///< m, an attained value of rho, within rounding errors
     bool sufficient;          ///< [F] eq. 7 holds
-    bool exact;               ///< rho_min_lower >= -rounding: a shape can be created
+    bool exact;               ///< rho_min_lower >= 0 within rounding errors: a shape can be created
 } dem2d_convexity;
 
-/// Convex hull of count points (Andrew's monotone chain), counter-clockwise, no collinear points.
-/// hull has room for count points. Errors: TOO_FEW_POINTS, NOT_FINITE, ZERO_AREA (all on one line),
-/// OUT_OF_MEMORY.
+/// Convex hull of count >= 3 points (m) by Andrew's monotone chain, counter-clockwise, without
+/// collinear points. hull has room for count points; hull_count gets their number. Errors:
+/// NULL_ARGUMENT, TOO_FEW_POINTS, NOT_FINITE, ZERO_AREA (all on one line), OUT_OF_MEMORY.
 DEM2D_API dem2d_result dem2d_polygon_hull(const dem2d_env *env, const dem2d_vec *points, int count,
                                           dem2d_vec *hull, int *hull_count);
-/// FS of an outline ([F] sec. 2.3): hull, `samples` uniform support values, least squares.
-/// a and b get order + 1 values; samples > 2 order, 0 for 16 order + 64. The series may be
-/// non-convex: dem2d_fourier_reduce. Errors: TOO_FEW_POINTS, NOT_FINITE, OUT_OF_RANGE, ZERO_AREA,
-/// OUT_OF_MEMORY.
+/// FS of an outline ([F] sec. 2.3): hull, `samples` uniform support values, least squares. a and b
+/// get order + 1 values (m); order 0 to 2^20, samples > 2 order, 0 for 16 order + 64. The series
+/// may be non-convex: see dem2d_fourier_reduce. Errors: NULL_ARGUMENT, TOO_FEW_POINTS, NOT_FINITE,
+/// OUT_OF_RANGE, ZERO_AREA, OUT_OF_MEMORY.
 DEM2D_API dem2d_result dem2d_fourier_fit(const dem2d_env *env, const dem2d_vec *points, int count,
                                          int order, int samples, double *a, double *b);
-/// Convexity of a series of this order: sufficient and exact test.
+/// Convexity of a series: sufficient and exact test. a and b have order + 1 elements (m). Errors:
+/// NULL_ARGUMENT, NOT_FINITE, OUT_OF_RANGE (order), ZERO_AREA (a0 not above 0).
 DEM2D_API dem2d_result dem2d_fourier_convexity(const double *a, const double *b, int order,
                                                dem2d_convexity *convexity);
-/// The paper's reduction ([F] sec. 2.3): the highest pair above the tolerance is multiplied by the
-/// factor until the test holds. Changes a and b in place; reductions (may be NULL) gets the
-/// number of multiplications. Errors: NOT_FINITE, OUT_OF_RANGE, ZERO_AREA (a0 not above 0).
+/// The paper's reduction ([F] sec. 2.3): multiplies the highest pair above the tolerance by the
+/// factor until the test holds. Changes a and b in place; reductions (may be NULL) gets the number
+/// of multiplications. Errors: NULL_ARGUMENT, NOT_FINITE, OUT_OF_RANGE, ZERO_AREA (a0 not above 0).
 DEM2D_API dem2d_result dem2d_fourier_reduce(double *a, double *b, int order,
                                             const dem2d_reduction_desc *desc, int *reductions);
-/// Polybezier of an outline ([P] sec. 4): joints are support points of the hull in `arcs` >= 3
-/// uniform directions, tangents are perpendicular to them, and the two lengths of each arc
-/// minimise the exact area between arc and outline (not [P]'s step 4, which is the swarm:
-/// DEM2D_FIT_SWARM). No arc has a radius of curvature above 20 times that of the circle with the
-/// hull's area where that can be had: nearly flat arcs make the stable time step short. Long edges
-/// of the hull become straight arcs where that is better, and the joints between them lie in
-/// uniform directions. dem2d_outline_fit has another bound, or none. control gets 3 * arcs points.
-/// Errors: TOO_FEW_POINTS, NOT_FINITE, OUT_OF_RANGE, CROSSING, ZERO_AREA, OUT_OF_MEMORY.
+/// Polybezier of an outline ([P] sec. 4): the joints are support points of the hull in `arcs`
+/// uniform directions (3 to 2^20), the tangents are perpendicular to these, and the two tangent
+/// lengths of each arc minimise the exact area between arc and outline ([P]'s step 4 uses a swarm:
+/// DEM2D_FIT_SWARM). Where possible no arc has a radius of curvature above 20 times the radius of
+/// the circle with the hull's area, because nearly flat arcs shorten the stable time step. Long
+/// edges of the hull become straight arcs where that is better; the joints between these lie in
+/// uniform directions. dem2d_outline_fit can change or drop the bound. control gets 3 * arcs points
+/// (m). Errors: NULL_ARGUMENT, TOO_FEW_POINTS, NOT_FINITE, OUT_OF_RANGE, CROSSING, ZERO_AREA,
+/// OUT_OF_MEMORY.
 DEM2D_API dem2d_result dem2d_bezier_fit(const dem2d_env *env, const dem2d_vec *points, int count,
                                         int arcs, dem2d_vec *control);
 
-/// How a template is found. Which methods belong to which model is said there.
+/// Method of a fit; each belongs to the model that is named first.
 typedef enum dem2d_fit_method {
-    DEM2D_FIT_DEFAULT,         ///< FOURIER: constrained; BEZIER: area; the others have one
+    DEM2D_FIT_DEFAULT,         ///< FOURIER: constrained; BEZIER: area; other models have one only
     DEM2D_FIT_REDUCTION,       ///< FOURIER: the paper's reduction by [F] eq. 7
     DEM2D_FIT_REDUCTION_EXACT, ///< FOURIER: the reduction by the exact test
     DEM2D_FIT_FEJER,           ///< FOURIER: (1 - n/(N+1)) p_n of the hull
     DEM2D_FIT_CONSTRAINED,     ///< FOURIER: least squares with rho >= min_radius
     DEM2D_FIT_AREA,            ///< BEZIER: least exact area to the outline
     /// BEZIER: [P] sec. 4, particle swarm with pixel overlap. [P] leaves its settings open: here
-    /// inertia .7298 and pulls 1.4962 (Clerc and Kennedy's constriction), birds, moves and pixels
-    /// as in the desc. Joints that share a corner of the hull are moved off it along both edges.
+    /// inertia .7298 and attraction 1.4962 (Clerc and Kennedy's constriction); birds, moves and
+    /// pixels as in the desc. Joints that share a corner of the hull are moved along both edges.
     DEM2D_FIT_SWARM
 } dem2d_fit_method;
 
-/// What the size of a fit is matched to ([F] fits that are constrained or Fejer's).
+/// Area to which a fit by DEM2D_FIT_CONSTRAINED or DEM2D_FIT_FEJER is scaled.
 typedef enum dem2d_fit_scale {
     DEM2D_SCALE_HULL,  ///< area of the outline's hull: best coverage
     DEM2D_SCALE_GRAIN, ///< area of the outline: right mass
-    DEM2D_SCALE_NONE   ///< as it comes out
+    DEM2D_SCALE_NONE   ///< no scaling
 } dem2d_fit_scale;
 
 /// A fit of a template to an outline.
 typedef struct dem2d_fit_desc {
-    int count;               ///< order, arcs or vertices; 0 for the least that has the coverage
-    double coverage;         ///< to be reached, inside (0, 1), when count is 0
+    int count;               ///< order, arcs or vertices; 0: the least that reaches the coverage
+    double coverage;         ///< wanted coverage, inside (0, 1), if count is 0
     dem2d_shape_type model;  ///< circle, ellipse, polygon, bezier or fourier
     dem2d_fit_method method; ///< DEFAULT or one of the model's
     dem2d_fit_scale scale;   ///< FOURIER
     double min_radius;       ///< CONSTRAINED: least radius of curvature, of a0/2; 0 for 0.1
-    bool corners;            ///< CONSTRAINED: min_radius 0 is meant
+    bool corners;            ///< CONSTRAINED: min_radius is 0, not its default
     double max_radius;       ///< BEZIER: greatest radius of curvature, of the radius of the circle
                              ///< with the hull's area; 0 for 20
     bool unbounded;          ///< BEZIER: any radius of curvature, and joints as in [P]
-    uint64_t seed;           ///< SWARM: of its random numbers
-    int birds;               ///< SWARM: how many search each arc; 0 for 30
-    int moves;               ///< SWARM: of each bird; 0 for 60
-    int pixels;              ///< SWARM: across the circle of the outline's area; 0 for 256
+    uint64_t seed;           ///< SWARM: seed of its random numbers
+    int birds;               ///< SWARM: number of birds that search for each arc; 0 for 30
+    int moves;               ///< SWARM: moves of each bird; 0 for 60
+    int pixels;              ///< SWARM: across the circle with the hull's area; 0 for 256
 } dem2d_fit_desc;
 
-/// What came out.
+/// Result of a fit.
 typedef struct dem2d_fit_report {
     int count;         ///< order, arcs or vertices of the template
-    dem2d_pose pose;   ///< where the template lies on the outline
+    dem2d_pose pose;   ///< of the template on the outline
     double coverage;   ///< 1 - difference / area of the outline
     double difference; ///< m2, area of the symmetric difference
     double hausdorff;  ///< m, see dem2d_difference
     double convexity;  ///< m, proved least radius of curvature; 0 with corners
-    double max_radius; ///< m, greatest radius of curvature, edges and straight arcs apart
-    int iterations;    ///< steps of the method, all attempts together
+    double max_radius; ///< m, greatest radius of curvature without edges and straight arcs
+    int iterations;    ///< steps of the method in all attempts
 } dem2d_fit_report;
 
-/// Fit a template to an outline, convex or not. Errors: NULL_ARGUMENT, TOO_FEW_POINTS, NOT_FINITE,
-/// CROSSING (see dem2d_outline_measure), ZERO_AREA, OUT_OF_RANGE (a field outside its range, a
-/// method of another model), NOT_REACHED (no count up to 64 has the coverage), OUT_OF_MEMORY. A
-/// bound of the radius of curvature that the arcs cannot have is no error: report->max_radius says
-/// what came out. report may be NULL.
+/// Fit a template to an outline of count >= 3 points (m), convex or not. report may be NULL. If the
+/// arcs can't keep the bound of the radius of curvature, that is no error: report->max_radius is
+/// the greatest radius. Errors: NULL_ARGUMENT, TOO_FEW_POINTS, NOT_FINITE, CROSSING (see
+/// dem2d_outline_measure), ZERO_AREA, OUT_OF_RANGE (a field outside its range, a method of another
+/// model), NOT_REACHED (no count up to 64 reaches the coverage), OUT_OF_MEMORY.
 DEM2D_API dem2d_result dem2d_outline_fit(const dem2d_env *env, const dem2d_vec *points, int count,
                                          const dem2d_fit_desc *desc, dem2d_shape **shape,
                                          dem2d_fit_report *report);
-/// For comparison: the radial Fourier series r(t) of an order about the centroid ([F] figs. 4-5),
-/// which is no shape here. Errors as of dem2d_outline_measure, OUT_OF_RANGE (order).
+/// Difference between an outline (m) and its radial Fourier series r(t) of an order (0 to 719)
+/// about the centroid, for comparison ([F] figs. 4-5): this series is no shape here. Errors as of
+/// dem2d_outline_measure, OUT_OF_RANGE (order).
 DEM2D_API dem2d_result dem2d_radial_compare(const dem2d_env *env, const dem2d_vec *points,
                                             int count, int order, dem2d_difference *difference);
 
-/// Virtual grains: the amplitude of each pair of coefficients relative to a0/2.
+/// A random grain: amplitudes |(a_n, b_n)| of an FS relative to a0/2.
 typedef struct dem2d_virtual_desc {
     double radius;          ///< m, of the circle of equal area, > 0
     double elongation;      ///< amplitude of n = 2, >= 0
     double roundness;       ///< amplitude of n = 3, falling as 1/n^2 to n = 7, >= 0
     double roughness;       ///< amplitude of n = 8, falling as 1/n^2 beyond, >= 0
-    const double *spectrum; ///< order + 1 amplitudes instead of the three; NULL without
+    const double *spectrum; ///< order + 1 amplitudes that replace the three above, or NULL
     double min_radius;      ///< least radius of curvature, of a0/2; 0 for 0.1
     uint64_t seed;          ///< same seed, same grain
 } dem2d_virtual_desc;
 
-/// Coefficients of a convex grain with random phases: amplitudes are lowered together as far as
-/// min_radius asks. a and b get order + 1 values. Errors: NULL_ARGUMENT, NOT_FINITE, OUT_OF_RANGE.
+/// Coefficients of a convex grain with random phases. If the radius of curvature would fall below
+/// min_radius, one factor lowers all amplitudes. a and b get order + 1 values (m); order 0 to 2^20.
+/// Errors: NULL_ARGUMENT, NOT_FINITE, OUT_OF_RANGE.
 DEM2D_API dem2d_result dem2d_fourier_virtual(const dem2d_virtual_desc *desc, int order, double *a,
                                              double *b);
 
@@ -1032,94 +1075,99 @@ DEM2D_API dem2d_result dem2d_fourier_virtual(const dem2d_virtual_desc *desc, int
    >>api-contact  Contact of two shapes, of a shape and a wall
    ============================================================================================ */
 
-/// What is known of a pair.
+/// State of a pair.
 typedef enum dem2d_contact_state {
-    DEM2D_SEPARATED,   ///< a gap, above rounding
-    DEM2D_TOUCHING,    ///< gap or overlap within rounding of the sizes, or deviations of both
-    DEM2D_PENETRATING, ///< an overlap, above rounding
-    DEM2D_UNRESOLVED   ///< the cap of iterations was reached; depth and error are still bounds
+    DEM2D_SEPARATED,   ///< a gap, above rounding errors
+    DEM2D_TOUCHING,    ///< gap or overlap within rounding errors, or the deviations of both
+    DEM2D_PENETRATING, ///< an overlap, above rounding errors
+    DEM2D_UNRESOLVED   ///< the limit of iterations was reached; depth and error are still bounds
 } dem2d_contact_state;
 
 /// How depth and distance are found.
 typedef enum dem2d_solver {
     DEM2D_CERTIFIED, ///< minimum of the support value by Newton's steps, proved global
-    /// The papers' way: GJK, then EPA when the shapes overlap. A world then takes every pair whose
-    /// bounding circles overlap anew in every step: circles too, from the line of centres.
+    /// The papers' method: GJK, then EPA if the shapes overlap. A world then collides every pair
+    /// whose bounding circles overlap in every step, circles too, from the line of centres.
     DEM2D_GJK_EPA,
     DEM2D_SOLVER_COUNT
 } dem2d_solver;
 
 /// What proves that an answer is the least overlap, or the greatest gap, to its error bound.
 typedef enum dem2d_proof {
-    DEM2D_BY_NOTHING,  ///< the cap was reached: the bounds hold, but are wide
+    DEM2D_BY_NOTHING,  ///< the limit of iterations was reached: the bounds hold, but are wide
     DEM2D_BY_FORM,     ///< closed form: circles, walls, edges and corners of two polygons
     DEM2D_BY_RADIUS,   ///< the depth is below the least radius of curvature; or a gap
-    DEM2D_BY_ARC,      ///< the boundary beside the contact outweighs all other directions
+    DEM2D_BY_ARC,      ///< least radii of curvature beside the contact exclude other directions
     DEM2D_BY_POLYTOPE, ///< branch and bound over arcs of directions, or EPA
     DEM2D_PROOF_COUNT
 } dem2d_proof;
 
-/// How a pair is searched. All zero is fine.
+/// Options of a contact query; all zero for the defaults.
 typedef struct dem2d_contact_desc {
-    double tolerance;    ///< of R_A + R_B + |d|: stop when the error is below; 0 for 1e-10
+    double tolerance;    ///< of R_A + R_B + |d|: wanted error; 0 for 1e-10
     int max_iterations;  ///< of each search; 0 for 128; a polytope takes 250 at most
-    dem2d_vec start;     ///< first direction, the last normal for instance; 0 for line of centres
+    dem2d_vec start;     ///< first direction, e.g. the last normal; 0 for the line of centres
     dem2d_solver solver; ///< certified, or GJK and EPA
-    bool skip_points;    ///< leave out the contact points: count 0, faster
+    bool skip_points;    ///< compute no contact points: count is 0, faster
 } dem2d_contact_desc;
 
 /// One of the points that carry a contact.
 typedef struct dem2d_contact_point {
     dem2d_vec position; ///< m
-    dem2d_vec normal;   ///< unit, of the force on B; of the deepest point the contact's
-    double depth;       ///< m, overlap there, at a right angle to the face that is met
-    double weight;      ///< force there over kn depth: 1, but for short common parts
+    dem2d_vec normal;   ///< unit, direction of the force on B; at the deepest point the contact's
+    double depth;       ///< m, overlap there, at a right angle to the face of the other shape
+    double weight;      ///< force there over kn depth: 1 except where the common part is short
     double energy;      ///< m2, energy stored there over kn; the sum is the contact's
-    /// The corner it is at, for springs that are kept from step to step: 2 i of A, 2 i + 1 of B, at
-    /// the counter-clockwise end of edge or arc i (up to the next straight arc). The same in every
-    /// pose; where A and B change places, so does the last bit. -1 of one point.
+    /// Number of the corner where the point is, the same in every pose, so that a spring can be
+    /// kept from step to step: 2 i for A, 2 i + 1 for B, with i the edge or arc whose
+    /// counter-clockwise end (up to the next straight arc) is the corner. If A and B are exchanged,
+    /// the last bit changes. -1 for one point.
     int corner;
 } dem2d_contact_point;
 
 /// Answer to a contact query, in the coordinates of the poses.
 typedef struct dem2d_contact {
-    dem2d_contact_state state;     ///< see there
+    dem2d_contact_state state;     ///< separated, touching, penetrating or unresolved
     dem2d_proof proof;             ///< why the error bound holds
-    int support_calls;             ///< evaluations of the support of A minus B
+    int support_calls;             ///< evaluations of the support function of A minus B
     int iterations;                ///< of all searches together
     dem2d_vec normal;              ///< unit, from A to B
     double depth;                  ///< m, overlap along the normal; negative: minus the gap
-    double error;                  ///< m, the true depth is within this of the depth
-    double residual;               ///< m, EPA's at its end: |W| less least edge distance; else 0
+    double error;                  ///< m, the true depth differs from depth by this at most
+    double residual;               ///< m, last residual of EPA, |W| less least edge distance; or 0
     dem2d_vec point_a;             ///< m, witness point on A
     dem2d_vec point_b;             ///< m, witness point on B
-    dem2d_vec point;               ///< m, the middle of the two; with a wall point_b, the foot
-    int count;                     ///< of contact points: 0 when separated, 2 where two faces meet
-    dem2d_contact_point points[2]; ///< by their place along the normal turned by +90 degrees
+    dem2d_vec point;               ///< m, the middle of the two; at a wall the foot point, point_b
+    int count;                     ///< contact points: 0 if separated, 2 where two faces meet
+    dem2d_contact_point points[2]; ///< sorted along the normal turned by +90 degrees
 } dem2d_contact;
 
-/// Whether a point lies in a shape (boundary included, to rounding).
+/// Whether a point (m) lies in a shape, boundary included, within rounding errors. Errors:
+/// NULL_ARGUMENT, NOT_FINITE, OUT_OF_RANGE (pose, sizes).
 DEM2D_API dem2d_result dem2d_shape_contains(const dem2d_shape *shape, dem2d_pose pose,
                                             dem2d_vec point, bool *inside);
-/// Do two shapes overlap? GJK stopped at the first direction that separates them or the first
-/// simplex that holds the origin ([P] sec. 3.1). Only state, counts, and bounds are
-/// meaningful: depth is the least support value met and error its distance to a lower bound.
+/// Whether two shapes overlap: GJK stops at the first direction that separates them or the first
+/// simplex that contains the origin ([P] sec. 3.1). Only state, counts, and bounds are meaningful:
+/// depth is the least support value found, error its distance from a lower bound. desc may be NULL.
+/// Errors of all pair queries: NULL_ARGUMENT, NOT_FINITE, OUT_OF_RANGE (desc, pose, sizes whose
+/// squares are not normal numbers).
 DEM2D_API dem2d_result dem2d_pair_overlap(const dem2d_shape *a, dem2d_pose pose_a,
                                           const dem2d_shape *b, dem2d_pose pose_b,
                                           const dem2d_contact_desc *desc, dem2d_contact *contact);
-/// Distance by GJK, whatever the solver: gap, normal and witness points of separated shapes.
-/// Overlapping shapes get the answer of dem2d_pair_overlap. desc may be NULL.
+/// Distance by GJK, whatever the solver: gap, normal and witness points of separated shapes. For
+/// overlapping shapes the answer is that of dem2d_pair_overlap. desc may be NULL.
 DEM2D_API dem2d_result dem2d_pair_distance(const dem2d_shape *a, dem2d_pose pose_a,
                                            const dem2d_shape *b, dem2d_pose pose_b,
                                            const dem2d_contact_desc *desc, dem2d_contact *contact);
-/// Distance or depth, with the contact points. Certified: two circles take the closed form (0
-/// support calls), two polygons (or a polygon and a circle) their edges and corners, all others
-/// Newton's steps on the support value, from desc->start or the line of centres. desc may be NULL.
+/// Distance or depth, with the contact points. Certified: a closed form for two circles (0 support
+/// calls), edges and corners for two polygons or a polygon and a circle, for all others Newton's
+/// steps on the support value, from desc->start or the line of centres. desc may be NULL.
 DEM2D_API dem2d_result dem2d_pair_contact(const dem2d_shape *a, dem2d_pose pose_a,
                                           const dem2d_shape *b, dem2d_pose pose_b,
                                           const dem2d_contact_desc *desc, dem2d_contact *contact);
-/// Shape A against a half-plane B: one support call, exact. `point` is on the wall's surface,
-/// `wall_normal` (any length but 0) points out of the wall, towards the shapes.
+/// Contact of a shape A and a half-plane B: one support call, exact. `point` (m) is on the wall's
+/// surface, `wall_normal` (any length but 0) points out of the wall, towards the shapes. Errors:
+/// NULL_ARGUMENT, NOT_FINITE, OUT_OF_RANGE (pose, zero normal).
 DEM2D_API dem2d_result dem2d_wall_contact(const dem2d_shape *shape, dem2d_pose pose,
                                           dem2d_vec point, dem2d_vec wall_normal,
                                           dem2d_contact *contact);
@@ -1128,7 +1176,7 @@ DEM2D_API dem2d_result dem2d_wall_contact(const dem2d_shape *shape, dem2d_pose p
    >>api-world  Particles, walls, materials, steps
    ============================================================================================ */
 
-/// A scene. Opaque. One call at a time.
+/// A scene. Opaque. Only one call at a time.
 typedef struct dem2d_world dem2d_world;
 
 /// Handle of a template in a world. Generation 0 is never valid.
@@ -1152,7 +1200,7 @@ typedef struct dem2d_wall_id {
     uint32_t generation; ///< of the slot
 } dem2d_wall_id;
 
-/// Where the force of a contact acts.
+/// Where the forces of a contact act.
 typedef enum dem2d_face_rule {
     DEM2D_TWO_POINTS, ///< both ends of the common part where two faces meet, else one point
     /// The papers' rule: one point, the middle of both witness points ([P] fig. 4a); at a wall, the
@@ -1169,31 +1217,31 @@ typedef enum dem2d_phase {
     DEM2D_PHASE_COUNT
 } dem2d_phase;
 
-/// A piece of work: items begin to end - 1. Different ranges may be done at once.
+/// A piece of work: items begin to end - 1. Different ranges may run at the same time.
 typedef void dem2d_task_fn(void *context, int begin, int end);
 
-/// Calls task(context, begin, end) on ranges that cover 0 to count - 1 once, on any threads, in
-/// any order and number, and returns when all are done. An item is a block of 64 or more contacts
-/// or particles, or, where count is 1, work that can't be shared. user is the desc's parallel_user.
+/// Calls task(context, begin, end) for ranges that cover 0 to count - 1 once, on any threads, in
+/// any number and order, and returns when all are done. An item is a block of 64 or more contacts
+/// or particles, or, if count is 1, work that can't be divided. user is the desc's parallel_user.
 typedef void dem2d_parallel_fn(void *user, dem2d_phase phase, int count, dem2d_task_fn *task,
                                void *context);
 
-/// A material. Two materials meet with the harmonic mean of their stiffnesses (springs in
-/// series, doubled), the smaller frictions and the greater damping ratio, unless
-/// dem2d_world_set_pair says otherwise.
+/// A material. A contact of two materials has the harmonic mean of their stiffnesses (springs in
+/// series, doubled), the smaller friction coefficients and the greater damping ratio, unless
+/// dem2d_world_set_pair sets others.
 typedef struct dem2d_material_desc {
     double density;              ///< kg/m2 (kg/m3 per metre of thickness), > 0
     double normal_stiffness;     ///< N/m, > 0
-    double tangential_stiffness; ///< N/m, >= 0; 0: no friction, nor against rolling
+    double tangential_stiffness; ///< N/m, >= 0; 0: neither friction nor rolling friction
     double friction;             ///< coefficient, >= 0
     double damping_ratio;        ///< of the normal dashpot, >= 0: see dem2d_damping_ratio
     double rolling_friction;     ///< coefficient, >= 0
 } dem2d_material_desc;
 
-/// How two materials meet.
+/// Properties of the contacts of two materials.
 typedef struct dem2d_pair_desc {
     double normal_stiffness;     ///< N/m, > 0
-    double tangential_stiffness; ///< N/m, >= 0; 0: no friction, nor against rolling
+    double tangential_stiffness; ///< N/m, >= 0; 0: neither friction nor rolling friction
     double friction;             ///< coefficient, >= 0
     /// Of the normal dashpot, >= 0: its force is 2 zeta sqrt(m kn) times the closing speed, with m
     /// the reduced mass of the two. Spring and dashpot together never pull.
