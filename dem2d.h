@@ -653,7 +653,7 @@ typedef struct dem2d_pose {
 
 /// Memory and messages. Where a function takes an environment, NULL means malloc, free and no log.
 typedef struct dem2d_env {
-    void *user;                                 ///< handed to the callbacks
+    void *user;                                 ///< passed to the callbacks
     void *(*allocate)(void *user, size_t size); ///< like malloc; used only if release is set too
     /// Like free, with the size that was asked for. If one of the two is NULL: malloc and free.
     void (*release)(void *user, void *memory, size_t size);
@@ -1243,37 +1243,37 @@ typedef struct dem2d_pair_desc {
     double normal_stiffness;     ///< N/m, > 0
     double tangential_stiffness; ///< N/m, >= 0; 0: neither friction nor rolling friction
     double friction;             ///< coefficient, >= 0
-    /// Of the normal dashpot, >= 0: its force is 2 zeta sqrt(m kn) times the closing speed, with m
-    /// the reduced mass of the two. Spring and dashpot together never pull.
+    /// Damping ratio zeta of the normal dashpot, >= 0: its force is 2 zeta sqrt(m kn) times the
+    /// approach speed, with m the reduced mass. Spring and dashpot together never pull.
     double damping_ratio;
-    /// Coefficient mu_r, >= 0: a spring kt R^2 against rolling, its moment at most mu_r R times the
-    /// normal force, with 1/R = 1/R_A + 1/R_B of the equivalent radii (a wall's is infinite).
+    /// Coefficient mu_r, >= 0: a rolling spring kt R^2 whose moment is at most mu_r R times the
+    /// normal force, with 1/R = 1/R_A + 1/R_B of the equivalent radii (infinite for a wall).
     double rolling_friction;
 } dem2d_pair_desc;
 
-/// What a contact is, for a caller's law. Velocities are those half a step before: of the step that
-/// was made, whatever has been set since.
+/// A contact as a caller's law gets it. Velocities are those of the last step, half a step before
+/// the positions, whatever has been set since.
 typedef struct dem2d_law_input {
-    dem2d_pair_desc pair; ///< how the materials meet
+    dem2d_pair_desc pair; ///< properties of contacts of the two materials
     dem2d_particle_id a;  ///< particle A
     dem2d_particle_id b;  ///< particle B; generation 0 when B is a wall
     dem2d_wall_id wall;   ///< wall B; generation 0 when B is a particle
     dem2d_vec normal;     ///< unit, from A to B
-    double time_step;     ///< s, of the step that was made: slip times it is the way slid
+    double time_step;     ///< s, of the last step: slip times it is the distance slid
     double depth;         ///< m, > 0
-    double closing;       ///< m/s, at which A and B approach along the normal
-    /// m/s, of B against A at the contact, along the normal turned by +90 degrees: mean of the
+    double closing;       ///< m/s, approach speed of A and B along the normal
+    /// m/s, sliding velocity of B relative to A along the normal turned by +90 degrees: mean of the
     /// step, see Sliding in the manual.
     double slip;
-    double turning;          ///< rad/s, of B against A
+    double turning;          ///< rad/s, spin of B relative to A
     double mass;             ///< kg/m, reduced; 0 when neither is free
     double radius;           ///< m, reduced, of the equivalent radii
     double tangential_force; ///< N/m, in the step before; 0 for a new contact
     double moment;           ///< N, likewise
-    double state[2];         ///< likewise, whatever the law keeps there
+    double state[2];         ///< as the law left it in the step before; 0 for a new contact
 } dem2d_law_input;
 
-/// What a caller's law answers; all zero at the call but for the state, which is the input's.
+/// Forces that a caller's law returns; at the call all zero, except the state: that of the input.
 typedef struct dem2d_law_output {
     double normal_force;     ///< N/m, on B along the normal; below 0 it pulls, while depth > 0
     double tangential_force; ///< N/m, on B along the normal turned by +90 degrees
@@ -1282,10 +1282,11 @@ typedef struct dem2d_law_output {
     double state[2];         ///< for the next step
 } dem2d_law_output;
 
-/// A contact law: forces of a contact. Called while depth > 0, never across a gap: where the shapes
-/// part, its force ends and its state is dropped. Called by the threads of parallel_for. Of a
-/// contact with a servo wall it is asked once more in a step, by the caller's thread, for a little
-/// more depth and closing speed: the wall learns how the force will rise, and drops that answer.
+/// A contact law: forces of a contact. It is called while depth > 0, by the threads of
+/// parallel_for. When the shapes separate, its force ends and its state is dropped. For a contact
+/// with a servo wall it is called once more in each step, by the calling thread, with a little more
+/// depth and approach speed: the wall needs to know how the force will rise, and uses nothing else
+/// of that answer.
 typedef void dem2d_law_fn(void *user, const dem2d_law_input *input, dem2d_law_output *output);
 
 /// A world. Only time_step has no default.
@@ -1294,7 +1295,7 @@ typedef struct dem2d_world_desc {
     dem2d_vec gravity;         ///< m/s2
     double local_damping;      ///< Cundall's factor, [0, 1)
     double global_damping;     ///< 1/s, viscous, >= 0
-    double skin;               ///< of the particle radius: reach of the pair list; 0: by itself
+    double skin;               ///< of the neighbour list, of the particle radius; 0: tuned
     double contact_tolerance;  ///< of R_A + R_B + |d|; 0 for 1e-8
     int max_iterations;        ///< of each search; 0 for 128
     dem2d_solver solver;       ///< of contacts: certified, or GJK and EPA
@@ -1303,12 +1304,12 @@ typedef struct dem2d_world_desc {
     int pair_capacity;         ///< reserved at creation; 0 grows
     bool skip_time_step_check; ///< no stability check
     bool ledger;               ///< keep the ledger of energies, see dem2d_world_ledger
-    /// Instead of springs, dashpot and friction; contacts then have one point. NULL: those.
+    /// Replaces springs, dashpot and friction, and contacts have one point. NULL for the built-in.
     dem2d_law_fn *law;
-    void *law_user;                  ///< handed to law
-    int law_tag;                     ///< names law in snapshots
-    dem2d_parallel_fn *parallel_for; ///< shares a step's work out; NULL: all is done in the call
-    void *parallel_user;             ///< handed to parallel_for
+    void *law_user;                  ///< passed to law
+    int law_tag;                     ///< identifies law in snapshots
+    dem2d_parallel_fn *parallel_for; ///< distributes the work of a step; NULL: the calling thread
+    void *parallel_user;             ///< passed to parallel_for
     const dem2d_env *env;            ///< memory and log, copied; NULL for malloc, free, silence
 } dem2d_world_desc;
 
@@ -1316,7 +1317,7 @@ typedef struct dem2d_world_desc {
 typedef enum dem2d_motion {
     DEM2D_FREE,  ///< by the forces on it
     DEM2D_FIXED, ///< not at all
-    DEM2D_DRIVEN ///< at the velocities it was given, whatever the forces
+    DEM2D_DRIVEN ///< at given velocities, whatever the forces
 } dem2d_motion;
 
 /// A particle. Errors name the field.
@@ -1339,7 +1340,7 @@ typedef struct dem2d_particle_info {
     dem2d_pose pose;            ///< now
     dem2d_vec velocity;         ///< m/s, half a step before the pose, or as it has been set since
     double angular_velocity;    ///< rad/s, likewise
-    dem2d_vec force;            ///< N/m, sum of contacts in the last force pass (no gravity)
+    dem2d_vec force;            ///< N/m, sum over contacts in the last force pass (no gravity)
     double torque;              ///< N, likewise, about the centroid
     double mass;                ///< kg/m
     double inertia;             ///< kg m, about the centroid
@@ -1354,36 +1355,37 @@ typedef enum dem2d_wall_mode {
     DEM2D_WALL_SERVO   ///< along its normal, so that force = stress * length: see dem2d_wall_desc
 } dem2d_wall_mode;
 
-/// A half-plane, or a segment. Segments push to both sides and at their ends. Ends of two that are
-/// nearer than a millionth of the shorter one are a joint: a particle there has one contact.
+/// A half-plane, or a segment. Segments push to both sides and at their ends. Two ends nearer than
+/// a millionth of the shorter segment are a joint: a particle there has one contact.
 ///
 /// A servo wall moves along its normal so that particles press on it with F = stress * length. In
-/// each step it takes the speed V at which the springs and dashpots of its contacts add up, in the
-/// next force pass, to
-///     F - b (V - D),   b = the greater of 0.2 sqrt(K M) and K dt/4,
-/// with K the stiffness of its contacts and M the mass of their particles, whose own next step is
-/// taken into account. b takes energy from the vibration of the contacts; D is the mean of V over
-/// the last 10 sqrt(M/K), so that the mean force is right while the particles yield steadily (it
-/// gives in where all between servo walls that face each other slides along). This is stable for
-/// every damping ratio and max_speed as long as the time step is for the particles.
-/// V is at most max_speed either way. So fast goes a wall that has touched nothing yet: its first
+/// each step it chooses the speed V for which the springs and dashpots of its contacts have the sum
+///     F - b (V - D),   b = the greater of 0.2 sqrt(K M) and K dt/4
+/// in the next force pass. K is the stiffness of its contacts and M the mass of their particles,
+/// whose own next step is taken into account. b damps the vibration of the contacts. D is the mean
+/// of V over the last 10 sqrt(M/K), so that the mean force is right while the particles yield
+/// steadily; D decays where everything between two facing servo walls drifts. The control is
+/// stable for every damping ratio and max_speed if the time step is stable for the particles.
+///
+/// |V| is at most max_speed. A wall that has touched nothing yet moves at max_speed: its first
 /// contact presses with up to (kn dt + c) max_speed in one step, c of the dashpot. A wall that has
-/// lost contact comes back slower, so that this is F at most, and in about 10 sqrt(M/K) faster and
-/// faster. max_speed must be above the speed at which the particles yield, or F is not reached.
-/// The normal of a segment is to the left of the way from point to end: a stress above 0 presses
-/// particles there, those on the other side press against it. With a stress of 0 a wall yields to
-/// what presses it and stands where nothing does; below 0 it leaves, if no law of yours pulls.
+/// lost contact returns at a lower speed, for which this force is F at most, and accelerates over
+/// about 10 sqrt(M/K). max_speed must be above the speed at which the particles yield, or F is not
+/// reached. The normal of a segment is to the left of the direction from point to end: a stress
+/// above 0 presses on particles there, and particles on the other side press against it. A wall
+/// with stress 0 yields to particles that press on it, and stands still without any; below 0 it
+/// moves away, unless a law of yours pulls.
 typedef struct dem2d_wall_desc {
-    double length;              ///< m, for stress; ignored when spans are given, and by segments
+    double length;              ///< m, for stress; ignored if spans are given, and for segments
     dem2d_wall_mode mode;       ///< still, moving, servo
     dem2d_material_id material; ///< friction and stiffness (its density is not used)
     dem2d_vec point;            ///< m, on the surface; of a segment the start
     dem2d_vec normal;           ///< out of the wall, towards the grains; any length but 0
-    bool segment;               ///< from point to end; normal is ignored, it is left of that
+    bool segment;               ///< from point to end; its normal is to the left, `normal` ignored
     dem2d_vec end;              ///< m, of a segment
     dem2d_vec velocity;         ///< m/s, for MOVING
     double stress;              ///< Pa, for SERVO, compression positive
-    double max_speed;           ///< m/s, for SERVO, > 0: the greatest, and that without a contact
+    double max_speed;           ///< m/s, for SERVO, > 0: greatest speed, taken before first contact
     dem2d_wall_id spans[2];     ///< the length is the distance between these walls; or both zero
 } dem2d_wall_desc;
 
@@ -1438,7 +1440,11 @@ typedef struct dem2d_stats {
     size_t bytes;                      ///< in use, all of the world
 } dem2d_stats;
 
-/// Create a world. Errors: NULL_ARGUMENT, NOT_FINITE, OUT_OF_RANGE, OUT_OF_MEMORY.
+/// Create a world; *world is the caller's, to be released by dem2d_world_destroy. Errors:
+/// NULL_ARGUMENT, NOT_FINITE, OUT_OF_RANGE, OUT_OF_MEMORY.
+///
+/// Errors of all functions of a world: NULL_ARGUMENT; STALE_ID for the id of a removed object;
+/// OUT_OF_MEMORY where something is added; NOT_FINITE and OUT_OF_RANGE for numbers.
 DEM2D_API dem2d_result dem2d_world_create(const dem2d_world_desc *desc, dem2d_world **world);
 /// Release a world and all in it; NULL is allowed.
 DEM2D_API void dem2d_world_destroy(dem2d_world *world);
@@ -1452,14 +1458,15 @@ DEM2D_API const dem2d_shape *dem2d_world_shape(const dem2d_world *world, dem2d_s
 /// Add a material. At most 256. Errors: NOT_FINITE, OUT_OF_RANGE, OUT_OF_MEMORY.
 DEM2D_API dem2d_result dem2d_world_add_material(dem2d_world *world, const dem2d_material_desc *desc,
                                                 dem2d_material_id *id);
-/// Damping ratio zeta of the dashpot that gives a restitution coefficient in (0, 1], at any speed
-/// and with no pull: -ln e = 2 zeta acos(zeta)/sqrt(1 - zeta^2), and likewise with acosh beyond
-/// zeta = 1 (Schwager, Poeschel 2007). Exact in the limit of small steps and of first order in them
-/// (a dashpot starts with a jump: 0.8 asked gives 0.8067 in steps of a tenth of the contact time),
-/// for central impacts at one point. Two contact points of faces that meet carry twice the
-/// stiffness and twice the dashpot. Errors: NULL_ARGUMENT, OUT_OF_RANGE, NOT_FINITE.
+/// Damping ratio zeta of the dashpot that gives a restitution coefficient in (0, 1] at any speed,
+/// without attraction: -ln e = 2 zeta acos(zeta)/sqrt(1 - zeta^2), and likewise with acosh beyond
+/// zeta = 1 (Schwager, Poeschel 2007). It holds for central impacts at one point, in the limit of
+/// small time steps, with an error of first order: with steps of a tenth of the contact time 0.8
+/// becomes 0.8067, because the force of a dashpot starts with a jump. Where two faces meet, two
+/// contact points have twice the stiffness and twice the dashpot. Errors: NULL_ARGUMENT,
+/// OUT_OF_RANGE, NOT_FINITE.
 DEM2D_API dem2d_result dem2d_damping_ratio(double restitution, double *damping_ratio);
-/// Say how two materials (or one with itself) meet from now on.
+/// Set the properties of contacts of two materials (or of one with itself), from now on.
 DEM2D_API dem2d_result dem2d_world_set_pair(dem2d_world *world, dem2d_material_id a,
                                             dem2d_material_id b, const dem2d_pair_desc *desc);
 /// Add a particle.
@@ -1470,20 +1477,20 @@ DEM2D_API dem2d_result dem2d_world_remove_particle(dem2d_world *world, dem2d_par
 /// State of a particle.
 DEM2D_API dem2d_result dem2d_world_get_particle(const dem2d_world *world, dem2d_particle_id id,
                                                 dem2d_particle_info *info);
-/// Put a particle elsewhere; its contacts start afresh.
+/// Move a particle to a position (m) and angle (rad); its contacts lose their history.
 DEM2D_API dem2d_result dem2d_world_move_particle(dem2d_world *world, dem2d_particle_id id,
                                                  dem2d_vec position, double angle);
-/// Give a particle other velocities (m/s, rad/s) and another kind of motion, from its next move on:
-/// springs and dashpots of the next force pass go by the move that was made. Errors: NOT_FINITE,
-/// OUT_OF_RANGE, OUT_OF_MEMORY.
+/// Set the velocities (m/s, rad/s) and the kind of motion of a particle, from its next move on: the
+/// springs and dashpots of the next force pass still use the velocities of the last move. Errors:
+/// NOT_FINITE, OUT_OF_RANGE, OUT_OF_MEMORY.
 DEM2D_API dem2d_result dem2d_world_drive_particle(dem2d_world *world, dem2d_particle_id id,
                                                   dem2d_motion motion, dem2d_vec velocity,
                                                   double angular_velocity);
 /// Add a wall.
 DEM2D_API dem2d_result dem2d_world_add_wall(dem2d_world *world, const dem2d_wall_desc *desc,
                                             dem2d_wall_id *id);
-/// Replace a wall's description; its contacts stay if the normal does and the wall is within the
-/// skin of where it was.
+/// Replace a wall's description. Its contacts keep their history if the normal stays the same and
+/// the wall moves by less than the skin.
 DEM2D_API dem2d_result dem2d_world_set_wall(dem2d_world *world, dem2d_wall_id id,
                                             const dem2d_wall_desc *desc);
 /// Remove a wall that no other wall spans to (else IN_USE).
@@ -1497,19 +1504,21 @@ DEM2D_API dem2d_result dem2d_world_set_gravity(dem2d_world *world, dem2d_vec gra
 DEM2D_API dem2d_result dem2d_world_set_damping(dem2d_world *world, double local, double global);
 /// Change the time step (s, > 0) from the next move on.
 DEM2D_API dem2d_result dem2d_world_set_time_step(dem2d_world *world, double time_step);
-/// Bounds of the stable time step for the contacts open in the last force pass (s; HUGE_VAL for
-/// limit without contacts; without contacts `safe` counts one contact per particle). While contacts
-/// stay, a time step at or below `safe` is stable; above `limit` it is not. Nearly flat arcs under
-/// a force lower both, as they resist rocking. A contact that closes and opens again gives back
-/// between 1 - q and 1/(1 - q) of its energy, q = (dt/safe)^2, at random (1 % at a tenth of `safe`,
-/// 7 % at a quarter): without damping or friction, grains that bounce for long may gain energy at
-/// any time step, and the more the longer it is. limit_particle (may be NULL) is the particle that
-/// sets the limit, generation 0 if none.
+/// Bounds of the stable time step (s) for the contacts of the last force pass. While these contacts
+/// stay, a time step at or below `safe` is stable, one above `limit` is not. Without contacts
+/// `limit` is HUGE_VAL, and `safe` assumes one contact per particle. Nearly flat arcs under a force
+/// lower both bounds, because they resist rocking. limit_particle (may be NULL) gets the particle
+/// that sets the limit, generation 0 if none.
+///
+/// A contact that closes and opens again returns between 1 - q and 1/(1 - q) of its energy,
+/// q = (dt/safe)^2, at random (1 % at a tenth of `safe`, 7 % at a quarter): without damping and
+/// friction, grains that bounce for a long time may gain energy at any time step, more with a
+/// longer one.
 DEM2D_API dem2d_result dem2d_world_time_step_bounds(const dem2d_world *world, double *safe,
                                                     double *limit,
                                                     dem2d_particle_id *limit_particle);
 /// Take count >= 0 steps; done (may be NULL) gets the number taken, also on failure. Errors: STATE,
-/// TIME_STEP, OUT_OF_MEMORY, OUT_OF_RANGE: the world is as before the step that failed.
+/// TIME_STEP, OUT_OF_MEMORY, OUT_OF_RANGE; the world then is as it was before the step that failed.
 DEM2D_API dem2d_result dem2d_world_step(dem2d_world *world, int count, int *done);
 
 /* ============================================================================================
@@ -1526,9 +1535,9 @@ typedef struct dem2d_energy {
     double potential;     ///< -sum m g.x
 } dem2d_energy;
 
-/// Where energy came from and went, J/m: stored at the last force pass, the rest since the first.
-/// The kinetic energy is that for which the leapfrog conserves the energy of a spring exactly: half
-/// the mass times the velocity half a step before times that half a step after.
+/// Energy balance, J/m: stored energies at the last force pass, all other accounts since the first
+/// step. The kinetic energy is half the mass times the velocity half a step before times the
+/// velocity half a step after: with it the leapfrog conserves the energy of a spring exactly.
 typedef struct dem2d_ledger {
     double kinetic;    ///< of the free particles
     double normal;     ///< in normal springs
@@ -1539,15 +1548,16 @@ typedef struct dem2d_ledger {
     double friction;   ///< dissipated by sliding and rolling, and by a caller's law
     double dashpot;    ///< dissipated by dashpots
     double damping;    ///< dissipated by local and global damping
-    /// Put in by the caller: at the start, and whenever objects, velocities or laws are changed. It
-    /// is what closes the ledger over the first step after that.
+    /// Put in by the caller: at the start, and by changes of objects, velocities and laws. The
+    /// first step after a change adds here what closes the balance over that step.
     double given;
-    /// Stored and dissipated energy less what was put in: error of the time stepping, of second
-    /// order in the time step. At 1/32 of the shortest contact it is below 3e-4 of the turnover; of
-    /// sharp corners and segments below 1e-3.
+    /// Stored and dissipated energy less what was put in: the error of the time stepping, of second
+    /// order in the time step. With a time step of 1/32 of the shortest contact it is below 3e-4 of
+    /// the turnover; with sharp corners and segments below 1e-3.
     double closure;
-    /// What has gone from one account to another: half the sum, over all steps and all accounts but
-    /// `given`, of the absolute change in the step. Steps after a change by the caller add nothing.
+    /// Energy that has gone from one account to another: half the sum of the absolute changes in
+    /// each step of all accounts except `given`. The first step after a change by the caller adds
+    /// nothing.
     double turnover;
 } dem2d_ledger;
 
@@ -1678,49 +1688,51 @@ DEM2D_API dem2d_result dem2d_world_inertial_number(const dem2d_world *world, dou
    >>api-snapshot  State hash, snapshots
    ============================================================================================ */
 
-/// Takes bytes; returns false when they could not be written.
+/// Writes count bytes; returns false if it fails.
 typedef bool dem2d_write_fn(void *user, const char *bytes, size_t count);
-/// Gives the next count bytes; returns false when there are not as many.
+/// Reads the next count bytes; returns false if there are fewer.
 typedef bool dem2d_read_fn(void *user, char *bytes, size_t count);
-/// The custom shape of a tag, or NULL: its support and user are taken, all else was saved.
+/// Finds the custom shape of a tag, or NULL. Only its support and user are used.
 typedef const dem2d_custom_desc *dem2d_custom_fn(void *user, int tag);
 
 /// Where a snapshot goes.
 typedef struct dem2d_save_desc {
     dem2d_write_fn *write; ///< where the bytes go, or NULL when a path is given
-    void *user;            ///< handed to write
+    void *user;            ///< passed to write
 } dem2d_save_desc;
 
-/// Where a snapshot comes from, and what can't be stored.
+/// Where a snapshot comes from, and the parts of a world that can't be saved.
 typedef struct dem2d_load_desc {
     dem2d_read_fn *read;             ///< where the bytes come from, or NULL when a path is given
-    void *user;                      ///< handed to read
+    void *user;                      ///< passed to read
     dem2d_parallel_fn *parallel_for; ///< of the world, as in dem2d_world_desc
-    void *parallel_user;             ///< handed to parallel_for
+    void *parallel_user;             ///< passed to parallel_for
     dem2d_custom_fn *custom;         ///< finds custom shapes; required when there are any
-    void *custom_user;               ///< handed to custom
+    void *custom_user;               ///< passed to custom
     dem2d_law_fn *law;               ///< of the world; required when it had one
-    void *law_user;                  ///< handed to law
+    void *law_user;                  ///< passed to law
     int law_tag;                     ///< must be that of the world
     const dem2d_env *env;            ///< memory and log, copied; NULL for malloc, free, silence
 } dem2d_load_desc;
 
-/// Hash of what the next step depends on and can be seen: settings, steps, time, materials, how
-/// they meet, templates, particles, walls, contacts and their springs. In the order of ids, doubles
-/// by their bits (0 and -0 differ): the same for any threads, memory, skins, compiler and machine.
-/// Not in it: counters, the list of pairs, callbacks, ids that are free. 0 for NULL.
+/// Hash of the state that the next step depends on: settings, steps, time, materials and their
+/// pairs, templates, particles, walls, contacts and their springs. It takes them in the order of
+/// ids and doubles by their bits (0 and -0 differ), so it is the same for any number of threads,
+/// storage order, skin, compiler and machine. Not included: counters, the neighbour list,
+/// callbacks, free ids. 0 for NULL.
 DEM2D_API uint64_t dem2d_world_hash(const dem2d_world *world);
-/// Write all of a world to desc->write, or to a file when path is not NULL; the file is written as
-/// path + ".part", then renamed, so that an old one stays until all is well. The same bytes on any
-/// machine. Takes no memory but for the name. Errors: NULL_ARGUMENT, OUT_OF_RANGE (path and write),
-/// OUT_OF_MEMORY, IO.
+/// Write all of a world to desc->write, or to a file if path is not NULL. The file is written as
+/// path + ".part", then renamed: an old file is replaced only by a complete one. The bytes are the
+/// same on any machine. Allocates only the file name. Errors: NULL_ARGUMENT, OUT_OF_RANGE (both
+/// path and write), OUT_OF_MEMORY, IO.
 DEM2D_API dem2d_result dem2d_world_save(const dem2d_world *world, const dem2d_save_desc *desc,
                                         const char *path);
-/// The world of a snapshot (desc may be NULL: all zero, then path is needed): all ids hold, and its
-/// steps are those of the world that was saved, to the bit, with all statistics but bytes. read
-/// must have no byte after the snapshot. Memory beside the world's: at most one and a half times
-/// the snapshot's size. Errors: NULL_ARGUMENT (also a tag that custom does not know, a law that is
-/// not given), OUT_OF_RANGE (path and read), OUT_OF_MEMORY, IO, FORMAT, FORMAT_VERSION.
+/// Create the world of a snapshot. All ids stay valid, and its steps and statistics (except bytes)
+/// have the same bits as those of the world that was saved. desc may be NULL (all zero, path is
+/// then needed). read must have no byte after the snapshot. Temporary memory: at most one and a
+/// half times the size of the snapshot. Errors: NULL_ARGUMENT (also a tag that custom does not
+/// know, a missing law), OUT_OF_RANGE (both path and read), OUT_OF_MEMORY, IO, FORMAT,
+/// FORMAT_VERSION.
 DEM2D_API dem2d_result dem2d_world_load(const dem2d_load_desc *desc, const char *path,
                                         dem2d_world **world);
 
@@ -1733,16 +1745,16 @@ typedef struct dem2d_svg_desc {
     double width;          ///< px, 0 for 800; the height follows from the scene
     int outline_points;    ///< per curved particle, 0 for 64
     bool force_chains;     ///< lines along branches, width by normal force
-    dem2d_box view;        ///< m, what is drawn; all zero for all there is
+    dem2d_box view;        ///< m, the part that is drawn; all zero for the whole scene
     dem2d_write_fn *write; ///< where the bytes go, or NULL when a path is given
-    void *user;            ///< handed to write
+    void *user;            ///< passed to write
 } dem2d_svg_desc;
 
 /// What a .vtp file holds.
 typedef enum dem2d_vtp_part {
     DEM2D_VTP_PARTICLES, ///< outlines
     DEM2D_VTP_CONTACTS,  ///< lines along the branches
-    DEM2D_VTP_WALLS,     ///< lines, cut off at the scene's box
+    DEM2D_VTP_WALLS,     ///< lines, half-planes clipped by the scene's bounding box
     DEM2D_VTP_PART_COUNT
 } dem2d_vtp_part;
 
@@ -1751,7 +1763,7 @@ typedef struct dem2d_vtp_desc {
     int outline_points;    ///< per curved particle, 0 for 64
     dem2d_vtp_part part;   ///< what is written
     dem2d_write_fn *write; ///< where the bytes go, or NULL when a path is given
-    void *user;            ///< handed to write
+    void *user;            ///< passed to write
 } dem2d_vtp_desc;
 
 /// A ParaView collection: files by time.
@@ -1760,7 +1772,7 @@ typedef struct dem2d_pvd_desc {
     const double *times;      ///< s, one for each
     const char *const *files; ///< names as seen from the .pvd, in UTF-8, without control characters
     dem2d_write_fn *write;    ///< where the bytes go, or NULL when a path is given
-    void *user;               ///< handed to write
+    void *user;               ///< passed to write
 } dem2d_pvd_desc;
 
 /// A row of a history, as comma-separated values; with the columns of the ledger if there is one.
@@ -1770,18 +1782,18 @@ typedef struct dem2d_csv_desc {
     const double *values;     ///< of them, finite
     bool append;              ///< one more row; else a header line and the first row, a new file
     dem2d_write_fn *write;    ///< where the bytes go, or NULL when a path is given
-    void *user;               ///< handed to write
+    void *user;               ///< passed to write
 } dem2d_csv_desc;
 
-/* Each writes to desc->write, or to a file when path is not NULL: one of the two. None changes the
-   world. Errors: NULL_ARGUMENT, OUT_OF_RANGE, NOT_FINITE, IO (the file can't be opened, written or
-   closed, or write returns false). */
+/* Each writes either to desc->write or, if path is not NULL, to a file. None changes the world.
+   Errors: NULL_ARGUMENT, OUT_OF_RANGE, NOT_FINITE, IO (the file can't be opened, written or closed,
+   or write returns false). */
 
 /// Draw shapes (a colour per model; fixed particles grey, driven ones hatched), walls, force chains
-/// and, below, a scale bar. All there is: particles, segments, and half-planes that are no farther
-/// off than a third of what these take up. The mean normal force has a line as wide as a quarter of
-/// the mean radius, but no more than 1/400 of the picture; none is wider than the smaller
-/// particle's radius. desc may be NULL: all zero.
+/// and, below, a scale bar. The whole scene is the box of particles and segments, with half-planes
+/// whose distance from it is at most a third of its size. The line of the mean normal force is as
+/// wide as a quarter of the mean radius, but at most 1/400 of the picture; no line is wider than
+/// the radius of the smaller particle. desc may be NULL: all zero.
 DEM2D_API dem2d_result dem2d_world_write_svg(const dem2d_world *world, const dem2d_svg_desc *desc,
                                              const char *path);
 /// Write one part of a world for VTK and ParaView. Cell data of particles: id (index), type,
