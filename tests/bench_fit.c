@@ -228,7 +228,7 @@ static void measure(const grains *all, const method *m, int count, figures of[2]
     of[0] = of[1] = (figures){0};
     for (int i = 0; i < all->count; i++) {
         const grain *g = &all->list[i];
-        double coverage, t[3], spent = 0;
+        double coverage = 0, t[3], spent = 0;
         int runs = 0;
         dem2d_result result = DEM2D_OK;
         while (!result && runs < 3 && spent < 0.05) /* what is slow needs no second run */
