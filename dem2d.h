@@ -2526,9 +2526,9 @@ typedef struct dem2di_arc {
 
 /* The straight arcs before and after a part of a polybezier; -1: there are none. A straight arc is
    its own. */
-typedef struct dem2di_beyond {
+typedef struct dem2di_edges_beside {
     int before, after;
-} dem2di_beyond;
+} dem2di_edges_beside;
 
 /* Four terms n, n+1, n+2, n+3 of a Fourier series, n times them for the derivative, and n^2. */
 typedef struct dem2di_block {
@@ -2536,7 +2536,7 @@ typedef struct dem2di_block {
 } dem2di_block;
 
 /* Sectors of directions that have a lower bound of rho: 1/32 of a quadrant each. */
-#define DEM2DI_FLOORS 128
+#define DEM2DI_RHO_SECTORS 128
 
 struct dem2d_shape {
     dem2d_shape_type type;
@@ -2557,14 +2557,14 @@ struct dem2d_shape {
     dem2d_env env;
     size_t bytes;
     /* What follows the struct in one block of memory: */
-    dem2d_vec *corners; /* polygon: count */
-    dem2d_vec *ends;    /* unit tangent; polygon: of the edge leaving k; Bezier: at the end of k */
-    dem2di_arc *given;  /* Bezier: count, the caller's, for the mass and the outline */
-    dem2di_arc *arcs;   /* Bezier: parts, for the support */
-    dem2di_beyond *beyond; /* Bezier: parts */
-    dem2di_block *blocks;  /* Fourier: terms 1..order, padded with zeros */
-    double *floors;        /* smooth, not a circle: least rho in the sectors k and k + 1 */
-    int *sector;           /* first guess of the corner or arc for a range of directions */
+    dem2d_vec *corners;  /* polygon: count */
+    dem2d_vec *tangents; /* unit tangent; polygon: of the edge leaving k; Bezier: at the end of k */
+    dem2di_arc *given;   /* Bezier: count, the caller's, for the mass and the outline */
+    dem2di_arc *arcs;    /* Bezier: parts, for the support */
+    dem2di_edges_beside *edges_beside; /* Bezier: parts */
+    dem2di_block *blocks;              /* Fourier: terms 1..order, padded with zeros */
+    double *least_rho; /* smooth, not a circle: least rho in the sectors k and k + 1 */
+    int *sector;       /* first guess of the corner or arc for a range of directions */
 };
 
 static int dem2di_block_count(int order) {
@@ -2584,11 +2584,11 @@ static void dem2di_shape_layout(dem2d_shape *shape) {
         next += n * sizeof(dem2di_arc);
         shape->given = (dem2di_arc *)(void *)next;
         next += (size_t)shape->count * sizeof(dem2di_arc);
-        shape->beyond = (dem2di_beyond *)(void *)next;
-        next += n * sizeof(dem2di_beyond);
+        shape->edges_beside = (dem2di_edges_beside *)(void *)next;
+        next += n * sizeof(dem2di_edges_beside);
     }
     if (shape->type == DEM2D_POLYGON || shape->type == DEM2D_BEZIER) {
-        shape->ends = (dem2d_vec *)(void *)next;
+        shape->tangents = (dem2d_vec *)(void *)next;
         next += n * sizeof(dem2d_vec);
     }
     if (shape->type == DEM2D_FOURIER) {
@@ -2597,8 +2597,8 @@ static void dem2di_shape_layout(dem2d_shape *shape) {
     }
     if (shape->type == DEM2D_ELLIPSE || shape->type == DEM2D_BEZIER ||
         shape->type == DEM2D_FOURIER) {
-        shape->floors = (double *)(void *)next;
-        next += DEM2DI_FLOORS * sizeof(double);
+        shape->least_rho = (double *)(void *)next;
+        next += DEM2DI_RHO_SECTORS * sizeof(double);
     }
     shape->sector = (int *)(void *)next;
     next += (size_t)shape->sectors * sizeof(int);
@@ -2611,31 +2611,31 @@ static inline double dem2di_pseudo_angle(dem2d_vec u) {
     return 5 - copysign(1 - u.y / (fabs(u.x) + fabs(u.y)), u.x);
 }
 
-/* The sector of floors that holds a direction. */
-static int dem2di_floor_sector(dem2d_vec u) {
-    return (int)(dem2di_pseudo_angle(u) * (DEM2DI_FLOORS / 4)) & (DEM2DI_FLOORS - 1);
+/* The sector of least_rho that holds a direction. */
+static int dem2di_rho_sector(dem2d_vec u) {
+    return (int)(dem2di_pseudo_angle(u) * (DEM2DI_RHO_SECTORS / 4)) & (DEM2DI_RHO_SECTORS - 1);
 }
 
 /* Lower bounds of rho from a direction on, over one sector's width clockwise and the other way. */
-static inline void dem2di_floor(const dem2d_shape *shape, dem2d_vec u, double floor[2]) {
-    if (shape->floors == NULL) {
-        floor[0] = floor[1] = shape->rho_min;
+static inline void dem2di_least_rho(const dem2d_shape *shape, dem2d_vec u, double rho[2]) {
+    if (shape->least_rho == NULL) {
+        rho[0] = rho[1] = shape->rho_min;
         return;
     }
-    int k = dem2di_floor_sector(u);
-    floor[0] = shape->floors[(k - 1) & (DEM2DI_FLOORS - 1)];
-    floor[1] = shape->floors[k];
+    int k = dem2di_rho_sector(u);
+    rho[0] = shape->least_rho[(k - 1) & (DEM2DI_RHO_SECTORS - 1)];
+    rho[1] = shape->least_rho[k];
 }
 
 /* Lower bound of rho over the directions from one to another, counter-clockwise, at most half a
    turn. */
-static double dem2di_floor_between(const dem2d_shape *shape, dem2d_vec from, dem2d_vec to) {
-    if (shape->floors == NULL) return shape->rho_min;
-    int k = dem2di_floor_sector(from), last = dem2di_floor_sector(to);
-    double least = shape->floors[k];
+static double dem2di_least_rho_between(const dem2d_shape *shape, dem2d_vec from, dem2d_vec to) {
+    if (shape->least_rho == NULL) return shape->rho_min;
+    int k = dem2di_rho_sector(from), last = dem2di_rho_sector(to);
+    double least = shape->least_rho[k];
     while (k != last) {
-        least = dem2di_min(least, shape->floors[k]);
-        k = (k + 1) & (DEM2DI_FLOORS - 1);
+        least = dem2di_min(least, shape->least_rho[k]);
+        k = (k + 1) & (DEM2DI_RHO_SECTORS - 1);
     }
     return least;
 }
@@ -2656,7 +2656,7 @@ static inline int dem2di_sector_find(const dem2d_shape *shape, dem2d_vec u) {
         k = shape->sector[place & (shape->sectors - 1)];
     }
     /* once around at most: a damaged snapshot may hold any tangents */
-    for (int left = shape->parts; dem2di_dot(shape->ends[k], u) > 0 && left > 0; left--)
+    for (int left = shape->parts; dem2di_dot(shape->tangents[k], u) > 0 && left > 0; left--)
         k = k + 1 < shape->parts ? k + 1 : 0;
     return k;
 }
@@ -2783,12 +2783,12 @@ static void dem2di_find_edges(dem2d_shape *shape) {
     if (shape->type != DEM2D_BEZIER) return;
     for (int i = 0; i < 2 * n; i++) {
         if (dem2di_arc_straight(&shape->arcs[i % n])) last = i % n;
-        shape->beyond[i % n].before = last;
+        shape->edges_beside[i % n].before = last;
     }
     shape->flat = last >= 0;
     for (int i = 2 * n - 1; i >= 0; i--) {
         if (dem2di_arc_straight(&shape->arcs[i % n])) last = i % n;
-        shape->beyond[i % n].after = last;
+        shape->edges_beside[i % n].after = last;
     }
 }
 
@@ -2806,7 +2806,7 @@ static inline int dem2di_part_find(const dem2d_shape *shape, dem2d_vec u) {
    they leave. */
 static inline int dem2di_edge_beside(const dem2d_shape *shape, int k, int side) {
     if (shape->type == DEM2D_POLYGON) return side > 0 ? k : dem2di_around(shape->count, k, -1);
-    return side > 0 ? shape->beyond[k].after : shape->beyond[k].before;
+    return side > 0 ? shape->edges_beside[k].after : shape->edges_beside[k].before;
 }
 
 /* The part that an edge comes from (side -1) or leads to (1). */
@@ -2992,8 +2992,8 @@ DEM2D_API dem2d_result dem2d_shape_mass(const dem2d_shape *shape, dem2d_mass *ma
 static dem2d_vec dem2di_rounded_point(const dem2d_shape *shape, int k, int j, int each) {
     int n = shape->count;
     dem2d_vec in, out, u;
-    (void)dem2di_unit(dem2di_negate(dem2di_perp(shape->ends[(k + n - 1) % n])), &in);
-    (void)dem2di_unit(dem2di_negate(dem2di_perp(shape->ends[k])), &out);
+    (void)dem2di_unit(dem2di_negate(dem2di_perp(shape->tangents[(k + n - 1) % n])), &in);
+    (void)dem2di_unit(dem2di_negate(dem2di_perp(shape->tangents[k])), &out);
     dem2d_rot between;
     between.c = dem2di_dot(in, out);
     between.s = dem2di_cross(in, out);
@@ -3113,7 +3113,7 @@ static dem2d_shape *dem2di_shape_copy(const dem2d_env *env, const dem2d_shape *s
 }
 
 /* The last step of creation: a shape whose moments are no normal numbers is taken back. */
-static dem2d_result dem2di_hand_out(dem2d_shape *made, dem2d_shape **shape) {
+static dem2d_result dem2di_shape_finish(dem2d_shape *made, dem2d_shape **shape) {
     dem2d_result result = dem2di_check_mass(&made->env, made->mass.area, made->mass.polar_moment);
     if (result == DEM2D_OK)
         *shape = made;
@@ -3153,25 +3153,26 @@ static dem2d_vec dem2di_sector_start(int sector, int sectors) {
 }
 
 /* From the floor of each sector to that of each and the next. */
-static inline void dem2di_join_floors(dem2d_shape *shape) {
-    double first = shape->floors[0];
-    for (int k = 0; k < DEM2DI_FLOORS; k++)
-        shape->floors[k] =
-            dem2di_min(shape->floors[k], k + 1 < DEM2DI_FLOORS ? shape->floors[k + 1] : first);
+static inline void dem2di_least_rho_join(dem2d_shape *shape) {
+    double first = shape->least_rho[0];
+    for (int k = 0; k < DEM2DI_RHO_SECTORS; k++)
+        shape->least_rho[k] = dem2di_min(
+            shape->least_rho[k], k + 1 < DEM2DI_RHO_SECTORS ? shape->least_rho[k + 1] : first);
 }
 
 /* rho falls or rises all the way along a quadrant, so its least value is at a sector's end. */
-static void dem2di_ellipse_floors(dem2d_shape *shape) {
-    for (int k = 0; k < DEM2DI_FLOORS; k++) {
+static void dem2di_ellipse_least_rho(dem2d_shape *shape) {
+    for (int k = 0; k < DEM2DI_RHO_SECTORS; k++) {
         dem2d_vec u = dem2di_vec(1, 0);
         double rho[2];
         for (int i = 0; i < 2; i++) {
-            (void)dem2di_unit(dem2di_sector_start((k + i) % DEM2DI_FLOORS, DEM2DI_FLOORS), &u);
+            (void)dem2di_unit(dem2di_sector_start((k + i) % DEM2DI_RHO_SECTORS, DEM2DI_RHO_SECTORS),
+                              &u);
             (void)dem2di_ellipse_support(shape, u, &rho[i]);
         }
-        shape->floors[k] = (1 - 8 * DBL_EPSILON) * dem2di_min(rho[0], rho[1]);
+        shape->least_rho[k] = (1 - 8 * DBL_EPSILON) * dem2di_min(rho[0], rho[1]);
     }
-    dem2di_join_floors(shape);
+    dem2di_least_rho_join(shape);
 }
 
 DEM2D_API dem2d_result dem2d_shape_create_ellipse(const dem2d_env *env, double a, double b,
@@ -3196,7 +3197,7 @@ DEM2D_API dem2d_result dem2d_shape_create_ellipse(const dem2d_env *env, double a
     made->rho_max = made->circumscribed * (made->circumscribed / made->inscribed);
     made->mass.area = area;
     made->mass.polar_moment = polar;
-    dem2di_ellipse_floors(made);
+    dem2di_ellipse_least_rho(made);
     *shape = made;
     return DEM2D_OK;
 }
@@ -3207,12 +3208,12 @@ static void dem2di_fill_sectors(dem2d_shape *shape) {
     for (int s = 0; s < sectors; s++) {
         dem2d_vec u = dem2di_sector_start(s, sectors);
         if (s == 0) { /* the one start that is not beyond: the end before it gains, its own not */
-            while (!(dem2di_dot(shape->ends[(k + shape->parts - 1) % shape->parts], u) > 0 &&
-                     dem2di_dot(shape->ends[k], u) <= 0) &&
+            while (!(dem2di_dot(shape->tangents[(k + shape->parts - 1) % shape->parts], u) > 0 &&
+                     dem2di_dot(shape->tangents[k], u) <= 0) &&
                    k + 1 < shape->parts)
                 k++;
         }
-        for (int left = shape->parts; dem2di_dot(shape->ends[k], u) > 0 && left > 0; left--)
+        for (int left = shape->parts; dem2di_dot(shape->tangents[k], u) > 0 && left > 0; left--)
             k = (k + 1) % shape->parts;
         shape->sector[s] = k;
     }
@@ -3223,7 +3224,7 @@ static void dem2di_polygon_radii(dem2d_shape *shape) {
     double outer = 0, inner = HUGE_VAL, r = shape->rounding;
     for (int k = 0; k < shape->count; k++) {
         outer = dem2di_max(outer, dem2di_length(shape->corners[k]));
-        inner = dem2di_min(inner, dem2di_cross(shape->corners[k], shape->ends[k]));
+        inner = dem2di_min(inner, dem2di_cross(shape->corners[k], shape->tangents[k]));
     }
     shape->circumscribed = outer + r;
     shape->inscribed = inner + r;
@@ -3254,11 +3255,11 @@ DEM2D_API dem2d_result dem2d_shape_create_polygon(const dem2d_env *env, const de
         made->mass.centroid = dem2di_vec(0, 0);
         for (int k = 0; k < count; k++) {
             made->corners[k] = dem2di_sub(corners[k], made->offset);
-            (void)dem2di_unit(dem2di_sub(corners[(k + 1) % count], corners[k]), &made->ends[k]);
+            (void)dem2di_unit(dem2di_sub(corners[(k + 1) % count], corners[k]), &made->tangents[k]);
         }
         dem2di_fill_sectors(made);
         dem2di_polygon_radii(made);
-        result = dem2di_hand_out(made, shape);
+        result = dem2di_shape_finish(made, shape);
     }
     dem2di_release(env, corners, n, size);
     return result;
@@ -3283,7 +3284,7 @@ static double dem2di_segment_distance(dem2d_vec a, dem2d_vec b) {
 
 /* A lower bound of rho on a whole arc: B' x B''/18 is quadratic with the coefficients d0 x d1,
    d0 x d2 / 2, d1 x d2, and |B'|/3 is at least the least projection of d0, d1, d2. */
-static double dem2di_arc_rho_bound(const dem2di_arc *arc) {
+static double dem2di_arc_rho_lower(const dem2di_arc *arc) {
     dem2d_vec mean;
     dem2d_vec sum = dem2di_add(dem2di_add(arc->d0, arc->d1), arc->d2);
     double turn = dem2di_max(dem2di_cross(arc->d0, arc->d1), dem2di_cross(arc->d1, arc->d2));
@@ -3314,7 +3315,7 @@ static void dem2di_bound_arc(dem2di_arc_bounds *bounds, const dem2di_arc *arc, i
     double outer = dem2di_max(ends[0], ends[1]);
     outer = dem2di_max(outer, dem2di_max(dem2di_length(q1), dem2di_length(q2)));
     double inner = dem2di_segment_distance(arc->start, q3);
-    double rho = dem2di_arc_rho_bound(arc), *attained = bounds->attained;
+    double rho = dem2di_arc_rho_lower(arc), *attained = bounds->attained;
     attained[0] = dem2di_max(attained[0], dem2di_max(ends[0], ends[1]));
     attained[1] = dem2di_min(attained[1], dem2di_min(ends[0], ends[1]));
     attained[2] =
@@ -3347,7 +3348,7 @@ static const dem2d_vec *dem2di_arc_side(const dem2di_arc *arc, double rounding, 
 }
 
 /* An upper bound of rho on a whole arc, in the way of the lower one. */
-static double dem2di_arc_rho_ceiling(const dem2di_arc *arc) {
+static double dem2di_arc_rho_upper(const dem2di_arc *arc) {
     double turn = dem2di_min(dem2di_cross(arc->d0, arc->d1), dem2di_cross(arc->d1, arc->d2));
     turn = dem2di_min(turn, dem2di_cross(arc->d0, arc->d2) / 2);
     double speed = dem2di_max(dem2di_length(arc->d0), dem2di_length(arc->d2));
@@ -3357,19 +3358,19 @@ static double dem2di_arc_rho_ceiling(const dem2di_arc *arc) {
 
 /* The greatest radius of curvature on an arc, at least what is known so far: from above, to a part
    in 1000 (halving quarters what is too much), so that it is never too small. */
-static double dem2di_arc_rho_most(const dem2di_arc *arc, double known, int depth) {
+static double dem2di_arc_rho_search(const dem2di_arc *arc, double known, int depth) {
     known = dem2di_max(known, dem2di_max(dem2di_arc_rho(arc, 0), dem2di_arc_rho(arc, 1)));
-    double ceiling = dem2di_arc_rho_ceiling(arc);
+    double ceiling = dem2di_arc_rho_upper(arc);
     if (ceiling <= known * 1.001 || depth == 0) return dem2di_max(known, ceiling);
     dem2di_arc half[2];
     dem2di_arc_halves(arc, half);
-    known = dem2di_arc_rho_most(&half[0], known, depth - 1);
-    return dem2di_arc_rho_most(&half[1], known, depth - 1);
+    known = dem2di_arc_rho_search(&half[0], known, depth - 1);
+    return dem2di_arc_rho_search(&half[1], known, depth - 1);
 }
 
 /* 12 halvings: where curvature is lost in rounding, more would not end. */
 static double dem2di_arc_rho_max(const dem2di_arc *arc, double known) {
-    return dem2di_arc_rho_most(arc, known, 12);
+    return dem2di_arc_rho_search(arc, known, 12);
 }
 
 /* Tangents at the ends of an arc. */
@@ -3380,35 +3381,35 @@ static bool dem2di_arc_tangents(const dem2di_arc *arc, double rounding, dem2d_ve
     return first != NULL && last != NULL && dem2di_unit(*first, start) && dem2di_unit(*last, end);
 }
 
-/* Lower the floors of the sectors from the normal of one tangent to that of another. */
-static void dem2di_lower_floors(dem2d_shape *shape, dem2d_vec from, dem2d_vec to, double rho) {
+/* Lower the least_rho of the sectors from the normal of one tangent to that of another. */
+static void dem2di_least_rho_lower(dem2d_shape *shape, dem2d_vec from, dem2d_vec to, double rho) {
     /* widened by more than rounding can move them over the border of a sector */
     from = dem2di_along(from, -1e-12, dem2di_perp(from));
     to = dem2di_along(to, 1e-12, dem2di_perp(to));
-    int k = dem2di_floor_sector(dem2di_negate(dem2di_perp(from)));
-    int last = dem2di_floor_sector(dem2di_negate(dem2di_perp(to)));
-    for (;; k = (k + 1) & (DEM2DI_FLOORS - 1)) {
-        shape->floors[k] = dem2di_min(shape->floors[k], rho);
+    int k = dem2di_rho_sector(dem2di_negate(dem2di_perp(from)));
+    int last = dem2di_rho_sector(dem2di_negate(dem2di_perp(to)));
+    for (;; k = (k + 1) & (DEM2DI_RHO_SECTORS - 1)) {
+        shape->least_rho[k] = dem2di_min(shape->least_rho[k], rho);
         if (k == last) break;
     }
 }
 
 /* The same for an arc, by its bound of rho, in halves
    while they turn by more than half a sector or the bound is far below what is attained. */
-static void dem2di_arc_floors(dem2d_shape *shape, const dem2di_arc *arc, int depth) {
+static void dem2di_arc_least_rho(dem2d_shape *shape, const dem2di_arc *arc, int depth) {
     dem2d_vec from, to;
     if (!dem2di_arc_tangents(arc, 0, &from, &to)) return; /* a point */
-    double rho = dem2di_arc_rho_bound(arc);
+    double rho = dem2di_arc_rho_lower(arc);
     double met = dem2di_min(dem2di_arc_rho(arc, 0), dem2di_arc_rho(arc, 1));
     bool wide = dem2di_cross(from, to) > 0.03 || dem2di_dot(from, to) < 0;
     if (depth > 0 && (wide || (dem2di_finite(met) && rho < 0.9 * met))) {
         dem2di_arc half[2];
         dem2di_arc_halves(arc, half);
-        dem2di_arc_floors(shape, &half[0], depth - 1);
-        dem2di_arc_floors(shape, &half[1], depth - 1);
+        dem2di_arc_least_rho(shape, &half[0], depth - 1);
+        dem2di_arc_least_rho(shape, &half[1], depth - 1);
         return;
     }
-    dem2di_lower_floors(shape, from, to, rho);
+    dem2di_least_rho_lower(shape, from, to, rho);
 }
 
 /* A joint may turn by this much to be called smooth, and an arc to be called straight: coordinates
@@ -3429,7 +3430,7 @@ static double dem2di_arc_length(const dem2di_arc *arc) { /* of its control polyg
     return dem2di_length(arc->d0) + dem2di_length(arc->d1) + dem2di_length(arc->d2);
 }
 
-static dem2d_vec dem2di_arc_way(const dem2di_arc *arc) {
+static dem2d_vec dem2di_arc_chord(const dem2di_arc *arc) {
     return dem2di_add(dem2di_add(arc->d0, arc->d1), arc->d2);
 }
 
@@ -3549,7 +3550,7 @@ static void dem2di_chain_corner(dem2di_chain *chain, int before, int after, dem2
 }
 
 /* The arcs that are not tiny, from the first of them on. False when they are less than two. */
-static bool dem2di_chain_take(dem2di_chain *chain, const dem2di_arc *arcs, int count) {
+static bool dem2di_chain_set(dem2di_chain *chain, const dem2di_arc *arcs, int count) {
     int first = 0, kept = 0;
     double length = 0; /* of the tiny ones since the last that was kept */
     dem2d_vec way = dem2di_vec(0, 0);
@@ -3558,7 +3559,7 @@ static bool dem2di_chain_take(dem2di_chain *chain, const dem2di_arc *arcs, int c
         const dem2di_arc *arc = &arcs[(first + i) % count];
         double own = dem2di_arc_length(arc);
         if (own <= chain->limits.tiny) {
-            way = dem2di_add(way, dem2di_arc_way(arc));
+            way = dem2di_add(way, dem2di_arc_chord(arc));
             length += own;
             continue;
         }
@@ -3581,7 +3582,7 @@ static bool dem2di_chain_take(dem2di_chain *chain, const dem2di_arc *arcs, int c
 
 /* How far the coordinates are rounded: by kinks of joints, and where the control polygon turns to
    the right, as ways of the point between two differences onto their chord. */
-static void dem2di_chain_listen(dem2di_chain *chain) {
+static void dem2di_chain_noise(dem2di_chain *chain) {
     chain->noise = chain->limits.rounding / 8; /* of one coordinate */
     for (int k = 0; k < chain->count; k++) {
         dem2d_vec a = chain->d[k], b = chain->d[(k + 1) % chain->count];
@@ -3616,7 +3617,7 @@ static bool dem2di_chain_straight(const dem2di_chain *chain, int k) {
 /* Tie what is too short to have a direction to what is beside it, and what is straight. */
 static void dem2di_chain_tie(dem2di_chain *chain) {
     double rounding = chain->limits.rounding;
-    dem2di_chain_listen(chain);
+    dem2di_chain_noise(chain);
     for (int k = 0; k < chain->count; k += 3) {
         const dem2d_vec *d = &chain->d[k];
         chain->tied[k] = dem2di_length(d[0]) <= rounding || dem2di_length(d[1]) <= rounding;
@@ -3726,7 +3727,7 @@ static void dem2di_arc_split(const dem2di_arc *arc, double t, dem2di_arc half[2]
     half[0].d0 = dem2di_scale(arc->d0, t);
     half[0].d1 = dem2di_scale(a, t);
     half[0].d2 = dem2di_scale(middle, t);
-    half[1].start = dem2di_add(arc->start, dem2di_arc_way(&half[0]));
+    half[1].start = dem2di_add(arc->start, dem2di_arc_chord(&half[0]));
     half[1].d0 = dem2di_scale(middle, s);
     half[1].d1 = dem2di_scale(b, s);
     half[1].d2 = dem2di_scale(arc->d2, s);
@@ -3747,7 +3748,7 @@ static int dem2di_arc_parts(dem2di_chain *chain, const dem2di_arc *arc, dem2di_a
     for (int i = 0; i < 2; i++) { /* one that is tiny becomes a corner */
         double length = dem2di_arc_length(&part[i]);
         if (length > chain->limits.tiny) continue;
-        dem2d_vec way = dem2di_arc_way(&part[i]);
+        dem2d_vec way = dem2di_arc_chord(&part[i]);
         dem2d_vec *beside = i == 0 ? &part[1].d0 : &part[0].d2;
         *beside = dem2di_add(*beside, way);
         if (i == 0) part[1].start = part[0].start;
@@ -3788,10 +3789,10 @@ static int dem2di_chain_parts(dem2di_chain *chain, dem2di_arc *part) {
         bool straight = tied[3 * k] && tied[3 * k + 1];
         if (straight && goes_on) {
             dem2di_arc *last = &part[count - 1];
-            dem2d_vec way = dem2di_add(dem2di_scale(last->d0, 3), dem2di_arc_way(&arc));
+            dem2d_vec way = dem2di_add(dem2di_scale(last->d0, 3), dem2di_arc_chord(&arc));
             last->d0 = last->d1 = last->d2 = dem2di_scale(way, 1.0 / 3);
         } else if (straight) {
-            arc.d0 = arc.d1 = arc.d2 = dem2di_scale(dem2di_arc_way(&arc), 1.0 / 3);
+            arc.d0 = arc.d1 = arc.d2 = dem2di_scale(dem2di_arc_chord(&arc), 1.0 / 3);
             part[count++] = arc;
         } else {
             count += dem2di_arc_parts(chain, &arc, &part[count]);
@@ -3816,7 +3817,7 @@ static dem2d_result dem2di_bezier_parts(const dem2d_env *env, const dem2di_arc *
     chain.tied = (bool *)(void *)(chain.d + 3 * n);
     chain.limits = limits;
     chain.cornered = chain.aligned = chain.parted = 0;
-    bool good = dem2di_chain_take(&chain, given, count) && dem2di_chain_repair(&chain);
+    bool good = dem2di_chain_set(&chain, given, count) && dem2di_chain_repair(&chain);
     if (good) *parts = dem2di_chain_parts(&chain, part);
     *moved = chain.cornered + chain.aligned + chain.parted;
     dem2di_release(env, chain.start, n, size);
@@ -3831,14 +3832,14 @@ static void dem2di_bezier_tangents(dem2d_shape *shape, double rounding) {
     int n = shape->parts;
     dem2d_vec start, unused;
     for (int k = 0; k < n; k++)
-        (void)dem2di_arc_tangents(&shape->arcs[k], rounding, &start, &shape->ends[k]);
+        (void)dem2di_arc_tangents(&shape->arcs[k], rounding, &start, &shape->tangents[k]);
     for (int k = 0; k < n; k++) {
         int next = (k + 1) % n;
         if (dem2di_arc_straight(&shape->arcs[next]))
-            shape->ends[k] = shape->ends[next];
+            shape->tangents[k] = shape->tangents[next];
         else if (dem2di_arc_length(&shape->arcs[k]) == 0 &&
                  dem2di_arc_tangents(&shape->arcs[next], rounding, &start, &unused))
-            shape->ends[k] = start;
+            shape->tangents[k] = start;
     }
 }
 
@@ -3846,8 +3847,8 @@ static void dem2di_bezier_tangents(dem2d_shape *shape, double rounding) {
 static int dem2di_bezier_turns(const dem2d_shape *shape) {
     int turns = 0;
     for (int k = 0; k < shape->parts; k++)
-        turns += !dem2di_upper(shape->ends[k]) &&
-                 dem2di_upper(shape->ends[k + 1 < shape->parts ? k + 1 : 0]);
+        turns += !dem2di_upper(shape->tangents[k]) &&
+                 dem2di_upper(shape->tangents[k + 1 < shape->parts ? k + 1 : 0]);
     return turns;
 }
 
@@ -3865,21 +3866,21 @@ static void dem2di_finish_bezier(dem2d_shape *shape) {
     shape->inscribed = dem2di_max(0, bounds.inner - shape->deviation);
     shape->rho_min = dem2di_finite(bounds.rho) ? bounds.rho : 0;
     shape->rho_max = 0;
-    for (int k = 0; k < DEM2DI_FLOORS; k++) shape->floors[k] = HUGE_VAL;
+    for (int k = 0; k < DEM2DI_RHO_SECTORS; k++) shape->least_rho[k] = HUGE_VAL;
     for (int k = 0; k < shape->parts; k++) {
-        dem2d_vec before = shape->ends[(k + shape->parts - 1) % shape->parts];
+        dem2d_vec before = shape->tangents[(k + shape->parts - 1) % shape->parts];
         const dem2di_arc *arc = &shape->arcs[k];
         if (dem2di_arc_straight(arc)) continue;
         if (dem2di_arc_length(arc) > 0) {
-            dem2di_arc_floors(shape, arc, 12);
+            dem2di_arc_least_rho(shape, arc, 12);
             shape->rho_max = dem2di_arc_rho_max(arc, shape->rho_max);
         } else {
-            dem2di_lower_floors(shape, before, shape->ends[k], 0);
+            dem2di_least_rho_lower(shape, before, shape->tangents[k], 0);
         }
     }
-    for (int k = 0; k < DEM2DI_FLOORS; k++) /* a sector no arc has come to has no bound */
-        if (!dem2di_finite(shape->floors[k])) shape->floors[k] = shape->rho_min;
-    dem2di_join_floors(shape);
+    for (int k = 0; k < DEM2DI_RHO_SECTORS; k++) /* a sector no arc has come to has no bound */
+        if (!dem2di_finite(shape->least_rho[k])) shape->least_rho[k] = shape->rho_min;
+    dem2di_least_rho_join(shape);
     dem2di_fill_sectors(shape);
     dem2di_find_edges(shape);
 }
@@ -3920,7 +3921,7 @@ static dem2d_result dem2di_bezier_make(const dem2d_env *env, dem2di_arc *arcs, i
         return dem2di_fail(env, DEM2D_NOT_CONVEX, -1, "the arcs do not turn exactly once");
     }
     dem2di_finish_bezier(made);
-    return dem2di_hand_out(made, shape);
+    return dem2di_shape_finish(made, shape);
 }
 
 /* Twice around three parts for each arc is the longest way of an index: half of an int. */
@@ -3987,13 +3988,14 @@ static dem2d_convexity dem2di_convexity(const double *a, const double *b, int or
 }
 
 /* Bound of rho in each sector: Taylor's in each quarter of it. */
-static void dem2di_fourier_floors(dem2d_shape *shape, const double *a, const double *b) {
+static void dem2di_fourier_least_rho(dem2d_shape *shape, const double *a, const double *b) {
     dem2di_series radius = dem2di_series_make(a, b, shape->count, true, 1);
     double rounding = DEM2DI_SERIES_ROUNDING * radius.size, d[3];
-    for (int k = 0; k < 4 * DEM2DI_FLOORS; k++) {
-        dem2d_vec u = dem2di_sector_start(2 * k + 1, 8 * DEM2DI_FLOORS);
-        dem2d_vec v = dem2di_sector_start(2 * k, 8 * DEM2DI_FLOORS);
-        dem2d_vec w = dem2di_sector_start((2 * k + 2) % (8 * DEM2DI_FLOORS), 8 * DEM2DI_FLOORS);
+    for (int k = 0; k < 4 * DEM2DI_RHO_SECTORS; k++) {
+        dem2d_vec u = dem2di_sector_start(2 * k + 1, 8 * DEM2DI_RHO_SECTORS);
+        dem2d_vec v = dem2di_sector_start(2 * k, 8 * DEM2DI_RHO_SECTORS);
+        dem2d_vec w =
+            dem2di_sector_start((2 * k + 2) % (8 * DEM2DI_RHO_SECTORS), 8 * DEM2DI_RHO_SECTORS);
         dem2d_rot q;
         q.c = u.x;
         q.s = u.y;
@@ -4002,11 +4004,11 @@ static void dem2di_fourier_floors(dem2d_shape *shape, const double *a, const dou
                                  dem2di_cross(u, w) / dem2di_dot(u, w));
         double value = dem2di_series_value(&radius, dem2d_rot_angle(q), d);
         double least = dem2di_taylor_bound(&radius, value, d, half) - rounding;
-        double *floor = &shape->floors[k / 4];
-        if (k % 4 == 0) *floor = HUGE_VAL;
-        *floor = dem2di_min(*floor, dem2di_max(least, shape->rho_min));
+        double *sector = &shape->least_rho[k / 4];
+        if (k % 4 == 0) *sector = HUGE_VAL;
+        *sector = dem2di_min(*sector, dem2di_max(least, shape->rho_min));
     }
-    dem2di_join_floors(shape);
+    dem2di_least_rho_join(shape);
 }
 
 /* The terms of order n. */
@@ -4034,7 +4036,7 @@ static void dem2di_finish_fourier(dem2d_shape *shape, const double *a, const dou
     shape->rho_min = dem2di_max(0, rho_min);
     dem2di_series flat = dem2di_series_make(a, b, order, true, -1);
     shape->rho_max = -dem2di_series_minimum(&flat, 1e-9 * flat.size).lower;
-    dem2di_fourier_floors(shape, a, b);
+    dem2di_fourier_least_rho(shape, a, b);
 }
 
 DEM2D_API dem2d_result dem2d_shape_create_fourier(const dem2d_env *env, const double *a,
@@ -4067,7 +4069,7 @@ DEM2D_API dem2d_result dem2d_shape_create_fourier(const dem2d_env *env, const do
         }
         made->mass.centroid = dem2di_vec(0, 0);
         dem2di_finish_fourier(made, ca, cb, convexity.rho_min_lower);
-        result = dem2di_hand_out(made, shape);
+        result = dem2di_shape_finish(made, shape);
     } else {
         result = DEM2D_OUT_OF_MEMORY;
     }
@@ -4164,7 +4166,7 @@ static bool dem2di_deviates(const dem2d_shape *shape) {
 
 /* Where an arc of any form turns along a direction: 0, up to two parameters in order, and 1.
    Returns how many. */
-static int dem2di_arc_stations(const dem2di_arc *arc, dem2d_vec u, double t[4]) {
+static int dem2di_arc_extrema(const dem2di_arc *arc, dem2d_vec u, double t[4]) {
     double q0 = dem2di_dot(arc->d0, u), q1 = dem2di_dot(arc->d1, u), q2 = dem2di_dot(arc->d2, u);
     double square = q1 * q1 - q0 * q2, root = square > 0 ? sqrt(square) : 0;
     double sum = q1 > 0 ? q1 + root : q1 - root;  /* of like signs */
@@ -4191,7 +4193,7 @@ static dem2d_vec dem2di_given_support(const dem2d_shape *shape, dem2d_vec u, dou
     double most = -HUGE_VAL;
     for (int k = 0; k < shape->count; k++) {
         double t[4];
-        for (int i = dem2di_arc_stations(&shape->given[k], u, t) - 1; i >= 0; i--) {
+        for (int i = dem2di_arc_extrema(&shape->given[k], u, t) - 1; i >= 0; i--) {
             dem2d_vec point = dem2di_arc_point(&shape->given[k], t[i]);
             if (dem2di_dot(point, u) <= most) continue;
             most = dem2di_dot(point, u);
@@ -4446,7 +4448,7 @@ DEM2D_API dem2d_result dem2d_shape_axis(const dem2d_shape *shape, double *angle,
    a component that was met before. */
 #define DEM2DI_ENTRY 1
 #define DEM2DI_EXIT 2
-#define DEM2DI_SEEN 4
+#define DEM2DI_MARKED 4
 
 struct dem2d_outline_set {
     dem2d_env env;
@@ -4535,17 +4537,17 @@ static bool dem2di_is_grain(const dem2di_picture *p, int row, int column) {
     return value >= p->low && value <= p->high;
 }
 
-static bool dem2di_is_new(const dem2di_picture *p, int row, int column) {
+static bool dem2di_is_unmarked(const dem2di_picture *p, int row, int column) {
     return dem2di_is_grain(p, row, column) &&
-           (p->marks[dem2di_picture_index(p, row, column)] & DEM2DI_SEEN) == 0;
+           (p->marks[dem2di_picture_index(p, row, column)] & DEM2DI_MARKED) == 0;
 }
 
 /* Put the first pixel of each run of new ones in a row on the stack. */
 static bool dem2di_fill_push(const dem2d_env *env, dem2di_picture *p, int *depth, int row, int from,
                              int to) {
     for (int column = from; column <= to; column++) {
-        if (!dem2di_is_new(p, row, column)) continue;
-        if (column > from && dem2di_is_new(p, row, column - 1)) continue;
+        if (!dem2di_is_unmarked(p, row, column)) continue;
+        if (column > from && dem2di_is_unmarked(p, row, column - 1)) continue;
         void *stack = p->stack;
         bool room = dem2di_reserve(env, &stack, &p->capacity, *depth + 1, sizeof *p->stack);
         p->stack = (int *)stack;
@@ -4563,10 +4565,10 @@ static bool dem2di_fill(const dem2d_env *env, dem2di_picture *p, int row, int co
     while (depth > 0) {
         int at = p->stack[--depth];
         int r = at / p->desc.width, from = at % p->desc.width, to = from;
-        if (!dem2di_is_new(p, r, from)) continue;
-        while (dem2di_is_new(p, r, from - 1)) from--;
-        while (dem2di_is_new(p, r, to + 1)) to++;
-        for (int c = from; c <= to; c++) p->marks[dem2di_picture_index(p, r, c)] |= DEM2DI_SEEN;
+        if (!dem2di_is_unmarked(p, r, from)) continue;
+        while (dem2di_is_unmarked(p, r, from - 1)) from--;
+        while (dem2di_is_unmarked(p, r, to + 1)) to++;
+        for (int c = from; c <= to; c++) p->marks[dem2di_picture_index(p, r, c)] |= DEM2DI_MARKED;
         *count += to - from + 1;
         if (!dem2di_fill_push(env, p, &depth, r - 1, from, to)) return false;
         if (!dem2di_fill_push(env, p, &depth, r + 1, from, to)) return false;
@@ -4665,7 +4667,7 @@ static bool dem2di_mark_frame(const dem2d_env *env, dem2di_picture *p, const uin
     p->high = most == 2 ? levels - 1 : edge[most] - 1;
     for (int i = 0; i < around; i++) {
         dem2di_border_pixel(p, i, &row, &column);
-        if (dem2di_is_new(p, row, column) && !dem2di_fill(env, p, row, column, &unused))
+        if (dem2di_is_unmarked(p, row, column) && !dem2di_fill(env, p, row, column, &unused))
             return false;
     }
     return true;
@@ -4744,8 +4746,8 @@ typedef struct dem2di_findings {
    of their centres: where the grey value, interpolated linearly, is threshold - 1/2. No pixel has
    that value, so the result is inside (0, 1). At the region's border it is the pixel's side, and
    of labels as well: they are names. */
-static double dem2di_crack_place(const dem2di_picture *p, int row, int column, int next_row,
-                                 int next_column) {
+static double dem2di_crack_fraction(const dem2di_picture *p, int row, int column, int next_row,
+                                    int next_column) {
     if (p->desc.labels || next_row < 0 || next_column < 0 || next_row >= p->desc.height ||
         next_column >= p->desc.width)
         return 0.5;
@@ -4782,7 +4784,7 @@ static void dem2di_trace(const dem2di_picture *p, dem2di_component *part, bool m
         int side = (heading + 3) % 4; /* what is on the right hand is ground */
         int out_row = row + down[side], out_column = column + right[side];
         if (points != NULL) {
-            double t = dem2di_crack_place(p, row, column, out_row, out_column);
+            double t = dem2di_crack_fraction(p, row, column, out_row, out_column);
             points[count] =
                 dem2di_vec((p->corner.x + column + 0.5 + t * right[side]) * p->desc.scale,
                            (p->corner.y + height - row - 0.5 - t * down[side]) * p->desc.scale);
@@ -4823,7 +4825,7 @@ static bool dem2di_is_frame(const dem2di_picture *p, const dem2di_component *par
         return false;
     for (int row = part->grain.row; row <= part->bottom; row++)
         for (int column = part->left; column <= part->right; column++)
-            inside += dem2di_is_new(p, row, column);
+            inside += dem2di_is_unmarked(p, row, column);
     return inside >= p->desc.min_pixels;
 }
 
@@ -4853,7 +4855,7 @@ static void dem2di_note_label(dem2di_findings *found, int label) {
 }
 
 /* The values in question: of all grains, or of the one that has a pixel. */
-static void dem2di_picture_seek(dem2di_picture *p, int label) {
+static void dem2di_picture_range(dem2di_picture *p, int label) {
     p->low = p->desc.labels ? label : p->desc.bright ? p->desc.threshold : 0;
     p->high = p->desc.labels ? label : p->desc.bright ? INT_MAX : p->desc.threshold - 1;
 }
@@ -4893,8 +4895,8 @@ static bool dem2di_scan_row(dem2d_outline_set *set, dem2di_picture *p, int row,
         if (!inside && (mark[column] & DEM2DI_ENTRY) == 0) {
             int value = p->desc.labels ? dem2di_picture_value(p, row, column) : 0;
             if (p->desc.labels && value == 0) continue;
-            dem2di_picture_seek(p, value);
-            if (!dem2di_is_new(p, row, column)) continue;
+            dem2di_picture_range(p, value);
+            if (!dem2di_is_unmarked(p, row, column)) continue;
             if (!dem2di_take_component(set, p, row, column, found)) return false;
             if ((mark[column] & DEM2DI_ENTRY) == 0) continue;
         }
@@ -4918,7 +4920,7 @@ static bool dem2di_scan_picture(dem2d_outline_set *set, dem2di_picture *p, dem2d
         dem2di_component part;
         memset(&part, 0, sizeof part);
         part.grain = set->grains[i];
-        dem2di_picture_seek(p, dem2di_picture_value(p, part.grain.row, part.grain.column));
+        dem2di_picture_range(p, dem2di_picture_value(p, part.grain.row, part.grain.column));
         dem2di_trace(p, &part, false, set->points + next);
         set->grains[i].points = set->points + next;
         set->grains[i].row += p->desc.crop_top;
@@ -4929,7 +4931,7 @@ static bool dem2di_scan_picture(dem2d_outline_set *set, dem2di_picture *p, dem2d
 }
 
 /* Does an outline fill its box and much of the region, as the ground in a frame does? */
-static bool dem2di_is_like_ground(const dem2di_picture *p, const dem2d_outline *grain) {
+static bool dem2di_is_like_background(const dem2di_picture *p, const dem2d_outline *grain) {
     dem2d_vec low = grain->points[0], high = low;
     for (int i = 1; i < grain->count; i++) {
         dem2d_vec q = grain->points[i];
@@ -4942,8 +4944,8 @@ static bool dem2di_is_like_ground(const dem2di_picture *p, const dem2d_outline *
 }
 
 /* Tell the log what was found suspicious, and why nothing was found. */
-static void dem2di_tell_findings(const dem2d_outline_set *set, const dem2di_picture *p,
-                                 const dem2di_findings *found) {
+static void dem2di_report_findings(const dem2d_outline_set *set, const dem2di_picture *p,
+                                   const dem2di_findings *found) {
     const dem2d_env *env = &set->env;
     if (found->frames > 0)
         (void)dem2di_fail(env, DEM2D_WARNING, -1,
@@ -4953,7 +4955,7 @@ static void dem2di_tell_findings(const dem2d_outline_set *set, const dem2di_pict
                           found->frame_row + p->desc.crop_top,
                           found->frame_column + p->desc.crop_left);
     for (int i = 0; i < set->count; i++)
-        if (dem2di_is_like_ground(p, &set->grains[i]))
+        if (dem2di_is_like_background(p, &set->grains[i]))
             (void)dem2di_fail(env, DEM2D_WARNING, i,
                               "outline %d has %d of %d by %d pixels, nearly all of its box: the "
                               "ground in a frame? (threshold %d; crop, ignore_frame, bright)",
@@ -5006,7 +5008,7 @@ static bool dem2di_outline_picture(dem2d_outline_set *set, const dem2d_image_des
     /* a picture of one grey value has no grain, dark or bright */
     if (search && p.desc.threshold == 0) return true;
     if (!dem2di_scan_picture(set, &p, &found)) return false;
-    dem2di_tell_findings(set, &p, &found);
+    dem2di_report_findings(set, &p, &found);
     return true;
 }
 
@@ -5545,16 +5547,16 @@ static void dem2di_circumscribe(const dem2d_vec *hull, int count, const int ends
 /* --- the greatest circle inside --------------------------------------------------------------- */
 
 /* A side seen from the centre of a cell. */
-typedef struct dem2di_view_side {
+typedef struct dem2di_near_side {
     dem2d_vec offset; /* from its nearest point to the centre */
     double square;    /* of the offset's length */
     int side;
-} dem2di_view_side;
+} dem2di_near_side;
 
 typedef struct dem2di_inscribe {
     const dem2di_side *sides;
     int count;
-    dem2di_view_side *seen; /* the sides that matter to a cell come first */
+    dem2di_near_side *near; /* the sides that matter to a cell come first */
     double best, tolerance; /* m */
     dem2d_vec at;
 } dem2di_inscribe;
@@ -5581,25 +5583,25 @@ static bool dem2di_inside_of(const dem2di_inscribe *in, int k, dem2d_vec p) {
    directions the middle term can vanish, and the bound is quadratic in s: few cells are left. The
    weights come from steps of Gilbert's method towards the least |sum w_i v_i|. *pull is that sum,
    a way towards greater distance. */
-static double dem2di_reach(const dem2di_inscribe *in, int count, int nearest, double s,
-                           dem2d_vec *pull) {
-    dem2d_vec sum = in->seen[nearest].offset;
-    double square = in->seen[nearest].square, bound = sqrt(square) + s;
+static double dem2di_distance_bound(const dem2di_inscribe *in, int count, int nearest, double s,
+                                    dem2d_vec *pull) {
+    dem2d_vec sum = in->near[nearest].offset;
+    double square = in->near[nearest].square, bound = sqrt(square) + s;
     *pull = sum;
     for (int step = 0; step < 6 && bound > in->best + in->tolerance; step++) {
         double length = dem2di_length(sum), least = DBL_MAX;
         int chosen = nearest;
         for (int i = 0; i < count && length > 0; i++) {
             double value =
-                in->seen[i].square + 2 * s / length * dem2di_dot(sum, in->seen[i].offset);
+                in->near[i].square + 2 * s / length * dem2di_dot(sum, in->near[i].offset);
             if (value < least) least = value, chosen = i;
         }
-        dem2d_vec apart = dem2di_sub(sum, in->seen[chosen].offset);
+        dem2d_vec apart = dem2di_sub(sum, in->near[chosen].offset);
         double w = dem2di_dot(sum, apart) / dem2di_dot(apart, apart);
         if (!(w > 0)) break; /* nothing lowers it; also 0 / 0 */
         if (w > 1) w = 1;
         sum = dem2di_along(sum, -w, apart);
-        square += w * (in->seen[chosen].square - square);
+        square += w * (in->near[chosen].square - square);
         double lower = sqrt(square + 2 * s * dem2di_length(sum) + s * s);
         if (!(lower < bound)) break;
         bound = lower;
@@ -5609,13 +5611,13 @@ static double dem2di_reach(const dem2di_inscribe *in, int count, int nearest, do
 }
 
 /* Sides that can be nearest somewhere in the cell, to the front. */
-static int dem2di_seen_keep(dem2di_inscribe *in, int count, double limit) {
+static int dem2di_near_keep(dem2di_inscribe *in, int count, double limit) {
     int kept = 0;
     for (int i = 0; i < count; i++) {
-        if (in->seen[i].square > limit * limit) continue;
-        dem2di_view_side one = in->seen[i];
-        in->seen[i] = in->seen[kept];
-        in->seen[kept++] = one;
+        if (in->near[i].square > limit * limit) continue;
+        dem2di_near_side one = in->near[i];
+        in->near[i] = in->near[kept];
+        in->near[kept++] = one;
     }
     return kept;
 }
@@ -5626,23 +5628,23 @@ static void dem2di_inscribe_cell(dem2di_inscribe *in, dem2d_vec centre, double h
                                  int depth) {
     int nearest = 0;
     for (int i = 0; i < count; i++) {
-        dem2di_view_side *one = &in->seen[i];
+        dem2di_near_side *one = &in->near[i];
         one->offset = dem2di_side_offset(&in->sides[one->side], centre);
         one->square = dem2di_dot(one->offset, one->offset);
-        if (one->square < in->seen[nearest].square) nearest = i;
+        if (one->square < in->near[nearest].square) nearest = i;
     }
     /* 1.4143 is just above the square root of 2 */
-    double distance = sqrt(in->seen[nearest].square), s = 1.4143 * half, bound = s - distance;
-    dem2d_vec uphill = dem2di_negate(in->seen[nearest].offset);
-    if (dem2di_inside_of(in, in->seen[nearest].side, centre)) {
+    double distance = sqrt(in->near[nearest].square), s = 1.4143 * half, bound = s - distance;
+    dem2d_vec uphill = dem2di_negate(in->near[nearest].offset);
+    if (dem2di_inside_of(in, in->near[nearest].side, centre)) {
         if (distance > in->best) {
             in->best = distance;
             in->at = centre;
         }
-        bound = dem2di_reach(in, count, nearest, s, &uphill);
+        bound = dem2di_distance_bound(in, count, nearest, s, &uphill);
     }
     if (bound <= in->best + in->tolerance || depth == 0) return;
-    count = dem2di_seen_keep(in, count, distance + 2 * s);
+    count = dem2di_near_keep(in, count, distance + 2 * s);
     double x = uphill.x < 0 ? -half / 2 : half / 2, y = uphill.y < 0 ? -half / 2 : half / 2;
     bool level = fabs(uphill.x) > fabs(uphill.y);
     for (int k = 0; k < 4; k++) { /* last the quarter downhill, the flatter neighbour second */
@@ -5659,10 +5661,10 @@ static bool dem2di_inscribed(const dem2d_env *env, const dem2di_side *sides, int
                              dem2d_outline_info *info) {
     dem2di_inscribe in;
     dem2d_vec low = sides[0].a, high = sides[0].a;
-    in.seen = (dem2di_view_side *)dem2di_allocate(env, (size_t)count, sizeof *in.seen);
-    if (in.seen == NULL) return false;
+    in.near = (dem2di_near_side *)dem2di_allocate(env, (size_t)count, sizeof *in.near);
+    if (in.near == NULL) return false;
     for (int i = 0; i < count; i++) {
-        in.seen[i].side = i;
+        in.near[i].side = i;
         low = dem2di_vec(dem2di_min(low.x, sides[i].a.x), dem2di_min(low.y, sides[i].a.y));
         high = dem2di_vec(dem2di_max(high.x, sides[i].a.x), dem2di_max(high.y, sides[i].a.y));
     }
@@ -5673,7 +5675,7 @@ static bool dem2di_inscribed(const dem2d_env *env, const dem2di_side *sides, int
     in.tolerance = 1e-6 * info->feret_max;
     double half = dem2di_max(high.x - low.x, high.y - low.y) / 2;
     dem2di_inscribe_cell(&in, dem2di_along(low, 0.5, dem2di_sub(high, low)), half, count, 22);
-    dem2di_release(env, in.seen, (size_t)count, sizeof *in.seen);
+    dem2di_release(env, in.near, (size_t)count, sizeof *in.near);
     info->inscribed = in.best;
     info->inscribed_at = dem2di_add(info->mass.centroid, in.at);
     return true;
@@ -6019,20 +6021,20 @@ static double dem2di_slabs_area(dem2di_slabs *slabs) {
 /* --- Hausdorff distance ----------------------------------------------------------------------- */
 
 /* Sides of an outline in groups of neighbours with a box around each. */
-typedef struct dem2di_fence {
+typedef struct dem2di_side_groups {
     dem2di_side *sides;
     dem2d_vec *boxes; /* low and high corner of each group */
     int count;
-} dem2di_fence;
+} dem2di_side_groups;
 
 /* Per group: a box costs about as much as a side, outlines have about 1000 sides, and the total is
    least near the square root. */
 #define DEM2DI_GROUP 32
 
-static void dem2di_fence_boxes(dem2di_fence *fence) {
-    for (int i = 0; i < fence->count; i++) {
-        dem2d_vec a = fence->sides[i].a, b = dem2di_add(a, fence->sides[i].e);
-        dem2d_vec *box = &fence->boxes[2 * (i / DEM2DI_GROUP)];
+static void dem2di_side_groups_boxes(dem2di_side_groups *grouped) {
+    for (int i = 0; i < grouped->count; i++) {
+        dem2d_vec a = grouped->sides[i].a, b = dem2di_add(a, grouped->sides[i].e);
+        dem2d_vec *box = &grouped->boxes[2 * (i / DEM2DI_GROUP)];
         if (i % DEM2DI_GROUP == 0) box[0] = box[1] = a;
         box[0].x = dem2di_min(box[0].x, dem2di_min(a.x, b.x));
         box[0].y = dem2di_min(box[0].y, dem2di_min(a.y, b.y));
@@ -6042,16 +6044,16 @@ static void dem2di_fence_boxes(dem2di_fence *fence) {
 }
 
 /* Nearest side, if it is nearer than `square` at side k; no further once within `enough`. */
-static int dem2di_fence_nearest(const dem2di_fence *fence, dem2d_vec p, int k, double enough,
-                                double *square) {
-    for (int start = 0; *square > enough && start < fence->count; start += DEM2DI_GROUP) {
-        const dem2d_vec *box = &fence->boxes[2 * (start / DEM2DI_GROUP)];
+static int dem2di_side_groups_nearest(const dem2di_side_groups *grouped, dem2d_vec p, int k,
+                                      double enough, double *square) {
+    for (int start = 0; *square > enough && start < grouped->count; start += DEM2DI_GROUP) {
+        const dem2d_vec *box = &grouped->boxes[2 * (start / DEM2DI_GROUP)];
         double x = dem2di_max(0, dem2di_max(box[0].x - p.x, p.x - box[1].x));
         double y = dem2di_max(0, dem2di_max(box[0].y - p.y, p.y - box[1].y));
         if (x * x + y * y >= *square) continue;
-        int end = fence->count - start > DEM2DI_GROUP ? start + DEM2DI_GROUP : fence->count;
+        int end = grouped->count - start > DEM2DI_GROUP ? start + DEM2DI_GROUP : grouped->count;
         for (int i = start; i < end; i++) {
-            double found = dem2di_side_square(&fence->sides[i], p);
+            double found = dem2di_side_square(&grouped->sides[i], p);
             if (!(found < *square)) continue;
             *square = found;
             k = i;
@@ -6060,24 +6062,24 @@ static int dem2di_fence_nearest(const dem2di_fence *fence, dem2d_vec p, int k, d
     return k;
 }
 
-/* Greatest of `most` and the squares of the distances of corners from a fence. The nearest side is
-   sought by walking on from the last corner's; only where that leaves the distance above `most`
+/* Greatest of `most` and the squares of the distances of corners from a grouped. The nearest side
+   is sought by walking on from the last corner's; only where that leaves the distance above `most`
    are all sides asked. */
-static double dem2di_fence_farthest(const dem2di_fence *fence, const dem2di_side *corners,
-                                    int count, double most) {
-    int n = fence->count, k = 0;
+static double dem2di_side_groups_farthest(const dem2di_side_groups *grouped,
+                                          const dem2di_side *corners, int count, double most) {
+    int n = grouped->count, k = 0;
     for (int i = 0; i < count; i++) {
         dem2d_vec p = corners[i].a;
-        double square = dem2di_side_square(&fence->sides[k], p);
+        double square = dem2di_side_square(&grouped->sides[k], p);
         for (int way = 0; way < 2; way++)
             for (;;) {
                 int next = way == 0 ? (k + 1 < n ? k + 1 : 0) : (k > 0 ? k - 1 : n - 1);
-                double found = dem2di_side_square(&fence->sides[next], p);
+                double found = dem2di_side_square(&grouped->sides[next], p);
                 if (!(found < square)) break;
                 square = found;
                 k = next;
             }
-        if (square > most) k = dem2di_fence_nearest(fence, p, k, most, &square);
+        if (square > most) k = dem2di_side_groups_nearest(grouped, p, k, most, &square);
         most = dem2di_max(most, square);
     }
     return most;
@@ -6086,22 +6088,23 @@ static double dem2di_fence_farthest(const dem2di_fence *fence, const dem2di_side
 /* Greatest distance of a corner of one from the other. */
 static bool dem2di_hausdorff(const dem2d_env *env, const dem2d_vec *a, int a_count,
                              const dem2d_vec *b, int b_count, double *distance) {
-    dem2di_fence fence[2];
+    dem2di_side_groups grouped[2];
     size_t room = (size_t)a_count + (size_t)b_count;
     size_t groups = 2 * (room / DEM2DI_GROUP + 2); /* each outline may have one not full */
     dem2di_side *sides = (dem2di_side *)dem2di_allocate(env, room, sizeof *sides);
     dem2d_vec *boxes = NULL;
     if (sides != NULL) boxes = (dem2d_vec *)dem2di_allocate(env, groups, sizeof *boxes);
     if (boxes != NULL) {
-        fence[0].sides = sides;
-        fence[0].boxes = boxes;
-        fence[0].count = dem2di_sides_make(a, a_count, a[0], sides);
-        fence[1].sides = sides + a_count;
-        fence[1].boxes = boxes + 2 * ((a_count - 1) / DEM2DI_GROUP + 1);
-        fence[1].count = dem2di_sides_make(b, b_count, a[0], fence[1].sides);
-        for (int i = 0; i < 2; i++) dem2di_fence_boxes(&fence[i]);
-        double most = dem2di_fence_farthest(&fence[1], fence[0].sides, fence[0].count, 0);
-        most = dem2di_fence_farthest(&fence[0], fence[1].sides, fence[1].count, most);
+        grouped[0].sides = sides;
+        grouped[0].boxes = boxes;
+        grouped[0].count = dem2di_sides_make(a, a_count, a[0], sides);
+        grouped[1].sides = sides + a_count;
+        grouped[1].boxes = boxes + 2 * ((a_count - 1) / DEM2DI_GROUP + 1);
+        grouped[1].count = dem2di_sides_make(b, b_count, a[0], grouped[1].sides);
+        for (int i = 0; i < 2; i++) dem2di_side_groups_boxes(&grouped[i]);
+        double most =
+            dem2di_side_groups_farthest(&grouped[1], grouped[0].sides, grouped[0].count, 0);
+        most = dem2di_side_groups_farthest(&grouped[0], grouped[1].sides, grouped[1].count, most);
         *distance = sqrt(most);
     }
     dem2di_release(env, boxes, groups, sizeof *boxes);
@@ -6246,7 +6249,8 @@ DEM2D_API dem2d_result dem2d_fourier_convexity(const double *a, const double *b,
     return result;
 }
 
-static bool dem2di_passes(const double *a, const double *b, int order, dem2d_convexity_test test) {
+static bool dem2di_test_holds(const double *a, const double *b, int order,
+                              dem2d_convexity_test test) {
     if (test == DEM2D_NO_TEST) return true;
     dem2di_series radius = dem2di_series_make(a, b, order, true, 1);
     if (a[0] - radius.size >= 0) return true;
@@ -6266,7 +6270,7 @@ DEM2D_API dem2d_result dem2d_fourier_reduce(double *a, double *b, int order,
         return DEM2D_OUT_OF_RANGE;
     int done = 0, n = order;
     double least = tolerance * a[0];
-    while (!dem2di_passes(a, b, n, desc->test)) {
+    while (!dem2di_test_holds(a, b, n, desc->test)) {
         while (n > 1 && dem2di_length(dem2di_vec(a[n], b[n])) <= least) {
             a[n] = b[n] = 0;
             n--;
@@ -6360,8 +6364,8 @@ static dem2d_rot dem2di_edge_normal(const dem2di_outline *outline, int from) {
 /* Curved arcs for the turns between sides, in their order along the hull: one each, the rest where
    an arc would turn most. False where one would turn by more than a third of a turn, as three arcs
    without sides do. */
-static bool dem2di_share_arcs(const dem2di_outline *outline, dem2di_straight *sides, int count,
-                              int arcs) {
+static bool dem2di_distribute_arcs(const dem2di_outline *outline, dem2di_straight *sides, int count,
+                                   int arcs) {
     for (int j = 0; j < count; j++) {
         dem2d_rot from = dem2di_edge_normal(outline, sides[j].edge), turn;
         dem2d_rot to = dem2di_edge_normal(outline, sides[(j + 1) % count].edge);
@@ -6636,11 +6640,11 @@ static bool dem2di_may_cross(const dem2di_arc *arc, const dem2di_foot *a, const 
 /* Samples of an arc's curvature, and by how much the curvature that is asked for is overdone, so
    that it holds between them as well. */
 #define DEM2DI_BEND_SAMPLES 32
-#define DEM2DI_BEND_SPARE 1.02
+#define DEM2DI_BEND_MARGIN 1.02
 
 /* The penalty for what is flatter than asked for, m2: the mean square of the part of the curvature
    that is missing, times the square of the chord. It costs about as much as the flat arc can gain,
-   the bulge, at a miss of DEM2DI_BEND_SPARE. Adds its slopes. */
+   the bulge, at a miss of DEM2DI_BEND_MARGIN. Adds its slopes. */
 static double dem2di_section_penalty(const dem2di_section *section, const dem2di_arc *arc,
                                      double slope[2]) {
     dem2d_vec chord = dem2di_sub(section->to->point, section->from->point), d[2];
@@ -6654,7 +6658,7 @@ static double dem2di_section_penalty(const dem2di_section *section, const dem2di
                                    dem2di_sub(arc->d2, arc->d1));
         double square = dem2di_dot(v, v), turn = dem2di_cross(v, a);
         double unit = 1 / (1.5 * square * sqrt(square) * section->bend); /* see dem2di_arc_rho */
-        double missing = DEM2DI_BEND_SPARE - turn * unit;
+        double missing = DEM2DI_BEND_MARGIN - turn * unit;
         if (!(missing > 0) || !(square > 0)) continue;
         sum += missing * missing;
         for (int j = 0; j < 2; j++) {
@@ -7027,12 +7031,11 @@ static bool dem2di_plan_better(const dem2di_bezier_plan *a, const dem2di_bezier_
 static void dem2di_plan_search(dem2di_bezier_plan *plan, dem2di_bezier_plan *spare,
                                dem2di_straight *found, dem2di_straight *sides) {
     int room = plan->arcs - 3, count = 0;
-    if (plan->rho_max < HUGE_VAL && room > 0)
-        count = dem2di_find_sides(plan->outline, found, room);
+    if (plan->rho_max < HUGE_VAL && room > 0) count = dem2di_find_sides(plan->outline, found, room);
     for (int straight = 0; straight <= count; straight++) {
         dem2di_sort_sides(found, straight, sides);
         if (straight > 0 &&
-            !dem2di_share_arcs(plan->outline, sides, straight, plan->arcs - straight))
+            !dem2di_distribute_arcs(plan->outline, sides, straight, plan->arcs - straight))
             continue;
         dem2di_joints_make(plan->outline, plan->arcs, sides, straight, spare->joints);
         dem2di_round_corners(plan->outline, spare->joints, plan->arcs);
@@ -7408,9 +7411,9 @@ typedef struct dem2di_fit {
     dem2di_outline outline;
     dem2d_mass mass; /* of the outline, about outline.centre */
     const dem2d_fit_desc *desc;
-    int count;            /* being tried */
-    dem2d_vec *buffer;    /* candidate outline: DEM2DI_FIT_POINTS */
-    dem2d_result trouble; /* of a comparison */
+    int count;                   /* being tried */
+    dem2d_vec *buffer;           /* candidate outline: DEM2DI_FIT_POINTS */
+    dem2d_result compare_result; /* of a comparison */
     dem2d_shape *shape;
     dem2d_fit_report report;
 } dem2di_fit;
@@ -7494,7 +7497,7 @@ static double dem2di_fit_difference(dem2di_fit *fit, const dem2d_vec *points, in
     dem2d_result result = dem2d_outline_compare(fit->env, fit->outline.points, fit->outline.count,
                                                 points, count, &difference);
     if (result == DEM2D_OK) return difference.area;
-    fit->trouble = result;
+    fit->compare_result = result;
     return HUGE_VAL;
 }
 
@@ -7534,7 +7537,7 @@ static dem2d_result dem2di_fit_ellipse(dem2di_fit *fit) {
     double x[5] = {0, 0, size * ratio, size / ratio, dem2d_rot_angle(twice) / 2};
     double steps[5] = {0.1 * size, 0.1 * size, 0.1 * size, 0.1 * size, 0.2};
     fit->report.iterations += dem2di_compass(dem2di_ellipse_objective, fit, x, steps, 5, 1e-3);
-    if (fit->trouble != DEM2D_OK) return fit->trouble;
+    if (fit->compare_result != DEM2D_OK) return fit->compare_result;
     fit->report.pose.position = dem2di_vec(x[0], x[1]);
     fit->report.pose.rotation = dem2d_rot_make(x[4]);
     return dem2d_shape_create_ellipse(fit->env, x[2], x[3], &fit->shape);
@@ -7592,7 +7595,7 @@ static dem2d_result dem2di_fit_polygon(dem2di_fit *fit) {
     fit->report.iterations += dem2di_compass(dem2di_polygon_objective, fit, x, steps, 2 * m, 1e-3);
     (void)dem2di_polygon_objective(fit, x);
     dem2di_release(fit->env, x, room, 2 * sizeof *x);
-    if (fit->trouble != DEM2D_OK) return fit->trouble;
+    if (fit->compare_result != DEM2D_OK) return fit->compare_result;
     return dem2d_shape_create_polygon(fit->env, fit->buffer, m, 0, &fit->shape);
 }
 
@@ -7909,8 +7912,8 @@ static dem2di_pair dem2di_pair_make(const dem2d_shape *a, const dem2d_pose *pose
 
 /* The vertex of A minus B minus d that two support points make. Through a pointer: a returned
    struct would be copied in pieces wider than those it was written in, which stalls. */
-static inline void dem2di_join(const dem2di_pair *pair, dem2d_vec a, dem2d_vec b,
-                               dem2di_vertex *v) {
+static inline void dem2di_vertex_set(const dem2di_pair *pair, dem2d_vec a, dem2d_vec b,
+                                     dem2di_vertex *v) {
     v->a = a;
     v->b = b;
     v->w.x = (a.x - b.x) - pair->d.x;
@@ -7925,8 +7928,8 @@ static inline void dem2di_minkowski(dem2di_pair *pair, dem2d_vec u, double rho[2
     dem2d_vec b = dem2di_support(pair->b, dem2di_turn_back(pair->rb, dem2di_negate(u)), rho_b);
     if (rho != NULL) rho[0] *= pair->scale_a, rho[1] *= pair->scale_b;
     pair->calls++;
-    dem2di_join(pair, dem2di_scale(dem2di_turn(pair->ra, a), pair->scale_a),
-                dem2di_scale(dem2di_turn(pair->rb, b), pair->scale_b), v);
+    dem2di_vertex_set(pair, dem2di_scale(dem2di_turn(pair->ra, a), pair->scale_a),
+                      dem2di_scale(dem2di_turn(pair->rb, b), pair->scale_b), v);
 }
 
 /* The line of centres; of concentric shapes any direction. */
@@ -7995,7 +7998,7 @@ static bool dem2di_simplex_add(dem2di_search *search, dem2di_vertex v, double *d
 }
 
 /* Support value at u: keeps the least one met. */
-static dem2di_vertex dem2di_look(dem2di_pair *pair, dem2di_search *search, dem2d_vec u) {
+static dem2di_vertex dem2di_evaluate(dem2di_pair *pair, dem2di_search *search, dem2d_vec u) {
     dem2di_vertex v;
     dem2di_minkowski(pair, u, NULL, &v);
     double h = dem2di_dot(v.w, u);
@@ -8024,7 +8027,7 @@ static void dem2di_feature_clear(dem2di_search *search) {
 }
 
 /* The state when the sign is known: rounding is taken into account. */
-static dem2d_contact_state dem2di_judge(const dem2di_pair *pair, const dem2di_search *search) {
+static dem2d_contact_state dem2di_state_of(const dem2di_pair *pair, const dem2di_search *search) {
     double rounding = DEM2DI_ROUNDING * pair->size;
     if (search->upper < -rounding) return DEM2D_SEPARATED;
     return search->upper > rounding ? DEM2D_PENETRATING : DEM2D_TOUCHING;
@@ -8044,7 +8047,7 @@ static void dem2di_gjk(dem2di_pair *pair, dem2d_vec start, double tolerance, int
     search->upper = HUGE_VAL;
     search->normal = u;
     search->a = search->b = dem2di_vec(0, 0);
-    search->simplex[0] = dem2di_look(pair, search, u);
+    search->simplex[0] = dem2di_evaluate(pair, search, u);
     search->count = 1;
     if (detect && search->upper < -rounding) {
         search->lower = -dem2di_length(search->simplex[0].w);
@@ -8061,7 +8064,7 @@ static void dem2di_gjk(dem2di_pair *pair, dem2d_vec start, double tolerance, int
             search->proof = DEM2D_BY_NOTHING;
             return;
         }
-        dem2di_vertex v = dem2di_look(pair, search, u);
+        dem2di_vertex v = dem2di_evaluate(pair, search, u);
         double gap = -search->upper;
         if (gap > rounding && (detect || distance - gap <= tolerance)) {
             if (!detect)
@@ -8099,11 +8102,11 @@ typedef struct dem2di_polytope {
 } dem2di_polytope;
 
 /* Least rho of the pair over the directions between two, at most half a turn apart. */
-static double dem2di_pair_floor(const dem2di_pair *pair, dem2d_vec from, dem2d_vec to) {
-    double a = dem2di_floor_between(pair->a, dem2di_turn_back(pair->ra, from),
-                                    dem2di_turn_back(pair->ra, to));
-    double b = dem2di_floor_between(pair->b, dem2di_turn_back(pair->rb, dem2di_negate(from)),
-                                    dem2di_turn_back(pair->rb, dem2di_negate(to)));
+static double dem2di_pair_least_rho_between(const dem2di_pair *pair, dem2d_vec from, dem2d_vec to) {
+    double a = dem2di_least_rho_between(pair->a, dem2di_turn_back(pair->ra, from),
+                                        dem2di_turn_back(pair->ra, to));
+    double b = dem2di_least_rho_between(pair->b, dem2di_turn_back(pair->rb, dem2di_negate(from)),
+                                        dem2di_turn_back(pair->rb, dem2di_negate(to)));
     return a * pair->scale_a + b * pair->scale_b;
 }
 
@@ -8119,7 +8122,7 @@ static bool dem2di_arc_set(const dem2di_pair *pair, dem2di_polytope *polytope, i
                            int to) {
     dem2di_edge *edge = &polytope->edge[slot];
     dem2d_vec u = polytope->direction[from], v = polytope->direction[to];
-    double r = dem2di_pair_floor(pair, u, v);
+    double r = dem2di_pair_least_rho_between(pair, u, v);
     dem2d_vec p = dem2di_along(polytope->vertex[from].w, -r, u);
     dem2d_vec q = dem2di_along(polytope->vertex[to].w, -r, v);
     dem2d_vec chord = dem2di_sub(q, p), low[3];
@@ -8197,7 +8200,7 @@ static void dem2di_polytope_start(dem2di_pair *pair, dem2di_search *search,
         if (search->count == 2) (void)dem2di_unit(dem2di_perp(dem2di_sub(s[1].w, s[0].w)), &u);
         for (int i = 0; i < 4; i++) {
             bool known = search->count == 2 && i % 2 == 1; /* the ends of the segment */
-            dem2di_vertex v = known ? s[i / 2] : dem2di_look(pair, search, u);
+            dem2di_vertex v = known ? s[i / 2] : dem2di_evaluate(pair, search, u);
             dem2di_polytope_push(pair, polytope, v, u);
             u = dem2di_perp(u);
         }
@@ -8232,7 +8235,7 @@ static void dem2di_epa(dem2di_pair *pair, dem2di_polytope *polytope, double tole
             break; /* and the sign is sure */
         if (iteration == cap) return;
         search->iterations++;
-        dem2di_vertex v = dem2di_look(pair, search, edge.normal);
+        dem2di_vertex v = dem2di_evaluate(pair, search, edge.normal);
         double h = dem2di_dot(v.w, edge.normal);
         if (!polytope->arcs) {
             search->residual = dem2di_length(v.w) - edge.distance; /* [P] sec. 3.2 */
@@ -8253,7 +8256,7 @@ static void dem2di_epa(dem2di_pair *pair, dem2di_polytope *polytope, double tole
         polytope->edge[nearest] = polytope->edge[--polytope->edges]; /* met within rounding */
         if (polytope->edges == 0) break;
     }
-    search->state = dem2di_judge(pair, search);
+    search->state = dem2di_state_of(pair, search);
     search->proof = DEM2D_BY_POLYTOPE;
 }
 
@@ -8301,7 +8304,7 @@ static void dem2di_core_set(const dem2d_shape *shape, dem2d_rot q, double scale,
     static const dem2d_vec centre = {0, 0};
     bool circle = shape->type == DEM2D_CIRCLE;
     core->corners = circle ? &centre : shape->corners;
-    core->tangents = shape->ends;
+    core->tangents = shape->tangents;
     core->count = circle ? 1 : shape->count;
     core->q.c = q.c;
     core->q.s = q.s;
@@ -8330,12 +8333,12 @@ typedef struct dem2di_walk {
 
 /* An edge of A minus B passed on a walk: the one of core `own` that leaves (side +1) or comes to
    (-1) corners k, which are at p; its other end is at `to`. */
-typedef struct dem2di_beside {
+typedef struct dem2di_passed_edge {
     int k[2], own, side;
     dem2d_vec p[2], to;
     dem2d_vec tangent;
     double h; /* support value at its normal */
-} dem2di_beside;
+} dem2di_passed_edge;
 
 static inline void dem2di_core_corner(const dem2di_core *core, int k, dem2d_vec *p) {
     dem2d_vec v = dem2di_turn(core->q, core->corners[k]);
@@ -8368,7 +8371,7 @@ static void dem2di_walk_set(const dem2di_pair *pair, const dem2di_core core[2], 
 
 /* The edge that comes next to a side, and along it to its other end. */
 static inline void dem2di_walk_on(const dem2di_pair *pair, const dem2di_core core[2], int side,
-                                  dem2di_walk *walk, dem2di_beside *edge) {
+                                  dem2di_walk *walk, dem2di_passed_edge *edge) {
     /* no short circuits: which comes first can't be predicted */
     int first = side * dem2di_cross(walk->t[0], walk->t[1]) > core[0].behind;
     int i = 1 - ((first & (core[0].count > 1)) | (core[1].count == 1));
@@ -8405,7 +8408,7 @@ static void dem2di_core_report(const dem2di_core core[2], dem2d_vec p, dem2d_vec
 }
 
 /* The foot of the origin on an edge, as a part of it from its first end. */
-static double dem2di_edge_foot(const dem2di_pair *pair, const dem2di_beside *edge) {
+static double dem2di_edge_foot(const dem2di_pair *pair, const dem2di_passed_edge *edge) {
     dem2d_vec w = dem2di_sub(dem2di_add(edge->p[0], edge->p[1]), pair->d);
     dem2d_vec along = dem2di_sub(edge->to, edge->p[edge->own]);
     return -dem2di_dot(w, along) / dem2di_dot(along, along);
@@ -8414,8 +8417,8 @@ static double dem2di_edge_foot(const dem2di_pair *pair, const dem2di_beside *edg
 /* The same at the foot of the origin on an edge. Where an edge of A and one of B are parallel they
    follow each other, and the foot may be on the other. */
 static void dem2di_edge_report(const dem2di_pair *pair, const dem2di_core core[2],
-                               const dem2di_beside *edge, dem2di_search *search) {
-    dem2di_beside next;
+                               const dem2di_passed_edge *edge, dem2di_search *search) {
+    dem2di_passed_edge next;
     double t = dem2di_edge_foot(pair, edge);
     if (t < 0 || t > 1) {
         int side = edge->side, k[2] = {edge->k[0], edge->k[1]};
@@ -8455,7 +8458,7 @@ static void dem2di_cores_apart(const dem2di_pair *pair, const dem2di_core core[2
     for (int side = 1; side >= -1 && !moved; side -= 2) {
         dem2di_walk_set(pair, core, ka, kb, side, &walk);
         for (int left = core[0].count + core[1].count; left > 0; left--) { /* once around */
-            dem2di_beside edge;
+            dem2di_passed_edge edge;
             dem2di_walk next = walk;
             dem2di_walk_on(pair, core, side, &next, &edge);
             /* an edge seen from behind, or one that leads away */
@@ -8479,8 +8482,8 @@ static void dem2di_cores_apart(const dem2di_pair *pair, const dem2di_core core[2
 /* Are all directions from the normal n of the edge last passed to v (of a length), the end of the
    cone on this side, worse than the least overlap met? There h is at least the support value of
    the corner w that was reached, and that is at least `least` at both ends. */
-static bool dem2di_walk_outweighs(dem2d_vec w, dem2d_vec n, int side, dem2d_vec v, double length,
-                                  double least) {
+static bool dem2di_walk_excludes(dem2d_vec w, dem2d_vec n, int side, dem2d_vec v, double length,
+                                 double least) {
     if (side * dem2di_cross(n, v) > 0) return dem2di_dot(w, v) >= least * length;
     return dem2di_dot(n, v) > 0; /* past the end */
 }
@@ -8488,12 +8491,12 @@ static bool dem2di_walk_outweighs(dem2d_vec w, dem2d_vec n, int side, dem2d_vec 
 /* The same on both sides, with the corners beside a minimum, for a cone of a right angle to each
    side of d, which holds the true one where the depth is below the inscribed radii: most faces
    need no more. */
-static bool dem2di_ends_outweigh(const dem2di_pair *pair, const dem2d_vec w[2],
-                                 const dem2d_vec n[2], double least, double depth) {
+static bool dem2di_corners_exclude(const dem2di_pair *pair, const dem2d_vec w[2],
+                                   const dem2d_vec n[2], double least, double depth) {
     double inner = pair->a->inscribed * pair->scale_a + pair->b->inscribed * pair->scale_b;
     dem2d_vec across = dem2di_perp(pair->d);
-    return depth <= inner && dem2di_walk_outweighs(w[1], n[1], 1, across, pair->distance, least) &&
-           dem2di_walk_outweighs(w[0], n[0], -1, dem2di_negate(across), pair->distance, least);
+    return depth <= inner && dem2di_walk_excludes(w[1], n[1], 1, across, pair->distance, least) &&
+           dem2di_walk_excludes(w[0], n[0], -1, dem2di_negate(across), pair->distance, least);
 }
 
 /* Of the edges before and after corner k, the one whose normal is nearer to v, named by its first
@@ -8563,8 +8566,8 @@ static bool dem2di_edge_warm(const dem2di_pair *pair, const dem2di_core core[2],
 }
 
 /* The feature of the last step, where it still is the answer; false says nothing. */
-static bool dem2di_edge_again(const dem2di_pair *pair, const dem2di_core core[2],
-                              const dem2di_feature *last, dem2di_search *search) {
+static bool dem2di_edge_last(const dem2di_pair *pair, const dem2di_core core[2],
+                             const dem2di_feature *last, dem2di_search *search) {
     return last != NULL && (unsigned)last->own < 2 && core[last->own].count > 1 &&
            (unsigned)last->corner[0] < (unsigned)core[0].count &&
            (unsigned)last->corner[1] < (unsigned)core[1].count &&
@@ -8583,14 +8586,14 @@ static bool dem2di_edges_solve(dem2di_pair *pair, const dem2di_feature *last, de
                                bool beside, dem2di_search *search) {
     dem2di_core core[2];
     dem2di_walk walk[2];
-    dem2di_beside edge[2]; /* the best, and the last passed */
+    dem2di_passed_edge edge[2]; /* the best, and the last passed */
     int best = 0;
     dem2d_vec end[2], n[2];
     bool cone = false;
     dem2di_cores_set(pair, core);
     pair->calls++;
     search->proof = DEM2D_BY_FORM;
-    if (dem2di_edge_again(pair, core, last, search)) return true;
+    if (dem2di_edge_last(pair, core, last, search)) return true;
     /* from behind both sides would seem to be past the cone */
     if (!(dem2di_dot(u, pair->d) > 0)) u = dem2di_centres(pair);
     int k[2] = {0, 0};
@@ -8613,10 +8616,10 @@ static bool dem2di_edges_solve(dem2di_pair *pair, const dem2di_feature *last, de
         for (int side = 0; side < 2; side++) {
             dem2di_walk *here = &walk[side];
             int turn = side > 0 ? 1 : -1;
-            if (cone && dem2di_walk_outweighs(here->w, n[side], turn, end[side], 1, edge[best].h))
+            if (cone && dem2di_walk_excludes(here->w, n[side], turn, end[side], 1, edge[best].h))
                 continue;
             open = true;
-            dem2di_beside *passed = &edge[1 - best];
+            dem2di_passed_edge *passed = &edge[1 - best];
             dem2di_walk_on(pair, core, turn, here, passed);
             n[side].x = passed->tangent.y;
             n[side].y = -passed->tangent.x;
@@ -8628,7 +8631,7 @@ static bool dem2di_edges_solve(dem2di_pair *pair, const dem2di_feature *last, de
         double depth = edge[best].h + (core[0].radius + core[1].radius);
         dem2d_vec w[2] = {{walk[0].w.x, walk[0].w.y}, {walk[1].w.x, walk[1].w.y}};
         if (!open || i == all || beside ||
-            (i == 0 && dem2di_ends_outweigh(pair, w, n, edge[best].h, depth))) {
+            (i == 0 && dem2di_corners_exclude(pair, w, n, edge[best].h, depth))) {
             if (!(edge[best].h < HUGE_VAL)) return false; /* all overflow: none was kept */
             dem2di_edge_report(pair, core, &edge[best], search);
             return true;
@@ -8646,24 +8649,24 @@ static bool dem2di_edges_solve(dem2di_pair *pair, const dem2di_feature *last, de
 
 /* One look at h(u) = s(u).u and dh/du = s(u).perp(u). On the normal of an edge both ends are kept:
    v[0] is the support from the clockwise side, v[1] from the other; elsewhere v[0]. */
-typedef struct dem2di_sight {
+typedef struct dem2di_eval {
     dem2d_vec u;
     dem2di_vertex v[2];
     bool edge;
     double h, slope[2]; /* slopes on both sides */
     double rho[2];      /* of A and of B, apart from the edge */
     int part[2][2];     /* of A and of B where they have edges, for v[0] and v[1] */
-    bool still;         /* at rest: nothing is known of what is beside it */
-} dem2di_sight;
+    bool no_step;       /* at rest: nothing is known of what is beside it */
+} dem2di_eval;
 
-static inline void dem2di_see(dem2di_pair *pair, dem2d_vec u, dem2di_sight *sight) {
-    dem2di_vertex *v = &sight->v[0];
-    dem2di_minkowski(pair, u, sight->rho, v);
-    sight->u.x = u.x;
-    sight->u.y = u.y;
-    sight->edge = false;
-    sight->h = v->w.x * u.x + v->w.y * u.y;
-    sight->slope[0] = sight->slope[1] = u.x * v->w.y - u.y * v->w.x;
+static inline void dem2di_eval_smooth(dem2di_pair *pair, dem2d_vec u, dem2di_eval *eval) {
+    dem2di_vertex *v = &eval->v[0];
+    dem2di_minkowski(pair, u, eval->rho, v);
+    eval->u.x = u.x;
+    eval->u.y = u.y;
+    eval->edge = false;
+    eval->h = v->w.x * u.x + v->w.y * u.y;
+    eval->slope[0] = eval->slope[1] = u.x * v->w.y - u.y * v->w.x;
 }
 
 /* One shape of a pair: polygons and polybeziers with straight arcs have edges, whose normals no
@@ -8685,26 +8688,26 @@ static dem2di_member dem2di_member_of(const dem2di_pair *pair, int own) {
 }
 
 /* A direction of the pair in the coordinates of a member, and back. */
-static dem2d_vec dem2di_member_view(const dem2di_member *m, dem2d_vec u) {
+static dem2d_vec dem2di_member_direction(const dem2di_member *m, dem2d_vec u) {
     return dem2di_turn_back(m->q, m->own == 0 ? u : dem2di_negate(u));
 }
 
 static dem2d_vec dem2di_member_normal(const dem2di_member *m, int edge) {
-    dem2d_vec u = dem2di_turn(m->q, dem2di_right(m->shape->ends[edge]));
+    dem2d_vec u = dem2di_turn(m->q, dem2di_right(m->shape->tangents[edge]));
     return m->own == 0 ? u : dem2di_negate(u);
 }
 
 /* The support of one member in u, at both ends of an edge (-1: none), else of a part. */
-static void dem2di_member_see(const dem2di_member *m, dem2d_vec u, int part, int edge,
-                              dem2di_sight *sight, dem2d_vec s[2]) {
+static void dem2di_member_eval(const dem2di_member *m, dem2d_vec u, int part, int edge,
+                               dem2di_eval *eval, dem2d_vec s[2]) {
     const dem2d_shape *shape = m->shape;
     double rho = shape->rounding;
-    dem2d_vec v = dem2di_member_view(m, u);
+    dem2d_vec v = dem2di_member_direction(m, u);
     for (int i = 0; i < 2; i++) {
-        sight->part[m->own][i] = part;
+        eval->part[m->own][i] = part;
         if (edge >= 0) {
             s[i] = dem2di_edge_end(shape, edge, i == 1);
-            sight->part[m->own][i] = dem2di_edge_part(shape, edge, 2 * i - 1);
+            eval->part[m->own][i] = dem2di_edge_part(shape, edge, 2 * i - 1);
         } else if (i == 1) {
             s[1] = s[0];
             continue;
@@ -8718,29 +8721,29 @@ static void dem2di_member_see(const dem2di_member *m, dem2d_vec u, int part, int
         if (shape->type == DEM2D_POLYGON) s[i] = dem2di_along(s[i], rho, v);
         s[i] = dem2di_scale(dem2di_turn(m->q, s[i]), m->scale);
     }
-    sight->rho[m->own] = rho * m->scale;
+    eval->rho[m->own] = rho * m->scale;
 }
 
 /* A look at edges (-1: none) and parts of both. */
-static void dem2di_see_at(dem2di_pair *pair, const dem2di_member member[2], dem2d_vec u,
-                          const int part[2], const int edge[2], dem2di_sight *sight) {
+static void dem2di_eval_parts(dem2di_pair *pair, const dem2di_member member[2], dem2d_vec u,
+                              const int part[2], const int edge[2], dem2di_eval *eval) {
     dem2d_vec a[2], b[2];
-    sight->u = u;
-    sight->edge = edge[0] >= 0 || edge[1] >= 0;
-    dem2di_member_see(&member[0], u, part[0], edge[0], sight, a);
-    dem2di_member_see(&member[1], u, part[1], edge[1], sight, b);
+    eval->u = u;
+    eval->edge = edge[0] >= 0 || edge[1] >= 0;
+    dem2di_member_eval(&member[0], u, part[0], edge[0], eval, a);
+    dem2di_member_eval(&member[1], u, part[1], edge[1], eval, b);
     for (int i = 0; i < 2; i++) {
-        if (i == 0 || sight->edge) dem2di_join(pair, a[i], b[i], &sight->v[i]);
-        sight->slope[i] = dem2di_cross(u, sight->v[sight->edge ? i : 0].w);
+        if (i == 0 || eval->edge) dem2di_vertex_set(pair, a[i], b[i], &eval->v[i]);
+        eval->slope[i] = dem2di_cross(u, eval->v[eval->edge ? i : 0].w);
     }
-    sight->h = dem2di_dot(sight->v[0].w, u);
+    eval->h = dem2di_dot(eval->v[0].w, u);
     pair->calls++;
 }
 
 /* The part of a member that holds its support point in u; 0 when it has none. */
 static inline int dem2di_member_part(const dem2di_member *m, dem2d_vec u) {
     if (!dem2di_has_parts(m->shape)) return 0;
-    return dem2di_part_find(m->shape, dem2di_member_view(m, u));
+    return dem2di_part_find(m->shape, dem2di_member_direction(m, u));
 }
 
 /* The edge beside a part whose normal is nearest to u, and the sine between them; -1 when there is
@@ -8748,10 +8751,10 @@ static inline int dem2di_member_part(const dem2di_member *m, dem2d_vec u) {
 static int dem2di_member_near(const dem2di_member *m, dem2d_vec u, int part, double *sine) {
     int nearest = -1;
     if (!m->shape->flat) return -1;
-    dem2d_vec v = dem2di_member_view(m, u);
+    dem2d_vec v = dem2di_member_direction(m, u);
     for (int side = 1; side >= -1; side -= 2) {
         int edge = dem2di_edge_beside(m->shape, part, side);
-        dem2d_vec along = m->shape->ends[edge];
+        dem2d_vec along = m->shape->tangents[edge];
         double off = fabs(dem2di_dot(along, v));
         if (!(off < *sine) || !(dem2di_cross(v, along) > 0)) continue;
         *sine = off;
@@ -8764,20 +8767,20 @@ static int dem2di_member_near(const dem2di_member *m, dem2d_vec u, int part, dou
 #define DEM2DI_PARALLEL (8 * DBL_EPSILON)
 
 /* A look along the normal of an edge of one member, with the other's if that is parallel. */
-static void dem2di_see_edge(dem2di_pair *pair, const dem2di_member member[2], int own, int found,
-                            dem2di_sight *sight) {
+static void dem2di_eval_edge(dem2di_pair *pair, const dem2di_member member[2], int own, int found,
+                             dem2di_eval *eval) {
     int part[2] = {0, 0}, edge[2] = {-1, -1}, other = 1 - own;
     double parallel = DEM2DI_PARALLEL;
     dem2d_vec u = dem2di_member_normal(&member[own], found);
     edge[own] = found;
     part[other] = dem2di_member_part(&member[other], u);
     edge[other] = dem2di_member_near(&member[other], u, part[other], &parallel);
-    dem2di_see_at(pair, member, u, part, edge, sight);
+    dem2di_eval_parts(pair, member, u, part, edge, eval);
 }
 
 /* The first look: along the normal of an edge nearby, if there is one. */
-static void dem2di_see_first(dem2di_pair *pair, const dem2di_member member[2], dem2d_vec u,
-                             dem2di_sight *sight) {
+static void dem2di_eval_first(dem2di_pair *pair, const dem2di_member member[2], dem2d_vec u,
+                              dem2di_eval *eval) {
     static const int none[2] = {-1, -1};
     int part[2], own = -1, found = -1;
     double sine = DEM2DI_SNAP;
@@ -8787,9 +8790,9 @@ static void dem2di_see_first(dem2di_pair *pair, const dem2di_member member[2], d
         if (edge >= 0) own = i, found = edge;
     }
     if (found >= 0)
-        dem2di_see_edge(pair, member, own, found, sight);
+        dem2di_eval_edge(pair, member, own, found, eval);
     else
-        dem2di_see_at(pair, member, u, part, none, sight);
+        dem2di_eval_parts(pair, member, u, part, none, eval);
 }
 
 /* The last edge of a member passed on the way to one of its parts, turning to a side; -1: none. */
@@ -8805,11 +8808,11 @@ static inline int dem2di_member_passed(const dem2di_member *m, int from, int to,
 /* The last edge of both on the way from the last look to u, where the parts are: -1 when there is
    none. */
 static int dem2di_edge_passed(const dem2di_member member[2], dem2d_vec u, const int part[2],
-                              const dem2di_sight *sight, int *own) {
-    int side = dem2di_cross(sight->u, u) > 0 ? 1 : -1, found = -1;
-    dem2d_vec normal = sight->u;
+                              const dem2di_eval *eval, int *own) {
+    int side = dem2di_cross(eval->u, u) > 0 ? 1 : -1, found = -1;
+    dem2d_vec normal = eval->u;
     for (int i = 0; i < 2; i++) {
-        int edge = dem2di_member_passed(&member[i], sight->part[i][0], part[i], side);
+        int edge = dem2di_member_passed(&member[i], eval->part[i][0], part[i], side);
         if (edge < 0) continue;
         dem2d_vec n = dem2di_member_normal(&member[i], edge);
         if (found >= 0 && side * dem2di_cross(normal, n) <= 0) continue;
@@ -8822,30 +8825,30 @@ static int dem2di_edge_passed(const dem2di_member member[2], dem2d_vec u, const 
 
 /* From the last look towards a direction: there, or along the normal of the last edge on the way.
  */
-static void dem2di_see_towards(dem2di_pair *pair, const dem2di_member member[2], dem2d_vec u,
-                               dem2di_sight *sight) {
+static void dem2di_eval_towards(dem2di_pair *pair, const dem2di_member member[2], dem2d_vec u,
+                                dem2di_eval *eval) {
     static const int none[2] = {-1, -1};
     int part[2], own = 0;
     for (int i = 0; i < 2; i++) part[i] = dem2di_member_part(&member[i], u);
-    int found = dem2di_edge_passed(member, u, part, sight, &own);
+    int found = dem2di_edge_passed(member, u, part, eval, &own);
     if (found >= 0)
-        dem2di_see_edge(pair, member, own, found, sight);
+        dem2di_eval_edge(pair, member, own, found, eval);
     else
-        dem2di_see_at(pair, member, u, part, none, sight);
+        dem2di_eval_parts(pair, member, u, part, none, eval);
 }
 
 /* From an edge to its end on a side, beyond which the minimum is. */
-static void dem2di_leave_edge(const dem2di_pair *pair, int side, dem2di_sight *sight) {
-    sight->v[0] = sight->v[side];
-    sight->slope[0] = sight->slope[1] = sight->slope[side];
-    sight->edge = false;
+static void dem2di_leave_edge(const dem2di_pair *pair, int side, dem2di_eval *eval) {
+    eval->v[0] = eval->v[side];
+    eval->slope[0] = eval->slope[1] = eval->slope[side];
+    eval->edge = false;
     for (int i = 0; i < 2; i++) {
         const dem2d_shape *shape = i == 0 ? pair->a : pair->b;
-        bool met = sight->part[i][0] != sight->part[i][1]; /* this one's edge */
-        sight->part[i][0] = sight->part[i][1] = sight->part[i][side];
+        bool met = eval->part[i][0] != eval->part[i][1]; /* this one's edge */
+        eval->part[i][0] = eval->part[i][1] = eval->part[i][side];
         if (!met || shape->type != DEM2D_BEZIER) continue;
         double scale = i == 0 ? pair->scale_a : pair->scale_b;
-        sight->rho[i] = scale * dem2di_arc_rho(&shape->arcs[sight->part[i][0]], side == 0 ? 1 : 0);
+        eval->rho[i] = scale * dem2di_arc_rho(&shape->arcs[eval->part[i][0]], side == 0 ? 1 : 0);
     }
 }
 
@@ -8853,15 +8856,15 @@ static void dem2di_leave_edge(const dem2di_pair *pair, int side, dem2di_sight *s
 typedef struct dem2di_bracket {
     dem2d_vec end[2];
     dem2di_vertex at[2];
-    bool known, seen[2], chord;
+    bool known, evaluated[2], chord;
 } dem2di_bracket;
 
 /* The bracket with the last look as one of its ends. A look outside of it changes nothing: false.
  */
-static bool dem2di_bracket_cut(const dem2di_pair *pair, const dem2di_sight *sight,
+static bool dem2di_bracket_cut(const dem2di_pair *pair, const dem2di_eval *eval,
                                dem2di_bracket *bracket) {
-    dem2d_vec u = sight->u;
-    if (!bracket->known && !dem2di_cone(pair, sight->h, bracket->end)) {
+    dem2d_vec u = eval->u;
+    if (!bracket->known && !dem2di_cone(pair, eval->h, bracket->end)) {
         bracket->end[0] = dem2di_negate(dem2di_perp(u));
         bracket->end[1] = dem2di_perp(u);
     }
@@ -8870,10 +8873,10 @@ static bool dem2di_bracket_cut(const dem2di_pair *pair, const dem2di_sight *sigh
     bool behind = dem2di_dot(u, middle) < 0 && dem2di_dot(bracket->end[0], bracket->end[1]) > 0;
     if (behind || dem2di_cross(bracket->end[0], u) < 0 || dem2di_cross(u, bracket->end[1]) < 0)
         return false;
-    int side = sight->slope[0] < 0 ? 0 : 1;
+    int side = eval->slope[0] < 0 ? 0 : 1;
     bracket->end[side] = u;
-    bracket->at[side] = sight->v[0];
-    bracket->seen[side] = true;
+    bracket->at[side] = eval->v[0];
+    bracket->evaluated[side] = true;
     return true;
 }
 
@@ -8886,7 +8889,7 @@ static bool dem2di_bracket_holds(const dem2di_bracket *bracket, dem2d_vec u) {
    when there is nothing between the ends. */
 static bool dem2di_bracket_next(dem2di_bracket *bracket, bool slow, dem2d_vec *u) {
     const dem2d_vec *end = bracket->end;
-    bracket->chord = !slow && bracket->seen[0] && bracket->seen[1] &&
+    bracket->chord = !slow && bracket->evaluated[0] && bracket->evaluated[1] &&
                      dem2di_unit(dem2di_right(dem2di_sub(bracket->at[1].w, bracket->at[0].w)), u) &&
                      dem2di_bracket_holds(bracket, *u);
     if (bracket->chord) return true;
@@ -8896,69 +8899,69 @@ static bool dem2di_bracket_next(dem2di_bracket *bracket, bool slow, dem2d_vec *u
         middle = dem2di_sub(dem2di_perp(end[0]), dem2di_perp(end[1]));
     /* one end that was never seen, closed in upon: the minimum is beyond it */
     bool narrow = dem2di_dot(end[0], end[1]) > 0 && dem2di_cross(end[0], end[1]) < 1e-6;
-    if (narrow && !(bracket->seen[0] && bracket->seen[1])) return false;
+    if (narrow && !(bracket->evaluated[0] && bracket->evaluated[1])) return false;
     return dem2di_unit(middle, u) && dem2di_bracket_holds(bracket, *u);
 }
 
 /* A minimum that Newton's step can find: h curves upward there. A radius so large that its circle
    is straight to rounding across the whole pair is a face. */
-static bool dem2di_bends(const dem2di_pair *pair, double bend) {
+static bool dem2di_curves_up(const dem2di_pair *pair, double bend) {
     return bend > 0 && bend * DEM2DI_ROUNDING < pair->size;
 }
 
 /* Is h stationary at the last look? On an edge when the slope changes sign there; on a chord of
    the bracket that is a face of the shapes; elsewhere when Newton's step is below `angle`, and
    lowers h by less than half the tolerance. */
-static inline bool dem2di_at_rest(const dem2di_pair *pair, const dem2di_bracket *bracket,
-                                  double angle, dem2di_sight *sight) {
-    if (sight->edge) {
-        if (sight->slope[0] <= 0 && sight->slope[1] >= 0) return true;
-        dem2di_leave_edge(pair, sight->slope[1] < 0, sight);
+static inline bool dem2di_stationary(const dem2di_pair *pair, const dem2di_bracket *bracket,
+                                     double angle, dem2di_eval *eval) {
+    if (eval->edge) {
+        if (eval->slope[0] <= 0 && eval->slope[1] >= 0) return true;
+        dem2di_leave_edge(pair, eval->slope[1] < 0, eval);
     }
-    double bend = sight->rho[0] + sight->rho[1] - sight->h, slope = sight->slope[0];
-    if (dem2di_bends(pair, bend) && fabs(slope) <= angle * bend &&
+    double bend = eval->rho[0] + eval->rho[1] - eval->h, slope = eval->slope[0];
+    if (dem2di_curves_up(pair, bend) && fabs(slope) <= angle * bend &&
         slope * slope <= angle * angle * bend * pair->size)
         return true;
     double rounding = DEM2DI_ROUNDING * pair->size;
-    if (!bracket->chord || sight->h - dem2di_dot(bracket->at[0].w, sight->u) > rounding ||
-        sight->h - dem2di_dot(bracket->at[1].w, sight->u) > rounding)
+    if (!bracket->chord || eval->h - dem2di_dot(bracket->at[0].w, eval->u) > rounding ||
+        eval->h - dem2di_dot(bracket->at[1].w, eval->u) > rounding)
         return false;
-    sight->edge = true;
+    eval->edge = true;
     for (int i = 0; i < 2; i++) {
-        sight->v[i] = bracket->at[i];
-        sight->slope[i] = dem2di_cross(sight->u, sight->v[i].w);
+        eval->v[i] = bracket->at[i];
+        eval->slope[i] = dem2di_cross(eval->u, eval->v[i].w);
     }
-    return sight->slope[0] <= 0 && sight->slope[1] >= 0;
+    return eval->slope[0] <= 0 && eval->slope[1] >= 0;
 }
 
 /* Newton's step without angles, to the direction in which the centre of the osculating circle is
    seen: (rho u - s)/|rho u - s|, that is u + e t with e = -slope/bend, made unit. For small e the
    root is its series, whose next term is below 5/16 e^6 = 3e-19. */
-static inline dem2d_vec dem2di_newton(const dem2di_sight *sight, double bend) {
-    double e = -sight->slope[0] / bend, square = e * e, f;
+static inline dem2d_vec dem2di_newton(const dem2di_eval *eval, double bend) {
+    double e = -eval->slope[0] / bend, square = e * e, f;
     f = square < 1e-6 ? 1 - square * (0.5 - 0.375 * square) : 1 / sqrt(1 + square);
-    double ux = sight->u.x, uy = sight->u.y;
+    double ux = eval->u.x, uy = eval->u.y;
     return dem2di_vec((ux - e * uy) * f, (uy + e * ux) * f);
 }
 
 /* May a face begin beside a direction without a sign of it? Of custom shapes nothing is known. */
-static bool dem2di_unseen(const dem2d_shape *shape) {
+static bool dem2di_edges_unknown(const dem2d_shape *shape) {
     return shape->type == DEM2D_CUSTOM;
 }
 
 /* A rest that is taken as it is must be nearer: a thousandth of the angle, and where shapes are
    nearly straight also of a circle of their size. */
-static inline bool dem2di_rest_near(const dem2di_pair *pair, double angle, double bend,
-                                    const dem2di_sight *sight) {
-    return fabs(sight->slope[0]) <= 1e-3 * angle * dem2di_min(bend, pair->size);
+static inline bool dem2di_stationary_close(const dem2di_pair *pair, double angle, double bend,
+                                           const dem2di_eval *eval) {
+    return fabs(eval->slope[0]) <= 1e-3 * angle * dem2di_min(bend, pair->size);
 }
 
 /* May Newton's last step end where rho is so large that h is higher there by more than what the
    angle leaves? By rho e^2/2 at most. */
 static inline bool dem2di_step_rises(const dem2di_pair *pair, double angle, double bend,
-                                     const dem2di_sight *sight) {
+                                     const dem2di_eval *eval) {
     double most = pair->a->rho_max * pair->scale_a + pair->b->rho_max * pair->scale_b;
-    double step = sight->slope[0] / (angle * bend);
+    double step = eval->slope[0] / (angle * bend);
     return !(step * step * most <= 2 * pair->size);
 }
 
@@ -8967,94 +8970,95 @@ static inline bool dem2di_step_rises(const dem2di_pair *pair, double angle, doub
    rest is taken as it is. */
 static bool dem2di_step_known(const dem2di_pair *pair, const dem2di_member member[2],
                               const dem2di_bracket *bracket, double angle, double bend,
-                              dem2di_sight *sight) {
+                              dem2di_eval *eval) {
     int part[2], own = 0;
-    dem2d_vec u = dem2di_newton(sight, bend);
-    sight->still |= dem2di_step_rises(pair, angle, bend, sight);
+    dem2d_vec u = dem2di_newton(eval, bend);
+    eval->no_step |= dem2di_step_rises(pair, angle, bend, eval);
     for (int i = 0; i < 2; i++) {
         part[i] = dem2di_member_part(&member[i], u);
-        sight->still |= part[i] != sight->part[i][0];
+        eval->no_step |= part[i] != eval->part[i][0];
     }
-    if (!sight->still) return true;
-    int edge = dem2di_edge_passed(member, u, part, sight, &own);
+    if (!eval->no_step) return true;
+    int edge = dem2di_edge_passed(member, u, part, eval, &own);
     if (edge >= 0) {
         bool seen = bracket->known &&
                     !dem2di_bracket_holds(bracket, dem2di_member_normal(&member[own], edge));
         if (!seen || member[own].shape->type == DEM2D_POLYGON) return false;
     }
-    return dem2di_rest_near(pair, angle, bend, sight);
+    return dem2di_stationary_close(pair, angle, bend, eval);
 }
 
 /* The same of a pair without edges. A step of a length s (as the witness points go) past the end of
    an arc leaves the outline by at most s^2/(2 rho): below the default tolerance it does no harm. */
 static inline bool dem2di_step_smooth(const dem2di_pair *pair, double angle, double bend,
-                                      dem2di_sight *sight) {
+                                      dem2di_eval *eval) {
     double r = dem2di_min(pair->a->rho_min * pair->scale_a, pair->b->rho_min * pair->scale_b);
-    double slope = sight->slope[0];
-    bool rises = dem2di_step_rises(pair, angle, bend, sight);
+    double slope = eval->slope[0];
+    bool rises = dem2di_step_rises(pair, angle, bend, eval);
     if (!rises && slope * slope <= 1e-10 * r * pair->size) return true;
-    dem2d_vec u = dem2di_newton(sight, bend);
-    sight->still |= rises;
+    dem2d_vec u = dem2di_newton(eval, bend);
+    eval->no_step |= rises;
     for (int i = 0; i < 2; i++) {
         dem2di_member m = dem2di_member_of(pair, i);
-        sight->still |= dem2di_member_part(&m, u) != dem2di_member_part(&m, sight->u);
+        eval->no_step |= dem2di_member_part(&m, u) != dem2di_member_part(&m, eval->u);
     }
-    return !sight->still || dem2di_rest_near(pair, angle, bend, sight);
+    return !eval->no_step || dem2di_stationary_close(pair, angle, bend, eval);
 }
 
 /* Down from a direction to a local minimum of h, by Newton's step on the osculating circle,
    u <- (rho u - s)/|rho u - s|, kept inside a bracket. With `detect` the first direction that
    separates is enough. False when the cap comes first. */
 static bool dem2di_descend(dem2di_pair *pair, dem2d_vec u, double angle, int cap, bool detect,
-                           dem2di_sight *sight, dem2di_search *search) {
+                           dem2di_eval *eval, dem2di_search *search) {
     dem2di_bracket bracket;
     bool edges = pair->a->flat || pair->b->flat;
     double turned[2] = {HUGE_VAL, HUGE_VAL}; /* by the last two steps of Newton */
     dem2di_member member[2];
-    bracket.known = bracket.seen[0] = bracket.seen[1] = bracket.chord = false;
+    bracket.known = bracket.evaluated[0] = bracket.evaluated[1] = bracket.chord = false;
     if (edges) {
         for (int i = 0; i < 2; i++) member[i] = dem2di_member_of(pair, i);
-        dem2di_see_first(pair, member, u, sight);
+        dem2di_eval_first(pair, member, u, eval);
     } else {
-        dem2di_see(pair, u, sight);
+        dem2di_eval_smooth(pair, u, eval);
     }
     for (int i = 0; i < cap; i++) {
         search->iterations++;
-        if (sight->h < search->upper) {
-            search->upper = sight->h;
-            search->normal.x = sight->u.x;
-            search->normal.y = sight->u.y;
+        if (eval->h < search->upper) {
+            search->upper = eval->h;
+            search->normal.x = eval->u.x;
+            search->normal.y = eval->u.y;
         }
-        if (detect && sight->h < -DEM2DI_ROUNDING * pair->size) return true;
-        bool rest = dem2di_at_rest(pair, &bracket, angle, sight);
-        double bend = sight->rho[0] + sight->rho[1] - sight->h, slope = sight->slope[0];
+        if (detect && eval->h < -DEM2DI_ROUNDING * pair->size) return true;
+        bool rest = dem2di_stationary(pair, &bracket, angle, eval);
+        double bend = eval->rho[0] + eval->rho[1] - eval->h, slope = eval->slope[0];
         if (rest) {
-            sight->still = dem2di_unseen(pair->a) || dem2di_unseen(pair->b);
-            if (sight->edge) return true;
-            if (edges ? dem2di_step_known(pair, member, &bracket, angle, bend, sight)
-                      : dem2di_step_smooth(pair, angle, bend, sight))
+            eval->no_step = dem2di_edges_unknown(pair->a) || dem2di_edges_unknown(pair->b);
+            if (eval->edge) return true;
+            if (edges ? dem2di_step_known(pair, member, &bracket, angle, bend, eval)
+                      : dem2di_step_smooth(pair, angle, bend, eval))
                 return true;
         }
-        bool bends = dem2di_bends(pair, bend);
+        bool bends = dem2di_curves_up(pair, bend);
         /* a small step needs no bracket, unless it has not helped before */
         bool near = bends && fabs(slope) < 0.2 * bend && i < 4;
-        bool outside = (bracket.known || !near) && !dem2di_bracket_cut(pair, sight, &bracket);
+        bool outside = (bracket.known || !near) && !dem2di_bracket_cut(pair, eval, &bracket);
         /* where rho grows without bound Newton's step jumps to and fro: it has to halve in two */
         double turn = bends ? fabs(slope) / bend : HUGE_VAL;
-        bool slow = bracket.known && bracket.seen[0] && bracket.seen[1] && turn > 0.5 * turned[0];
+        bool slow =
+            bracket.known && bracket.evaluated[0] && bracket.evaluated[1] && turn > 0.5 * turned[0];
         bool newton = bends && !outside && !slow;
         turned[0] = turned[1];
         turned[1] = turn;
         bracket.chord = false;
-        if (newton) u = dem2di_newton(sight, bend);
+        if (newton) u = dem2di_newton(eval, bend);
         if (!newton || (bracket.known && !dem2di_bracket_holds(&bracket, u)))
             if (!dem2di_bracket_next(&bracket, slow, &u)) return false;
         if (edges)
-            dem2di_see_towards(pair, member, u, sight);
+            dem2di_eval_towards(pair, member, u, eval);
         else
-            dem2di_see(pair, u, sight);
+            dem2di_eval_smooth(pair, u, eval);
         /* an edge on the way to the chord's normal is not the chord */
-        if (sight->u.x != u.x || sight->u.y != u.y) bracket.chord = false;
+        if (eval->u.x != u.x || eval->u.y != u.y) bracket.chord = false;
     }
     return false;
 }
@@ -9062,21 +9066,21 @@ static bool dem2di_descend(dem2di_pair *pair, dem2d_vec u, double angle, int cap
 /* The minimum at rest: along an edge the foot of the origin; else Newton's last step, on the
    osculating circle, which leaves the square of its angle. Where a face may begin beside the last
    look there is no step. */
-static void dem2di_settle(const dem2di_sight *sight, dem2di_search *search) {
-    const dem2di_vertex *v = sight->v;
-    double ux = sight->u.x, uy = sight->u.y, slope = sight->slope[0];
+static void dem2di_descend_finish(const dem2di_eval *eval, dem2di_search *search) {
+    const dem2di_vertex *v = eval->v;
+    double ux = eval->u.x, uy = eval->u.y, slope = eval->slope[0];
     search->normal.x = ux;
     search->normal.y = uy;
-    search->upper = sight->h;
-    if (sight->edge) {
-        double t = slope < 0 ? slope / (slope - sight->slope[1]) : 0;
+    search->upper = eval->h;
+    if (eval->edge) {
+        double t = slope < 0 ? slope / (slope - eval->slope[1]) : 0;
         search->a = dem2di_along(v[0].a, t, dem2di_sub(v[1].a, v[0].a));
         search->b = dem2di_along(v[0].b, t, dem2di_sub(v[1].b, v[0].b));
         return;
     }
     /* tan of the angle; for small e sine e, 1 - cosine and the fall of h, bend e^2/2, to e^4 */
-    double e = -slope / (sight->rho[0] + sight->rho[1] - sight->h), fall = e * e / 2, half = 0.5;
-    if (sight->still) e = fall = 0;
+    double e = -slope / (eval->rho[0] + eval->rho[1] - eval->h), fall = e * e / 2, half = 0.5;
+    if (eval->no_step) e = fall = 0;
     double tangent = e;
     if (fall > 1e-8) { /* a tolerance above 1e-6 was asked for */
         double root = sqrt(1 + e * e);
@@ -9089,22 +9093,22 @@ static void dem2di_settle(const dem2di_sight *sight, dem2di_search *search) {
     double f = 1.5 - (nx * nx + ny * ny) / 2; /* steps and warm starts let the length drift */
     search->normal.x = nx * f;
     search->normal.y = ny * f;
-    search->upper = sight->h + slope * tangent * half;
-    search->a.x = v->a.x + sight->rho[0] * dx;
-    search->a.y = v->a.y + sight->rho[0] * dy;
-    search->b.x = v->b.x - sight->rho[1] * dx;
-    search->b.y = v->b.y - sight->rho[1] * dy;
+    search->upper = eval->h + slope * tangent * half;
+    search->a.x = v->a.x + eval->rho[0] * dx;
+    search->a.y = v->a.y + eval->rho[0] * dy;
+    search->b.x = v->b.x - eval->rho[1] * dx;
+    search->b.y = v->b.y - eval->rho[1] * dy;
 }
 
 /* The same of a pair. */
-static inline void dem2di_pair_floors(const dem2di_pair *pair, dem2d_vec u, double floor[2]) {
+static inline void dem2di_pair_least_rho(const dem2di_pair *pair, dem2d_vec u, double rho[2]) {
     double a[2], b[2];
-    dem2di_floor(pair->a, dem2di_turn_back(pair->ra, u), a);
-    dem2di_floor(pair->b, dem2di_turn_back(pair->rb, dem2di_negate(u)), b);
-    for (int i = 0; i < 2; i++) floor[i] = a[i] * pair->scale_a + b[i] * pair->scale_b;
+    dem2di_least_rho(pair->a, dem2di_turn_back(pair->ra, u), a);
+    dem2di_least_rho(pair->b, dem2di_turn_back(pair->rb, dem2di_negate(u)), b);
+    for (int i = 0; i < 2; i++) rho[i] = a[i] * pair->scale_a + b[i] * pair->scale_b;
 }
 
-/* Steps of the march below turn by 2 atan(1/64), which is less than any sector of floors. */
+/* Steps of the march below turn by 2 atan(1/64), which is less than any sector of least_rho. */
 #define DEM2DI_MARCH_COS (4095.0 / 4097)
 #define DEM2DI_MARCH_SIN (128.0 / 4097)
 
@@ -9113,18 +9117,18 @@ static inline void dem2di_pair_floors(const dem2di_pair *pair, dem2d_vec u, doub
    the support value of a circle of radius r that fits value and slope, and so on from sector to
    sector; r is given for the first. Where the support point reached keeps above the value up to v,
    nothing in between is below it. */
-static bool dem2di_outweighs(const dem2di_pair *pair, const dem2di_sight *sight, int side, double r,
-                             dem2d_vec v, double length, double tolerance) {
+static bool dem2di_side_excludes(const dem2di_pair *pair, const dem2di_eval *eval, int side,
+                                 double r, dem2d_vec v, double length, double tolerance) {
     int turn = side > 0 ? 1 : -1;
-    double h = sight->h, slope = turn * sight->slope[side], least = (h - tolerance) * length;
-    double along = dem2di_dot(sight->u, v), ahead = turn * dem2di_cross(sight->u, v), floor[2];
+    double h = eval->h, slope = turn * eval->slope[side], least = (h - tolerance) * length;
+    double along = dem2di_dot(eval->u, v), ahead = turn * dem2di_cross(eval->u, v), rho[2];
     const double c = DEM2DI_MARCH_COS, s = DEM2DI_MARCH_SIN;
-    dem2d_vec u = sight->u;
+    dem2d_vec u = eval->u;
     dem2d_rot step;
     step.c = c;
     step.s = turn * s;
     /* at rest but for a last small slope, which lowers h by slope^2/(2 (r - h)) */
-    if (!(sight->edge ? slope >= 0 : slope * slope <= 2 * tolerance * (r - h))) return false;
+    if (!(eval->edge ? slope >= 0 : slope * slope <= 2 * tolerance * (r - h))) return false;
     for (int i = 0; i < 20; i++) { /* 20 steps are 36 degrees: a support point farther is rare */
         double next = r + (h - r) * c + slope * s, rest = ahead * c - along * s;
         slope = (r - h) * s + slope * c;
@@ -9135,47 +9139,47 @@ static bool dem2di_outweighs(const dem2di_pair *pair, const dem2di_sight *sight,
         if (!(ahead > 0)) return along > 0;
         if (h * along + slope * ahead >= least && h > 0) return true;
         u = dem2di_turn(step, u);
-        dem2di_pair_floors(pair, u, floor);
-        r = floor[side];
+        dem2di_pair_least_rho(pair, u, rho);
+        r = rho[side];
     }
     return false;
 }
 
 /* How far the ends of a face are below its support value: a chord across a curved outline is taken
    for a face where that is within rounding, and the minimum may be as much lower. */
-static inline double dem2di_face_gap(const dem2di_sight *sight) {
-    if (!sight->edge) return 0;
-    double first = dem2di_dot(sight->v[0].w, sight->u), last = dem2di_dot(sight->v[1].w, sight->u);
-    return dem2di_max(0, sight->h - dem2di_min(first, last));
+static inline double dem2di_face_gap(const dem2di_eval *eval) {
+    if (!eval->edge) return 0;
+    double first = dem2di_dot(eval->v[0].w, eval->u), last = dem2di_dot(eval->v[1].w, eval->u);
+    return dem2di_max(0, eval->h - dem2di_min(first, last));
 }
 
 /* Is the minimum at rest the least of all? With r <= rho everywhere, r - |s - r u| <= depth (A
    minus B eroded by r is convex, and its distance from the origin bounds the depth); else the
    boundary beside it must outweigh the cone: a right angle to each side of d, which does for
    depths below the inscribed radii and needs no root, or the true one. */
-static bool dem2di_certify(const dem2di_pair *pair, const dem2di_sight *sight, double tolerance,
+static bool dem2di_certify(const dem2di_pair *pair, const dem2di_eval *eval, double tolerance,
                            dem2di_search *search) {
     double r = pair->a->rho_min * pair->scale_a + pair->b->rho_min * pair->scale_b;
-    double h = sight->h, square = sight->edge ? 0 : sight->slope[0] * sight->slope[0];
+    double h = eval->h, square = eval->edge ? 0 : eval->slope[0] * eval->slope[0];
     double inner = pair->a->inscribed * pair->scale_a + pair->b->inscribed * pair->scale_b;
-    double floor[2], allowed = sight->edge ? 0 : tolerance;
+    double rho[2], allowed = eval->edge ? 0 : tolerance;
     dem2d_vec end[2];
     if (r > h && square <= 2 * tolerance * (r - h)) {
-        search->lower = search->upper - dem2di_face_gap(sight) - square / (2 * (r - h));
+        search->lower = search->upper - dem2di_face_gap(eval) - square / (2 * (r - h));
         search->proof = DEM2D_BY_RADIUS;
         return true;
     }
-    dem2di_pair_floors(pair, sight->u, floor);
+    dem2di_pair_least_rho(pair, eval->u, rho);
     end[1] = dem2di_perp(pair->d);
     end[0] = dem2di_negate(end[1]);
     if (!(h <= inner &&
-          dem2di_outweighs(pair, sight, 0, floor[0], end[0], pair->distance, allowed) &&
-          dem2di_outweighs(pair, sight, 1, floor[1], end[1], pair->distance, allowed)) &&
+          dem2di_side_excludes(pair, eval, 0, rho[0], end[0], pair->distance, allowed) &&
+          dem2di_side_excludes(pair, eval, 1, rho[1], end[1], pair->distance, allowed)) &&
         !(dem2di_cone(pair, h, end) &&
-          dem2di_outweighs(pair, sight, 0, floor[0], end[0], 1, allowed) &&
-          dem2di_outweighs(pair, sight, 1, floor[1], end[1], 1, allowed)))
+          dem2di_side_excludes(pair, eval, 0, rho[0], end[0], 1, allowed) &&
+          dem2di_side_excludes(pair, eval, 1, rho[1], end[1], 1, allowed)))
         return false;
-    search->lower = search->upper - dem2di_face_gap(sight) - allowed;
+    search->lower = search->upper - dem2di_face_gap(eval) - allowed;
     search->proof = DEM2D_BY_ARC;
     return true;
 }
@@ -9186,13 +9190,13 @@ static double dem2di_pair_deviation(const dem2di_pair *pair) {
 }
 
 /* A direction seen by the descent below, how steeply h falls on in the sense of that, and h. */
-typedef struct dem2di_foothold {
+typedef struct dem2di_probe {
     dem2d_vec u;
     dem2di_vertex v;
     double h, slope;
-} dem2di_foothold;
+} dem2di_probe;
 
-static bool dem2di_foothold_at(dem2di_pair *pair, dem2d_vec way, int turn, dem2di_foothold *f) {
+static bool dem2di_probe_at(dem2di_pair *pair, dem2d_vec way, int turn, dem2di_probe *f) {
     if (!dem2di_unit(way, &f->u)) return false;
     dem2di_minkowski(pair, f->u, NULL, &f->v);
     f->h = dem2di_dot(f->v.w, f->u);
@@ -9204,22 +9208,22 @@ static bool dem2di_foothold_at(dem2di_pair *pair, dem2d_vec way, int turn, dem2d
    which Newton's steps do not come to rest. h falls at `near` and is above it, or rises, at `far`:
    there is a minimum between. The supports of two directions as near as rounding are the ends of a
    face, or of so short an arc that its chord is on the outline (length x angle / 8). */
-static void dem2di_branch_foot(dem2di_pair *pair, dem2di_search *search) {
+static void dem2di_branch_bisect(dem2di_pair *pair, dem2di_search *search) {
     /* values are no surer than the shapes */
     const double rounding = DEM2DI_ROUNDING * pair->size + dem2di_pair_deviation(pair);
-    dem2di_foothold near, far, at;
-    if (!dem2di_foothold_at(pair, search->normal, 1, &near)) return;
+    dem2di_probe near, far, at;
+    if (!dem2di_probe_at(pair, search->normal, 1, &near)) return;
     int turn = near.slope < 0 ? 1 : -1;
     near.slope *= turn;
     far = near;
     bool between = false;
     for (double angle = 4 * DBL_EPSILON; angle < 1 && !between; angle *= 8) {
         dem2d_vec way = dem2di_along(near.u, turn * angle, dem2di_perp(near.u));
-        if (!dem2di_foothold_at(pair, way, turn, &far)) return;
+        if (!dem2di_probe_at(pair, way, turn, &far)) return;
         between = far.slope >= 0 || far.h > near.h + rounding;
         if (!between) near = far;
     }
-    while (between && dem2di_foothold_at(pair, dem2di_add(near.u, far.u), turn, &at)) {
+    while (between && dem2di_probe_at(pair, dem2di_add(near.u, far.u), turn, &at)) {
         bool last = turn * dem2di_cross(near.u, far.u) <= 2 * DBL_EPSILON;
         *(at.slope >= 0 || at.h > near.h + rounding ? &far : &near) = at;
         if (last) break;
@@ -9232,23 +9236,23 @@ static void dem2di_branch_foot(dem2di_pair *pair, dem2di_search *search) {
 
 /* From the least value met down to rest, as exactly as shapes allow: not higher by more than the
    tolerance, and with the sign that is sure. */
-static bool dem2di_branch_rest(dem2di_pair *pair, double tolerance, double angle, int cap,
-                               dem2di_search *search) {
+static bool dem2di_branch_refine(dem2di_pair *pair, double tolerance, double angle, int cap,
+                                 dem2di_search *search) {
     double rounding = DEM2DI_ROUNDING * pair->size, most = search->upper + tolerance;
     if (search->upper < -rounding) most = dem2di_min(most, -rounding);
-    dem2di_sight sight;
+    dem2di_eval eval;
     dem2di_search last = *search;
     if (dem2di_has_core(pair->a) && dem2di_has_core(pair->b)) {
         (void)dem2di_edges_solve(pair, NULL, search->normal, true, &last);
         if (last.upper > most) return false;
         last.lower = dem2di_min(last.upper, search->lower);
     } else {
-        if (!dem2di_descend(pair, search->normal, angle, cap, false, &sight, &last)) return false;
-        dem2di_settle(&sight, &last);
+        if (!dem2di_descend(pair, search->normal, angle, cap, false, &eval, &last)) return false;
+        dem2di_descend_finish(&eval, &last);
         if (last.upper > most) return false;
         /* what Newton's last step takes away was not attained: as unsure as what is below */
         last.upper = dem2di_max(last.upper, search->lower);
-        last.lower = dem2di_min(search->lower, 2 * last.upper - sight.h);
+        last.lower = dem2di_min(search->lower, 2 * last.upper - eval.h);
     }
     *search = last;
     return true;
@@ -9263,32 +9267,32 @@ static void dem2di_branch(dem2di_pair *pair, double tolerance, double angle, int
     polytope.vertices = polytope.edges = 0;
     polytope.arcs = true;
     search->upper = HUGE_VAL; /* the least value again, with its points */
-    (void)dem2di_look(pair, search, u);
+    (void)dem2di_evaluate(pair, search, u);
     bool cone = dem2di_cone(pair, search->upper, end) && dem2di_dot(end[0], end[1]) > -0.9;
     if (cone) {
         bool inside = dem2di_inside(u, end[0], end[1]);
         for (int i = 0; i < 3; i++) {
             dem2d_vec v = i == 0 ? end[0] : i == 1 ? u : end[1];
             if (i == 1 && !inside) continue;
-            dem2di_polytope_push(pair, &polytope, dem2di_look(pair, search, v), v);
+            dem2di_polytope_push(pair, &polytope, dem2di_evaluate(pair, search, v), v);
         }
     } else {
         for (int i = 0; i < 4; i++, u = dem2di_perp(u))
-            dem2di_polytope_push(pair, &polytope, dem2di_look(pair, search, u), u);
+            dem2di_polytope_push(pair, &polytope, dem2di_evaluate(pair, search, u), u);
         dem2di_polytope_close(pair, &polytope);
     }
     dem2di_epa(pair, &polytope, tolerance, cap, search);
     bool unresolved = search->state == DEM2D_UNRESOLVED;
-    if (unresolved || !dem2di_branch_rest(pair, tolerance, angle, cap, search))
-        dem2di_branch_foot(pair, search);
+    if (unresolved || !dem2di_branch_refine(pair, tolerance, angle, cap, search))
+        dem2di_branch_bisect(pair, search);
     if (unresolved) return;
     search->proof = DEM2D_BY_POLYTOPE;
-    search->state = dem2di_judge(pair, search);
+    search->state = dem2di_state_of(pair, search);
 }
 
 /* Looks that a warm start gets: two for the normal of the last step, and some for a corner passed
    or an edge that was not where it was. */
-#define DEM2DI_WARM 6
+#define DEM2DI_WARM_EVALUATIONS 6
 
 /* Least overlap or greatest gap, certified. With `detect` any direction that separates will do. */
 static void dem2di_certified(dem2di_pair *pair, const dem2di_feature *last, dem2d_vec start,
@@ -9298,14 +9302,14 @@ static void dem2di_certified(dem2di_pair *pair, const dem2di_feature *last, dem2
        than halving the cone down to rounding needs. */
     double relative = dem2di_max(tolerance, DEM2DI_ROUNDING);
     double absolute = relative * pair->size, angle = (detect ? 0.3 : 0.1) * sqrt(relative);
-    if (dem2di_unseen(pair->a) || dem2di_unseen(pair->b)) angle *= 0.01;
+    if (dem2di_edges_unknown(pair->a) || dem2di_edges_unknown(pair->b)) angle *= 0.01;
     search->iterations = 0;
     search->upper = HUGE_VAL;
     search->normal = start;
     dem2di_feature_clear(search);
     if (dem2di_has_core(pair->a) && dem2di_has_core(pair->b)) {
         if (dem2di_edges_solve(pair, last, start, false, search)) {
-            search->state = dem2di_judge(pair, search);
+            search->state = dem2di_state_of(pair, search);
             return;
         }
         search->normal = start;
@@ -9316,10 +9320,10 @@ static void dem2di_certified(dem2di_pair *pair, const dem2di_feature *last, dem2
        that are good to the tolerance leave the sign open, a third time, from there to rounding. */
     double rounding = DEM2DI_ROUNDING * pair->size;
     for (int i = 0; i < 3; i++) {
-        dem2di_sight sight;
-        int looks = i == 0 ? DEM2DI_WARM : cap < 64 ? cap : 64;
+        dem2di_eval eval;
+        int looks = i == 0 ? DEM2DI_WARM_EVALUATIONS : cap < 64 ? cap : 64;
         bool rest = dem2di_descend(pair, i == 1 ? dem2di_centres(pair) : start, angle, looks,
-                                   detect, &sight, search);
+                                   detect, &eval, search);
         if (detect && search->upper < -rounding) {
             search->lower = -HUGE_VAL;
             search->proof = DEM2D_BY_RADIUS;
@@ -9327,11 +9331,11 @@ static void dem2di_certified(dem2di_pair *pair, const dem2di_feature *last, dem2
             return;
         }
         if (rest) {
-            dem2di_settle(&sight, search);
-            search->state = dem2di_judge(pair, search);
+            dem2di_descend_finish(&eval, search);
+            search->state = dem2di_state_of(pair, search);
         }
-        bool proved = rest && dem2di_certify(pair, &sight, absolute, search);
-        bool open = proved && sight.h >= -rounding && search->lower < -rounding;
+        bool proved = rest && dem2di_certify(pair, &eval, absolute, search);
+        bool open = proved && eval.h >= -rounding && search->lower < -rounding;
         if (proved && (!open || i == 2)) return;
         if (!open && i >= 1) break;
         if (!open) continue;
@@ -9374,7 +9378,7 @@ static inline int dem2di_polygon_face(const dem2d_shape *shape, dem2d_vec v, int
     int edge[2] = {k, dem2di_around(shape->count, k, -1)}, other = side < 0;
     double sine[2];
     for (int i = 0; i < 2; i++) {
-        dem2d_vec along = shape->ends[edge[i]];
+        dem2d_vec along = shape->tangents[edge[i]];
         sine[i] = dem2di_cross(v, along) > 0.7071 ? fabs(dem2di_dot(v, along)) : 1;
     }
     if (dem2di_min(sine[0], sine[1]) < DEM2DI_ALONG) other = sine[1] < sine[0];
@@ -9388,7 +9392,7 @@ static int dem2di_arc_face(const dem2d_shape *shape, dem2d_vec v, int side) {
     double sine[2];
     for (int i = 0; i < 2; i++) {
         edge[i] = dem2di_edge_beside(shape, k, i ? -side : side);
-        dem2d_vec along = shape->ends[edge[i]];
+        dem2d_vec along = shape->tangents[edge[i]];
         sine[i] = dem2di_cross(v, along) > 0 ? fabs(dem2di_dot(along, v)) : 1;
     }
     int other = sine[1] < DEM2DI_ALONG && sine[1] < sine[0];
@@ -9446,7 +9450,7 @@ static double dem2di_face_height(const dem2di_face *face, double x) {
 
 /* The shallower end of the common part of two faces: a corner of one meets the other, the base, at
    a right angle. */
-typedef struct dem2di_second {
+typedef struct dem2di_second_point {
     int side;                  /* 1 or -1: beyond or before the deeper end */
     int base;                  /* whose face is met: 0 for A's, 1 for B's */
     int corner, corner_deep;   /* at both ends */
@@ -9459,11 +9463,11 @@ typedef struct dem2di_second {
     double width;              /* along the base, from below the deeper end to below the corner */
     double energy;             /* over kn, beside that of the deeper end, depth^2/2 */
     double deep, press, slide; /* forces over kn: deeper end, along and across the base's normal */
-} dem2di_second;
+} dem2di_second_point;
 
 /* The deeper end, where the later of both faces begins, or ends. */
 static void dem2di_second_deep(const dem2di_face *a, const dem2di_face *b, int side,
-                               dem2di_second *end) {
+                               dem2di_second_point *end) {
     double xa = side > 0 ? dem2di_min(a->x0, a->near) : dem2di_max(a->x1, a->near);
     double xb = side > 0 ? dem2di_min(b->x0, b->near) : dem2di_max(b->x1, b->near);
     bool of_a = b->endless || side * (xa - xb) >= 0;
@@ -9477,7 +9481,7 @@ static void dem2di_second_deep(const dem2di_face *a, const dem2di_face *b, int s
    both are on the line that halves the angle between the normals: they are then as deep in each
    other. */
 static bool dem2di_second_place(const dem2di_face *a, const dem2di_face *b, double depth,
-                                double size, int side, dem2di_second *end) {
+                                double size, int side, dem2di_second_point *end) {
     double tilt = side * (b->rise - a->rise);
     if (tilt > 1) return false;
     double xa = side > 0 ? a->x1 : a->x0, xb = side > 0 ? b->x1 : b->x0;
@@ -9554,7 +9558,7 @@ static double dem2di_second_share(double square, double width, double depth, dou
    that both forces are the same where the depths are, and the moment is steady where faces that
    are parallel tilt to either side. Below, where little is common, it cannot be without one of the
    forces being attractive. */
-static void dem2di_second_forces(double square, double depth, dem2di_second *end) {
+static void dem2di_second_forces(double square, double depth, dem2di_second_point *end) {
     double by_width, by_depth, s = end->depth, mean = (depth + s) / 2;
     double share = dem2di_second_share(square, end->width, mean, &by_width, &by_depth);
     double more = dem2di_max(0, 2 * share - 1), ratio = (s / depth) * (s / depth);
@@ -9569,8 +9573,8 @@ static void dem2di_second_forces(double square, double depth, dem2di_second *end
 }
 
 /* No second point: all of it is 0, so are its energy and force. */
-static dem2di_second dem2di_second_none(void) {
-    dem2di_second none;
+static dem2di_second_point dem2di_second_none(void) {
+    dem2di_second_point none;
     memset(&none, 0, sizeof none);
     return none;
 }
@@ -9578,15 +9582,15 @@ static dem2di_second dem2di_second_none(void) {
 /* The second point of two faces on a side, if it takes more energy than the one known so far: of
    three corners that touch two count, and the energy is steady where the third takes over. */
 static void dem2di_second_try(const dem2di_face *a, const dem2di_face *b, double depth, double size,
-                              int side, dem2di_second *best) {
-    dem2di_second end;
+                              int side, dem2di_second_point *best) {
+    dem2di_second_point end;
     if (!dem2di_second_place(a, b, depth, size, side, &end)) return;
     dem2di_second_forces(dem2di_min(a->square, b->square), depth, &end);
     if (end.energy > best->energy) *best = end;
 }
 
 /* The two points of a contact along u, by its second one. */
-static void dem2di_two_points(const dem2di_second *end, double depth, dem2d_vec u,
+static void dem2di_two_points(const dem2di_second_point *end, double depth, dem2d_vec u,
                               dem2d_contact_point points[2]) {
     dem2d_vec across = dem2di_perp(u), force; /* on B, along perp(u) and u */
     force.x = (end->slide - end->press * end->rise) / end->slope;
@@ -9627,7 +9631,7 @@ static void dem2di_one_point(dem2d_vec position, double depth, dem2d_vec u,
 
 /* The second point of an overlapping pair, on either side; `best` stays as it is without one. */
 static void dem2di_pair_second(const dem2di_pair *pair, const dem2di_search *search,
-                               dem2di_second *best) {
+                               dem2di_second_point *best) {
     const int *corner = search->feature.corner;
     dem2d_vec u = search->normal;
     dem2d_vec va = dem2di_turn_back(pair->ra, u), vb = dem2di_turn_back(pair->rb, dem2di_negate(u));
@@ -9656,7 +9660,7 @@ static int dem2di_pair_points(const dem2di_pair *pair, const dem2di_search *sear
                               dem2d_contact_point points[2]) {
     dem2d_vec u = search->normal;
     if (pair->a->flat && pair->b->flat) {
-        dem2di_second second = dem2di_second_none();
+        dem2di_second_point second = dem2di_second_none();
         dem2di_pair_second(pair, search, &second);
         if (second.energy > 0) {
             dem2di_two_points(&second, search->upper, u, points);
@@ -9676,7 +9680,7 @@ static int dem2di_wall_points(const dem2d_shape *shape, dem2d_rot q, double scal
     double size = 2 * shape->circumscribed * scale;
     dem2d_vec v = dem2di_turn_back(q, u);
     dem2di_face face, wall = {-size, size, 0, surface, surface, 0, size * size, 0, -1, -1, true};
-    dem2di_second second = dem2di_second_none();
+    dem2di_second_point second = dem2di_second_none();
     for (int side = -1; side <= 1 && shape->flat; side += 2) {
         int found = dem2di_face_find(shape, v, -1, side);
         if (found < 0) continue;
@@ -9750,7 +9754,8 @@ static void dem2di_report_given(const dem2di_pair *pair, const dem2di_search *se
     for (int i = 0; i < 2; i++) {
         dem2di_member m = dem2di_member_of(pair, i);
         dem2d_vec *witness = i == 0 ? &contact->point_a : &contact->point_b;
-        dem2d_vec v = dem2di_member_view(&m, search->normal), old = i == 0 ? search->a : search->b;
+        dem2d_vec v = dem2di_member_direction(&m, search->normal),
+                  old = i == 0 ? search->a : search->b;
         old = dem2di_scale(dem2di_turn_back(m.q, old), 1 / m.scale);
         dem2d_vec way = dem2di_sub(dem2di_given_point(m.shape, v, old), old);
         *witness = dem2di_along(*witness, m.scale, dem2di_turn(m.q, way));
@@ -9885,7 +9890,7 @@ DEM2D_API dem2d_result dem2d_pair_contact(const dem2d_shape *a, dem2d_pose pose_
         search.a = dem2di_scale(search.normal, ra);
         search.b = dem2di_scale(search.normal, -rb);
         search.proof = DEM2D_BY_FORM;
-        search.state = dem2di_judge(&pair, &search);
+        search.state = dem2di_state_of(&pair, &search);
     } else {
         dem2di_contact_solve(&pair, used.solver, dem2di_start(&pair, used.start), used.tolerance,
                              used.max_iterations, false, &search);
@@ -9953,7 +9958,7 @@ typedef struct dem2di_disc {
     double reach; /* bounding radius and skin */
     int level;    /* its cells are 2^-level of the largest, at least twice its reach */
     bool fixed;   /* two fixed ones are no pair */
-    bool round;   /* two circles are a pair of the first kind, others of the second */
+    bool circle;  /* two circles are a pair of the first kind, others of the second */
 } dem2di_disc;
 
 /* The discs sorted by the cells of their centres. The arrays are the caller's. */
@@ -10069,8 +10074,8 @@ typedef struct dem2di_finds {
 } dem2di_finds;
 
 /* The partners among the discs from begin to end of those sorted. */
-static inline void dem2di_grid_look(const dem2di_grid *grid, int begin, int end, int level,
-                                    dem2di_finds *finds) {
+static inline void dem2di_grid_range(const dem2di_grid *grid, int begin, int end, int level,
+                                     dem2di_finds *finds) {
     const dem2di_disc *own = &grid->discs[finds->own];
     for (int k = begin; k < end; k++) {
         int j = grid->sorted[k];
@@ -10079,7 +10084,7 @@ static inline void dem2di_grid_look(const dem2di_grid *grid, int begin, int end,
         double both = own->reach + other->reach;
         if (!(dem2di_dot(d, d) < both * both) || other->level != level) continue;
         if (own->fixed && other->fixed) continue;
-        int kind = !(own->round && other->round);
+        int kind = !(own->circle && other->circle);
         if (finds->to[kind] != NULL) {
             finds->to[kind][finds->count[kind]].a = finds->own;
             finds->to[kind][finds->count[kind]].b = j;
@@ -10095,7 +10100,7 @@ static void dem2di_grid_row(const dem2di_grid *grid, int64_t x0, int64_t x1, int
         int64_t run = 8 - (x0 & 7), left = x1 - x0 + 1;
         if (run > left) run = left;
         int slot = dem2di_cell_slot(grid, x0, y, level);
-        dem2di_grid_look(grid, grid->heads[slot], grid->heads[slot + run], level, finds);
+        dem2di_grid_range(grid, grid->heads[slot], grid->heads[slot + run], level, finds);
         x0 += run;
     }
 }
@@ -10118,7 +10123,7 @@ static void dem2di_grid_partners(const dem2di_grid *grid, dem2di_finds *finds) {
             continue;
         }
         int slot = dem2di_cell_slot(grid, x, y, level), place = grid->slot[finds->own];
-        dem2di_grid_look(grid, place + 1, grid->heads[slot + 1], level, finds);
+        dem2di_grid_range(grid, place + 1, grid->heads[slot + 1], level, finds);
         dem2di_grid_row(grid, x + 1, x + 1, y, level, finds);
     }
 }
@@ -11721,7 +11726,7 @@ static bool dem2di_line_make(dem2d_world *world, const dem2d_wall_desc *desc) {
     if (line == NULL) return false;
     for (int k = 0; k < 2; k++) {
         line->corners[k] = dem2di_vec(k - 0.5, 0);
-        line->ends[k] = dem2di_vec(1 - 2 * k, 0);
+        line->tangents[k] = dem2di_vec(1 - 2 * k, 0);
     }
     line->flat = true;
     line->circumscribed = 0.5;
@@ -12330,7 +12335,7 @@ static void dem2di_disc_task(void *context, int begin, int end) {
             disc->centre = world->now[i].x;
             disc->reach = world->now[i].radius + skin;
             disc->fixed = body->motion == DEM2D_FIXED;
-            disc->round = dem2di_shape_of(world, body)->type == DEM2D_CIRCLE &&
+            disc->circle = dem2di_shape_of(world, body)->type == DEM2D_CIRCLE &&
                           dem2di_has_disc_kernel(world, &build->plan);
             largest = dem2di_max(largest, disc->reach);
             if (dem2di_outruns(world, i)) fast = dem2di_first_of(world, fast, i);
@@ -15296,8 +15301,8 @@ static void dem2di_archive_kernel(dem2di_archive *ar, dem2d_shape *shape) {
         dem2di_archive_arc(ar, &shape->given[k]);
     for (int k = 0; shape->arcs != NULL && k < shape->parts; k++)
         dem2di_archive_arc(ar, &shape->arcs[k]);
-    for (int k = 0; shape->ends != NULL && k < shape->parts; k++)
-        dem2di_archive_vec(ar, "tangent", &shape->ends[k]);
+    for (int k = 0; shape->tangents != NULL && k < shape->parts; k++)
+        dem2di_archive_vec(ar, "tangent", &shape->tangents[k]);
     for (int n = 1; shape->blocks != NULL && n <= shape->count; n++) {
         double *a = &shape->blocks[(n - 1) / 4].a[(n - 1) % 4];
         double *b = &shape->blocks[(n - 1) / 4].b[(n - 1) % 4];
@@ -15305,8 +15310,8 @@ static void dem2di_archive_kernel(dem2di_archive *ar, dem2d_shape *shape) {
         dem2di_archive_finite(ar, "b", b);
         if (dem2di_archive_loaded(ar)) dem2di_fourier_term(shape, n, *a, *b);
     }
-    for (int k = 0; shape->floors != NULL && k < DEM2DI_FLOORS; k++)
-        dem2di_archive_finite(ar, "floor", &shape->floors[k]);
+    for (int k = 0; shape->least_rho != NULL && k < DEM2DI_RHO_SECTORS; k++)
+        dem2di_archive_finite(ar, "floor", &shape->least_rho[k]);
     if (!dem2di_archive_loaded(ar)) return;
     if (shape->sectors > 0) dem2di_fill_sectors(shape);
     dem2di_find_edges(shape);
