@@ -1826,7 +1826,7 @@ DEM2D_API dem2d_result dem2d_world_write_csv(const dem2d_world *world, const dem
 #define DEM2D_IMPLEMENTATION_ONCE
 
 /* ============================================================================================
-   >>config  What the code below asks of the compiler, constants, exact floating point
+   >>config  Requirements on the compiler, constants, exact floating point
    uses: nothing
    ============================================================================================ */
 
@@ -1852,8 +1852,8 @@ DEM2D_API dem2d_result dem2d_world_write_csv(const dem2d_world *world, const dem
 #error "dem2d.h: 80-bit arithmetic; on 32-bit x86 compile with -msse2 -mfpmath=sse"
 #endif
 
-/* a * b + c must be two rounded operations everywhere, or runs differ between compilers. gcc 12
-   forms fused a * b +- c from pairs of statements in its basic-block vectoriser even so. */
+/* a * b + c must be two rounded operations everywhere, or runs differ between compilers. In spite
+   of fp-contract=off, gcc 12 fuses a * b +- c in its basic-block vectoriser. */
 #if defined(__clang__)
 #pragma STDC FP_CONTRACT OFF
 #elif defined(__GNUC__)
@@ -1867,14 +1867,14 @@ DEM2D_API dem2d_result dem2d_world_write_csv(const dem2d_world *world, const dem
 #define DEM2DI_PRINTF(text, first)
 #endif
 
-/* For loops that are written once and compiled for what a scene has. */
+/* For loops that are written once and compiled for several sets of features. */
 #if defined(__GNUC__)
 #define DEM2DI_INLINE inline __attribute__((always_inline))
 #else
 #define DEM2DI_INLINE inline
 #endif
 
-/* Around loops that are worth vector instructions, which gcc leaves out at -O2. */
+/* Around loops that are to use vector instructions: gcc 12 does not vectorise them at -O2. */
 #if defined(__GNUC__) && !defined(__clang__)
 #define DEM2DI_VECTORS_BEGIN    \
     _Pragma("GCC push_options") \
@@ -1885,7 +1885,7 @@ DEM2D_API dem2d_result dem2d_world_write_csv(const dem2d_world *world, const dem
 #define DEM2DI_VECTORS_END
 #endif
 
-/* Memory that is wanted soon; beyond an array's end it does no harm. */
+/* Load memory into the cache that is needed soon; an address past the array's end does no harm. */
 #if defined(__GNUC__)
 #define DEM2DI_PREFETCH(array, ahead) \
     __builtin_prefetch((const void *)((uintptr_t)(array) + (ahead) * sizeof *(array)))
@@ -1895,8 +1895,8 @@ DEM2D_API dem2d_result dem2d_world_write_csv(const dem2d_world *world, const dem
 
 #define DEM2DI_PI 3.14159265358979323846
 
-/* Rounding of a support value of A minus B, in units of R_A + R_B + |d|: two rotations, two
-   kernels and two subtractions of about eps each stay below 8 eps; twice that is safe. */
+/* Rounding error of a support value of A minus B, in units of R_A + R_B + |d|: two rotations, two
+   support functions and two subtractions of about eps each are below 8 eps; this is twice that. */
 #define DEM2DI_ROUNDING (16 * DBL_EPSILON)
 
 #ifdef __cplusplus
@@ -1953,7 +1953,7 @@ static double dem2di_length(dem2d_vec a) {
     return sqrt(dem2di_dot(a, a));
 }
 
-/* A NaN in a is left out, one in b comes out. */
+/* If a is NaN the result is b; if b is NaN it is NaN. */
 static double dem2di_max(double a, double b) {
     return a > b ? a : b;
 }
@@ -1970,7 +1970,7 @@ static bool dem2di_vec_finite(dem2d_vec a) {
     return dem2di_finite(a.x) && dem2di_finite(a.y);
 }
 
-/* v / |v| for any finite v but 0, without overflow or underflow on the way. */
+/* v / |v| for any finite v but 0, without intermediate overflow or underflow; else false. */
 static bool dem2di_unit(dem2d_vec v, dem2d_vec *unit) {
     double square = dem2di_dot(v, v);
     if (square > 1e-280 && square < 1e280) {
@@ -1994,7 +1994,7 @@ static dem2d_vec dem2di_turn_back(dem2d_rot q, dem2d_vec v) {
     return dem2di_vec(q.c * v.x + q.s * v.y, q.c * v.y - q.s * v.x);
 }
 
-/* Sine and cosine for |x| <= pi/4 by their Taylor series; the first terms left out are
+/* Sine and cosine for |x| <= pi/4 by their Taylor series; the first omitted terms are
    (pi/4)^19/19! = 8e-20 and (pi/4)^20/20! = 3e-21. */
 static dem2d_rot dem2di_small_rot(double x) {
     double y = x * x, sine = 1, cosine = 1;
@@ -2009,7 +2009,7 @@ static dem2d_rot dem2di_small_rot(double x) {
 }
 
 DEM2D_API dem2d_rot dem2d_rot_make(double angle) {
-    /* pi/2 in three parts of 22 bits and a rest: k times a part is exact for k < 2^31. */
+    /* pi/2 in three parts of 22 bits and a remainder: k times a part is exact for k < 2^31. */
     static const double part[4] = {1.570796012878418, 3.139164164167596e-07, 6.223371969669989e-14,
                                    2.0222662487959506e-21};
     double k = floor(angle * (2 / DEM2DI_PI) + 0.5), x = angle;
@@ -2031,8 +2031,8 @@ DEM2D_API double dem2d_rot_angle(dem2d_rot rotation) {
     dem2d_vec v;
     if (!dem2di_unit(dem2di_vec(rotation.c, rotation.s), &v)) return 0;
     double x = fabs(v.x), y = fabs(v.y), t = x > y ? y / x : x / y;
-    /* atan t is about t (pi/4 + 0.273 (1 - t)) to 0.004; each correction by
-       asin d = d + d^3/6 + ... leaves 3 d^5/40: 7e-14, then nothing. */
+    /* atan t = t (pi/4 + 0.273 (1 - t)) to 0.004. A correction by asin d = d + d^3/6 + ... has an
+       error of 3 d^5/40: 7e-14 after the first, below rounding errors after the second. */
     double angle = t * (DEM2DI_PI / 4 + 0.273 * (1 - t));
     if (y >= x) angle = DEM2DI_PI / 2 - angle;
     if (v.x < 0) angle = DEM2DI_PI - angle;
@@ -2045,9 +2045,9 @@ DEM2D_API double dem2d_rot_angle(dem2d_rot rotation) {
     return angle > -DEM2DI_PI ? angle : DEM2DI_PI;
 }
 
-/* ln(a/b) for a >= b > 0 = k ln 2 + 2 artanh z, z = (a - b)/(a + b): b is brought to within a
-   factor of 2 of a by exact halving and doubling, nearest in the sense of z^2 <= 1/34. Then a - b
-   is exact, and the first term left out, z^24/25, is 1e-38. */
+/* ln(a/b) for a >= b > 0 = k ln 2 + 2 artanh z, z = (a - b)/(a + b). Exact halving and doubling
+   bring b to between 0.7 a and 1.4 a, so that z^2 <= 1/34. Then a - b is exact, and the first
+   omitted term, z^24/25, is 1e-38. */
 static double dem2di_log_ratio(double a, double b) {
     /* ln 2 in two parts, the first of 32 bits: k times it is exact */
     const double high = 6.93147180369123816490e-01, low = 1.90821492927058770002e-10;
@@ -2057,7 +2057,7 @@ static double dem2di_log_ratio(double a, double b) {
             a /= 2;
         else
             b *= 2;
-    if (a > 1) a /= 2, b /= 2; /* for the sum of two great ones */
+    if (a > 1) a /= 2, b /= 2; /* so that a + b does not overflow */
     double z = (a - b) / (a + b), square = z * z, sum = 0;
     for (int n = 23; n > 1; n -= 2) sum = square * (sum + 1.0 / n);
     return k * high + (2 * z + (2 * z * sum + k * low));
@@ -2116,7 +2116,7 @@ DEM2D_API const char *dem2d_result_text(dem2d_result result) {
     return known ? text[result] : "unknown result";
 }
 
-/* Tell the log what exactly is wrong, and return the result. */
+/* Write the details of an error to the log, and return the result. */
 DEM2DI_PRINTF(4, 5)
 static dem2d_result dem2di_fail(const dem2d_env *env, dem2d_result result, int index,
                                 const char *format, ...) {
@@ -2135,12 +2135,12 @@ static dem2d_result dem2di_fail_null(const dem2d_env *env, const char *name) {
     return dem2di_fail(env, DEM2D_NULL_ARGUMENT, -1, "%s is NULL", name);
 }
 
-/* Both callbacks, or malloc and free: half a pair would free what the other had not made. */
+/* Only both callbacks together replace malloc and free. */
 static bool dem2di_env_allocates(const dem2d_env *env) {
     return env != NULL && env->allocate != NULL && env->release != NULL;
 }
 
-/* Memory for count elements of a size; NULL when there is none or the product overflows. */
+/* Memory for count elements of a size; NULL if there is none or the product overflows. */
 static void *dem2di_allocate(const dem2d_env *env, size_t count, size_t size) {
     if (count == 0 || size > (size_t)PTRDIFF_MAX / count) return NULL;
     if (dem2di_env_allocates(env)) return env->allocate(env->user, count * size);
@@ -2185,7 +2185,8 @@ static bool dem2di_columns_reserve(const dem2d_env *env, const dem2di_column *co
     return true;
 }
 
-/* Room for `needed`, and for half as many again: for what grows one by one. */
+/* A new capacity for at least `needed` elements: it grows by half, for arrays that grow one by
+   one. */
 static int dem2di_growth(int capacity, int needed) {
     int grown = capacity < INT_MAX / 2 ? capacity + capacity / 2 : INT_MAX;
     return needed <= capacity ? capacity : grown < needed ? needed : grown;
@@ -2224,7 +2225,7 @@ static dem2d_result dem2di_check_not_negative(const dem2d_env *env, const char *
     return dem2di_fail(env, DEM2D_OUT_OF_RANGE, -1, "%s = %g must not be negative", name, value);
 }
 
-/* Points of a caller: there, enough of them, finite. */
+/* Points of a caller: not NULL, at least `least` of them, finite. */
 static dem2d_result dem2di_check_points(const dem2d_env *env, const char *name,
                                         const dem2d_vec *points, int count, int least) {
     if (points == NULL) return dem2di_fail_null(env, name);
@@ -2249,8 +2250,8 @@ static int dem2di_compare_points(const void *a, const void *b) {
     return (p->y > q->y) - (p->y < q->y);
 }
 
-/* Rounding of the cross product of two edges whose ends have coordinates up to `size`: each
-   edge component is off by eps size. */
+/* Rounding error of the cross product of two edges whose ends have coordinates up to `size`: each
+   component of an edge has an error of eps size. */
 static double dem2di_cross_rounding(double size, dem2d_vec a, dem2d_vec b) {
     return 4 * DBL_EPSILON * size * (dem2di_length(a) + dem2di_length(b));
 }
@@ -2279,7 +2280,7 @@ static int dem2di_monotone_chain(const dem2d_vec *sorted, int count, dem2d_vec *
             }
             chain[length++] = p;
         }
-        length--; /* the last point opens the other half */
+        length--; /* the last point is the first one of the other half */
     }
     return length;
 }
@@ -2322,13 +2323,14 @@ static void dem2di_reverse(dem2d_vec *points, int count) {
     }
 }
 
-/* Does the direction belong to the upper half: angle in [0, pi)? */
+/* Is the angle of a direction in [0, pi)? */
 static bool dem2di_upper(dem2d_vec e) {
     return e.y > 0 || (e.y == 0 && e.x > 0);
 }
 
-/* One pass: keep the corners that turn left, drop those straight to rounding. index[] holds the
-   places in the caller's array. Returns DEM2D_NOT_CONVEX and the place of a right turn. */
+/* One pass: keep the corners that turn left, drop those that are straight within rounding errors.
+   index[] has their indices in the caller's array. A right turn gives DEM2D_NOT_CONVEX, and *bad is
+   its index. */
 static dem2d_result dem2di_keep_corners(dem2d_vec *points, int *index, int *count, int *bad) {
     int kept = 0, n = *count;
     double size = dem2di_coordinate_size(points, n);
@@ -2349,7 +2351,7 @@ static dem2d_result dem2di_keep_corners(dem2d_vec *points, int *index, int *coun
     return DEM2D_OK;
 }
 
-/* A closed convex chain turns once: its edges enter the upper half of directions once. */
+/* A closed convex chain turns once if its edge directions enter the upper half-plane once. */
 static bool dem2di_turns_once(const dem2d_vec *points, int count) {
     int entries = 0;
     dem2d_vec edge = dem2di_sub(points[0], points[count - 1]);
@@ -2361,7 +2363,7 @@ static bool dem2di_turns_once(const dem2d_vec *points, int count) {
     return entries == 1;
 }
 
-/* Make count points a counter-clockwise strictly convex polygon, or say which point prevents it. */
+/* Turn count points into a counter-clockwise strictly convex polygon; an error names the point. */
 static dem2d_result dem2di_clean_polygon(const dem2d_env *env, dem2d_vec *points, int *index,
                                          int *count) {
     int n = *count, bad = 0;
@@ -2399,15 +2401,15 @@ static dem2d_result dem2di_clean_polygon(const dem2d_env *env, dem2d_vec *points
    uses: config, math
    ============================================================================================ */
 
-/* A polynomial sum of (a[n] weight cos nt + b[n] weight sin nt), with the weight of derivative
-   combinations: rho = p + p'' has 1 - n^2, and -p has -1. */
+/* The sum of weight(n) (a[n] cos nt + b[n] sin nt). The weight is 1 for p and 1 - n^2 for the
+   radius of curvature rho = p + p'', times a sign. */
 typedef struct dem2di_series {
-    const double *a, *b; /* order + 1 each; a[0] counts half, b[0] not at all */
+    const double *a, *b; /* order + 1 each; a[0]/2 is the mean, b[0] is not used */
     int order;
-    bool radius;   /* of curvature: weight 1 - n^2 */
-    double sign;   /* weight +1 or -1 */
+    bool radius;   /* radius of curvature: weight 1 - n^2 */
+    double sign;   /* +1 or -1 */
     double fourth; /* bound of the fourth derivative: sum n^4 |c_n| |weight| */
-    double size;   /* sum |c_n| |weight| */
+    double size;   /* bound of the value: sum |c_n| |weight| */
 } dem2di_series;
 
 static double dem2di_series_weight(const dem2di_series *s, int n) {
@@ -2432,7 +2434,7 @@ static dem2di_series dem2di_series_make(const double *a, const double *b, int or
     return s;
 }
 
-/* Value and derivatives at an angle, by repeated rotation: error about n eps of each term. */
+/* Value and three derivatives at an angle, by repeated rotation: term n has an error of n eps. */
 static double dem2di_series_value(const dem2di_series *s, double t, double d[3]) {
     dem2d_rot z = dem2d_rot_make(t);
     dem2d_vec power = dem2di_vec(z.c, z.s);
@@ -2452,11 +2454,11 @@ static double dem2di_series_value(const dem2di_series *s, double t, double d[3])
 }
 
 typedef struct dem2di_bounds {
-    double lower, upper; /* of a minimum: proved, attained */
+    double lower, upper; /* of a minimum: a proved lower bound, an attained value */
 } dem2di_bounds;
 
-/* Lower bound on an interval of half width w, by Taylor's formula: the least value of the
-   parabola, and the largest that the cubic and the rest can take away. */
+/* Lower bound on an interval of half width w, by Taylor's formula: the least value of the parabola
+   minus the greatest absolute values of the cubic term and the remainder. */
 static double dem2di_taylor_bound(const dem2di_series *s, double value, const double d[3],
                                   double w) {
     double slope = fabs(d[0]), parabola = value - slope * w + d[1] * w * w / 2;
@@ -2464,9 +2466,10 @@ static double dem2di_taylor_bound(const dem2di_series *s, double value, const do
     return parabola - fabs(d[2]) * w * w * w / 6 - s->fourth * w * w * w * w / 24;
 }
 
-/* Minimum by branch and bound: each interval that may undercut the best value is halved until
-   its bound is within the tolerance. 48 halvings of 2 pi reach the spacing of doubles. After
-   DEM2DI_SERIES_PIECES intervals the bounds of larger ones are taken: looser, never wrong. */
+/* Minimum by branch and bound: each interval that may have values below the best one is halved
+   until its bound is within the tolerance. 48 halvings of 2 pi reach the spacing of doubles. After
+   DEM2DI_SERIES_PIECES intervals the remaining ones are not halved: their bounds are valid, but
+   less sharp. */
 #define DEM2DI_SERIES_PIECES 1000000
 
 static dem2di_bounds dem2di_series_minimum(const dem2di_series *s, double tolerance) {
@@ -2514,18 +2517,18 @@ static dem2di_bounds dem2di_series_minimum(const dem2di_series *s, double tolera
    uses: config, math, memory, series
    ============================================================================================ */
 
-/* Up to this many corners a plain loop over all costs no more than a look-up in the sector table:
-   4.9 against 6.3 ns with four, 6.2 each with six, 7.3 against 6.3 with eight. */
+/* Up to this many corners a loop over all of them is as fast as the sector table: 4.9 against 6.3
+   ns with four corners, 6.2 ns each with six, 7.3 against 6.3 ns with eight. */
 #define DEM2DI_FEW_CORNERS 6
 
-/* One arc: its first point and its three control differences. Three equal ones: a straight arc;
-   all zero: a corner. */
+/* One arc: its first point and the three differences of its control points. If these are equal the
+   arc is straight; if they are zero it is a corner. */
 typedef struct dem2di_arc {
     dem2d_vec start, d0, d1, d2;
 } dem2di_arc;
 
-/* The straight arcs before and after a part of a polybezier; -1: there are none. A straight arc is
-   its own. */
+/* The straight arcs before and after a part of a polybezier; -1 if it has none. For a straight arc
+   both are itself. */
 typedef struct dem2di_edges_beside {
     int before, after;
 } dem2di_edges_beside;
@@ -2535,20 +2538,20 @@ typedef struct dem2di_block {
     double a[4], b[4], na[4], nb[4], square[4];
 } dem2di_block;
 
-/* Sectors of directions that have a lower bound of rho: 1/32 of a quadrant each. */
+/* Number of sectors of directions with a lower bound of rho each: 32 in a quadrant. */
 #define DEM2DI_RHO_SECTORS 128
 
 struct dem2d_shape {
     dem2d_shape_type type;
-    int count;        /* vertices, arcs, order, as the caller sees them */
-    int parts;        /* polygon: count; Bezier: the kernel's arcs and corners */
+    int count;        /* vertices, arcs, order, as given by the caller */
+    int parts;        /* polygon: count; Bezier: repaired arcs and corners, for contacts */
     int sectors;      /* length of the sector table, a power of two, or 0 */
     bool flat;        /* has edges: a polygon, or a Bezier with straight arcs */
     double a, b;      /* circle: radius; ellipse: squared half axes; Fourier: a0/2 */
-    double deviation; /* Bezier: the parts are nowhere farther than this from the caller's arcs */
+    double deviation; /* Bezier: greatest distance of the parts from the caller's arcs */
     double rounding;
     double circumscribed, inscribed, rho_min;
-    double rho_max; /* edges and straight arcs apart; custom: 0, not known */
+    double rho_max; /* without edges and straight arcs; custom: 0, not known */
     dem2d_mass mass;
     dem2d_vec offset;
     dem2d_support_fn *function;
@@ -2556,7 +2559,7 @@ struct dem2d_shape {
     int function_tag;
     dem2d_env env;
     size_t bytes;
-    /* What follows the struct in one block of memory: */
+    /* The arrays follow the struct in the same block of memory: */
     dem2d_vec *corners;  /* polygon: count */
     dem2d_vec *tangents; /* unit tangent; polygon: of the edge leaving k; Bezier: at the end of k */
     dem2di_arc *given;   /* Bezier: count, the caller's, for the mass and the outline */
@@ -2571,7 +2574,7 @@ static int dem2di_block_count(int order) {
     return (order + 3) / 4;
 }
 
-/* Place the arrays of a shape behind it; bytes is the size of the whole. */
+/* Place the arrays of a shape after the struct; bytes is the size of all. */
 static void dem2di_shape_layout(dem2d_shape *shape) {
     char *next = (char *)(shape + 1);
     size_t n = (size_t)shape->parts;
@@ -2605,18 +2608,19 @@ static void dem2di_shape_layout(dem2d_shape *shape) {
     shape->bytes = (size_t)(next - (char *)shape);
 }
 
-/* The angle y/(|x| + |y|) of a quadrant, unwrapped, and a turn (4): in [3, 7]. Monotone, without
-   trigonometry, and without branches, as the quadrant can't be predicted. */
+/* Pseudo-angle of a direction in [3, 7], monotone in the angle, 4 for a full turn: y/(|x| + |y|) in
+   the first quadrant. It needs no trigonometry, and no branches: a quadrant can't be predicted. */
 static inline double dem2di_pseudo_angle(dem2d_vec u) {
     return 5 - copysign(1 - u.y / (fabs(u.x) + fabs(u.y)), u.x);
 }
 
-/* The sector of least_rho that holds a direction. */
+/* The sector of the table least_rho that contains a direction. */
 static int dem2di_rho_sector(dem2d_vec u) {
     return (int)(dem2di_pseudo_angle(u) * (DEM2DI_RHO_SECTORS / 4)) & (DEM2DI_RHO_SECTORS - 1);
 }
 
-/* Lower bounds of rho from a direction on, over one sector's width clockwise and the other way. */
+/* Lower bounds of rho over one sector's width from a direction: [0] clockwise, [1]
+   counter-clockwise. */
 static inline void dem2di_least_rho(const dem2d_shape *shape, dem2d_vec u, double rho[2]) {
     if (shape->least_rho == NULL) {
         rho[0] = rho[1] = shape->rho_min;
@@ -2640,22 +2644,22 @@ static double dem2di_least_rho_between(const dem2d_shape *shape, dem2d_vec from,
     return least;
 }
 
-/* Index one step (+1 or -1) from k around a polygon, without a branch, where it can't be
+/* Index one step (+1 or -1) from k around a polygon, without a branch, which could not be
    predicted. */
 static inline int dem2di_around(int count, int k, int step) {
     k += step;
     return k + count * ((k < 0) - (k == count));
 }
 
-/* The corner (polygon) or arc (Bezier) that holds the support point: go on while the next end
-   still gains in the direction. */
+/* The corner (polygon) or part (Bezier) that has the support point: advance while the support value
+   still grows at its end. */
 static inline int dem2di_sector_find(const dem2d_shape *shape, dem2d_vec u) {
     int k = 0;
     if (shape->sectors > 0) {
         int place = (int)(dem2di_pseudo_angle(u) * (shape->sectors / 4));
         k = shape->sector[place & (shape->sectors - 1)];
     }
-    /* once around at most: a damaged snapshot may hold any tangents */
+    /* once around at most: a damaged snapshot may have any tangents */
     for (int left = shape->parts; dem2di_dot(shape->tangents[k], u) > 0 && left > 0; left--)
         k = k + 1 < shape->parts ? k + 1 : 0;
     return k;
@@ -2676,7 +2680,7 @@ static inline int dem2di_polygon_corner(const dem2d_shape *shape, dem2d_vec u) {
     return best;
 }
 
-/* Point of an arc at t: start + integral of (1-t)^2 d0 + 2t(1-t) d1 + t^2 d2, times 3. */
+/* Point of an arc at t: start + 3 times the integral of (1-t)^2 d0 + 2t(1-t) d1 + t^2 d2. */
 static dem2d_vec dem2di_arc_point(const dem2di_arc *arc, double t) {
     double w0 = t * (3 - t * (3 - t)), w1 = t * t * (3 - 2 * t), w2 = t * t * t;
     return dem2di_vec(arc->start.x + w0 * arc->d0.x + w1 * arc->d1.x + w2 * arc->d2.x,
@@ -2690,7 +2694,7 @@ static dem2d_vec dem2di_arc_speed(const dem2di_arc *arc, double t) {
                       dem2di_scale(arc->d2, t * t));
 }
 
-/* |B'|^3 / B' x B'': 0 where B' vanishes (a point of infinite curvature), infinite on a flat. */
+/* |B'|^3 / B' x B'': 0 where B' vanishes (infinite curvature), HUGE_VAL where the arc is flat. */
 static double dem2di_arc_rho(const dem2di_arc *arc, double t) {
     dem2d_vec first = dem2di_arc_speed(arc, t);
     dem2d_vec second = dem2di_add(dem2di_scale(dem2di_sub(arc->d1, arc->d0), 1 - t),
@@ -2701,8 +2705,8 @@ static double dem2di_arc_rho(const dem2di_arc *arc, double t) {
     return turn > 0 ? 1.5 * speed * (speed / turn * speed) : HUGE_VAL;
 }
 
-/* [P] sec. 2.2, eq. 9 without its slips: the root of q0 (1-t)^2 + 2 q1 t(1-t) + q2 t^2 with the sum
-   of like signs in the denominator, so that nothing cancels and t is in [0, 1]. */
+/* [P] sec. 2.2, eq. 9, corrected: the root of q0 (1-t)^2 + 2 q1 t(1-t) + q2 t^2. Its denominator is
+   a sum of terms of one sign, so that nothing cancels and t is in [0, 1]. */
 static double dem2di_arc_parameter(double q0, double q1, double q2) {
     if (q2 > 0) return 1;
     if (q0 < 0) return 0;
@@ -2712,15 +2716,15 @@ static double dem2di_arc_parameter(double q0, double q1, double q2) {
     return bottom > 0 ? top / bottom : 0;
 }
 
-/* With B'/3 along the tangent and B''/6 against u, rho = |B'|^2 / (-B''.u) = 9/6 of their own; at
-   the root the latter is the square root of [P]'s formula. */
+/* Support point of an arc. rho = |B'|^2 / (-B''.u) = 3/2 speed^2 / bend, with speed = |B'|/3 and
+   bend = -B''.u/6; at the root, bend is the square root in [P]'s formula. */
 static inline dem2d_vec dem2di_arc_support(const dem2di_arc *arc, dem2d_vec u, double *rho) {
     double q0 = dem2di_dot(arc->d0, u), q1 = dem2di_dot(arc->d1, u), q2 = dem2di_dot(arc->d2, u);
     double t = dem2di_arc_parameter(q0, q1, q2);
     if (rho != NULL) {
         bool inside = q0 >= 0 && q2 <= 0;
         double bend = inside ? sqrt(q1 * q1 - q0 * q2) : (q0 - q1) * (1 - t) + (q1 - q2) * t;
-        double f = 1.5 / bend, s = 1 - t; /* beside the division for t, not after it */
+        double f = 1.5 / bend, s = 1 - t; /* does not wait for the division that gives t */
         double speed = dem2di_cross(u, arc->d0) * (s * s) + dem2di_cross(u, arc->d1) * (2 * t * s) +
                        dem2di_cross(u, arc->d2) * (t * t);
         *rho = speed <= 0 ? 0 : bend > 0 ? speed * speed * f : HUGE_VAL;
@@ -2728,9 +2732,9 @@ static inline dem2d_vec dem2di_arc_support(const dem2di_arc *arc, dem2d_vec u, d
     return dem2di_arc_point(arc, t);
 }
 
-/* s = p u + p' t and rho = p + p'' with z = ux + i uy: powers z .. z^4, then four terms at a time
-   by z^4, so that the chain of dependent products is a quarter of the order. The four are written
-   out: gcc then keeps them in registers, which halves the time. */
+/* s = p u + p' t and rho = p + p'' with the powers of z = ux + i uy: first z .. z^4, then four
+   terms at a time by z^4, so that the chain of dependent products is a quarter of the order. The
+   four terms are written out: gcc then keeps them in registers, which halves the time. */
 static dem2d_vec dem2di_fourier_support(const dem2d_shape *shape, dem2d_vec u, double *rho) {
     double x1 = u.x, y1 = u.y, x2 = x1 * x1 - y1 * y1, y2 = 2 * x1 * y1;
     double x3 = x2 * x1 - y2 * y1, y3 = x2 * y1 + y2 * x1, x4 = x2 * x2 - y2 * y2, y4 = 2 * x2 * y2;
@@ -2768,15 +2772,15 @@ static inline dem2d_vec dem2di_ellipse_support(const dem2d_shape *shape, dem2d_v
     return dem2di_vec(s.x * f, s.y * f);
 }
 
-/* As the parts of a polybezier are made: to the bit. */
+/* Straight parts of a polybezier have three equal differences, to the bit. */
 static bool dem2di_arc_straight(const dem2di_arc *arc) {
     dem2d_vec d = arc->d0;
     return (d.x != 0 || d.y != 0) && d.x == arc->d1.x && d.y == arc->d1.y && d.x == arc->d2.x &&
            d.y == arc->d2.y;
 }
 
-/* The edges of a shape: of a polygon all, of a polybezier the straight arcs, each between two other
-   parts. */
+/* Find the edges of a shape: of a polygon all, of a polybezier the straight arcs, each between two
+   other parts. */
 static void dem2di_find_edges(dem2d_shape *shape) {
     int n = shape->parts, last = -1;
     shape->flat = shape->type == DEM2D_POLYGON;
@@ -2796,20 +2800,20 @@ static inline bool dem2di_has_parts(const dem2d_shape *shape) {
     return shape->type == DEM2D_POLYGON || shape->type == DEM2D_BEZIER;
 }
 
-/* The part of a shape that has them, not itself an edge, that holds the support point. */
+/* The part (not an edge) that has the support point; only for shapes with parts. */
 static inline int dem2di_part_find(const dem2d_shape *shape, dem2d_vec u) {
     return shape->type == DEM2D_POLYGON ? dem2di_polygon_corner(shape, u)
                                         : dem2di_sector_find(shape, u);
 }
 
-/* The edge before (-1) or after (1) a part: edges of polygons have the number of the corner that
-   they leave. */
+/* The edge before (-1) or after (1) a part. An edge of a polygon has the number of its first
+   corner. */
 static inline int dem2di_edge_beside(const dem2d_shape *shape, int k, int side) {
     if (shape->type == DEM2D_POLYGON) return side > 0 ? k : dem2di_around(shape->count, k, -1);
     return side > 0 ? shape->edges_beside[k].after : shape->edges_beside[k].before;
 }
 
-/* The part that an edge comes from (side -1) or leads to (1). */
+/* The part at the start (side -1) or at the end (1) of an edge. */
 static inline int dem2di_edge_part(const dem2d_shape *shape, int edge, int side) {
     if (shape->type == DEM2D_POLYGON) return side < 0 ? edge : dem2di_around(shape->count, edge, 1);
     return dem2di_around(shape->parts, edge, side);
@@ -2821,8 +2825,8 @@ static inline dem2d_vec dem2di_edge_end(const dem2d_shape *shape, int edge, bool
     return shape->type == DEM2D_POLYGON ? shape->corners[k] : shape->arcs[k].start;
 }
 
-/* Support point of a template in a unit direction; rho, if asked for, is the radius of curvature
-   there. */
+/* Support point of a template in a unit direction; rho (may be NULL) gets the radius of
+   curvature. */
 static inline dem2d_vec dem2di_support(const dem2d_shape *shape, dem2d_vec u, double *rho) {
     dem2d_vec s;
     switch (shape->type) {
@@ -2852,7 +2856,7 @@ static inline dem2d_vec dem2di_support(const dem2d_shape *shape, dem2d_vec u, do
    uses: config, math, memory, series, support
    ============================================================================================ */
 
-/* Area and moments about the origin, added up piece by piece. */
+/* Area and moments about the origin, summed over pieces. */
 typedef struct dem2di_moments {
     double area;     /* m2 */
     dem2d_vec first; /* m3: area times centroid */
@@ -2867,7 +2871,7 @@ static dem2d_mass dem2di_mass_of(const dem2di_moments *m) {
     return mass;
 }
 
-/* The triangle of the origin and an edge ([P] eq. 10-11). */
+/* Adds the triangle of the origin and an edge from a to b ([P] eq. 10-11). */
 static void dem2di_add_triangle(dem2di_moments *m, dem2d_vec a, dem2d_vec b) {
     double area = dem2di_cross(a, b) / 2;
     m->area += area;
@@ -2875,7 +2879,7 @@ static void dem2di_add_triangle(dem2di_moments *m, dem2d_vec a, dem2d_vec b) {
     m->polar += area / 6 * (dem2di_dot(a, a) + dem2di_dot(a, b) + dem2di_dot(b, b));
 }
 
-/* A piece with centroid c and polar moment about it. */
+/* Adds a piece with an area, a centroid c and a polar moment about c. */
 static void dem2di_add_piece(dem2di_moments *m, double area, dem2d_vec c, double polar) {
     m->area += area;
     m->first = dem2di_along(m->first, area, c);
@@ -2909,7 +2913,7 @@ DEM2D_API dem2d_result dem2d_polygon_mass(const dem2d_vec *points, int count, de
     return DEM2D_OK;
 }
 
-/* A polygon grown by r: itself, a rectangle on each edge, a sector at each corner. */
+/* A polygon grown by r: the polygon, a rectangle on each edge, a sector at each corner. */
 static dem2d_mass dem2di_rounded_polygon_mass(const dem2d_vec *corners, int count, double r) {
     dem2d_mass core = dem2di_polygon_mass(corners, count);
     dem2di_moments m = {0, {0, 0}, 0};
@@ -2926,7 +2930,7 @@ static dem2d_mass dem2di_rounded_polygon_mass(const dem2d_vec *corners, int coun
         rotation.c = dem2di_dot(last, edge);
         rotation.s = dem2di_cross(last, edge);
         turn = dem2d_rot_angle(rotation);
-        dem2d_rot half = dem2d_rot_make(-turn / 2); /* from the edge's normal back to the middle */
+        dem2d_rot half = dem2d_rot_make(-turn / 2); /* from the edge's normal to the bisector */
         double area = r * r * turn / 2, reach = -4 * r * half.s / (3 * turn);
         dem2d_vec centre = dem2di_along(corner, reach, dem2di_turn(half, normal));
         dem2di_add_piece(&m, area, centre, area * (r * r / 2 - reach * reach));
@@ -2936,9 +2940,8 @@ static dem2d_mass dem2di_rounded_polygon_mass(const dem2d_vec *corners, int coun
     return mass;
 }
 
-/* Of an FS by the trapezoid rule: the integrands have degree 4N at most, so more than 4N points
-   integrate them exactly (first moments 1/3 int s p rho, polar 1/4 int
-   (p^2 + p'^2) p rho). */
+/* Mass of an FS by the trapezoid rule (first moments 1/3 int s p rho, polar moment 1/4 int (p^2 +
+   p'^2) p rho): the integrands have degree 4N at most, so more than 4N points are exact. */
 static dem2d_mass dem2di_fourier_mass(const double *a, const double *b, int order) {
     dem2di_series series = dem2di_series_make(a, b, order, false, 1);
     dem2di_series radius = dem2di_series_make(a, b, order, true, 1);
@@ -2957,7 +2960,7 @@ static dem2d_mass dem2di_fourier_mass(const double *a, const double *b, int orde
     return dem2di_mass_of(&m);
 }
 
-/* Point i of six in [0, 1] and its weight, of sum 2: Gauss-Legendre, exact to degree 11. */
+/* Point i of six in [0, 1] and its weight (their sum is 2): Gauss-Legendre, exact to degree 11. */
 static double dem2di_gauss_point(int i, double *weight) {
     static const double node[3] = {0.2386191860831969086, 0.6612093864662645136,
                                    0.9324695142031520278};
@@ -2967,7 +2970,7 @@ static double dem2di_gauss_point(int i, double *weight) {
     return 0.5 + (i < 3 ? 0.5 : -0.5) * node[i % 3];
 }
 
-/* Of Bezier arcs: the polar moment 1/4 int |B|^2 B x B' has degree 6 + 5. */
+/* Mass inside Bezier arcs: the polar moment 1/4 int |B|^2 B x B' has degree 6 + 5. */
 static dem2d_mass dem2di_bezier_mass(const dem2di_arc *arcs, int count) {
     dem2di_moments m = {0, {0, 0}, 0};
     for (int k = 0; k < count; k++)
@@ -2988,7 +2991,7 @@ DEM2D_API dem2d_result dem2d_shape_mass(const dem2d_shape *shape, dem2d_mass *ma
     return DEM2D_OK;
 }
 
-/* Corner normals of a rounded polygon: point j of `each` on the rounding of corner k. */
+/* Point j of `each` on the circular arc at corner k of a rounded polygon. */
 static dem2d_vec dem2di_rounded_point(const dem2d_shape *shape, int k, int j, int each) {
     int n = shape->count;
     dem2d_vec in, out, u;
@@ -3002,8 +3005,8 @@ static dem2d_vec dem2di_rounded_point(const dem2d_shape *shape, int k, int j, in
     return dem2di_along(shape->corners[k], shape->rounding, u);
 }
 
-/* Point i of count on the boundary of a template. Models with corners share the points out so
-   that every corner (or joint) is one of them when there are enough. */
+/* Point i of count on the boundary of a template. Each edge (or arc) has about as many points, so
+   that every corner (or joint) is one of them if there are enough. */
 static dem2d_vec dem2di_outline_point(const dem2d_shape *shape, int i, int count) {
     int n = shape->count;
     if (shape->type == DEM2D_POLYGON || shape->type == DEM2D_BEZIER) {
@@ -3024,7 +3027,7 @@ static dem2d_vec dem2di_outline_point(const dem2d_shape *shape, int i, int count
     return dem2di_support(shape, dem2di_vec(z.c, z.s), NULL);
 }
 
-/* [P] eq. 10-11 over outline points that are not stored. */
+/* [P] eq. 10-11 over outline points, without storing them. */
 static dem2d_mass dem2di_mass_interpolated(const dem2d_shape *shape, int count) {
     dem2di_moments m = {0, {0, 0}, 0};
     dem2d_vec first = dem2di_outline_point(shape, 0, count), point = first;
@@ -3045,19 +3048,19 @@ DEM2D_API dem2d_result dem2d_shape_mass_interpolated(const dem2d_shape *shape, i
 }
 
 /* ============================================================================================
-   >>shapes  Creation with validation; questions that need only support points
+   >>shapes  Creation with validation; queries that need only support points
    uses: config, math, memory, hull, series, support, mass
    ============================================================================================ */
 
-/* The table has four to eight entries for each corner or arc, so that most look-ups need no step
-   and are predicted well: a power of two. */
+/* The sector table has four to eight entries for each corner or part, so that most look-ups need no
+   further step and are predicted well. Its length is a power of two. */
 static int dem2di_sector_count(int count) {
     int sectors = 16;
     while (sectors / 4 < count && sectors < (1 << 28)) sectors *= 2;
     return sectors;
 }
 
-/* What a model has: for a few corners the table is not worth it. */
+/* Length of a model's sector table: none for a few corners, where a loop is as fast. */
 static int dem2di_sectors_of(dem2d_shape_type type, int count) {
     bool table = type == DEM2D_BEZIER || (type == DEM2D_POLYGON && count > DEM2DI_FEW_CORNERS);
     return table ? dem2di_sector_count(count) : 0;
@@ -3088,7 +3091,7 @@ static dem2d_shape *dem2di_shape_allocate(const dem2d_env *env, dem2d_shape_type
     return shape;
 }
 
-/* Sizes whose fourth power is not a normal number have no moments: refused. */
+/* Refuses sizes whose fourth power is not a normal number: their polar moment is not accurate. */
 static dem2d_result dem2di_check_mass(const dem2d_env *env, double area, double polar_moment) {
     if (dem2di_finite(polar_moment) && area >= DBL_MIN && polar_moment >= DBL_MIN) return DEM2D_OK;
     return dem2di_fail(env, DEM2D_OUT_OF_RANGE, -1, "size: area %g, polar moment %g", area,
@@ -3112,7 +3115,7 @@ static dem2d_shape *dem2di_shape_copy(const dem2d_env *env, const dem2d_shape *s
     return copy;
 }
 
-/* The last step of creation: a shape whose moments are no normal numbers is taken back. */
+/* The last step of creation: a shape whose moments are not normal numbers is destroyed again. */
 static dem2d_result dem2di_shape_finish(dem2d_shape *made, dem2d_shape **shape) {
     dem2d_result result = dem2di_check_mass(&made->env, made->mass.area, made->mass.polar_moment);
     if (result == DEM2D_OK)
@@ -3145,14 +3148,14 @@ DEM2D_API dem2d_result dem2d_shape_create_circle(const dem2d_env *env, double ra
     return DEM2D_OK;
 }
 
-/* The direction where a sector of `sectors` in a turn begins, not normalised: the inverse of the
-   pseudo-angle. */
+/* The direction, not normalised, at the start of one of `sectors` sectors of a full turn: the
+   inverse of the pseudo-angle. */
 static dem2d_vec dem2di_sector_start(int sector, int sectors) {
-    double f = 4.0 * sector / sectors, g = f < 2 ? 1 - f : f - 3; /* |x| - like part of it */
+    double f = 4.0 * sector / sectors, g = f < 2 ? 1 - f : f - 3; /* x with |x| + |y| = 1 */
     return dem2di_vec(g, f < 1 ? f : f < 3 ? 2 - f : f - 4);
 }
 
-/* From the floor of each sector to that of each and the next. */
+/* From the least rho of each sector to the least of each sector and the next one. */
 static inline void dem2di_least_rho_join(dem2d_shape *shape) {
     double first = shape->least_rho[0];
     for (int k = 0; k < DEM2DI_RHO_SECTORS; k++)
@@ -3160,7 +3163,7 @@ static inline void dem2di_least_rho_join(dem2d_shape *shape) {
             shape->least_rho[k], k + 1 < DEM2DI_RHO_SECTORS ? shape->least_rho[k + 1] : first);
 }
 
-/* rho falls or rises all the way along a quadrant, so its least value is at a sector's end. */
+/* rho is monotone in each quadrant, so its least value in a sector is at an end of the sector. */
 static void dem2di_ellipse_least_rho(dem2d_shape *shape) {
     for (int k = 0; k < DEM2DI_RHO_SECTORS; k++) {
         dem2d_vec u = dem2di_vec(1, 0);
@@ -3202,12 +3205,13 @@ DEM2D_API dem2d_result dem2d_shape_create_ellipse(const dem2d_env *env, double a
     return DEM2D_OK;
 }
 
-/* Entry s of the table: the corner or arc whose sector holds the first direction of range s. */
+/* Entry s of the sector table: the corner or part that has the support point in the first direction
+   of sector s. */
 static void dem2di_fill_sectors(dem2d_shape *shape) {
     int sectors = shape->sectors, k = 0;
     for (int s = 0; s < sectors; s++) {
         dem2d_vec u = dem2di_sector_start(s, sectors);
-        if (s == 0) { /* the one start that is not beyond: the end before it gains, its own not */
+        if (s == 0) { /* the support value grows at the start of this part, not at its end */
             while (!(dem2di_dot(shape->tangents[(k + shape->parts - 1) % shape->parts], u) > 0 &&
                      dem2di_dot(shape->tangents[k], u) <= 0) &&
                    k + 1 < shape->parts)
@@ -3265,13 +3269,13 @@ DEM2D_API dem2d_result dem2d_shape_create_polygon(const dem2d_env *env, const de
     return result;
 }
 
-/* Bounds of an arc's distance from the origin and of its radius of curvature, by halving: each
-   piece is bounded by its control points. */
+/* Bounds of an arc's distance from the origin and of its radius of curvature, by halving: the
+   control points of a piece bound its values. */
 typedef struct dem2di_arc_bounds {
-    double outer;       /* greatest distance, never too small */
-    double inner;       /* least distance, never too large */
-    double rho;         /* least radius of curvature, never too large */
-    double attained[3]; /* values met: distance, distance, radius */
+    double outer;       /* upper bound of the distance */
+    double inner;       /* lower bound of the distance */
+    double rho;         /* lower bound of the radius of curvature */
+    double attained[3]; /* greatest distance, least distance, least radius at ends of pieces */
     double tolerance;   /* m */
 } dem2di_arc_bounds;
 
@@ -3282,8 +3286,9 @@ static double dem2di_segment_distance(dem2d_vec a, dem2d_vec b) {
     return dem2di_length(dem2di_along(a, dem2di_max(0, dem2di_min(1, t)), edge));
 }
 
-/* A lower bound of rho on a whole arc: B' x B''/18 is quadratic with the coefficients d0 x d1,
-   d0 x d2 / 2, d1 x d2, and |B'|/3 is at least the least projection of d0, d1, d2. */
+/* Lower bound of rho on an arc: B' x B''/18 is quadratic with the coefficients d0 x d1, d0 x d2 /
+   2, d1 x d2, and |B'|/3 is not below the least projection of d0, d1, d2 onto their mean
+   direction. */
 static double dem2di_arc_rho_lower(const dem2di_arc *arc) {
     dem2d_vec mean;
     dem2d_vec sum = dem2di_add(dem2di_add(arc->d0, arc->d1), arc->d2);
@@ -3295,7 +3300,7 @@ static double dem2di_arc_rho_lower(const dem2di_arc *arc) {
     return turn > 0 ? 1.5 * speed * (speed / turn * speed) : HUGE_VAL;
 }
 
-/* De Casteljau at 1/2, in differences. */
+/* De Casteljau's subdivision at 1/2, in differences. */
 static void dem2di_arc_halves(const dem2di_arc *arc, dem2di_arc half[2]) {
     dem2d_vec a = dem2di_scale(dem2di_add(arc->d0, arc->d1), 0.25);
     dem2d_vec b = dem2di_scale(dem2di_add(arc->d1, arc->d2), 0.25);
@@ -3320,7 +3325,7 @@ static void dem2di_bound_arc(dem2di_arc_bounds *bounds, const dem2di_arc *arc, i
     attained[1] = dem2di_min(attained[1], dem2di_min(ends[0], ends[1]));
     attained[2] =
         dem2di_min(attained[2], dem2di_min(dem2di_arc_rho(arc, 0), dem2di_arc_rho(arc, 1)));
-    /* the rounding of a large radius of curvature is above any part of the size */
+    /* a large radius of curvature has a rounding error above any part of the size */
     double small = dem2di_max(bounds->tolerance, 1e-6 * attained[2]);
     bool open = outer > attained[0] + bounds->tolerance ||
                 inner < attained[1] - bounds->tolerance || rho < attained[2] - small;
@@ -3336,8 +3341,7 @@ static void dem2di_bound_arc(dem2di_arc_bounds *bounds, const dem2di_arc *arc, i
     dem2di_bound_arc(bounds, &half[1], depth - 1);
 }
 
-/* The first difference of an arc that is longer than rounding, or the last; NULL when there is
-   none. */
+/* The first (or last) difference of an arc that is longer than rounding errors; NULL if none is. */
 static const dem2d_vec *dem2di_arc_side(const dem2di_arc *arc, double rounding, bool last) {
     const dem2d_vec *d[3] = {&arc->d0, &arc->d1, &arc->d2};
     for (int i = 0; i < 3; i++) {
@@ -3347,7 +3351,7 @@ static const dem2d_vec *dem2di_arc_side(const dem2di_arc *arc, double rounding, 
     return NULL;
 }
 
-/* An upper bound of rho on a whole arc, in the way of the lower one. */
+/* Upper bound of rho on an arc: see the lower one. */
 static double dem2di_arc_rho_upper(const dem2di_arc *arc) {
     double turn = dem2di_min(dem2di_cross(arc->d0, arc->d1), dem2di_cross(arc->d1, arc->d2));
     turn = dem2di_min(turn, dem2di_cross(arc->d0, arc->d2) / 2);
@@ -3356,8 +3360,8 @@ static double dem2di_arc_rho_upper(const dem2di_arc *arc) {
     return turn > 0 ? 1.5 * speed * (speed / turn * speed) : HUGE_VAL;
 }
 
-/* The greatest radius of curvature on an arc, at least what is known so far: from above, to a part
-   in 1000 (halving quarters what is too much), so that it is never too small. */
+/* Upper bound of rho on an arc, or `known` if that is greater, with a relative excess of 1e-3: each
+   halving divides the excess by four. */
 static double dem2di_arc_rho_search(const dem2di_arc *arc, double known, int depth) {
     known = dem2di_max(known, dem2di_max(dem2di_arc_rho(arc, 0), dem2di_arc_rho(arc, 1)));
     double ceiling = dem2di_arc_rho_upper(arc);
@@ -3368,7 +3372,7 @@ static double dem2di_arc_rho_search(const dem2di_arc *arc, double known, int dep
     return dem2di_arc_rho_search(&half[1], known, depth - 1);
 }
 
-/* 12 halvings: where curvature is lost in rounding, more would not end. */
+/* 12 halvings: where rounding errors hide the curvature, more would not end. */
 static double dem2di_arc_rho_max(const dem2di_arc *arc, double known) {
     return dem2di_arc_rho_search(arc, known, 12);
 }
@@ -3381,9 +3385,9 @@ static bool dem2di_arc_tangents(const dem2di_arc *arc, double rounding, dem2d_ve
     return first != NULL && last != NULL && dem2di_unit(*first, start) && dem2di_unit(*last, end);
 }
 
-/* Lower the least_rho of the sectors from the normal of one tangent to that of another. */
+/* Lower least_rho to rho in the sectors from the normal of one tangent to that of another. */
 static void dem2di_least_rho_lower(dem2d_shape *shape, dem2d_vec from, dem2d_vec to, double rho) {
-    /* widened by more than rounding can move them over the border of a sector */
+    /* widened, so that no rounding error moves them over the border of a sector */
     from = dem2di_along(from, -1e-12, dem2di_perp(from));
     to = dem2di_along(to, 1e-12, dem2di_perp(to));
     int k = dem2di_rho_sector(dem2di_negate(dem2di_perp(from)));
@@ -3394,8 +3398,8 @@ static void dem2di_least_rho_lower(dem2d_shape *shape, dem2d_vec from, dem2d_vec
     }
 }
 
-/* The same for an arc, by its bound of rho, in halves
-   while they turn by more than half a sector or the bound is far below what is attained. */
+/* The same for an arc, by its lower bound of rho. The arc is halved while it turns by more than
+   half a sector or the bound is far below the values at its ends. */
 static void dem2di_arc_least_rho(dem2d_shape *shape, const dem2di_arc *arc, int depth) {
     dem2d_vec from, to;
     if (!dem2di_arc_tangents(arc, 0, &from, &to)) return; /* a point */
@@ -3412,18 +3416,18 @@ static void dem2di_arc_least_rho(dem2d_shape *shape, const dem2di_arc *arc, int 
     dem2di_least_rho_lower(shape, from, to, rho);
 }
 
-/* A joint may turn by this much to be called smooth, and an arc to be called straight: coordinates
-   written with seven digits. */
+/* A joint with this sine between its tangents is smooth, and an arc that turns by it is straight:
+   the precision of coordinates with seven digits. */
 #define DEM2DI_SMOOTH 1e-6
 
-/* An arc shorter than this part of the size (2^-44, 256 eps) is a corner: rounding of its control
-   points leaves it no direction. */
+/* An arc shorter than this part of the size (2^-44 = 256 eps) is a corner: the rounding errors of
+   its control points leave it no direction. */
 #define DEM2DI_TINY (1.0 / 17592186044416.0)
 
-/* Lengths that mean nothing in a control polygon. */
+/* Lengths that are too short to have a direction in a control polygon, m. */
 typedef struct dem2di_limits {
-    double rounding; /* of the difference of two points */
-    double tiny;     /* an arc as short as that is a corner */
+    double rounding; /* rounding error of the difference of two points */
+    double tiny;     /* an arc not longer than this is a corner */
 } dem2di_limits;
 
 static double dem2di_arc_length(const dem2di_arc *arc) { /* of its control polygon */
@@ -3434,13 +3438,14 @@ static dem2d_vec dem2di_arc_chord(const dem2di_arc *arc) {
     return dem2di_add(dem2di_add(arc->d0, arc->d1), arc->d2);
 }
 
-/* Sine (times both lengths) that two differences may have by the rounding of their coordinates. */
+/* Cross product of two differences (of lengths la, lb) that still counts as parallel: by rounding
+   errors of coordinates or by the smoothness. */
 static double dem2di_turn_slack(double la, double lb, double rounding) {
     return dem2di_max(rounding * (la + lb), DEM2DI_SMOOTH * la * lb);
 }
 
-/* Does b turn left of a, or to the right within the smoothness, and not back? Differences within
-   rounding have no direction. */
+/* Does b turn left from a, or to the right within the smoothness, and not backwards? Also true for
+   differences within rounding errors, which have no direction. */
 static bool dem2di_turns_left(dem2d_vec a, dem2d_vec b, double rounding) {
     double la = dem2di_length(a), lb = dem2di_length(b), turn = dem2di_cross(a, b);
     if (la <= rounding || lb <= rounding) return true;
@@ -3448,18 +3453,18 @@ static bool dem2di_turns_left(dem2d_vec a, dem2d_vec b, double rounding) {
            (turn > rounding * (la + lb) || dem2di_dot(a, b) > 0);
 }
 
-/* Convex, turning left by at most pi, within the smoothness: every turn of the control polygon is
-   to the left, and so is the whole turn. */
+/* Is the arc convex, turning left by at most pi, within the smoothness? Every turn of the control
+   polygon is to the left, and so is the total turn. */
 static bool dem2di_arc_convex(const dem2di_arc *arc, double rounding) {
     const dem2d_vec *start = dem2di_arc_side(arc, rounding, false);
     const dem2d_vec *end = dem2di_arc_side(arc, rounding, true);
     double slack = dem2di_turn_slack(dem2di_length(*start), dem2di_length(*end), rounding);
     return dem2di_turns_left(arc->d0, arc->d1, rounding) &&
            dem2di_turns_left(arc->d1, arc->d2, rounding) &&
-           dem2di_cross(*start, *end) >= -2 * slack; /* of two turns */
+           dem2di_cross(*start, *end) >= -2 * slack; /* slack of two turns */
 }
 
-/* Is a joint smooth? `kink` gets the sine between the tangents. */
+/* Is the joint of two arcs smooth? kink gets the sine between the tangents. */
 static bool dem2di_joint_smooth(const dem2di_arc *before, const dem2di_arc *after, double rounding,
                                 double *kink) {
     dem2d_vec a = *dem2di_arc_side(before, rounding, true);
@@ -3469,7 +3474,8 @@ static bool dem2di_joint_smooth(const dem2di_arc *before, const dem2di_arc *afte
     return fabs(turn) <= dem2di_turn_slack(la, lb, rounding) && dem2di_dot(a, b) > 0;
 }
 
-/* Each arc is none but a tiny one or convex, and joints of two that are not tiny are smooth. */
+/* Check the caller's arcs: no arc is a point, each is tiny or convex, and joints of two arcs that
+   are not tiny are smooth. */
 static dem2d_result dem2di_check_arcs(const dem2d_env *env, const dem2di_arc *arcs, int count,
                                       bool reversed, dem2di_limits limits) {
     const dem2di_arc *before = &arcs[count - 1];
@@ -3509,27 +3515,28 @@ static void dem2di_arcs_from_control(const dem2d_vec *control, int count, bool r
     }
 }
 
-/* --- from the caller's arcs to the parts of the kernel ---
-   The kernel needs joints with one tangent, straight arcs that are straight to the bit, arcs that
-   turn by at most a right angle, and none too short to have a direction. Coordinates are rounded,
-   so that the caller's arcs are all this only to the smoothness. The control polygon is put right:
-   differences that should have one direction, and those that turn to the right, are tied together,
-   and the points between them are moved onto the chord of their group. The greatest way of a point
-   bounds how far the outline has moved, and goes into the error of every answer. */
+/* --- repair of the caller's arcs, for contacts ---
+   Contact detection needs joints with one tangent, straight arcs that are straight to the bit, arcs
+   that turn by at most a right angle, and no arc too short to have a direction. The caller's arcs
+   fulfil this only within the smoothness, because coordinates are rounded. The control polygon is
+   repaired: differences that should have one direction, and those that turn to the right, are tied
+   into a group, and the points between them are moved onto the chord of the group. The greatest
+   displacement of a point bounds that of the outline and is part of the error of every contact. */
 
 /* The control polygon of all arcs that are not tiny, as differences. */
 typedef struct dem2di_chain {
     int count;        /* of differences, three for each arc */
     dem2d_vec *start; /* of each arc */
     dem2d_vec *d;
-    bool *tied; /* does d[k] have the direction of d[k + 1]? */
+    bool *tied; /* d[k] gets the direction of d[k + 1] */
     dem2di_limits limits;
-    double noise; /* m, rounding of the coordinates as kinks and dents show it */
-    /* m, greatest ways of a point: to corners of tiny arcs, onto chords, to corners of parts */
+    double noise; /* m, rounding errors of the coordinates as kinks and dents show them */
+    /* m, greatest displacement of a point: into corners of tiny arcs, onto chords, into corners of
+       parts */
     double cornered, aligned, parted;
 } dem2di_chain;
 
-/* The first difference at an end of an arc that is not tiny. */
+/* The difference at an end of an arc, or the next one that is not tiny. */
 static dem2d_vec *dem2di_chain_side(const dem2di_chain *chain, int arc, bool last) {
     dem2d_vec *d = &chain->d[3 * arc + (last ? 2 : 0)];
     if (dem2di_length(*d) <= chain->limits.tiny) d = &chain->d[3 * arc + 1];
@@ -3537,7 +3544,7 @@ static dem2d_vec *dem2di_chain_side(const dem2di_chain *chain, int arc, bool las
     return &chain->d[3 * arc + (last ? 0 : 2)];
 }
 
-/* A tiny corner between two arcs: they meet in the middle of it. */
+/* Tiny arcs between two arcs become a corner: the two meet in the middle of the chord. */
 static void dem2di_chain_corner(dem2di_chain *chain, int before, int after, dem2d_vec way,
                                 double length) {
     dem2d_vec half = dem2di_scale(way, 0.5), *end = dem2di_chain_side(chain, before, true);
@@ -3549,10 +3556,10 @@ static void dem2di_chain_corner(dem2di_chain *chain, int before, int after, dem2
     chain->cornered = dem2di_max(chain->cornered, length / 2); /* to the middle of its chord */
 }
 
-/* The arcs that are not tiny, from the first of them on. False when they are less than two. */
+/* Fill the chain with the arcs that are not tiny. False if there are less than two. */
 static bool dem2di_chain_set(dem2di_chain *chain, const dem2di_arc *arcs, int count) {
     int first = 0, kept = 0;
-    double length = 0; /* of the tiny ones since the last that was kept */
+    double length = 0; /* of the tiny arcs after the last that was kept */
     dem2d_vec way = dem2di_vec(0, 0);
     while (first < count && dem2di_arc_length(&arcs[first]) <= chain->limits.tiny) first++;
     for (int i = 0; i < count && first < count; i++) {
@@ -3580,8 +3587,8 @@ static bool dem2di_chain_set(dem2di_chain *chain, const dem2di_arc *arcs, int co
     return true;
 }
 
-/* How far the coordinates are rounded: by kinks of joints, and where the control polygon turns to
-   the right, as ways of the point between two differences onto their chord. */
+/* Estimate the rounding errors of the coordinates from kinks of joints and from turns to the right:
+   distance of the point between two differences from their chord. */
 static void dem2di_chain_noise(dem2di_chain *chain) {
     chain->noise = chain->limits.rounding / 8; /* of one coordinate */
     for (int k = 0; k < chain->count; k++) {
@@ -3592,9 +3599,9 @@ static void dem2di_chain_noise(dem2di_chain *chain) {
     }
 }
 
-/* Is the arc from difference k on straight, and in line with all that is tied to its ends: to the
-   smoothness, and to four times the rounding of the coordinates? The greatest of a few errors is
-   seldom below a quarter of another. */
+/* Is the arc of differences k to k + 2 straight, and in line with all differences tied to its ends?
+   Allowed are the smoothness and four times the estimated rounding error of the coordinates: the
+   greatest of a few errors is seldom below a quarter of another. */
 static bool dem2di_chain_straight(const dem2di_chain *chain, int k) {
     int n = chain->count, from = k, last = k + 2, left = n - 3;
     double rounding = chain->limits.rounding;
@@ -3614,7 +3621,7 @@ static bool dem2di_chain_straight(const dem2di_chain *chain, int k) {
     return true;
 }
 
-/* Tie what is too short to have a direction to what is beside it, and what is straight. */
+/* Tie differences that are too short to have a direction to their neighbours, and straight arcs. */
 static void dem2di_chain_tie(dem2di_chain *chain) {
     double rounding = chain->limits.rounding;
     dem2di_chain_noise(chain);
@@ -3627,7 +3634,7 @@ static void dem2di_chain_tie(dem2di_chain *chain) {
         if (dem2di_chain_straight(chain, k)) chain->tied[k] = chain->tied[k + 1] = true;
 }
 
-/* The sum of a group from a difference on; `end` is its last. */
+/* The sum of a group of tied differences from a difference on; *end is the last of the group. */
 static dem2d_vec dem2di_chain_sum(const dem2di_chain *chain, int from, int *end) {
     dem2d_vec sum = chain->d[from];
     for (*end = from; chain->tied[*end];) {
@@ -3637,14 +3644,14 @@ static dem2d_vec dem2di_chain_sum(const dem2di_chain *chain, int from, int *end)
     return sum;
 }
 
-/* The first difference of a group; -1 when all are tied. */
+/* The first difference of a group; -1 if all are tied. */
 static int dem2di_chain_first(const dem2di_chain *chain) {
     for (int k = 0; k < chain->count; k++)
         if (!chain->tied[k]) return (k + 1) % chain->count;
     return -1;
 }
 
-/* Once around: tie groups that turn to the right. True when there was none. */
+/* Once around: tie neighbouring groups that turn to the right. True if there was none. */
 static bool dem2di_chain_pool(dem2di_chain *chain, int first) {
     int n = chain->count, from = first, last = (first + n - 1) % n;
     bool none = true;
@@ -3656,7 +3663,7 @@ static bool dem2di_chain_pool(dem2di_chain *chain, int first) {
     for (int i = 0; i < n; i++) {
         int k = (first + i) % n;
         sum = dem2di_add(sum, chain->d[k]);
-        if (chain->tied[k]) continue; /* also by the first group of this round */
+        if (chain->tied[k]) continue; /* perhaps by the first group of this round */
         if (dem2di_cross(before, sum) < 0) {
             chain->tied[(from + n - 1) % n] = true;
             none = false;
@@ -3669,8 +3676,8 @@ static bool dem2di_chain_pool(dem2di_chain *chain, int first) {
     return none;
 }
 
-/* One direction for a group: its points onto its chord. False when one of its differences is off
-   by more than joints and arcs that are smooth can make it, both ends together. */
+/* Move the points of a group onto its chord. False if a difference is off by more than smooth
+   joints and arcs allow at both ends together. */
 static bool dem2di_chain_align(dem2di_chain *chain, int from, int *end) {
     int n = chain->count;
     dem2d_vec along, shift = dem2di_vec(0, 0), sum = dem2di_chain_sum(chain, from, end);
@@ -3684,7 +3691,7 @@ static bool dem2di_chain_align(dem2di_chain *chain, int from, int *end) {
         if (length > 0) worst = dem2di_max(worst, off / length);
         last = k == *end;
     }
-    if (worst <= 4 * DBL_EPSILON) return true; /* as it is */
+    if (worst <= 4 * DBL_EPSILON) return true; /* already aligned */
     for (int k = from; k != *end; k = (k + 1) % n) {
         dem2d_vec old = chain->d[k];
         chain->d[k] = dem2di_scale(along, dem2di_max(0, dem2di_dot(old, along)));
@@ -3697,10 +3704,10 @@ static bool dem2di_chain_align(dem2di_chain *chain, int from, int *end) {
     return true;
 }
 
-/* Rounds of ties: one does for errors of coordinates, which are few and apart. */
+/* Limit of rounds of ties: one is enough for rounding errors of coordinates that are far apart. */
 #define DEM2DI_CHAIN_ROUNDS 64
 
-/* The control polygon convex and smooth. False when it is not so to the smoothness. */
+/* Make the control polygon convex and smooth. False if it is not so within the smoothness. */
 static bool dem2di_chain_repair(dem2di_chain *chain) {
     int first, end;
     dem2di_chain_tie(chain);
@@ -3717,7 +3724,7 @@ static bool dem2di_chain_repair(dem2di_chain *chain) {
     return true;
 }
 
-/* De Casteljau at t, in differences. */
+/* De Casteljau's subdivision at t, in differences. */
 static void dem2di_arc_split(const dem2di_arc *arc, double t, dem2di_arc half[2]) {
     double s = 1 - t;
     dem2d_vec a = dem2di_along(dem2di_scale(arc->d0, s), t, arc->d1);
@@ -3733,7 +3740,7 @@ static void dem2di_arc_split(const dem2di_arc *arc, double t, dem2di_arc half[2]
     half[1].d2 = dem2di_scale(arc->d2, s);
 }
 
-/* An arc that turns by more than a right angle as two, cut where it has turned by half. */
+/* Divide an arc that turns by more than a right angle in two, where it has turned by half. */
 static int dem2di_arc_parts(dem2di_chain *chain, const dem2di_arc *arc, dem2di_arc part[2]) {
     dem2d_vec start, end, tangent;
     part[0] = *arc;
@@ -3745,7 +3752,7 @@ static int dem2di_arc_parts(dem2di_chain *chain, const dem2di_arc *arc, dem2di_a
     double t = dem2di_arc_parameter(dem2di_dot(arc->d0, u), dem2di_dot(arc->d1, u),
                                     dem2di_dot(arc->d2, u));
     dem2di_arc_split(arc, t, part);
-    for (int i = 0; i < 2; i++) { /* one that is tiny becomes a corner */
+    for (int i = 0; i < 2; i++) { /* a tiny part becomes a corner */
         double length = dem2di_arc_length(&part[i]);
         if (length > chain->limits.tiny) continue;
         dem2d_vec way = dem2di_arc_chord(&part[i]);
@@ -3759,7 +3766,7 @@ static int dem2di_arc_parts(dem2di_chain *chain, const dem2di_arc *arc, dem2di_a
     return 2;
 }
 
-/* Of corners that follow each other one stays. */
+/* Keep one of several corners in a row. */
 static int dem2di_join_corners(dem2di_arc *part, int count) {
     int kept = 0;
     for (int k = 0; k < count; k++) {
@@ -3769,12 +3776,12 @@ static int dem2di_join_corners(dem2di_arc *part, int count) {
     return kept;
 }
 
-/* The parts, up to three for each arc: curved arcs, straight ones, each as long as it goes, and
-   corners. Returns how many. */
+/* The parts, up to three for each arc: curved arcs, straight arcs, each of greatest length, and
+   corners. Returns their number. */
 static int dem2di_chain_parts(dem2di_chain *chain, dem2di_arc *part) {
     int arcs = chain->count / 3, first = 0, count = 0;
     const bool *tied = chain->tied;
-    /* not in the middle of a straight line */
+    /* do not start in the middle of a straight line */
     while (first < arcs && tied[3 * first] && tied[3 * first + 1] &&
            tied[(3 * first + chain->count - 1) % chain->count])
         first++;
@@ -3805,7 +3812,7 @@ static int dem2di_chain_parts(dem2di_chain *chain, dem2di_arc *part) {
     return dem2di_join_corners(part, count);
 }
 
-/* The parts of arcs that were checked: there is room for three times as many. */
+/* The parts of checked arcs; `part` has room for three parts of each arc. */
 static dem2d_result dem2di_bezier_parts(const dem2d_env *env, const dem2di_arc *given, int count,
                                         dem2di_limits limits, dem2di_arc *part, int *parts,
                                         double *moved) {
@@ -3826,8 +3833,8 @@ static dem2d_result dem2di_bezier_parts(const dem2d_env *env, const dem2di_arc *
                        DEM2DI_SMOOTH);
 }
 
-/* Unit tangents where the parts end; those of straight arcs also where the part before ends, to the
-   bit, so that no support point is looked for on one. */
+/* Unit tangents at the ends of parts. The part before a straight arc has exactly the same tangent
+   as the straight arc, so that no direction selects the straight arc itself. */
 static void dem2di_bezier_tangents(dem2d_shape *shape, double rounding) {
     int n = shape->parts;
     dem2d_vec start, unused;
@@ -3843,7 +3850,7 @@ static void dem2di_bezier_tangents(dem2d_shape *shape, double rounding) {
     }
 }
 
-/* How often the parts turn around: each turns by pi at most. */
+/* Number of full turns of all parts; each part turns by pi at most. */
 static int dem2di_bezier_turns(const dem2d_shape *shape) {
     int turns = 0;
     for (int k = 0; k < shape->parts; k++)
@@ -3852,14 +3859,14 @@ static int dem2di_bezier_turns(const dem2d_shape *shape) {
     return turns;
 }
 
-/* Everything about a polybezier that follows from its parts. */
+/* All fields of a polybezier that follow from its parts. */
 static void dem2di_finish_bezier(dem2d_shape *shape) {
     dem2di_arc_bounds bounds;
     bounds.outer = 0;
     bounds.inner = bounds.rho = HUGE_VAL;
     bounds.attained[0] = 0;
     bounds.attained[1] = bounds.attained[2] = HUGE_VAL;
-    /* 1e-9 of the size is below any tolerance of a contact; 40 halvings are beyond doubles */
+    /* 1e-9 of the size is below the tolerance of any contact; 40 halvings are enough for doubles */
     bounds.tolerance = 1e-9 * sqrt(shape->mass.area);
     for (int k = 0; k < shape->parts; k++) dem2di_bound_arc(&bounds, &shape->arcs[k], 40);
     shape->circumscribed = bounds.outer + shape->deviation;
@@ -3878,18 +3885,18 @@ static void dem2di_finish_bezier(dem2d_shape *shape) {
             dem2di_least_rho_lower(shape, before, shape->tangents[k], 0);
         }
     }
-    for (int k = 0; k < DEM2DI_RHO_SECTORS; k++) /* a sector no arc has come to has no bound */
+    for (int k = 0; k < DEM2DI_RHO_SECTORS; k++) /* sectors without an arc */
         if (!dem2di_finite(shape->least_rho[k])) shape->least_rho[k] = shape->rho_min;
     dem2di_least_rho_join(shape);
     dem2di_fill_sectors(shape);
     dem2di_find_edges(shape);
 }
 
-/* Arcs about their centroid; its place before is the offset. */
+/* Move arcs so that their centroid is the origin; offset gets the old centroid. */
 static dem2d_mass dem2di_bezier_centre(dem2di_arc *arcs, int count, dem2d_vec *offset) {
     dem2d_mass mass;
     *offset = dem2di_vec(0, 0);
-    for (int pass = 0; pass < 2; pass++) { /* the second makes the moments central */
+    for (int pass = 0; pass < 2; pass++) { /* the second pass gives moments about the centroid */
         mass = dem2di_bezier_mass(arcs, count);
         for (int k = 0; k < count; k++) arcs[k].start = dem2di_sub(arcs[k].start, mass.centroid);
         *offset = dem2di_add(*offset, mass.centroid);
@@ -3898,7 +3905,7 @@ static dem2d_mass dem2di_bezier_centre(dem2di_arc *arcs, int count, dem2d_vec *o
     return mass;
 }
 
-/* A polybezier of arcs that were checked. `work` has room for three times as many. */
+/* A polybezier of checked arcs; `work` has room for three parts of each arc. */
 static dem2d_result dem2di_bezier_make(const dem2d_env *env, dem2di_arc *arcs, int count,
                                        dem2di_limits limits, dem2di_arc *work,
                                        dem2d_shape **shape) {
@@ -3924,7 +3931,7 @@ static dem2d_result dem2di_bezier_make(const dem2d_env *env, dem2di_arc *arcs, i
     return dem2di_shape_finish(made, shape);
 }
 
-/* Twice around three parts for each arc is the longest way of an index: half of an int. */
+/* Indices go up to twice around three parts for each arc: that is half of INT_MAX. */
 #define DEM2DI_MAX_ARCS (INT_MAX / 12)
 
 DEM2D_API dem2d_result dem2d_shape_create_bezier(const dem2d_env *env, const dem2d_vec *control,
@@ -3944,7 +3951,7 @@ DEM2D_API dem2d_result dem2d_shape_create_bezier(const dem2d_env *env, const dem
     dem2di_limits limits;
     limits.rounding = 8 * DBL_EPSILON * size;
     limits.tiny = dem2di_max(DEM2DI_TINY * extent, 4 * limits.rounding); /* has a direction */
-    size_t n = (size_t)arcs, each = 4 * sizeof(dem2di_arc); /* the arcs, and work on their parts */
+    size_t n = (size_t)arcs, each = 4 * sizeof(dem2di_arc); /* an arc, and room for three parts */
     dem2di_arc *work = (dem2di_arc *)dem2di_allocate(env, n, each);
     if (work == NULL) return dem2di_fail(env, DEM2D_OUT_OF_MEMORY, -1, "%d arcs", arcs);
     dem2di_arcs_from_control(control, arcs, area < 0, work);
@@ -3954,8 +3961,8 @@ DEM2D_API dem2d_result dem2d_shape_create_bezier(const dem2d_env *env, const dem
     return result;
 }
 
-/* Rounding of rho of a series: its bound is found to 2e-14 of the sum of terms, and each of the
-   terms is rounded about n times. */
+/* Rounding error of rho of a series, relative to the sum of its terms: its bound is found to 2e-14,
+   and term n has about n rounding errors. */
 #define DEM2DI_SERIES_TOLERANCE 2e-14
 #define DEM2DI_SERIES_ROUNDING 6e-14
 
@@ -3987,7 +3994,7 @@ static dem2d_convexity dem2di_convexity(const double *a, const double *b, int or
     return convexity;
 }
 
-/* Bound of rho in each sector: Taylor's in each quarter of it. */
+/* Lower bound of rho in each sector, by Taylor's formula in each quarter of it. */
 static void dem2di_fourier_least_rho(dem2d_shape *shape, const double *a, const double *b) {
     dem2di_series radius = dem2di_series_make(a, b, shape->count, true, 1);
     double rounding = DEM2DI_SERIES_ROUNDING * radius.size, d[3];
@@ -3999,7 +4006,7 @@ static void dem2di_fourier_least_rho(dem2d_shape *shape, const double *a, const 
         dem2d_rot q;
         q.c = u.x;
         q.s = u.y;
-        /* tangents are above the angles */
+        /* tangents of the half angles: upper bounds of the half angles */
         double half = dem2di_max(dem2di_cross(v, u) / dem2di_dot(v, u),
                                  dem2di_cross(u, w) / dem2di_dot(u, w));
         double value = dem2di_series_value(&radius, dem2d_rot_angle(q), d);
@@ -4022,7 +4029,7 @@ static void dem2di_fourier_term(dem2d_shape *shape, int n, double a, double b) {
     block->square[j] = (double)n * n;
 }
 
-/* Everything about an FS shape but its coefficients a, b (already about the centroid). */
+/* All fields of an FS shape that follow from its coefficients a, b about the centroid. */
 static void dem2di_finish_fourier(dem2d_shape *shape, const double *a, const double *b,
                                   double rho_min) {
     int order = shape->count;
@@ -4048,7 +4055,7 @@ DEM2D_API dem2d_result dem2d_shape_create_fourier(const dem2d_env *env, const do
     if (!convexity.exact)
         return dem2di_fail(env, DEM2D_NEGATIVE_CURVATURE, -1, "the least radius of curvature is %g",
                            convexity.rho_min_lower);
-    /* a1, b1 move the shape; at least order 1 is worked with, so that it can be recentred */
+    /* a1, b1 move the shape: the copy has at least order 1, so that it can be recentred */
     int terms = order > 1 ? order + 1 : 2;
     double *copy = (double *)dem2di_allocate(env, (size_t)terms, 2 * sizeof *copy);
     if (copy == NULL) return dem2di_fail(env, DEM2D_OUT_OF_MEMORY, -1, "order %d", order);
@@ -4061,7 +4068,7 @@ DEM2D_API dem2d_result dem2d_shape_create_fourier(const dem2d_env *env, const do
     if (made != NULL) {
         made->offset = dem2di_vec(ca[1], cb[1]); /* the Steiner point */
         ca[1] = cb[1] = 0;
-        for (int pass = 0; pass < 2; pass++) { /* the second makes the moments central */
+        for (int pass = 0; pass < 2; pass++) { /* the second gives moments about the centroid */
             made->mass = dem2di_fourier_mass(ca, cb, terms - 1);
             ca[1] -= made->mass.centroid.x;
             cb[1] -= made->mass.centroid.y;
@@ -4135,12 +4142,13 @@ DEM2D_API dem2d_result dem2d_shape_get(const dem2d_shape *shape, dem2d_shape_inf
     return DEM2D_OK;
 }
 
-/* Unit to rounding: kept to the bit, so that exact rotations stay exact. */
+/* Is (x, y) a unit vector within rounding errors? It is then not normalised again, so that exact
+   rotations stay exact. */
 static bool dem2di_is_unit(double x, double y) {
     return fabs(x * x + y * y - 1) <= 4 * DBL_EPSILON;
 }
 
-/* A pose that a caller gave: finite, rotation not zero (made unit), scale above 0. */
+/* Check a caller's pose (finite, rotation not zero, scale above 0) and normalise its rotation. */
 static dem2d_result dem2di_check_pose(dem2d_pose *pose) {
     dem2d_vec rotation = dem2di_vec(pose->rotation.c, pose->rotation.s);
     if (!dem2di_vec_finite(pose->position) || !dem2di_vec_finite(rotation) ||
@@ -4154,23 +4162,23 @@ static dem2d_result dem2di_check_pose(dem2d_pose *pose) {
     return DEM2D_OK;
 }
 
-/* A support point of a template at a pose, relative to its position. */
+/* A point of a template at a pose, relative to the pose's position. */
 static dem2d_vec dem2di_at_pose(const dem2d_pose *pose, dem2d_vec s) {
     return dem2di_scale(dem2di_turn(pose->rotation, s), pose->scale);
 }
 
-/* Are the arcs that the caller gave other ones than the parts that the kernel works with? */
+/* Do the parts for contacts differ from the caller's arcs by more than rounding errors? */
 static bool dem2di_deviates(const dem2d_shape *shape) {
     return shape->deviation > DEM2DI_ROUNDING * shape->circumscribed;
 }
 
-/* Where an arc of any form turns along a direction: 0, up to two parameters in order, and 1.
-   Returns how many. */
+/* Parameters where an arc of any form may have its extreme along a direction: 0, up to two zeros of
+   the derivative in order, and 1. Returns their number. */
 static int dem2di_arc_extrema(const dem2di_arc *arc, dem2d_vec u, double t[4]) {
     double q0 = dem2di_dot(arc->d0, u), q1 = dem2di_dot(arc->d1, u), q2 = dem2di_dot(arc->d2, u);
     double square = q1 * q1 - q0 * q2, root = square > 0 ? sqrt(square) : 0;
-    double sum = q1 > 0 ? q1 + root : q1 - root;  /* of like signs */
-    double part[2][2] = {{sum, -q2}, {q0, -sum}}; /* t over 1 - t, of both roots */
+    double sum = q1 > 0 ? q1 + root : q1 - root;  /* nothing cancels */
+    double part[2][2] = {{sum, -q2}, {q0, -sum}}; /* t : 1 - t for both roots */
     int count = 1;
     t[0] = 0;
     for (int i = 0; i < 2 && square > 0; i++) {
@@ -4186,7 +4194,7 @@ static int dem2di_arc_extrema(const dem2di_arc *arc, dem2d_vec u, double t[4]) {
     return count;
 }
 
-/* Support point of a template as it was given: all arcs are looked at where they deviate. */
+/* Support point of the caller's arcs; all of them are evaluated if the parts differ from them. */
 static dem2d_vec dem2di_given_support(const dem2d_shape *shape, dem2d_vec u, double *rho) {
     dem2d_vec best = dem2di_support(shape, u, rho);
     if (!dem2di_deviates(shape)) return best;
@@ -4211,9 +4219,10 @@ static dem2d_vec dem2di_posed_given(const dem2d_shape *shape, const dem2d_pose *
     return dem2di_at_pose(pose, s);
 }
 
-/* From a point on the parts, where u is normal, straight along u to the hull of the arcs that were
-   given: between support points of directions to both sides, halved to rounding. Beyond the last
-   one (beside a corner) there is nothing along u: to that support point. */
+/* From a point on the parts with the normal u, along u to the hull of the caller's arcs: the
+   segment between two support points, of directions on both sides of u, which are halved until only
+   rounding errors are left. If no point of the hull is along u (beside a corner), the nearest
+   support point. */
 static dem2d_vec dem2di_given_point(const dem2d_shape *shape, dem2d_vec u, dem2d_vec point) {
     double place = dem2di_cross(u, point), at[2];
     dem2d_vec end[2], s[2], way, v;
@@ -4230,7 +4239,7 @@ static dem2d_vec dem2di_given_point(const dem2d_shape *shape, dem2d_vec u, dem2d
         if (beyond == 0) break;
     }
     if (beyond != 0) return s[beyond > 0];
-    /* 60 halvings are below rounding */
+    /* 60 halvings reach rounding errors */
     for (int i = 0; i < 60 && dem2di_cross(end[0], end[1]) > 2 * DBL_EPSILON; i++) {
         if (!dem2di_unit(dem2di_add(end[0], end[1]), &v)) break;
         way = dem2di_given_support(shape, v, NULL);
@@ -4273,7 +4282,7 @@ DEM2D_API dem2d_result dem2d_shape_aabb(const dem2d_shape *shape, dem2d_pose pos
     return DEM2D_OK;
 }
 
-/* From template coordinates to the pose's. */
+/* A point of a template at a pose. */
 static dem2d_vec dem2di_place(const dem2d_pose *pose, dem2d_vec point) {
     return dem2di_along(pose->position, pose->scale, dem2di_turn(pose->rotation, point));
 }
@@ -4289,13 +4298,13 @@ DEM2D_API dem2d_result dem2d_shape_outline(const dem2d_shape *shape, dem2d_pose 
     return DEM2D_OK;
 }
 
-/* Part of a shape's area that its outline polygon may leave out, where it stands for the shape: no
-   part of it is then wrong by more. Points are doubled until that holds; their cap is for custom
-   shapes, whose area is what the caller says. */
+/* Relative area that an outline polygon may lack where it represents a shape: no part of the area
+   then has a greater error. The points are doubled until that holds; their limit is for custom
+   shapes, whose area the caller may give. */
 #define DEM2DI_OUTLINE_DEFECT 1e-5
 #define DEM2DI_OUTLINE_CAP 65536
 
-/* As many points for each corner or arc, so that regular shapes have regular polygons. */
+/* A multiple of the number of corners or arcs, so that regular shapes have regular polygons. */
 static int dem2di_fine_count(const dem2d_shape *shape) {
     int parts = shape->count > 0 ? shape->count : 1;
     if (shape->type == DEM2D_POLYGON && shape->rounding == 0) return parts;
@@ -4306,17 +4315,17 @@ static int dem2di_fine_count(const dem2d_shape *shape) {
     return points;
 }
 
-/* Second moments of area about the centroid, along axes turned by q. In these axes a needle keeps
-   its width: the sums of the two directions never meet. Of a triangle with the centroid's corner:
-   area / 12 ((a + b)(a + b) + aa + bb). */
+/* Second moments of area about the centroid, in axes turned by q. Along its own axes the width of a
+   needle keeps its digits: the sums of the two directions are never added. A triangle of the
+   centroid, a and b has area / 12 ((a + b)(a + b) + aa + bb). */
 static void dem2di_second_triangle(dem2di_tensor *sum, dem2d_vec a, dem2d_vec b) {
-    double sixth = dem2di_cross(a, b) / 12; /* of the triangle's area */
+    double sixth = dem2di_cross(a, b) / 12; /* a sixth of the triangle's area */
     dem2di_tensor_add(sum, sixth, a, a);
     dem2di_tensor_add(sum, sixth, a, b);
     dem2di_tensor_add(sum, sixth, b, b);
 }
 
-/* Of a polygon; of a custom shape, as for its mass, the polygon through outline points. */
+/* Of the polygon through outline points, which is exact for sharp polygons. */
 static dem2di_tensor dem2di_second_polygon(const dem2d_shape *shape, int points, dem2d_rot q) {
     dem2di_tensor sum = {0, 0, 0};
     dem2d_vec a = dem2di_turn_back(q, dem2di_outline_point(shape, 0, points));
@@ -4328,9 +4337,9 @@ static dem2di_tensor dem2di_second_polygon(const dem2d_shape *shape, int points,
     return sum;
 }
 
-/* The rounding at a corner: a sector of radius r about c, from direction `in` on by an angle. About
-   its apex it has, along its middle w, r^4/8 (angle + sin angle), across r^4/8 (angle - sin angle),
-   and the first moment 2/3 r^3 sin(angle/2) w. */
+/* Of the circular sector at a corner: apex c, radius r, first direction `in`, an angle. About its
+   apex it has r^4/8 (angle + sin angle) along its bisector w, r^4/8 (angle - sin angle) across, and
+   the first moment 2/3 r^3 sin(angle/2) w. */
 static void dem2di_second_sector(dem2di_tensor *sum, dem2d_vec c, double r, dem2d_vec in,
                                  double angle) {
     dem2d_rot half = dem2d_rot_make(angle / 2);
@@ -4342,7 +4351,7 @@ static void dem2di_second_sector(dem2di_tensor *sum, dem2d_vec c, double r, dem2
     dem2di_tensor_add(sum, fourth * (angle - sine), across, across);
 }
 
-/* A rounded polygon: the polygon of its corners, a rectangle on each edge, a sector at each
+/* Of a rounded polygon: the polygon of its corners, a rectangle on each edge, a sector at each
    corner. */
 static dem2di_tensor dem2di_second_rounded(const dem2d_shape *shape, dem2d_rot q) {
     dem2di_tensor sum = {0, 0, 0};
@@ -4369,7 +4378,8 @@ static dem2di_tensor dem2di_second_rounded(const dem2d_shape *shape, dem2d_rot q
     return sum;
 }
 
-/* 1/4 int ss (s x ds), degree 11 in an arc's parameter: six points are exact, as for the mass. */
+/* Of a polybezier: 1/4 int ss (s x ds) has degree 11 in an arc's parameter, six points are
+   exact. */
 static dem2di_tensor dem2di_second_bezier(const dem2d_shape *shape, dem2d_rot q) {
     dem2di_tensor sum = {0, 0, 0};
     for (int k = 0; k < shape->count; k++)
@@ -4382,7 +4392,7 @@ static dem2di_tensor dem2di_second_bezier(const dem2d_shape *shape, dem2d_rot q)
     return sum;
 }
 
-/* 1/4 int ss h rho dt, degree 4N + 2: more points than that are exact. */
+/* Of an FS: 1/4 int ss h rho dt has degree 4N + 2, more points than that are exact. */
 static dem2di_tensor dem2di_second_fourier(const dem2d_shape *shape, dem2d_rot q) {
     dem2di_tensor sum = {0, 0, 0};
     int points = 4 * shape->count + 8;
@@ -4396,7 +4406,8 @@ static dem2di_tensor dem2di_second_fourier(const dem2d_shape *shape, dem2d_rot q
     return sum;
 }
 
-/* terms: how many are summed, for the rounding. */
+/* Of any template but circles and ellipses; *terms is the number of summands, for rounding
+   errors. */
 static dem2di_tensor dem2di_second_moments(const dem2d_shape *shape, dem2d_rot q, int *terms) {
     *terms = shape->count;
     if (shape->type == DEM2D_BEZIER) return dem2di_second_bezier(shape, q);
@@ -4407,8 +4418,8 @@ static dem2di_tensor dem2di_second_moments(const dem2d_shape *shape, dem2d_rot q
 }
 
 /* The long axis, in (-pi/2, pi/2], and the ratio of the radii of gyration; 0 and 1 if the moments
-   differ by no more than their rounding. The second sum, along the axis found, is nearly diagonal:
-   its own axis is a small correction, and a needle's width does not drown in its length. */
+   differ only by rounding errors. The moments are computed again in the axes found: the tensor is
+   then nearly diagonal, its axis is a small correction, and a needle's width keeps its digits. */
 static double dem2di_axis(const dem2d_shape *shape, double *ratio) {
     int terms;
     *ratio = 1;
