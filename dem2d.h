@@ -2155,36 +2155,6 @@ static void dem2di_release(const dem2d_env *env, void *memory, size_t count, siz
         free(memory);
 }
 
-/* Arrays of one length, which grow together. */
-typedef struct dem2di_column {
-    void **array;
-    size_t size; /* of an element */
-} dem2di_column;
-
-#define DEM2DI_COLUMNS 8 /* at most */
-
-static bool dem2di_columns_reserve(const dem2d_env *env, const dem2di_column *columns, int count,
-                                   int *capacity, int grown) {
-    void *made[DEM2DI_COLUMNS];
-    size_t old = (size_t)*capacity, longer = (size_t)grown;
-    if (grown <= *capacity) return true;
-    for (int k = 0; k < count; k++) {
-        made[k] = dem2di_allocate(env, longer, columns[k].size);
-        if (made[k] != NULL) continue;
-        while (k-- > 0) dem2di_release(env, made[k], longer, columns[k].size);
-        return false;
-    }
-    for (int k = 0; k < count; k++) {
-        size_t size = columns[k].size;
-        if (old > 0) memcpy(made[k], *columns[k].array, old * size);
-        memset((char *)made[k] + old * size, 0, (longer - old) * size);
-        dem2di_release(env, *columns[k].array, old, size);
-        *columns[k].array = made[k];
-    }
-    *capacity = grown;
-    return true;
-}
-
 /* A new capacity for at least `needed` elements: it grows by half, for arrays that grow one by
    one. */
 static int dem2di_growth(int capacity, int needed) {
@@ -2192,12 +2162,27 @@ static int dem2di_growth(int capacity, int needed) {
     return needed <= capacity ? capacity : grown < needed ? needed : grown;
 }
 
+/* A copy of an array with room for more elements, which are all zero; NULL without memory. */
+static void *dem2di_lengthened(const dem2d_env *env, const void *array, size_t size, int old,
+                               int grown) {
+    size_t used = (size_t)old * size, more = (size_t)(grown - old) * size;
+    void *made = dem2di_allocate(env, (size_t)grown, size);
+    if (made == NULL) return NULL;
+    if (used > 0) memcpy(made, array, used);
+    memset((char *)made + used, 0, more);
+    return made;
+}
+
 static bool dem2di_reserve(const dem2d_env *env, void **array, int *capacity, int needed,
                            size_t size) {
-    dem2di_column column;
-    column.array = array;
-    column.size = size;
-    return dem2di_columns_reserve(env, &column, 1, capacity, dem2di_growth(*capacity, needed));
+    int grown = dem2di_growth(*capacity, needed);
+    if (grown == *capacity) return true;
+    void *made = dem2di_lengthened(env, *array, size, *capacity, grown);
+    if (made == NULL) return false;
+    dem2di_release(env, *array, (size_t)*capacity, size);
+    *array = made;
+    *capacity = grown;
+    return true;
 }
 
 /* Errors of numbers: each names the field and the value. */
@@ -10618,9 +10603,9 @@ typedef struct dem2di_push {
    of the wall, then of the particle's id). Each at the last force pass and in the one being made.
    What the scene has no use for is not there. */
 typedef struct dem2di_list {
-    dem2di_key *keys;                   /* count; a < 0 when the contact was forgotten */
-    bool *touched; /* circles: may the two have touched at the last force pass? Until one is made
-                      with this list: see dem2di_touched */
+    dem2di_key *keys; /* count; a < 0 when the contact was forgotten */
+    bool *touched;    /* circles: may the two have touched at the last force pass? Until one is made
+                         with this list: see dem2di_touched */
     int discs, pairs, count;            /* where the kinds end */
     double *shear, *next_shear;         /* circles with friction: the tangential springs */
     dem2di_link *links, *next_links;    /* all but circles: of contact i at i - discs */
@@ -10629,8 +10614,6 @@ typedef struct dem2di_list {
     int *incident; /* 2 i for the A of contact i, 2 i + 1 for its B: those of each particle in the
                       order of the partner's id, walls last; then 2 count up to a whole gather */
     int *first;    /* of a slot's in incident; bodies + 1 */
-    int keys_capacity, springs_capacity, links_capacity, ends_capacity, extras_capacity;
-    int incident_capacity;
 } dem2di_list;
 
 /* What the contact passes count. */
@@ -10705,6 +10688,28 @@ typedef struct dem2di_ledger {
     dem2di_stored stored;
 } dem2di_ledger;
 
+/* Columns of one length. Those before the keys grow one by one; the others are renewed with the
+   list, and in large scenes are most of the memory. */
+typedef enum dem2di_group {
+    DEM2DI_TEMPLATES,
+    DEM2DI_MATERIALS,
+    DEM2DI_LAWS, /* laws_side squared */
+    DEM2DI_NAMES,
+    DEM2DI_BODIES,  /* and one more */
+    DEM2DI_TRAVELS, /* of bodies, where plan.turns */
+    DEM2DI_MADE,    /* of bodies, where some are redirected */
+    DEM2DI_WALLS,
+    DEM2DI_KEYS,
+    DEM2DI_SPRINGS,
+    DEM2DI_LINKS,
+    DEM2DI_ENDS,
+    DEM2DI_EXTRAS,
+    DEM2DI_INCIDENT,
+    DEM2DI_TALLIES,
+    DEM2DI_SCRATCH, /* lines */
+    DEM2DI_GROUPS
+} dem2di_group;
+
 struct dem2d_world {
     dem2d_env user_env, env; /* the caller's, and the one that counts bytes */
     size_t bytes;
@@ -10742,7 +10747,7 @@ struct dem2d_world {
     dem2di_template *templates;
     dem2d_material_desc *materials;
     dem2d_pair_desc *laws, *used_laws; /* laws_side squared: now, and at the last force pass */
-    int template_count, template_capacity, material_count, material_capacity, laws_side;
+    int template_count, material_count, laws_side;
 
     int body_count; /* slots in use, holes too */
     int holes, name_count, free_name;
@@ -10755,12 +10760,11 @@ struct dem2d_world {
     double *lever;           /* a support value changes by at most this times the angle of a turn */
     dem2di_velocities *made; /* of the redirected: velocities in the step that was made */
     bool redirected;         /* some particles are */
-    int body_capacity, travel_capacity, made_capacity;
 
     dem2d_shape *line; /* a polygon of two corners, of length 1: what segments are, scaled */
     dem2di_wall *walls;
     dem2di_wall_state *wall_before, *wall_now, *wall_next;
-    int wall_count, wall_capacity;
+    int wall_count;
 
     dem2di_list list;
     double *load_x, *load_y, *load_turn; /* force and torque of contact i on its A at 2 i, on its B
@@ -10768,7 +10772,8 @@ struct dem2d_world {
     dem2di_push *pushes;                 /* room for the contacts of a servo wall; in scratch */
     char *scratch; /* what only a step or only the building of the list needs */
     dem2di_tally *tallies;
-    int scratch_capacity, tally_capacity;
+
+    int capacity[DEM2DI_GROUPS]; /* elements that the columns of a group have room for */
 };
 
 /* The world's own environment counts what is in use and hands on to the caller's. */
@@ -10790,110 +10795,153 @@ static void dem2di_world_log(void *user, dem2d_result result, int index, const c
     if (world->user_env.log != NULL) world->user_env.log(world->user_env.user, result, index, text);
 }
 
-static bool dem2di_grow(dem2d_world *world, void **array, int *capacity, int needed, size_t size) {
-    return dem2di_reserve(&world->env, array, capacity, needed, size);
+/* --- columns ------------------------------------------------------------------------------------
+   Each array of the world is a column: one line of the table says what is done with it. */
+
+enum {
+    DEM2DI_MOVES = 1, /* with the particles, when these are sorted in memory */
+    DEM2DI_SWAPS = 2  /* with the column on the next line, which holds the next step's values */
+};
+
+typedef struct dem2di_column {
+    dem2di_group group;
+    size_t at, size; /* where the world has its pointer; of an element */
+    int treatment;
+} dem2di_column;
+
+#define DEM2DI_COLUMN(group, pointer, treatment) \
+    { group, offsetof(dem2d_world, pointer), sizeof *((dem2d_world *)NULL)->pointer, treatment }
+
+static const dem2di_column dem2di_columns[] = {
+    DEM2DI_COLUMN(DEM2DI_TEMPLATES, templates, 0),
+    DEM2DI_COLUMN(DEM2DI_MATERIALS, materials, 0),
+    DEM2DI_COLUMN(DEM2DI_LAWS, laws, 0),
+    DEM2DI_COLUMN(DEM2DI_LAWS, used_laws, 0),
+    DEM2DI_COLUMN(DEM2DI_NAMES, names, 0),
+    DEM2DI_COLUMN(DEM2DI_BODIES, before, DEM2DI_MOVES | DEM2DI_SWAPS),
+    DEM2DI_COLUMN(DEM2DI_BODIES, now, DEM2DI_MOVES),
+    DEM2DI_COLUMN(DEM2DI_BODIES, bodies, DEM2DI_MOVES),
+    DEM2DI_COLUMN(DEM2DI_BODIES, inverse, DEM2DI_MOVES),
+    DEM2DI_COLUMN(DEM2DI_BODIES, wear, 0),
+    DEM2DI_COLUMN(DEM2DI_BODIES, list.first, 0),
+    DEM2DI_COLUMN(DEM2DI_TRAVELS, travel, DEM2DI_MOVES | DEM2DI_SWAPS),
+    DEM2DI_COLUMN(DEM2DI_TRAVELS, next_travel, 0),
+    DEM2DI_COLUMN(DEM2DI_TRAVELS, lever, DEM2DI_MOVES),
+    DEM2DI_COLUMN(DEM2DI_MADE, made, DEM2DI_MOVES),
+    DEM2DI_COLUMN(DEM2DI_WALLS, walls, 0),
+    DEM2DI_COLUMN(DEM2DI_WALLS, wall_before, DEM2DI_SWAPS),
+    DEM2DI_COLUMN(DEM2DI_WALLS, wall_now, DEM2DI_SWAPS),
+    DEM2DI_COLUMN(DEM2DI_WALLS, wall_next, 0),
+    DEM2DI_COLUMN(DEM2DI_KEYS, list.keys, 0),
+    DEM2DI_COLUMN(DEM2DI_KEYS, list.touched, 0),
+    DEM2DI_COLUMN(DEM2DI_SPRINGS, list.shear, DEM2DI_SWAPS),
+    DEM2DI_COLUMN(DEM2DI_SPRINGS, list.next_shear, 0),
+    DEM2DI_COLUMN(DEM2DI_LINKS, list.links, DEM2DI_SWAPS),
+    DEM2DI_COLUMN(DEM2DI_LINKS, list.next_links, 0),
+    DEM2DI_COLUMN(DEM2DI_ENDS, list.ends, DEM2DI_SWAPS),
+    DEM2DI_COLUMN(DEM2DI_ENDS, list.next_ends, 0),
+    DEM2DI_COLUMN(DEM2DI_EXTRAS, list.extras, DEM2DI_SWAPS),
+    DEM2DI_COLUMN(DEM2DI_EXTRAS, list.next_extras, 0),
+    DEM2DI_COLUMN(DEM2DI_INCIDENT, list.incident, 0),
+    DEM2DI_COLUMN(DEM2DI_TALLIES, tallies, 0),
+    {DEM2DI_SCRATCH, offsetof(dem2d_world, scratch), DEM2DI_LINE, 0},
+};
+
+#define DEM2DI_COLUMNS ((int)(sizeof dem2di_columns / sizeof *dem2di_columns))
+
+static void *dem2di_column_get(const dem2d_world *world, const dem2di_column *column) {
+    void *array;
+    memcpy(&array, (const char *)world + column->at, sizeof array);
+    return array;
 }
 
-/* As above with little to spare: for what is renewed as a whole, in large scenes most of it. */
+static void dem2di_column_set(dem2d_world *world, const dem2di_column *column, void *array) {
+    memcpy((char *)world + column->at, &array, sizeof array);
+}
+
+/* As dem2di_growth, with little to spare: for what is renewed as a whole. */
 static int dem2di_room(int capacity, int needed) {
     int spare = needed / 16;
     return needed <= capacity ? capacity : needed < INT_MAX - spare ? needed + spare : needed;
 }
 
-static bool dem2di_array_reserve(dem2d_world *world, void **array, int *capacity, int needed,
-                                 size_t size) {
-    dem2di_column column;
-    column.array = array;
-    column.size = size;
-    return dem2di_columns_reserve(&world->env, &column, 1, capacity,
-                                  dem2di_room(*capacity, needed));
-}
-
-/* The arrays of a world, by their lengths. */
-typedef enum dem2di_group {
-    DEM2DI_BODIES,
-    DEM2DI_TRAVELS,
-    DEM2DI_MADE,
-    DEM2DI_WALLS,
-    DEM2DI_KEYS,
-    DEM2DI_SPRINGS,
-    DEM2DI_LINKS,
-    DEM2DI_ENDS,
-    DEM2DI_EXTRAS,
-    DEM2DI_GROUPS
-} dem2di_group;
-
-#define DEM2DI_COLUMN(pointer) \
-    (columns[count].array = (void **)&(pointer), columns[count++].size = sizeof *(pointer))
-
-static int dem2di_columns_of(dem2d_world *w, dem2di_group group, int **capacity,
-                             dem2di_column columns[DEM2DI_COLUMNS]) {
-    int count = 0;
-    if (group == DEM2DI_BODIES) {
-        *capacity = &w->body_capacity;
-        DEM2DI_COLUMN(w->names);
-        DEM2DI_COLUMN(w->before);
-        DEM2DI_COLUMN(w->now);
-        DEM2DI_COLUMN(w->bodies);
-        DEM2DI_COLUMN(w->inverse);
-        DEM2DI_COLUMN(w->wear);
-        DEM2DI_COLUMN(w->list.first);
-    } else if (group == DEM2DI_TRAVELS) {
-        *capacity = &w->travel_capacity;
-        DEM2DI_COLUMN(w->travel);
-        DEM2DI_COLUMN(w->next_travel);
-        DEM2DI_COLUMN(w->lever);
-    } else if (group == DEM2DI_MADE) {
-        *capacity = &w->made_capacity;
-        DEM2DI_COLUMN(w->made);
-    } else if (group == DEM2DI_WALLS) {
-        *capacity = &w->wall_capacity;
-        DEM2DI_COLUMN(w->walls);
-        DEM2DI_COLUMN(w->wall_before);
-        DEM2DI_COLUMN(w->wall_now);
-        DEM2DI_COLUMN(w->wall_next);
-    } else if (group == DEM2DI_KEYS) {
-        *capacity = &w->list.keys_capacity;
-        DEM2DI_COLUMN(w->list.keys);
-        DEM2DI_COLUMN(w->list.touched);
-    } else if (group == DEM2DI_SPRINGS) {
-        *capacity = &w->list.springs_capacity;
-        DEM2DI_COLUMN(w->list.shear);
-        DEM2DI_COLUMN(w->list.next_shear);
-    } else if (group == DEM2DI_LINKS) {
-        *capacity = &w->list.links_capacity;
-        DEM2DI_COLUMN(w->list.links);
-        DEM2DI_COLUMN(w->list.next_links);
-    } else if (group == DEM2DI_ENDS) {
-        *capacity = &w->list.ends_capacity;
-        DEM2DI_COLUMN(w->list.ends);
-        DEM2DI_COLUMN(w->list.next_ends);
-    } else {
-        *capacity = &w->list.extras_capacity;
-        DEM2DI_COLUMN(w->list.extras);
-        DEM2DI_COLUMN(w->list.next_extras);
+/* Room for `needed` elements in all columns of a group, or nothing has changed. */
+static bool dem2di_group_reserve(dem2d_world *world, dem2di_group group, int needed) {
+    void *made[DEM2DI_COLUMNS];
+    const dem2d_env *env = &world->env;
+    const dem2di_column *columns = dem2di_columns;
+    int old = world->capacity[group];
+    int grown = group < DEM2DI_KEYS ? dem2di_growth(old, needed) : dem2di_room(old, needed);
+    if (grown == old) return true;
+    for (int k = 0; k < DEM2DI_COLUMNS; k++) {
+        made[k] = NULL;
+        if (columns[k].group != group) continue;
+        made[k] = dem2di_lengthened(env, dem2di_column_get(world, &columns[k]), columns[k].size,
+                                    old, grown);
+        if (made[k] != NULL) continue;
+        while (k-- > 0) dem2di_release(env, made[k], (size_t)grown, columns[k].size);
+        return false;
     }
-    return count;
+    for (int k = 0; k < DEM2DI_COLUMNS; k++) {
+        if (made[k] == NULL) continue;
+        dem2di_release(env, dem2di_column_get(world, &columns[k]), (size_t)old, columns[k].size);
+        dem2di_column_set(world, &columns[k], made[k]);
+    }
+    world->capacity[group] = grown;
+    return true;
 }
 
-/* Room in all arrays of a group: with half to spare, or (`renewed`) with little. */
-static bool dem2di_group_reserve(dem2d_world *world, dem2di_group group, int needed, bool renewed) {
-    dem2di_column columns[DEM2DI_COLUMNS];
-    int *capacity, count = dem2di_columns_of(world, group, &capacity, columns);
-    int grown = renewed ? dem2di_room(*capacity, needed) : dem2di_growth(*capacity, needed);
-    return dem2di_columns_reserve(&world->env, columns, count, capacity, grown);
+static void dem2di_columns_release(dem2d_world *world) {
+    for (int k = 0; k < DEM2DI_COLUMNS; k++) {
+        const dem2di_column *column = &dem2di_columns[k];
+        dem2di_release(&world->env, dem2di_column_get(world, column),
+                       (size_t)world->capacity[column->group], column->size);
+    }
 }
 
-static void dem2di_group_release(dem2d_world *world, dem2di_group group) {
-    dem2di_column columns[DEM2DI_COLUMNS];
-    int *capacity, count = dem2di_columns_of(world, group, &capacity, columns);
-    for (int k = 0; k < count; k++)
-        dem2di_release(&world->env, *columns[k].array, (size_t)*capacity, columns[k].size);
+/* The next values become the present ones, in a group and all behind it. */
+static void dem2di_columns_swap(dem2d_world *world, dem2di_group first) {
+    for (const dem2di_column *column = dem2di_columns; column < dem2di_columns + DEM2DI_COLUMNS;
+         column++) {
+        if (!(column->treatment & DEM2DI_SWAPS) || column->group < first) continue;
+        void *present = dem2di_column_get(world, column);
+        dem2di_column_set(world, column, dem2di_column_get(world, column + 1));
+        dem2di_column_set(world, column + 1, present);
+    }
 }
 
-/* A slot more than particles: list.first ends with the end of the last. */
+/* Size of the largest element that moves with its particle. */
+static size_t dem2di_moved_size(void) {
+    size_t most = 0;
+    for (int k = 0; k < DEM2DI_COLUMNS; k++)
+        if ((dem2di_columns[k].treatment & DEM2DI_MOVES) && dem2di_columns[k].size > most)
+            most = dem2di_columns[k].size;
+    return most;
+}
+
+/* What moves with the particles, in a new order: of `slots` elements number i goes to to[i], or is
+   dropped when that is -1; `count` are left. The spare memory has room for a whole column. */
+static void dem2di_columns_move(dem2d_world *world, const int *to, int slots, int count,
+                                char *spare) {
+    for (int k = 0; k < DEM2DI_COLUMNS; k++) {
+        const dem2di_column *column = &dem2di_columns[k];
+        size_t size = column->size;
+        if (!(column->treatment & DEM2DI_MOVES)) continue;
+        if (world->capacity[column->group] < slots) continue; /* the scene has no use for it */
+        char *array = (char *)dem2di_column_get(world, column);
+        for (int i = 0; i < slots; i++)
+            if (to[i] >= 0) memcpy(spare + (size_t)to[i] * size, array + (size_t)i * size, size);
+        if (count > 0) memcpy(array, spare, (size_t)count * size);
+    }
+}
+
+/* Room for particles, in all columns of particles that are in use: list.first ends with the end of
+   the last one. */
 static bool dem2di_reserve_bodies(dem2d_world *world, int count) {
-    return dem2di_group_reserve(world, DEM2DI_BODIES, count + 1, false);
+    return dem2di_group_reserve(world, DEM2DI_BODIES, count + 1) &&
+           dem2di_group_reserve(world, DEM2DI_NAMES, count) &&
+           (!world->plan.turns || dem2di_group_reserve(world, DEM2DI_TRAVELS, count)) &&
+           (!world->redirected || dem2di_group_reserve(world, DEM2DI_MADE, count));
 }
 
 static bool dem2di_list_reserve(dem2d_world *world, const dem2di_plan *plan, int discs, int count) {
@@ -10901,11 +10949,11 @@ static bool dem2di_list_reserve(dem2d_world *world, const dem2di_plan *plan, int
     int others = count - discs;
     /* the old ones are read once more */
     if (list->count - list->discs > others) others = list->count - list->discs;
-    return dem2di_group_reserve(world, DEM2DI_KEYS, count, true) &&
-           dem2di_group_reserve(world, DEM2DI_SPRINGS, plan->friction ? discs : 0, true) &&
-           dem2di_group_reserve(world, DEM2DI_LINKS, others, true) &&
-           dem2di_group_reserve(world, DEM2DI_ENDS, plan->faces ? others : 0, true) &&
-           dem2di_group_reserve(world, DEM2DI_EXTRAS, plan->full ? others : 0, true);
+    return dem2di_group_reserve(world, DEM2DI_KEYS, count) &&
+           dem2di_group_reserve(world, DEM2DI_SPRINGS, plan->friction ? discs : 0) &&
+           dem2di_group_reserve(world, DEM2DI_LINKS, others) &&
+           dem2di_group_reserve(world, DEM2DI_ENDS, plan->faces ? others : 0) &&
+           dem2di_group_reserve(world, DEM2DI_EXTRAS, plan->full ? others : 0);
 }
 
 static dem2d_result dem2di_out_of_memory(const dem2d_world *world, const char *what) {
@@ -10914,23 +10962,11 @@ static dem2d_result dem2di_out_of_memory(const dem2d_world *world, const char *w
 
 DEM2D_API void dem2d_world_destroy(dem2d_world *world) {
     if (world == NULL) return;
-    dem2d_world *w = world;
-    const dem2d_env *env = &w->env;
-    for (int i = 0; i < w->template_count; i++) dem2d_shape_destroy(w->templates[i].shape);
-    size_t side = (size_t)w->laws_side;
-    dem2d_shape_destroy(w->line);
-    dem2di_release(env, w->templates, (size_t)w->template_capacity, sizeof *w->templates);
-    dem2di_release(env, w->materials, (size_t)w->material_capacity, sizeof *w->materials);
-    dem2di_release(env, w->laws, side * side, sizeof *w->laws);
-    dem2di_release(env, w->used_laws, side * side, sizeof *w->laws);
-    for (int group = 0; group < DEM2DI_GROUPS; group++)
-        dem2di_group_release(w, (dem2di_group)group);
-    dem2di_release(env, w->list.incident, (size_t)w->list.incident_capacity,
-                   sizeof *w->list.incident);
-    dem2di_release(env, w->scratch, (size_t)w->scratch_capacity, DEM2DI_LINE);
-    dem2di_release(env, w->tallies, (size_t)w->tally_capacity, sizeof *w->tallies);
-    dem2d_env user = w->user_env;
-    dem2di_release(&user, w, 1, sizeof *w);
+    for (int i = 0; i < world->template_count; i++) dem2d_shape_destroy(world->templates[i].shape);
+    dem2d_shape_destroy(world->line);
+    dem2di_columns_release(world);
+    dem2d_env user = world->user_env;
+    dem2di_release(&user, world, 1, sizeof *world);
 }
 
 static dem2d_result dem2di_check_count(const dem2d_env *env, const char *name, int value) {
@@ -11057,8 +11093,7 @@ DEM2D_API dem2d_result dem2d_world_add_shape(dem2d_world *world, const dem2d_sha
     if (world == NULL || shape == NULL || id == NULL) return DEM2D_NULL_ARGUMENT;
     int slot = 0;
     while (slot < world->template_count && world->templates[slot].shape != NULL) slot++;
-    if (!dem2di_grow(world, (void **)&world->templates, &world->template_capacity, slot + 1,
-                     sizeof *world->templates))
+    if (!dem2di_group_reserve(world, DEM2DI_TEMPLATES, slot + 1))
         return dem2di_out_of_memory(world, "a template");
     dem2d_shape *copy = dem2di_shape_copy(&world->env, shape);
     if (copy == NULL) return DEM2D_OUT_OF_MEMORY;
@@ -11088,7 +11123,7 @@ DEM2D_API const dem2d_shape *dem2d_world_shape(const dem2d_world *world, dem2d_s
     return world != NULL && dem2di_shape_lives(world, id) ? world->templates[id.index].shape : NULL;
 }
 
-#define DEM2DI_MATERIALS 256 /* as declared: the table of laws has at most 256 x 256 entries */
+#define DEM2DI_MATERIALS_MAX 256 /* as declared: so many squared are the pairs of laws */
 
 /* Springs in series, doubled: two equal materials meet with their own stiffness. */
 static double dem2di_mean_stiffness(double a, double b) {
@@ -11154,23 +11189,18 @@ static dem2d_result dem2di_check_law(const dem2d_env *env, const dem2d_pair_desc
 
 /* Wider tables of laws with the old entries in place. */
 static bool dem2di_widen_laws(dem2d_world *world, int side) {
-    if (side <= world->laws_side) return true;
-    int wider = side < 4 ? 4 : 2 * side, old = world->laws_side;
-    size_t cells = (size_t)wider * (size_t)wider, was = (size_t)old * (size_t)old;
-    dem2d_pair_desc **tables[2] = {&world->laws, &world->used_laws}, *made[2];
-    for (int k = 0; k < 2; k++) {
-        made[k] = (dem2d_pair_desc *)dem2di_allocate(&world->env, cells, sizeof **made);
-        if (made[k] != NULL) continue;
-        if (k > 0) dem2di_release(&world->env, made[0], cells, sizeof **made);
-        return false;
-    }
-    for (int k = 0; k < 2; k++) {
-        memset(made[k], 0, cells * sizeof **made);
-        for (int i = 0; i < old; i++)
-            memcpy(&made[k][i * wider], *tables[k] + i * old, (size_t)old * sizeof **made);
-        dem2di_release(&world->env, *tables[k], was, sizeof **made);
-        *tables[k] = made[k];
-    }
+    int old = world->laws_side, wider = side < 4 ? 4 : 2 * side;
+    dem2d_pair_desc *tables[2];
+    if (side <= old) return true;
+    if (!dem2di_group_reserve(world, DEM2DI_LAWS, wider * wider)) return false;
+    tables[0] = world->laws;
+    tables[1] = world->used_laws;
+    for (int row = old - 1; row >= 0; row--)
+        for (int k = 0; k < 2; k++) {
+            dem2d_pair_desc *to = tables[k] + row * wider;
+            memmove(to, tables[k] + row * old, (size_t)old * sizeof *to);
+            memset(to + old, 0, (size_t)(wider - old) * sizeof *to);
+        }
     world->laws_side = wider;
     return true;
 }
@@ -11185,10 +11215,9 @@ DEM2D_API dem2d_result dem2d_world_add_material(dem2d_world *world, const dem2d_
     }
     if (result != DEM2D_OK) return result;
     int slot = world->material_count;
-    if (slot == DEM2DI_MATERIALS)
+    if (slot == DEM2DI_MATERIALS_MAX)
         return dem2di_fail(&world->env, DEM2D_OUT_OF_RANGE, slot, "more than %d materials", slot);
-    if (!dem2di_grow(world, (void **)&world->materials, &world->material_capacity, slot + 1,
-                     sizeof *world->materials) ||
+    if (!dem2di_group_reserve(world, DEM2DI_MATERIALS, slot + 1) ||
         !dem2di_widen_laws(world, slot + 1))
         return dem2di_out_of_memory(world, "a material");
     world->materials[slot] = *desc;
@@ -11625,7 +11654,7 @@ static bool dem2di_redirect(dem2d_world *world, int slot, dem2d_vec v, double w)
     const dem2di_state *now = &world->now[slot];
     bool same = v.x == now->v.x && v.y == now->v.y && w == now->w;
     if (same || world->bodies[slot].redirected) return true;
-    if (!dem2di_group_reserve(world, DEM2DI_MADE, world->body_count, false)) return false;
+    if (!dem2di_group_reserve(world, DEM2DI_MADE, world->body_count)) return false;
     world->made[slot] = dem2di_velocities_of(&world->now[slot]);
     world->bodies[slot].redirected = world->redirected = true;
     return true;
@@ -11757,7 +11786,7 @@ DEM2D_API dem2d_result dem2d_world_add_wall(dem2d_world *world, const dem2d_wall
     if (result != DEM2D_OK) return result;
     int slot = 0;
     while (slot < world->wall_count && world->walls[slot].alive) slot++;
-    if (!dem2di_group_reserve(world, DEM2DI_WALLS, slot + 1, false))
+    if (!dem2di_group_reserve(world, DEM2DI_WALLS, slot + 1))
         return dem2di_out_of_memory(world, "a wall");
     if (!dem2di_line_make(world, desc)) return DEM2D_OUT_OF_MEMORY;
     dem2di_wall *wall = &world->walls[slot];
@@ -11947,8 +11976,7 @@ static void *dem2di_cut(dem2di_cutter *cutter, size_t count, size_t size) {
 static bool dem2di_scratch_reserve(dem2d_world *world, size_t bytes) {
     size_t lines = bytes / DEM2DI_LINE + (bytes % DEM2DI_LINE > 0);
     if (lines > (size_t)INT_MAX) return false;
-    return dem2di_array_reserve(world, (void **)&world->scratch, &world->scratch_capacity,
-                                (int)lines, DEM2DI_LINE);
+    return dem2di_group_reserve(world, DEM2DI_SCRATCH, (int)lines);
 }
 
 static int dem2di_contact_blocks(int discs, int count) {
@@ -11959,24 +11987,7 @@ static int dem2di_contact_blocks(int discs, int count) {
 static bool dem2di_tallies_reserve(dem2d_world *world, int discs, int count) {
     int blocks = dem2di_contact_blocks(discs, count);
     int bodies = dem2di_blocks(world->body_count, DEM2DI_BLOCK);
-    return dem2di_array_reserve(world, (void **)&world->tallies, &world->tally_capacity,
-                                blocks > bodies ? blocks : bodies, sizeof *world->tallies);
-}
-
-/* What was next becomes the present. */
-static void dem2di_swap_contacts(dem2di_list *list) {
-    double *shear = list->shear;
-    dem2di_link *links = list->links;
-    dem2di_ends *ends = list->ends;
-    dem2di_extra *extras = list->extras;
-    list->shear = list->next_shear;
-    list->next_shear = shear;
-    list->links = list->next_links;
-    list->next_links = links;
-    list->ends = list->next_ends;
-    list->next_ends = ends;
-    list->extras = list->next_extras;
-    list->next_extras = extras;
+    return dem2di_group_reserve(world, DEM2DI_TALLIES, blocks > bodies ? blocks : bodies);
 }
 
 /* --- the contacts of each particle ------------------------------------------------------------ */
@@ -12085,16 +12096,6 @@ static int dem2di_order_make(const dem2d_world *world, dem2di_order *items, dem2
     return count;
 }
 
-/* One array in the new order, by way of spare memory for all of it. */
-static void dem2di_reorder(void *array, size_t size, const int *to, int slots, int count,
-                           void *spare) {
-    for (int i = 0; i < slots; i++)
-        if (to[i] >= 0)
-            memcpy((char *)spare + (size_t)to[i] * size, (const char *)array + (size_t)i * size,
-                   size);
-    if (count > 0) memcpy(array, spare, (size_t)count * size);
-}
-
 static void dem2di_arrange_task(void *context, int begin, int end) {
     dem2d_world *w = (dem2d_world *)context;
     size_t slots = (size_t)w->body_count;
@@ -12104,17 +12105,9 @@ static void dem2di_arrange_task(void *context, int begin, int end) {
     int *to = (int *)dem2di_cut(&cutter, slots, sizeof *to);
     (void)begin;
     (void)end;
-    char *room = (char *)dem2di_cut(&cutter, slots, sizeof *w->now);
+    char *room = (char *)dem2di_cut(&cutter, slots, dem2di_moved_size());
     int n = w->body_count, count = dem2di_order_make(w, items, spare, to);
-    dem2di_reorder(w->now, sizeof *w->now, to, n, count, room);
-    dem2di_reorder(w->before, sizeof *w->before, to, n, count, room);
-    dem2di_reorder(w->bodies, sizeof *w->bodies, to, n, count, room);
-    dem2di_reorder(w->inverse, sizeof *w->inverse, to, n, count, room);
-    if (w->redirected) dem2di_reorder(w->made, sizeof *w->made, to, n, count, room);
-    if (w->plan.turns) {
-        dem2di_reorder(w->travel, sizeof *w->travel, to, n, count, room);
-        dem2di_reorder(w->lever, sizeof *w->lever, to, n, count, room);
-    }
+    dem2di_columns_move(w, to, n, count, room);
     for (int i = 0; i < count; i++) w->names[w->bodies[i].index].slot = i;
     for (int i = 0; i < w->list.count; i++) {
         dem2di_key *key = &w->list.keys[i];
@@ -12135,12 +12128,8 @@ static bool dem2di_arrange(dem2d_world *world) {
     (void)dem2di_cut(&cutter, slots, sizeof(dem2di_order));
     (void)dem2di_cut(&cutter, slots, sizeof(dem2di_order));
     (void)dem2di_cut(&cutter, slots, sizeof(int));
-    (void)dem2di_cut(&cutter, slots, sizeof *world->now);
+    (void)dem2di_cut(&cutter, slots, dem2di_moved_size());
     if (!dem2di_scratch_reserve(world, cutter.used)) return false;
-    if (world->plan.turns && !dem2di_group_reserve(world, DEM2DI_TRAVELS, world->body_count, false))
-        return false;
-    if (world->redirected && !dem2di_group_reserve(world, DEM2DI_MADE, world->body_count, false))
-        return false;
     dem2di_run(world, DEM2D_PHASE_LIST, 1, dem2di_arrange_task, world);
     if (world->list.incident != NULL) dem2di_incident_make(world); /* there is no list at first */
     return true;
@@ -12252,7 +12241,7 @@ static dem2di_plan dem2di_plan_make(const dem2d_world *world) {
     dem2di_plan plan;
     memset(&plan, 0, sizeof plan);
     plan.one_law = true;
-    bool used[DEM2DI_MATERIALS] = {false}, met[DEM2DI_MATERIALS] = {false};
+    bool used[DEM2DI_MATERIALS_MAX] = {false}, met[DEM2DI_MATERIALS_MAX] = {false};
     for (int i = 0; i < world->body_count; i++) {
         const dem2di_body *body = &world->bodies[i];
         used[body->material] = true;
@@ -12641,7 +12630,7 @@ static void dem2di_build_finish(dem2di_build *build) {
     dem2di_loads_clear(world);
     if (world->plan.turns != build->plan.turns) dem2di_reorient(world, build->plan.turns);
     world->plan = build->plan;
-    dem2di_swap_contacts(list);
+    dem2di_columns_swap(world, DEM2DI_KEYS);
     dem2di_incident_make(world);
     if (world->plan.turns)
         dem2di_run(world, DEM2D_PHASE_LIST, dem2di_blocks(world->body_count, DEM2DI_BLOCK),
@@ -12685,15 +12674,13 @@ static dem2d_result dem2di_build_list(dem2d_world *world) {
         for (int j = 0; j < world->wall_count; j++)
             world->walls[j].skin = dem2di_skin_of(world, largest, dem2di_wall_velocity(world, j));
         build.plan = dem2di_plan_make(world);
-        room = !build.plan.turns ||
-               dem2di_group_reserve(world, DEM2DI_TRAVELS, world->body_count, false);
+        room = !build.plan.turns || dem2di_group_reserve(world, DEM2DI_TRAVELS, world->body_count);
     }
     if (!room || !dem2di_build_search(&build)) return dem2di_list_failed(world, skin, interval);
     int blocks = dem2di_blocks(world->body_count, DEM2DI_BLOCK);
     dem2di_run(world, DEM2D_PHASE_LIST, blocks, dem2di_fill_task, &build);
     dem2di_run(world, DEM2D_PHASE_LIST, 1, dem2di_touches_task, &build);
-    if (!dem2di_array_reserve(world, (void **)&world->list.incident, &world->list.incident_capacity,
-                              build.incident + 1, sizeof *world->list.incident))
+    if (!dem2di_group_reserve(world, DEM2DI_INCIDENT, build.incident + 1))
         return dem2di_list_failed(world, skin, interval);
     dem2di_build_finish(&build);
     dem2di_watch_spread(world, sorted);
@@ -14216,17 +14203,7 @@ static void dem2di_made(dem2d_world *world) {
 
 /* Everything new becomes the present; the present becomes the state of the last force pass. */
 static void dem2di_commit(dem2d_world *world) {
-    dem2di_state *state = world->before;
-    dem2di_wall_state *wall = world->wall_before;
-    world->before = world->now;
-    world->now = state;
-    double *travel = world->travel;
-    world->travel = world->next_travel;
-    world->next_travel = travel;
-    world->wall_before = world->wall_now;
-    world->wall_now = world->wall_next;
-    world->wall_next = wall;
-    dem2di_swap_contacts(&world->list);
+    dem2di_columns_swap(world, DEM2DI_TEMPLATES);
     dem2di_made(world);
     world->steps++;
 }
@@ -15269,13 +15246,11 @@ static void dem2di_archive_laws(dem2di_archive *ar, const dem2d_world *w, dem2d_
 
 static void dem2di_archive_materials(dem2di_archive *ar, dem2d_world *w) {
     dem2di_archive_count(ar, "materials", &w->material_count, (int)sizeof *w->materials);
-    dem2di_archive_expect(ar, w->material_count <= DEM2DI_MATERIALS, "too many materials");
+    dem2di_archive_expect(ar, w->material_count <= DEM2DI_MATERIALS_MAX, "too many materials");
     if (!dem2di_archive_good(ar)) return;
     int n = w->material_count;
-    bool fits =
-        ar->aim != DEM2DI_LOADING ||
-        (dem2di_grow(w, (void **)&w->materials, &w->material_capacity, n, sizeof *w->materials) &&
-         dem2di_widen_laws(w, n));
+    bool fits = ar->aim != DEM2DI_LOADING ||
+                (dem2di_group_reserve(w, DEM2DI_MATERIALS, n) && dem2di_widen_laws(w, n));
     if (!dem2di_archive_room(ar, fits)) return;
     for (int i = 0; i < n; i++) dem2di_archive_material(ar, &w->materials[i]);
     dem2di_archive_laws(ar, w, w->laws);
@@ -15367,8 +15342,7 @@ static void dem2di_archive_shape(dem2di_archive *ar, const dem2d_env *env, dem2d
 static void dem2di_archive_templates(dem2di_archive *ar, dem2d_world *w) {
     dem2di_archive_count(ar, "templates", &w->template_count, 5);
     bool fits =
-        ar->aim != DEM2DI_LOADING || dem2di_grow(w, (void **)&w->templates, &w->template_capacity,
-                                                 w->template_count, sizeof *w->templates);
+        ar->aim != DEM2DI_LOADING || dem2di_group_reserve(w, DEM2DI_TEMPLATES, w->template_count);
     if (!dem2di_archive_room(ar, fits)) w->template_count = 0;
     for (int i = 0; i < w->template_count && dem2di_archive_good(ar); i++) {
         dem2di_template *place = &w->templates[i];
@@ -15433,9 +15407,9 @@ static void dem2di_archive_wall_state(dem2di_archive *ar, dem2di_wall_state *sta
     dem2di_archive_bits(ar, &backing->stiffness); /* sums may overflow */
     dem2di_archive_bits(ar, &backing->impedance);
     dem2di_archive_bits(ar, &backing->mass);
-    dem2di_archive_expect(
-        ar, backing->stiffness >= 0 && backing->impedance >= 0 && backing->mass >= 0,
-        "what a servo wall pushed against");
+    dem2di_archive_expect(ar,
+                          backing->stiffness >= 0 && backing->impedance >= 0 && backing->mass >= 0,
+                          "what a servo wall pushed against");
 }
 
 /* Of an open contact, beside its normal and depth. */
@@ -15646,21 +15620,17 @@ static void dem2di_archive_revive(dem2di_archive *ar, dem2d_world *w, int slot) 
     if (w->plan.turns) w->lever[slot] = dem2di_lever_of(w, slot);
 }
 
-/* Particles in the order of memory, removed ones too until the list is renewed. One that has come
-   since has no travel yet. */
+/* Particles in the order of memory, removed ones too until the list is renewed. */
 static void dem2di_archive_bodies(dem2di_archive *ar, dem2d_world *w) {
     dem2di_archive_count(ar, "particles", &w->body_count, 100);
     dem2di_archive_count(ar, "names", &w->name_count, 8);
     dem2di_archive_int(ar, "free_name", &w->free_name, -1, w->name_count - 1);
-    int n = w->body_count, most = n > w->name_count ? n : w->name_count;
-    bool fits = ar->aim != DEM2DI_LOADING ||
-                (dem2di_reserve_bodies(w, most) &&
-                 (!w->redirected || dem2di_group_reserve(w, DEM2DI_MADE, n, false)) &&
-                 (!w->plan.turns || dem2di_group_reserve(w, DEM2DI_TRAVELS, n, false)));
+    int n = w->body_count;
+    bool fits = ar->aim != DEM2DI_LOADING || (dem2di_reserve_bodies(w, n) &&
+                                              dem2di_group_reserve(w, DEM2DI_NAMES, w->name_count));
     if (!dem2di_archive_room(ar, fits)) return;
     for (int i = 0; i < n && dem2di_archive_good(ar); i++) {
         dem2di_body body = w->bodies[i];
-        double none = 0;
         dem2di_archive_body(ar, w, &body);
         dem2di_archive_expect(ar, w->redirected || !body.redirected, "a particle redirected");
         if (dem2di_archive_loaded(ar)) w->bodies[i] = body;
@@ -15669,9 +15639,7 @@ static void dem2di_archive_bodies(dem2di_archive *ar, dem2d_world *w) {
         if (body.redirected && dem2di_archive_good(ar)) dem2di_archive_velocity(ar, &w->made[i]);
         dem2di_archive_bits(ar, &w->wear[i]);
         dem2di_archive_revive(ar, w, i);
-        if (w->plan.turns)
-            dem2di_archive_not_negative(ar, "travel",
-                                        i < w->travel_capacity ? &w->travel[i] : &none);
+        if (w->plan.turns) dem2di_archive_not_negative(ar, "travel", &w->travel[i]);
     }
 }
 
@@ -15729,8 +15697,7 @@ static void dem2di_archive_erect(dem2di_archive *ar, dem2d_world *w) {
 /* The slots of walls, free ones too. */
 static void dem2di_archive_walls(dem2di_archive *ar, dem2d_world *w) {
     dem2di_archive_count(ar, "walls", &w->wall_count, 100);
-    bool fits =
-        ar->aim != DEM2DI_LOADING || dem2di_group_reserve(w, DEM2DI_WALLS, w->wall_count, false);
+    bool fits = ar->aim != DEM2DI_LOADING || dem2di_group_reserve(w, DEM2DI_WALLS, w->wall_count);
     if (!dem2di_archive_room(ar, fits)) return;
     int materials = w->material_count;
     for (int j = 0; j < w->wall_count && dem2di_archive_good(ar); j++) {
@@ -15829,9 +15796,7 @@ static void dem2di_archive_relist(dem2di_archive *ar, dem2d_world *w) {
     if (!dem2di_archive_good(ar)) return;
     int entries =
         dem2di_incident_count(list->keys, list->pairs, list->count, list->first + 1, w->body_count);
-    bool fits = entries < INT_MAX &&
-                dem2di_array_reserve(w, (void **)&list->incident, &list->incident_capacity,
-                                     entries + 1, sizeof *list->incident);
+    bool fits = entries < INT_MAX && dem2di_group_reserve(w, DEM2DI_INCIDENT, entries + 1);
     if (!dem2di_archive_room(ar, fits)) return;
     dem2di_incident_make(w);
     dem2di_loads_clear(w);
