@@ -753,8 +753,35 @@ static void test_readme(void **state) {
     assert_int_equal(other, -1);
 }
 
+// Lines of a document that give a compiler or linker /dev/null as its output: run by root, some
+// (tcc) put a file there.
+static int null_outputs(const doc *d) {
+    int count = 0;
+    for (int i = 0; i < d->count; i++)
+        count +=
+            strstr(d->line[i], "-o /dev/null") != NULL || strstr(d->line[i], "-o/dev/null") != NULL;
+    return count;
+}
+
+static void test_recipes(void **state) {
+    (void)state;
+    static const char *const paths[] = {"Makefile", "../examples/Makefile", "compile_matrix.sh",
+                                        "bench_cost.sh", "../.ci/run"};
+    char bad[] = "\tcc probe.c -o /dev/null";
+    char *line = bad;
+    doc sample = {.line = &line, .count = 1};
+    assert_int_equal(null_outputs(&sample), 1);
+    for (size_t k = 0; k < sizeof paths / sizeof *paths; k++) {
+        doc recipes = doc_read("", paths[k]);
+        int count = null_outputs(&recipes), lines = recipes.count;
+        doc_free(&recipes);
+        assert_true(lines > 5);
+        assert_int_equal(count, 0);
+    }
+}
+
 int main(void) {
-    struct CMUnitTest tests[RULES + 2 + MUTATIONS] = {{0}};
+    struct CMUnitTest tests[RULES + 3 + MUTATIONS] = {{0}};
     int count = 0;
     for (int i = 0; i < RULES; i++, count++) {
         tests[count].name = rules[i].name;
@@ -765,6 +792,8 @@ int main(void) {
     tests[count++].test_func = test_sample;
     tests[count].name = "the README's world is world.c";
     tests[count++].test_func = test_readme;
+    tests[count].name = "no recipe writes to /dev/null";
+    tests[count++].test_func = test_recipes;
     for (int i = 0; i < MUTATIONS; i++, count++) {
         tests[count].name = mutations[i].name;
         tests[count].test_func = test_mutation;
