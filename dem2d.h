@@ -10166,10 +10166,17 @@ static uint64_t dem2di_curve_place(dem2d_vec corner, double size, dem2d_vec poin
    uses: config, math, gjk
    ============================================================================================ */
 
+/* The contact point from the centres of A and B: components along the contact's normal and along
+   its tangent perp(normal). Those of a circle along the tangent are exactly 0: kernels of circles,
+   which leave them out, give the same bits. Walls do not turn: their b is not used. */
+typedef struct dem2di_arms {
+    double a_n, a_t, b_n, b_t; /* m */
+} dem2di_arms;
+
 /* A contact. Closed (depth <= 0) ones keep the normal for the next warm start. */
 typedef struct dem2di_link {
-    dem2d_vec normal;       /* from A to B; 0 before the first look */
-    dem2d_vec point;        /* contact point from A's centre */
+    dem2d_vec normal; /* from A to B; 0 before the first look */
+    dem2di_arms arms;
     double depth;           /* m; closed: at most 0 */
     double force;           /* normal, N/m */
     double shear;           /* on B along perp(normal), N/m: the tangential spring */
@@ -10181,7 +10188,7 @@ typedef struct dem2di_link {
    sum of the normal forces, and as its point their centre. All zero for a contact of one point. */
 typedef struct dem2di_ends {
     double weight[2], depth[2];
-    double offset[2]; /* along perp(normal) from the link's point */
+    double offset[2]; /* along the tangent from the link's point */
     double shear[2];
     double energy; /* m2: that in the normal springs over kn */
     int corner[2]; /* as in dem2d_contact_point */
@@ -10201,26 +10208,49 @@ typedef struct dem2di_twist {
     double wa, wb;
 } dem2di_twist;
 
-/* Velocity of B against A at the contact point; arm_b is the point seen from B's centre. */
-static inline dem2d_vec dem2di_approach(const dem2di_link *link, dem2d_vec arm_b,
-                                        const dem2di_twist *twist) {
-    dem2d_vec a = dem2di_along(twist->va, twist->wa, dem2di_perp(link->point));
-    dem2d_vec b = dem2di_along(twist->vb, twist->wb, dem2di_perp(arm_b));
-    return dem2di_sub(b, a);
+/* A vector in the plane of a contact whose components along normal and tangent are given. */
+static inline dem2d_vec dem2di_from_frame(dem2d_vec normal, double n, double t) {
+    return dem2di_along(dem2di_scale(normal, n), t, dem2di_perp(normal));
 }
 
-/* Sliding velocity: the part of an approach along the tangent, as its mean over the step that was
-   made, of what the arms and the normal were at its beginning and are at its end: those of the end
-   alone leave an error of first order in the step. Of a new contact that of its end. One rule for
-   all pairs: dem2di_batch_slip is the same for circles. */
-static double dem2di_slip(const dem2di_link *last, const dem2di_link *link, dem2d_vec arm_b,
-                          dem2d_vec approach, const dem2di_twist *twist, double time_step) {
-    double slip = dem2di_cross(link->normal, approach);
+/* The contact point from A's centre. */
+static inline dem2d_vec dem2di_arm_a(const dem2di_link *link) {
+    return dem2di_from_frame(link->normal, link->arms.a_n, link->arms.a_t);
+}
+
+/* The contact point from B's centre. */
+static inline dem2d_vec dem2di_arm_b(const dem2di_link *link) {
+    return dem2di_from_frame(link->normal, link->arms.b_n, link->arms.b_t);
+}
+
+/* From A's centre to B's; to a wall: the contact point. */
+static inline dem2d_vec dem2di_branch_of(const dem2di_link *link, bool wall) {
+    const dem2di_arms *arms = &link->arms;
+    if (wall) return dem2di_arm_a(link);
+    return dem2di_from_frame(link->normal, arms->a_n - arms->b_n, arms->a_t - arms->b_t);
+}
+
+/* Velocity of B against A at the contact point, along the tangent. */
+static inline double dem2di_velocity_t(const dem2di_link *link, const dem2di_twist *twist) {
+    dem2d_vec v = dem2di_sub(twist->vb, twist->va);
+    return dem2di_cross(link->normal, v) -
+           (link->arms.a_n * twist->wa - link->arms.b_n * twist->wb);
+}
+
+/* The same along the normal: below 0 the two approach. */
+static inline double dem2di_velocity_n(const dem2di_link *link, const dem2di_twist *twist) {
+    dem2d_vec v = dem2di_sub(twist->vb, twist->va);
+    return dem2di_dot(link->normal, v) - (link->arms.b_t * twist->wb - link->arms.a_t * twist->wa);
+}
+
+/* Sliding velocity: mean over the step that was made, of what normal and arms were at its beginning
+   and are at its end: those of the end alone leave an error of first order in the step. Of a new
+   contact that of its end. One rule for all pairs: dem2di_batch_slip is the same for circles. */
+static double dem2di_slip(const dem2di_link *last, const dem2di_link *link,
+                          const dem2di_twist *twist) {
+    double slip = dem2di_velocity_t(link, twist);
     if (!(last->depth > 0)) return slip;
-    dem2d_vec to_a = dem2di_sub(arm_b, link->point); /* from B's centre, now and before */
-    to_a = dem2di_along(to_a, time_step, dem2di_sub(twist->vb, twist->va));
-    dem2d_vec before = dem2di_approach(last, dem2di_add(last->point, to_a), twist);
-    return slip + (dem2di_cross(last->normal, before) - slip) / 2;
+    return slip + (dem2di_velocity_t(last, twist) - slip) / 2;
 }
 
 /* [F] eq. 8-10 for a given normal force, with the tangential one held within both limits. The
@@ -10279,11 +10309,11 @@ static void dem2di_law_apply_ends(const dem2d_pair_desc *law, double slip, doubl
     }
 }
 
-/* Normal, point and depths of a contact of two points into its link: those of the normal springs'
-   resultant, whose moment is theirs. The normals are nearly parallel: as springs along the
-   resultant both keep their parts of it. */
-static void dem2di_ends_set(const dem2d_contact_point points[2], dem2di_ends *ends,
-                            dem2di_link *link) {
+/* Normal, point (from A's centre) and depths of a contact of two points into its link: those of the
+   normal springs' resultant, whose moment is theirs. The normals are nearly parallel: as springs
+   along the resultant both keep their parts of it. */
+static dem2d_vec dem2di_ends_set(const dem2d_contact_point points[2], dem2di_ends *ends,
+                                 dem2di_link *link) {
     dem2d_vec force[2], sum, u;
     double part[2], moment = 0;
     for (int i = 0; i < 2; i++) {
@@ -10293,19 +10323,26 @@ static void dem2di_ends_set(const dem2d_contact_point points[2], dem2di_ends *en
     sum = dem2di_add(force[0], force[1]);
     if (dem2di_unit(sum, &u)) link->normal = u;
     double total = dem2di_dot(sum, link->normal), both = part[0] + part[1];
-    link->point = dem2di_along(points[0].position, part[1] / both,
-                               dem2di_sub(points[1].position, points[0].position));
+    dem2d_vec point = dem2di_along(points[0].position, part[1] / both,
+                                   dem2di_sub(points[1].position, points[0].position));
     for (int i = 0; i < 2; i++)
-        moment += dem2di_cross(dem2di_sub(points[i].position, link->point), force[i]);
+        moment += dem2di_cross(dem2di_sub(points[i].position, point), force[i]);
     dem2d_vec t = dem2di_perp(link->normal);
-    link->point = dem2di_along(link->point, -moment / total, t);
+    point = dem2di_along(point, -moment / total, t);
     for (int i = 0; i < 2; i++) {
         ends->weight[i] = points[i].weight * (total / both);
         ends->depth[i] = points[i].depth;
         ends->corner[i] = points[i].corner;
-        ends->offset[i] = dem2di_dot(dem2di_sub(points[i].position, link->point), t);
+        ends->offset[i] = dem2di_dot(dem2di_sub(points[i].position, point), t);
     }
     ends->energy = points[0].energy + points[1].energy;
+    return point;
+}
+
+/* The contact point is moved along the tangent. */
+static inline void dem2di_arms_shift(dem2di_arms *arms, double by) {
+    arms->a_t += by;
+    arms->b_t += by;
 }
 
 /* --- dashpot, rolling --------------------------------------------------------------------------
@@ -10340,7 +10377,7 @@ static void dem2di_ends_damp(const dem2d_pair_desc *law, const dem2di_meeting *m
     double sum = force[0] + force[1];
     if (!(sum > 0)) return;
     double move = force[0] / sum * ends->offset[0] + force[1] / sum * ends->offset[1];
-    link->point = dem2di_along(link->point, move, dem2di_perp(link->normal));
+    dem2di_arms_shift(&link->arms, move);
     for (int i = 0; i < 2; i++) ends->offset[i] -= move;
 }
 
@@ -10399,13 +10436,14 @@ typedef struct dem2di_load {
 
 /* What a contact does to its partners A (0) and B (1); extra may be NULL. */
 static inline void dem2di_link_loads(const dem2di_link *link, const dem2di_extra *extra,
-                                     dem2d_vec arm_b, dem2di_load loads[2]) {
+                                     dem2di_load loads[2]) {
     double moment = extra != NULL ? extra->moment : 0;
+    const dem2di_arms *arms = &link->arms;
     dem2d_vec force = dem2di_link_force(link);
     loads[0].force = dem2di_negate(force);
-    loads[0].torque = -dem2di_cross(link->point, force) - moment;
+    loads[0].torque = -(arms->a_n * link->shear - arms->a_t * link->force) - moment;
     loads[1].force = force;
-    loads[1].torque = dem2di_cross(arm_b, force) + moment;
+    loads[1].torque = arms->b_n * link->shear - arms->b_t * link->force + moment;
 }
 
 /* Stiffness of one particle: the upper triangle of a symmetric matrix in x, y, angle. */
@@ -10413,10 +10451,8 @@ typedef struct dem2di_stiffness {
     double xx, xy, yy, xr, yr, rr;
 } dem2di_stiffness;
 
-/* K += k b b^T for the direction u at the lever arm. */
-static void dem2di_stiffness_add(dem2di_stiffness *k, double stiffness, dem2d_vec u,
-                                 dem2d_vec arm) {
-    double r = dem2di_cross(arm, u);
+/* K += k b b^T for the direction u, which has the lever r about the centre. */
+static void dem2di_stiffness_add(dem2di_stiffness *k, double stiffness, dem2d_vec u, double r) {
     k->xx += stiffness * u.x * u.x;
     k->xy += stiffness * u.x * u.y;
     k->yy += stiffness * u.y * u.y;
@@ -11285,6 +11321,10 @@ static const dem2d_shape *dem2di_shape_of(const dem2d_world *world, const dem2di
     return world->templates[body->shape_index].shape;
 }
 
+static bool dem2di_is_circle(const dem2d_world *world, int slot) {
+    return dem2di_shape_of(world, &world->bodies[slot])->type == DEM2D_CIRCLE;
+}
+
 static double dem2di_body_mass(const dem2d_world *world, const dem2di_body *body) {
     double square = body->scale * body->scale;
     return world->materials[body->material].density * dem2di_shape_of(world, body)->mass.area *
@@ -11510,21 +11550,24 @@ static inline bool dem2di_touched(const dem2d_world *world, int contact) {
     return world->steps > world->listed_at || list->touched[contact];
 }
 
-/* A listed contact then, and the contact point from B's centre (with walls 0); false when it is
-   closed. Of two circles only the tangential spring is kept, the rest follows from the positions
-   with the same bits. */
-static bool dem2di_link_at(const dem2d_world *world, int contact, bool next, dem2di_link *link,
-                           dem2d_vec *arm_b) {
+/* The contact point of two circles. */
+static inline dem2di_arms dem2di_round_arms(const dem2di_round *round) {
+    dem2di_arms arms;
+    arms.a_n = round->arm_a;
+    arms.b_n = -round->arm_b;
+    arms.a_t = arms.b_t = 0;
+    return arms;
+}
+
+/* A listed contact then; false when it is apart. Of two circles only the tangential spring is kept,
+   the rest follows from the positions with the same bits. */
+static bool dem2di_link_at(const dem2d_world *world, int contact, bool next, dem2di_link *link) {
     const dem2di_list *list = &world->list;
     const dem2di_key *key = &list->keys[contact];
     const dem2di_state *states = dem2di_states_at(world, next);
     if (contact == list->count || key->a < 0) return false; /* 2 count fills up a gather */
     if (contact >= list->discs) {
         *link = (next ? list->next_links : list->links)[contact - list->discs];
-        *arm_b = dem2di_vec(0, 0);
-        if (contact < list->pairs)
-            *arm_b =
-                dem2di_sub(link->point, dem2di_centre_line(states[key->a].x, states[key->b].x));
         return link->depth > 0;
     }
     const dem2d_pair_desc *law = dem2di_law_at(world, contact, next);
@@ -11532,12 +11575,11 @@ static bool dem2di_link_at(const dem2d_world *world, int contact, bool next, dem
     dem2di_round round =
         dem2di_round_make(dem2di_disc_line(a, b), a->radius, b->radius, law->normal_stiffness);
     link->normal = round.normal;
-    link->point = dem2di_scale(round.normal, round.arm_a);
+    link->arms = dem2di_round_arms(&round);
     link->depth = round.depth;
     link->force = round.force;
     link->shear = dem2di_spring_at(world, contact, next);
     link->budget = 0;
-    *arm_b = dem2di_scale(round.normal, -round.arm_b);
     return round.depth > 0 && (next || dem2di_touched(world, contact));
 }
 
@@ -11599,10 +11641,9 @@ static dem2di_load dem2di_load_of(const dem2d_world *world, int slot) {
     for (int k = list->first[slot]; k < list->first[slot + 1]; k++) {
         int contact = list->incident[k] / 2, side = list->incident[k] & 1;
         dem2di_link link;
-        dem2d_vec arm_b;
-        if (!dem2di_link_at(world, contact, false, &link, &arm_b)) continue;
+        if (!dem2di_link_at(world, contact, false, &link)) continue;
         dem2di_load loads[2];
-        dem2di_link_loads(&link, dem2di_extra_at(world, contact, false), arm_b, loads);
+        dem2di_link_loads(&link, dem2di_extra_at(world, contact, false), loads);
         load.force = dem2di_add(load.force, loads[side].force);
         load.torque += loads[side].torque;
     }
@@ -12294,10 +12335,9 @@ static double dem2di_skin_make(const dem2d_world *world, int slot) {
     for (int k = list->first[slot]; k < list->first[slot + 1]; k++) {
         int contact = list->incident[k] / 2;
         dem2di_link link;
-        dem2d_vec arm;
         if (contact == list->count || list->keys[contact].a < 0) continue;
         double gap = dem2di_gap_now(world, contact);
-        if (gap > skin && dem2di_link_at(world, contact, false, &link, &arm))
+        if (gap > skin && dem2di_link_at(world, contact, false, &link))
             skin = gap * (1 + DEM2DI_ROUNDING);
     }
     return skin;
@@ -12419,8 +12459,7 @@ static void dem2di_recall(const dem2di_build *build, int place) {
     dem2di_link *link = &list->next_links[place - discs];
     memset(link, 0, sizeof *link);
     if (old >= 0 && at < 0) { /* of circles, which are among the others from now on */
-        dem2d_vec arm_b;
-        if (!dem2di_link_at(world, old, false, link, &arm_b)) memset(link, 0, sizeof *link);
+        if (!dem2di_link_at(world, old, false, link)) memset(link, 0, sizeof *link);
     }
     bool kept = old >= 0 && at >= 0;
     if (kept) *link = list->links[at];
@@ -12749,16 +12788,14 @@ static void dem2di_book_contact(const dem2d_world *world, int contact, dem2di_le
     const dem2di_twist twist = dem2di_twist_of(world, contact);
     const double turning = twist.wb - twist.wa;
     for (int k = 0; k < 2; k++) {
-        dem2d_vec arm;
-        closed[k] = dem2di_link_at(world, contact, k == 1, &link[k], &arm);
+        closed[k] = dem2di_link_at(world, contact, k == 1, &link[k]);
         if (!closed[k]) continue;
-        dem2d_vec approach = dem2di_approach(&link[k], arm, &twist);
-        double closing = -dem2di_dot(link[k].normal, approach);
+        double closing = -dem2di_velocity_n(&link[k], &twist);
         const dem2di_extra *extra = dem2di_extra_at(world, contact, k == 1);
         dem2di_stored stored = dem2di_stored_in(world, contact, k == 1, &link[k]);
         if (k == 1) dem2di_stored_add(&ledger->stored, stored, 1);
         dem2di_stored_add(&gained, stored, k == 1 ? 1 : -1);
-        slide += dem2di_cross(link[k].normal, approach) * world->made_step;
+        slide += dem2di_velocity_t(&link[k], &twist) * world->made_step;
         shear += link[k].shear / 2;
         force += link[k].force / 2;
         deeper += k == 1 ? link[k].depth : -link[k].depth;
@@ -12844,14 +12881,11 @@ static double dem2di_ledger_turnover(const dem2di_ledger *ledger, const dem2di_l
    of the tangential spring. */
 #define DEM2DI_BATCH 32 /* 4 kB of arrays, little of the innermost cache */
 
-/* Nothing beside the square of any distance between centres, but for two that were the same: then
-   there was no normal, and no sliding along it. */
-#define DEM2DI_SQUARE_MIN 1e-300
-
 typedef struct dem2di_batch {
     double dx[DEM2DI_BATCH], dy[DEM2DI_BATCH]; /* from A to B */
     double radius_a[DEM2DI_BATCH], radius_b[DEM2DI_BATCH];
-    double vx[DEM2DI_BATCH], vy[DEM2DI_BATCH]; /* of B against A */
+    double nx[DEM2DI_BATCH], ny[DEM2DI_BATCH], last[DEM2DI_BATCH]; /* normal, depth: a step ago */
+    double vx[DEM2DI_BATCH], vy[DEM2DI_BATCH];                     /* of B against A */
     double wa[DEM2DI_BATCH], wb[DEM2DI_BATCH];
     double shear[DEM2DI_BATCH], depth[DEM2DI_BATCH];
     double fx[DEM2DI_BATCH], fy[DEM2DI_BATCH]; /* on B */
@@ -12883,6 +12917,11 @@ static DEM2DI_INLINE void dem2di_batch_fetch(const dem2d_world *world, int first
         batch->wa[k] = a->w;
         batch->wb[k] = b->w;
         batch->shear[k] = world->list.shear[first + k];
+        a = &world->before[keys[k].a], b = &world->before[keys[k].b];
+        dem2di_round last = dem2di_round_make(dem2di_disc_line(a, b), a->radius, b->radius, 1);
+        batch->nx[k] = last.normal.x;
+        batch->ny[k] = last.normal.y;
+        batch->last[k] = dem2di_touched(world, first + k) ? last.depth : -1;
     }
 }
 
@@ -12898,18 +12937,14 @@ static void dem2di_batch_made(const dem2d_world *world, int first, int count, de
 }
 
 DEM2DI_VECTORS_BEGIN
-/* dem2di_slip for two circles, whose normal and arms at the beginning of the step follow from the
-   way they have made. */
+/* dem2di_slip for two circles. */
 static DEM2DI_INLINE double dem2di_batch_slip(const dem2di_batch *batch, int k,
-                                              const dem2di_round *now, double time_step) {
+                                              const dem2di_round *now) {
     double vx = batch->vx[k], vy = batch->vy[k], wa = batch->wa[k], wb = batch->wb[k];
-    double dx = batch->dx[k] - vx * time_step, dy = batch->dy[k] - vy * time_step;
-    double distance = sqrt(dx * dx + dy * dy + DEM2DI_SQUARE_MIN), f = 1 / distance;
-    double depth = batch->radius_a[k] + batch->radius_b[k] - distance;
+    double depth = batch->last[k], closed = depth > 0 ? 1 : 0; /* no branch: for vectors */
     double arm_a = batch->radius_a[k] - depth / 2, arm_b = batch->radius_b[k] - depth / 2;
     double slip = now->normal.x * vy - now->normal.y * vx - (now->arm_a * wa + now->arm_b * wb);
-    double before = dx * f * vy - dy * f * vx - (arm_a * wa + arm_b * wb);
-    double closed = depth > 0 ? 1 : 0; /* no branch: for vector instructions */
+    double before = batch->nx[k] * vy - batch->ny[k] * vx - (arm_a * wa + arm_b * wb);
     return slip + (before - slip) * (closed / 2);
 }
 
@@ -12929,7 +12964,7 @@ static DEM2DI_INLINE void dem2di_batch_loop(dem2di_batch *batch, int count, doub
         batch->fx[k] = r.normal.x * r.force;
         batch->fy[k] = r.normal.y * r.force;
         if (!friction) continue;
-        double slip = dem2di_batch_slip(batch, k, &r, time_step);
+        double slip = dem2di_batch_slip(batch, k, &r);
         double limit = mu * r.force, spring = batch->shear[k] - kt * slip * time_step;
         spring = limit < spring ? limit : spring;
         spring = -limit > spring ? -limit : spring;
@@ -13053,7 +13088,7 @@ static int dem2di_round_geometry(const dem2di_state *a, const dem2di_state *b, d
     dem2di_round round = dem2di_round_make(dem2di_disc_line(a, b), a->radius, b->radius, 1);
     link->normal = round.normal;
     link->depth = round.depth;
-    points[0].position = dem2di_scale(round.normal, round.arm_a);
+    points[0].position = dem2di_vec(0, 0); /* what circles have follows from the depth */
     count->looks++;
     count->proofs[DEM2D_BY_FORM]++;
     return round.depth > 0;
@@ -13097,15 +13132,14 @@ static int dem2di_pair_geometry(const dem2d_world *world, int a, int b, const de
    where its springs are: its place among those that are not of circles, but for one that has come
    across a joint. */
 static inline void dem2di_link_load(const dem2d_world *world, int i, int from,
-                                    const dem2d_pair_desc *law, dem2d_vec arm_b, bool two) {
+                                    const dem2d_pair_desc *law, bool two) {
     const dem2di_list *list = &world->list;
     int at = i - list->discs;
     dem2di_link *link = &list->next_links[at];
     double slip = 0;
     if (law->friction > 0) {
         dem2di_twist twist = dem2di_twist_of(world, i);
-        dem2d_vec approach = dem2di_approach(link, arm_b, &twist);
-        slip = dem2di_slip(&list->links[from], link, arm_b, approach, &twist, world->made_step);
+        slip = dem2di_slip(&list->links[from], link, &twist);
     }
     if (two) {
         double force[2];
@@ -13118,21 +13152,18 @@ static inline void dem2di_link_load(const dem2d_world *world, int i, int from,
     dem2di_law_apply(law, slip, world->made_step, list->links[from].shear, link);
 }
 
-/* How the two of contact i meet, whose point is arm_b from B's centre. */
-static dem2di_meeting dem2di_meeting_make(const dem2d_world *world, int i, int from,
-                                          dem2d_vec arm_b) {
+/* How the two of contact i meet. */
+static dem2di_meeting dem2di_meeting_make(const dem2d_world *world, int i, int from) {
     const dem2di_list *list = &world->list;
     const dem2di_link *link = &list->next_links[i - list->discs];
     double inverse = dem2di_reduced_inverse(world, i);
     dem2di_twist twist = dem2di_twist_of(world, i);
     dem2di_meeting meeting;
     meeting.turning = twist.wb - twist.wa;
-    dem2d_vec approach = dem2di_approach(link, arm_b, &twist);
-    meeting.closing = -dem2di_dot(link->normal, approach);
+    meeting.closing = -dem2di_velocity_n(link, &twist);
     meeting.slip = 0;
     if (dem2di_law_of(world, i)->friction > 0 || world->law != NULL)
-        meeting.slip =
-            dem2di_slip(&list->links[from], link, arm_b, approach, &twist, world->made_step);
+        meeting.slip = dem2di_slip(&list->links[from], link, &twist);
     meeting.mass = inverse > 0 ? 1 / inverse : 0;
     return meeting;
 }
@@ -13183,14 +13214,14 @@ static void dem2di_call_law(const dem2d_world *world, int i, int from,
 }
 
 /* The full law: dashpot and rolling as well, or the caller's. Two points may get another centre. */
-static void dem2di_full_load(const dem2d_world *world, int i, int from, dem2d_vec arm_b, bool two) {
+static void dem2di_full_load(const dem2d_world *world, int i, int from, bool two) {
     const dem2di_list *list = &world->list;
     const dem2d_pair_desc *law = dem2di_law_of(world, i);
     int at = i - list->discs;
     dem2di_link *link = &list->next_links[at];
     dem2di_extra *extra = &list->next_extras[at];
     const double dt = world->made_step;
-    dem2di_meeting meeting = dem2di_meeting_make(world, i, from, arm_b);
+    dem2di_meeting meeting = dem2di_meeting_make(world, i, from);
     if (world->law != NULL) {
         dem2di_call_law(world, i, from, &meeting);
         return;
@@ -13212,16 +13243,31 @@ static void dem2di_full_load(const dem2d_world *world, int i, int from, dem2d_ve
                                        link->force, list->extras[from].moment);
 }
 
-/* Points of a contact into its link, and beside it when there are two. */
-static inline void dem2di_link_place(const dem2di_list *list, int at, int count,
-                                     const dem2d_contact_point points[2]) {
-    dem2di_link *link = &list->next_links[at];
-    if (count == 2) {
-        dem2di_ends_set(points, &list->next_ends[at], link);
-        return;
+/* Points of contact i into its link, and beside it when there are two; B's centre is at d. A circle
+   has its points on the line of the normal: on its own side of the middle of an overlap, and on a
+   wall at the foot. */
+static inline void dem2di_link_place(const dem2d_world *world, int i, int count,
+                                     const dem2d_contact_point points[2], dem2d_vec d) {
+    const dem2di_list *list = &world->list;
+    const dem2di_key *key = &list->keys[i];
+    bool wall = i >= list->pairs;
+    dem2di_link *link = &list->next_links[i - list->discs];
+    dem2di_arms *arms = &link->arms;
+    dem2d_vec point = count == 2 ? dem2di_ends_set(points, &list->next_ends[i - list->discs], link)
+                                 : points[0].position;
+    dem2d_vec from_b = dem2di_sub(point, d);
+    arms->a_n = dem2di_dot(link->normal, point);
+    arms->a_t = dem2di_cross(link->normal, point);
+    arms->b_n = wall ? 0 : dem2di_dot(link->normal, from_b);
+    arms->b_t = wall ? 0 : dem2di_cross(link->normal, from_b);
+    if (dem2di_is_circle(world, key->a)) {
+        arms->a_n = world->now[key->a].radius - (wall ? link->depth : link->depth / 2);
+        arms->a_t = 0;
     }
-    link->point.x = points[0].position.x;
-    link->point.y = points[0].position.y;
+    if (!wall && dem2di_is_circle(world, key->b)) {
+        arms->b_n = -(world->now[key->b].radius - link->depth / 2);
+        arms->b_t = 0;
+    }
 }
 
 static inline void dem2di_load_set(const dem2d_world *world, int at, dem2di_load load) {
@@ -13237,11 +13283,10 @@ static void dem2di_no_loads(const dem2d_world *world, int i) {
     dem2di_load_set(world, 2 * i + 1, none);
 }
 
-static inline void dem2di_set_loads(const dem2d_world *world, int i, dem2d_vec arm_b,
-                                    dem2di_count *count) {
+static inline void dem2di_set_loads(const dem2d_world *world, int i, dem2di_count *count) {
     dem2di_load loads[2];
     dem2di_link_loads(&world->list.next_links[i - world->list.discs],
-                      dem2di_extra_at(world, i, true), arm_b, loads);
+                      dem2di_extra_at(world, i, true), loads);
     dem2di_load_set(world, 2 * i, loads[0]);
     dem2di_load_set(world, 2 * i + 1, loads[1]);
     double sum = loads[1].force.x + loads[1].force.y + loads[0].torque + loads[1].torque;
@@ -13280,15 +13325,12 @@ static void dem2di_pair_look(const dem2d_world *world, int i, dem2di_count *coun
     const dem2di_state *sa = &world->now[a], *sb = &world->now[b];
     const dem2d_pair_desc *law = dem2di_law_of(world, i);
     dem2d_vec d = dem2di_centre_line(sa->x, sb->x);
-    dem2di_link_place(list, at, found, points);
-    dem2d_vec arm_b = dem2di_sub(link->point, d);
-    if (world->plan.full) {
-        dem2di_full_load(world, i, at, arm_b, found == 2);
-        arm_b = dem2di_sub(link->point, d);
-    } else {
-        dem2di_link_load(world, i, at, law, arm_b, found == 2);
-    }
-    dem2di_set_loads(world, i, arm_b, count);
+    dem2di_link_place(world, i, found, points, d);
+    if (world->plan.full)
+        dem2di_full_load(world, i, at, found == 2);
+    else
+        dem2di_link_load(world, i, at, law, found == 2);
+    dem2di_set_loads(world, i, count);
 }
 
 /* A particle at a half-plane: one support call, none for a circle. Returns the number of points. */
@@ -13363,13 +13405,12 @@ static void dem2di_touch_force(const dem2d_world *world, int i, int from, dem2di
     const dem2d_pair_desc *law = dem2di_law_of(world, i);
     bool two = dem2di_ends_at(world, i, true) != NULL;
     if (world->faces == DEM2D_ONE_POINT) /* [P] fig. 4b: from the foot point to the middle */
-        link->point = dem2di_along(link->point, link->depth / 2, link->normal);
-    dem2d_vec foot = dem2di_vec(0, 0); /* walls do not turn */
+        link->arms.a_n += link->depth / 2;
     if (world->plan.full)
-        dem2di_full_load(world, i, from, foot, two);
+        dem2di_full_load(world, i, from, two);
     else
-        dem2di_link_load(world, i, from, law, foot, two);
-    dem2di_set_loads(world, i, foot, count);
+        dem2di_link_load(world, i, from, law, two);
+    dem2di_set_loads(world, i, count);
 }
 
 /* The same as for a pair, for a particle and a wall. Where segments are joined, forces come after
@@ -13387,7 +13428,7 @@ static void dem2di_touch_look(const dem2d_world *world, int i, dem2di_count *cou
     int found = segment ? dem2di_segment_geometry(world, a, j, last, link, points, count)
                         : dem2di_plane_geometry(world, a, j, link, points, count);
     if (found == 0) return;
-    dem2di_link_place(list, at, found, points);
+    dem2di_link_place(world, i, found, points, dem2di_vec(0, 0));
     if (!segment || !world->plan.joints) dem2di_touch_force(world, i, at, count);
 }
 
@@ -13410,7 +13451,7 @@ static int dem2di_point_near(const dem2d_world *world, int contact, dem2d_vec pl
     const dem2di_link *link = &world->list.next_links[contact - world->list.discs];
     const dem2di_ends *ends = dem2di_ends_at(world, contact, true);
     const dem2di_state *a = &world->now[world->list.keys[contact].a];
-    dem2d_vec from = dem2di_sub(place, dem2di_add(a->x, link->point));
+    dem2d_vec from = dem2di_sub(place, dem2di_add(a->x, dem2di_arm_a(link)));
     for (int k = 0; k < (ends != NULL ? 2 : 1); k++) {
         double offset = ends != NULL ? ends->offset[k] : 0;
         dem2d_vec left = dem2di_along(from, -offset, dem2di_perp(link->normal));
@@ -13432,7 +13473,7 @@ static void dem2di_drop_point(const dem2d_world *world, int contact, int point) 
     dem2di_link *link = &list->next_links[contact - list->discs];
     dem2di_ends *ends = &list->next_ends[contact - list->discs];
     link->depth = ends->depth[1 - point];
-    link->point = dem2di_along(link->point, ends->offset[1 - point], dem2di_perp(link->normal));
+    dem2di_arms_shift(&link->arms, ends->offset[1 - point]);
     memset(ends, 0, sizeof *ends);
 }
 
@@ -13665,7 +13706,7 @@ static void dem2di_push_ask(const dem2d_world *world, int contact, double elasti
                             double *impedance, double *spring) {
     int from = contact - world->list.discs;
     const dem2di_link *link = &world->list.next_links[from];
-    dem2di_meeting meeting = dem2di_meeting_make(world, contact, from, dem2di_vec(0, 0));
+    dem2di_meeting meeting = dem2di_meeting_make(world, contact, from);
     double closing = meeting.closing, deeper = link->depth / 16, faster = deeper / world->time_step;
     dem2d_law_output output;
     meeting.closing += faster;
@@ -13685,11 +13726,11 @@ static dem2di_push dem2di_push_make(const dem2d_world *world, int contact, dem2d
     int a = list->keys[contact].a;
     double inverse = world->inverse[a].mass, mass = inverse > 0 ? 1 / inverse : 0;
     double weight = 1, spring = link->force;
-    dem2d_vec arm = link->point;
+    dem2di_arms arms = link->arms;
     if (ends != NULL) { /* their springs act at the centre of the weights */
         weight = dem2di_ends_weight(ends);
         double offset = ends->weight[0] * ends->offset[0] + ends->weight[1] * ends->offset[1];
-        arm = dem2di_along(arm, offset / weight, dem2di_perp(link->normal));
+        dem2di_arms_shift(&arms, offset / weight);
     }
     double stiffness = weight * law->normal_stiffness;
     double elastic = stiffness * world->time_step;
@@ -13697,10 +13738,10 @@ static dem2di_push dem2di_push_make(const dem2d_world *world, int contact, dem2d
     if (extra != NULL) spring -= extra->viscous[0] + extra->viscous[1];
     if (world->law != NULL) dem2di_push_ask(world, contact, elastic, &impedance, &spring);
     dem2di_state next = dem2di_foresee(world, a);
-    dem2d_vec surface = dem2di_along(next.v, next.w, dem2di_perp(arm));
+    double leaves = dem2di_dot(link->normal, next.v) - arms.a_t * next.w;
     dem2di_push push;
     push.along = -dem2di_dot(link->normal, normal);
-    push.force = spring + impedance * dem2di_dot(link->normal, surface);
+    push.force = spring + impedance * leaves;
     push.rise = impedance * push.along;
     backing->stiffness += stiffness;
     backing->impedance += impedance;
@@ -13926,11 +13967,12 @@ static int dem2di_unsound(const dem2d_world *world) {
 /* --- the stable time step -----------------------------------------------------------------------
  */
 
-/* Stiffness of one contact on one of its particles, at one point (seen from its centre). */
-static void dem2di_stiffness_point(double kn, double kt, dem2d_vec normal, dem2d_vec arm,
-                                   dem2di_stiffness *sum) {
-    dem2di_stiffness_add(sum, kn, normal, arm);
-    dem2di_stiffness_add(sum, kt, dem2di_perp(normal), arm);
+/* Stiffness of one contact on one of its particles, at one point, arm_n and arm_t from its centre.
+ */
+static void dem2di_stiffness_point(double kn, double kt, dem2d_vec normal, double arm_n,
+                                   double arm_t, dem2di_stiffness *sum) {
+    dem2di_stiffness_add(sum, kn, normal, -arm_t);
+    dem2di_stiffness_add(sum, kt, dem2di_perp(normal), arm_n);
 }
 
 /* The greatest c/kn of the dashpots on a particle, s. */
@@ -13941,8 +13983,7 @@ static double dem2di_dashpot_lag(const dem2d_world *world, int slot, bool next) 
     for (int k = list->first[slot]; k < list->first[slot + 1]; k++) {
         int i = list->incident[k] / 2;
         dem2di_link link;
-        dem2d_vec arm_b;
-        if (!dem2di_link_at(world, i, next, &link, &arm_b)) continue;
+        if (!dem2di_link_at(world, i, next, &link)) continue;
         const dem2d_pair_desc *law = dem2di_law_at(world, i, next);
         double inverse = dem2di_reduced_inverse(world, i);
         if (!(inverse > 0)) continue;
@@ -14020,8 +14061,7 @@ static void dem2di_stiffness_sum(const dem2d_world *world, int slot, bool next,
     for (int k = list->first[slot]; k < list->first[slot + 1]; k++) {
         int i = list->incident[k] / 2, side = list->incident[k] & 1;
         dem2di_link link;
-        dem2d_vec arm_b;
-        if (!dem2di_link_at(world, i, next, &link, &arm_b)) continue;
+        if (!dem2di_link_at(world, i, next, &link)) continue;
         const dem2di_key *key = &list->keys[i];
         const dem2d_pair_desc *law = dem2di_law_at(world, i, next);
         const dem2di_ends *ends = dem2di_ends_at(world, i, next);
@@ -14030,7 +14070,8 @@ static void dem2di_stiffness_sum(const dem2d_world *world, int slot, bool next,
         bool sticks = world->law == NULL && fabs(link.shear) < law->friction * link.force;
         bool rubs = law->friction > 0 || world->law != NULL;
         double kn = law->normal_stiffness, kt = law->tangential_stiffness;
-        dem2d_vec arm = side ? arm_b : link.point, t = dem2di_perp(link.normal);
+        double arm_n = side ? link.arms.b_n : link.arms.a_n;
+        double arm_t = side ? link.arms.b_t : link.arms.a_t;
         for (int bound = 0; bound < 2; bound++) {
             double f = bound == 1 && shared ? 2 : 1;
             double slide = sticks || (bound == 1 && rubs) ? f * kt : 0;
@@ -14041,8 +14082,8 @@ static void dem2di_stiffness_sum(const dem2d_world *world, int slot, bool next,
                                  dem2di_rocking(world, i, side, next, &link, bound == 1);
             for (int p = 0; p < (ends != NULL ? 2 : 1); p++) {
                 double w = ends != NULL ? ends->weight[p] : 1;
-                dem2d_vec at = ends != NULL ? dem2di_along(arm, ends->offset[p], t) : arm;
-                dem2di_stiffness_point(w * f * kn, w * slide, link.normal, at, &sum[bound]);
+                double at = ends != NULL ? arm_t + ends->offset[p] : arm_t;
+                dem2di_stiffness_point(w * f * kn, w * slide, link.normal, arm_n, at, &sum[bound]);
             }
         }
     }
@@ -14298,11 +14339,10 @@ static bool dem2di_tour_next(const dem2d_world *world, dem2di_tour *walk) {
         while (walk->entry < list->first[slot + 1] - list->first[slot]) {
             int entry = list->incident[list->first[slot] + walk->entry++];
             int contact = entry / 2;
-            dem2d_vec arm_b;
             if (entry % 2 != 0 || (contact >= list->pairs) != walk->walls) continue;
-            if (!dem2di_link_at(world, contact, false, &walk->link, &arm_b)) continue;
+            if (!dem2di_link_at(world, contact, false, &walk->link)) continue;
             walk->contact = contact;
-            walk->branch = dem2di_sub(walk->link.point, arm_b);
+            walk->branch = dem2di_branch_of(&walk->link, walk->walls);
             return true;
         }
     }
@@ -14319,8 +14359,7 @@ static dem2di_tour dem2di_tour_start(bool walls) {
 static int dem2di_open_contacts(const dem2d_world *world, int begin, int end) {
     int open = 0;
     dem2di_link link;
-    dem2d_vec arm_b;
-    for (int i = begin; i < end; i++) open += dem2di_link_at(world, i, false, &link, &arm_b);
+    for (int i = begin; i < end; i++) open += dem2di_link_at(world, i, false, &link);
     return open;
 }
 
@@ -14374,7 +14413,7 @@ static dem2d_contact_info dem2di_contact_of(const dem2d_world *world, const dem2
     else
         info.b = dem2di_particle_id(world, key->b);
     info.normal = link->normal;
-    info.point = dem2di_add(world->before[key->a].x, link->point);
+    info.point = dem2di_add(world->before[key->a].x, dem2di_arm_a(link));
     info.branch = walk->branch;
     info.points = dem2di_ends_at(world, walk->contact, false) != NULL ? 2 : 1;
     info.depth = link->depth;
@@ -14495,13 +14534,12 @@ static dem2d_stress dem2di_particle_stress(const dem2d_world *world, int slot) {
     for (int k = list->first[slot]; k < list->first[slot + 1]; k++) {
         int contact = list->incident[k] / 2, side = list->incident[k] & 1;
         dem2di_link link;
-        dem2d_vec arm_b;
-        if (!dem2di_link_at(world, contact, false, &link, &arm_b)) continue;
+        if (!dem2di_link_at(world, contact, false, &link)) continue;
         dem2d_vec force = dem2di_link_force(&link);
         if (side == 0)
-            dem2di_stress_add(&sum, link.point, force);
+            dem2di_stress_add(&sum, dem2di_arm_a(&link), force);
         else
-            dem2di_stress_add(&sum, dem2di_negate(arm_b), force);
+            dem2di_stress_add(&sum, dem2di_negate(dem2di_arm_b(&link)), force);
     }
     return dem2di_stress_over(&sum, dem2di_body_area(world, &world->bodies[slot]));
 }
@@ -15002,7 +15040,7 @@ static dem2d_result dem2di_writer_close(const dem2d_env *env, const char *path,
    on different systems, so that a copy as text is noticed. Whoever changes the list of fields
    changes the version. */
 #define DEM2DI_SNAPSHOT_MARK 0x0A0D64326D65648Du /* 8D "dem2d" 0D 0A */
-#define DEM2DI_SNAPSHOT_VERSION 3u
+#define DEM2DI_SNAPSHOT_VERSION 4u
 #define DEM2DI_SNAPSHOT_HEAD 24 /* bytes: mark, version, size */
 #define DEM2DI_SNAPSHOT_TAIL 8  /* the checksum */
 
@@ -15414,7 +15452,10 @@ static void dem2di_archive_wall_state(dem2di_archive *ar, dem2di_wall_state *sta
 
 /* Of an open contact, beside its normal and depth. */
 static void dem2di_archive_hold(dem2di_archive *ar, dem2di_link *link) {
-    dem2di_archive_vec(ar, "contact point", &link->point);
+    dem2di_archive_finite(ar, "arm of A", &link->arms.a_n);
+    dem2di_archive_finite(ar, "arm of A", &link->arms.a_t);
+    dem2di_archive_finite(ar, "arm of B", &link->arms.b_n);
+    dem2di_archive_finite(ar, "arm of B", &link->arms.b_t);
     dem2di_archive_finite(ar, "normal force", &link->force);
     dem2di_archive_finite(ar, "shear", &link->shear);
 }

@@ -72,8 +72,7 @@ static int count_missed(const dem2d_world *world) {
             if (world->bodies[a].index < world->bodies[b].index) key.a = a, key.b = b;
             const int listed = dem2di_listed(world, &key, false);
             dem2di_link link;
-            dem2d_vec arm;
-            missed += listed < 0 || !dem2di_link_at(world, listed, false, &link, &arm);
+            missed += listed < 0 || !dem2di_link_at(world, listed, false, &link);
         }
     return missed;
 }

@@ -663,11 +663,8 @@ static void make_pairs(dem2d_world *world, int count, const second_order a[4]) {
         const double d = depth * around(a[NORMAL], t), length = around(a[BRANCHES], t);
         const double shear =
             -kn * depth * a[TANGENTIAL].coefficient * sin(2 * (t - a[TANGENTIAL].direction));
-        const double mean = -shear / kt / time_step, other = k % 2 == 0 ? 1 : -1;
-        double slip =
-            mean; /* at the step's end; at its beginning the cosine of its turn times that */
-        for (int i = 0; i < 30; i++)
-            slip = 2 * mean / (1 + 1 / hypot(1, slip * time_step / length));
+        const double slip = -shear / kt / time_step; /* of new contacts: at the step's end */
+        const double other = k % 2 == 0 ? 1 : -1;
         const dem2d_vec n = direction(t), at = vec(4 * (k % 20), 4 * (k / 20));
         const dem2d_vec next = vec(at.x + other * length * n.x, at.y + other * length * n.y);
         add(world, disc, material, at, (length + d) * 0.4, 0, DEM2D_DRIVEN);
