@@ -2099,7 +2099,7 @@ static dem2d_principal dem2di_tensor_principal(dem2di_tensor t) {
 
 /* ============================================================================================
    >>memory  Allocation by the environment, results and the log
-   uses: config
+   uses: config, math
    ============================================================================================ */
 
 DEM2D_API int dem2d_version(void) {
@@ -2499,7 +2499,7 @@ static dem2di_bounds dem2di_series_minimum(const dem2di_series *s, double tolera
 
 /* ============================================================================================
    >>support  The template in memory and its support point in a unit direction
-   uses: config, math, memory, series
+   uses: config, math
    ============================================================================================ */
 
 /* Up to this many corners a loop over all of them is as fast as the sector table: 4.9 against 6.3
@@ -2838,7 +2838,7 @@ static inline dem2d_vec dem2di_support(const dem2d_shape *shape, dem2d_vec u, do
 
 /* ============================================================================================
    >>mass  Area, centroid and polar moment: exact per model, and by interpolation
-   uses: config, math, memory, series, support
+   uses: config, math, memory, hull, series, support
    ============================================================================================ */
 
 /* Area and moments about the origin, summed over pieces. */
@@ -9344,7 +9344,7 @@ static void dem2di_certified(dem2di_pair *pair, const dem2di_feature *last, dem2
 
 /* ============================================================================================
    >>faces  Where two faces meet: the two points that carry the contact
-   uses: config, math, support, gjk, edges
+   uses: config, math, support, gjk
    ============================================================================================ */
 
 /* A face of a shape beside a contact along u, without its rounding: places are along perp(u),
@@ -9695,7 +9695,7 @@ static int dem2di_wall_points(const dem2d_shape *shape, dem2d_rot q, double scal
 
 /* ============================================================================================
    >>contact  Contact of two shapes, of a shape and a wall
-   uses: config, math, memory, support, shapes, gjk, epa, edges, minimum, faces
+   uses: config, math, shapes, gjk, epa, minimum, faces
    ============================================================================================ */
 
 /* [P] sec. 3: GJK, then EPA when the shapes overlap. */
@@ -10558,7 +10558,7 @@ static bool dem2di_state_finite(const dem2di_state *state) {
 
 /* ============================================================================================
    >>world  Objects with ids
-   uses: config, math, memory, support, shapes, faces, contact, broad, law, motion
+   uses: config, math, memory, shapes, gjk, broad, law, motion
    ============================================================================================ */
 
 typedef struct dem2di_template {
@@ -11974,7 +11974,7 @@ DEM2D_API dem2d_result dem2d_world_set_time_step(dem2d_world *world, double time
 
 /* ============================================================================================
    >>list  The list of contacts: particles in the order of space, partners, what they remember
-   uses: config, math, memory, contact, broad, law, motion, world
+   uses: config, math, gjk, broad, law, motion, world
    ============================================================================================ */
 
 /* Parallel work is cut into blocks of so many items: enough to pay for a call of the callback's,
@@ -12728,7 +12728,7 @@ static dem2d_result dem2di_build_list(dem2d_world *world) {
 
 /* ============================================================================================
    >>ledger  The ledger of energies: what is stored, and what went where in a step
-   uses: config, math, law, motion, world, list
+   uses: config, math, broad, law, motion, world
    ============================================================================================ */
 
 /* Velocities of the step that was made for those that have been given others since. */
@@ -12871,8 +12871,8 @@ static double dem2di_ledger_turnover(const dem2di_ledger *ledger, const dem2di_l
 
 /* ============================================================================================
    >>step  Contacts, their sums, walls, motion; the stable time step
-   uses: config, math, memory, support, shapes, minimum, faces, contact, law, motion, world, list,
-         ledger
+   uses: config, math, memory, support, shapes, gjk, faces, contact, broad, law, motion, world,
+         list, ledger
    ============================================================================================ */
 
 /* Contacts of circles are taken in batches: what they need is fetched, all are computed by a loop
@@ -14318,7 +14318,7 @@ DEM2D_API dem2d_result dem2d_world_step(dem2d_world *world, int count, int *done
 
 /* ============================================================================================
    >>measures  Lists of what is there, energy, stress, fabric, packing, distance from rest
-   uses: config, math, memory, mass, shapes, law, motion, world
+   uses: config, math, memory, mass, shapes, broad, law, motion, world
    ============================================================================================ */
 
 /* A walk over the contacts of the last force pass in the order of their ids: those of particles, or
@@ -15032,7 +15032,7 @@ static dem2d_result dem2di_writer_close(const dem2d_env *env, const char *path,
 
 /* ============================================================================================
    >>snapshot  State hash, snapshots: one list of fields for all that is done with them
-   uses: config, math, memory, support, shapes, law, motion, world, list, measures, output
+   uses: config, memory, support, shapes, broad, law, motion, world, list, measures, output
    ============================================================================================ */
 
 /* A snapshot is a mark, a version, its size in bytes, what dem2di_archive_world lists, and a
@@ -16036,7 +16036,7 @@ DEM2D_API dem2d_result dem2d_world_load(const dem2d_load_desc *desc, const char 
 
 /* ============================================================================================
    >>writers  Pictures, files for ParaView, histories
-   uses: config, math, memory, mass, shapes, law, motion, world, measures, output
+   uses: config, math, memory, mass, shapes, broad, law, world, measures, output
    ============================================================================================ */
 
 /* Text as it is, of any length. */

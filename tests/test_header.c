@@ -438,8 +438,9 @@ static int check_names(const doc *d, const doc *hello) {
     return errors;
 }
 
-// The words after "uses:" are anchors above this one, or "nothing".
-static int uses_faults(const doc *d, int line, const list *contents, int self) {
+// The words after "uses:" are anchors above this one, or "nothing"; stated[] gets their places in
+// the contents.
+static int uses_faults(const doc *d, int line, const list *contents, int self, bool *stated) {
     const char *at = strstr(d->line[line], "uses:") + 5;
     int errors = 0, words = 0;
     at += strspn(at, " ");
@@ -454,6 +455,7 @@ static int uses_faults(const doc *d, int line, const list *contents, int self) {
         if (place < 0) errors += fault(d, line, "uses what is not in the contents: ", name);
         if (place == self) errors += fault(d, line, "uses itself: ", name);
         if (place > self) errors += fault(d, line, "uses a section below: ", name);
+        if (place >= 0) stated[place] = true;
         at += length;
         if (strcmp(at, ",") == 0 && line + 1 < d->count) { // goes on in the next line
             at = d->line[++line];
@@ -465,29 +467,185 @@ static int uses_faults(const doc *d, int line, const list *contents, int self) {
     }
 }
 
+// The heading of section s of the contents: its lines, and which sections it says it uses.
+static int heading_faults(const doc *d, const list *contents, const list *headings, int s,
+                          int *first, int *last, bool *stated) {
+    int errors = 0, found = 0;
+    memset(stated, 0, MAX_NAMES * sizeof *stated);
+    if (!section(headings, d->count, contents->name[s], first, last)) {
+        *first = *last = 0;
+        return fault(d, contents->line[s], "no section: ", contents->name[s]);
+    }
+    for (int i = *first; i < *last && !strstr(d->line[i], "*/"); i++) {
+        const char *text = d->line[i] + strspn(d->line[i], " ");
+        if (!starts(text, "uses:")) continue;
+        errors += found++ ? fault(d, i, "a second line of uses", "")
+                          : uses_faults(d, i, contents, s, stated);
+    }
+    if (!found) errors += fault(d, *first, "no line \"uses: ...\" in the heading", "");
+    return errors;
+}
+
 // Every section of the implementation says in its heading which sections above it uses.
 static int check_uses(const doc *d, const doc *hello) {
     (void)hello;
     list contents, headings;
     anchors_read(d, &contents, &headings);
-    int errors = 0, sections = 0;
+    int errors = 0, sections = 0, first, last;
+    bool stated[MAX_NAMES];
     for (int s = 0; s < contents.count; s++) {
-        int first, last, found = 0;
         if (!is_implementation(contents.name[s])) continue;
         sections++;
-        if (!section(&headings, d->count, contents.name[s], &first, &last)) {
-            errors += fault(d, contents.line[s], "no section: ", contents.name[s]);
-            continue;
-        }
-        for (int i = first; i < last && !strstr(d->line[i], "*/"); i++) {
-            const char *text = d->line[i] + strspn(d->line[i], " ");
-            if (!starts(text, "uses:")) continue;
-            errors += found++ ? fault(d, i, "a second line of uses", "")
-                              : uses_faults(d, i, &contents, s);
-        }
-        if (!found) errors += fault(d, first, "no line \"uses: ...\" in the heading", "");
+        errors += heading_faults(d, &contents, &headings, s, &first, &last, stated);
     }
     return sections ? errors : fault(d, -1, "no implementation", "");
+}
+
+// ---- what sections call -----------------------------------------------------------------------
+
+// Private names and public functions, and the section of each: its place in the contents. There are
+// no forward declarations, so a private name first stands where it is defined.
+typedef struct definitions {
+    char (*name)[NAME];
+    int *place;
+    int count, room;
+} definitions;
+
+static int definitions_find(const definitions *all, const char *name) {
+    for (int i = 0; i < all->count; i++)
+        if (strcmp(all->name[i], name) == 0) return i;
+    return -1;
+}
+
+static void definitions_add(definitions *all, const char *name, int place) {
+    if (definitions_find(all, name) >= 0) return;
+    if (all->count == all->room) {
+        all->room = 2 * all->room + 64;
+        all->name = realloc(all->name, (size_t)all->room * sizeof *all->name);
+        all->place = realloc(all->place, (size_t)all->room * sizeof *all->place);
+        assert_non_null(all->name);
+        assert_non_null(all->place);
+    }
+    strcpy(all->name[all->count], name);
+    all->place[all->count++] = place;
+}
+
+// The next word of a line's code from *at on, outside comments and literals; false at its end.
+static bool word_next(const char **at, bool *comment, char word[NAME]) {
+    const char *c = *at;
+    while (*c) {
+        size_t length = strspn(c, word_characters);
+        if (*comment) {
+            c = strstr(c, "*/");
+            if (!c) return false;
+            c += 2;
+            *comment = false;
+        } else if (starts(c, "/*")) {
+            c += 2;
+            *comment = true;
+        } else if (starts(c, "//")) {
+            return false;
+        } else if (*c == '"' || *c == '\'') {
+            const char quote = *c++;
+            while (*c && *c != quote) c += *c == '\\' && c[1] ? 2 : 1;
+            if (*c) c++;
+        } else if (length == 0) {
+            c++;
+        } else {
+            snprintf(word, NAME, "%.*s", (int)length, c);
+            *at = c + length;
+            return true;
+        }
+    }
+    return false;
+}
+
+static bool is_private(const char *word) {
+    return starts(word, "dem2di_") || starts(word, "DEM2DI_");
+}
+
+static void section_defines(const doc *d, int first, int last, int place, definitions *all) {
+    bool comment = true; // the heading
+    char word[NAME];
+    for (int i = first; i < last; i++) {
+        const bool declares = starts(d->line[i], "DEM2D_API ");
+        for (const char *at = d->line[i]; word_next(&at, &comment, word);)
+            if (is_private(word) || (declares && starts(word, "dem2d_") && *at == '('))
+                definitions_add(all, word, place);
+    }
+}
+
+// Sections whose names this one uses without saying so, and the other way round.
+static int section_faults(const doc *d, int first, int last, int place, const list *contents,
+                          const definitions *all, const bool *stated) {
+    bool comment = true, used[MAX_NAMES] = {false};
+    char word[NAME];
+    int errors = 0;
+    for (int i = first; i < last; i++)
+        for (const char *at = d->line[i]; word_next(&at, &comment, word);) {
+            const int found =
+                is_private(word) || starts(word, "dem2d_") ? definitions_find(all, word) : -1;
+            const int other = found < 0 ? place : all->place[found];
+            if (other == place || used[other]) continue;
+            used[other] = true;
+            if (!stated[other])
+                errors +=
+                    fault(d, i, "uses what the heading does not name: ", contents->name[other]);
+        }
+    for (int s = 0; s < contents->count; s++) // config gives the C library, too
+        if (stated[s] && !used[s] && strcmp(contents->name[s], "config") != 0)
+            errors += fault(d, first, "uses nothing of ", contents->name[s]);
+    return errors;
+}
+
+// A section uses what its heading names, and nothing else.
+static int check_calls(const doc *d, const doc *hello) {
+    (void)hello;
+    list contents, headings;
+    definitions all = {NULL, NULL, 0, 0};
+    bool stated[MAX_NAMES];
+    int errors = 0, first, last;
+    anchors_read(d, &contents, &headings);
+    for (int s = 0; s < contents.count; s++)
+        if (is_implementation(contents.name[s]) &&
+            section(&headings, d->count, contents.name[s], &first, &last))
+            section_defines(d, first, last, s, &all);
+    for (int s = 0; s < contents.count; s++) {
+        if (!is_implementation(contents.name[s])) continue;
+        errors += heading_faults(d, &contents, &headings, s, &first, &last, stated);
+        errors += section_faults(d, first, last, s, &contents, &all, stated);
+    }
+    free(all.name);
+    free(all.place);
+    return all.count ? errors : fault(d, -1, "nothing defined", "");
+}
+
+// Every public function is named in the manual: in an example, a how-to or a concept. "dem2d_x_*"
+// names all that begin so.
+static int check_named(const doc *d, const doc *hello) {
+    (void)hello;
+    int first, last, errors = 0;
+    const int manual = line_starting(d, 0, ">>manual"), options = line_starting(d, manual, "OPTI");
+    if (manual < 0 || options < 0) return fault(d, -1, "no manual with options", "");
+    if (!declarations(d, &first, &last)) return fault(d, -1, "no declarations", "");
+    for (int i = first; i < last; i++) {
+        if (!starts(d->line[i], "DEM2D_API ")) continue;
+        const char *at = strchr(d->line[i], '('), *begin = at;
+        while (begin && begin > d->line[i] && strchr(word_characters, begin[-1])) begin--;
+        char name[NAME] = {0}, family[NAME];
+        if (!begin || at - begin >= NAME - 1) return fault(d, i, "no function", "");
+        memcpy(name, begin, (size_t)(at - begin));
+        bool found = false;
+        for (int k = manual; k < options && !found; k++) found = has_word(d->line[k], name);
+        for (size_t n = strlen(name); n > 6 && !found; n--) {
+            if (name[n - 1] != '_') continue;
+            snprintf(family, sizeof family, "%.*s*", (int)n, name);
+            for (int k = manual; k < options && !found; k++)
+                found = strstr(d->line[k], family) != NULL;
+        }
+        if (!found) errors += fault(d, i, "not in the manual: ", name);
+    }
+    return errors;
 }
 
 // ---- texts with one fault ---------------------------------------------------------------------
@@ -507,6 +665,7 @@ static const char sample[] =
     "    Changes                             >>licence\n"
     "=============\n"
     ">>manual\n"
+    "HOW TO dem2d_version(), dem2d_area()\n"
     "QUICK START (the same bytes)\n"
     "\n"
     "    int main(void) {\n"
@@ -563,6 +722,7 @@ static const char sample[] =
     "   uses: config\n"
     "   ========== */\n"
     "static void *dem2di_new(size_t size) { return malloc(size); }\n"
+    "static double dem2di_free(double x) { return x; }\n"
     "/* ==========\n"
     "   >>mass  Area\n"
     "   Of everything.\n"
@@ -593,7 +753,9 @@ static rule rules[] = {
     {"ASCII, no tabs, 100 columns", check_text},
     {"no goto", check_goto},
     {"sections use those above", check_uses},
+    {"sections use what they name", check_calls},
     {"the manual names what is there", check_names},
+    {"the manual names every function", check_named},
 };
 
 // The check must reject the sample once `from` (its first occurrence) has become `to`.
@@ -665,12 +827,20 @@ static mutation mutations[] = {
     {"rejects: uses twice", check_uses, "   uses: config\n", "   uses: config\n   uses: config\n"},
     {"rejects: uses after the heading", check_uses, "   uses: config\n   ========== */\n",
      "   ========== */\n   uses: config\n"},
+    {"rejects: calls a section it does not name", check_calls, "   uses: config, memory\n",
+     "   uses: config\n"},
+    {"rejects: calls a section below", check_calls, "return malloc(size);",
+     "return dem2d_area(1, 2);"},
+    {"rejects: names a section it does not call", check_calls, "dem2di_free(x) * y",
+     "x * y /* dem2di_free */"},
+    {"rejects: a function that the manual does not name", check_named, "dem2d_version()", "it"},
+    {"rejects: a function whose name is longer", check_named, "dem2d_area()", "dem2d_area_of()"},
     {"rejects: no sections", check_uses, "CONTENTS", "WHAT IS IN IT"},
     {"rejects: a function that is not there", check_names, "QUICK START (the same bytes)\n",
      "QUICK START: dem2d_versions()\n"},
     {"rejects: a value that is not there", check_names, "\nERRORS\n", "\nERRORS DEM2D_KINDS.\n"},
     {"rejects: a family that is not there", check_names, "\nERRORS\n", "\nERRORS dem2d_such_*\n"},
-    {"rejects: no manual", check_names, ">>manual\nQUICK", "manual\nQUICK"},
+    {"rejects: no manual", check_names, ">>manual\nHOW", "manual\nHOW"},
 };
 
 enum { RULES = sizeof rules / sizeof *rules, MUTATIONS = sizeof mutations / sizeof *mutations };
