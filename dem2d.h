@@ -4438,10 +4438,10 @@ DEM2D_API dem2d_result dem2d_shape_axis(const dem2d_shape *shape, double *angle,
    ============================================================================================ */
 
 #define DEM2DI_PICTURE_SIDE 32768 /* 2^15 squared pixels: their number stays an int */
-#define DEM2DI_MIN_PIXELS 16      /* four by four: below, the outline is all staircase */
+#define DEM2DI_MIN_PIXELS 16      /* four by four: smaller outlines show the pixels, not a shape */
 
 /* Marks of a pixel: its left or right side is part of a kept grain's outer boundary; it belongs to
-   a component that was met before. */
+   a component that was found before. */
 #define DEM2DI_ENTRY 1
 #define DEM2DI_EXIT 2
 #define DEM2DI_MARKED 4
@@ -4454,14 +4454,14 @@ struct dem2d_outline_set {
     size_t point_count;
 };
 
-/* A region of a picture, valid, defaults filled in. The pixels in question are those with values
-   from low to high: a grain's, all grains', a frame's. */
+/* A region of a checked picture, with defaults filled in. Pixels with values from low to high are
+   selected: those of one grain, of all grains, or of a frame. */
 typedef struct dem2di_picture {
     dem2d_image_desc desc; /* pixels, width and height are the region's */
     int low, high;
     dem2d_vec corner; /* px, of the region's lower left corner in the whole picture */
-    uint8_t *marks;   /* of each pixel, or NULL */
-    int *stack;       /* capacity, of a fill */
+    uint8_t *marks;   /* one for each pixel, or NULL */
+    int *stack;       /* capacity; of a flood fill */
     int capacity;
 } dem2di_picture;
 
@@ -4469,7 +4469,7 @@ static int dem2di_picture_levels(const dem2d_image_desc *desc) {
     return desc->pixels16 != NULL ? 65536 : 256;
 }
 
-/* A side of the region of interest: its start, and its length, 0 for all that is left. */
+/* Check one direction of the region of interest: its start, and its length, 0 for the rest. */
 static dem2d_result dem2di_check_crop(const dem2d_env *env, const char *name, int size, int start,
                                       int length) {
     if (start < 0 || start >= size)
@@ -4526,7 +4526,7 @@ static size_t dem2di_picture_index(const dem2di_picture *p, int row, int column)
     return (size_t)row * (size_t)p->desc.width + (size_t)column;
 }
 
-/* A pixel in question? Beyond the border there is none. */
+/* Is a pixel selected? Outside the region none is. */
 static bool dem2di_is_grain(const dem2di_picture *p, int row, int column) {
     if (row < 0 || column < 0 || row >= p->desc.height || column >= p->desc.width) return false;
     int value = dem2di_picture_value(p, row, column);
@@ -4538,7 +4538,7 @@ static bool dem2di_is_unmarked(const dem2di_picture *p, int row, int column) {
            (p->marks[dem2di_picture_index(p, row, column)] & DEM2DI_MARKED) == 0;
 }
 
-/* Put the first pixel of each run of new ones in a row on the stack. */
+/* Put the first pixel of each run of selected, unmarked pixels in a row on the stack. */
 static bool dem2di_fill_push(const dem2d_env *env, dem2di_picture *p, int *depth, int row, int from,
                              int to) {
     for (int column = from; column <= to; column++) {
@@ -4553,7 +4553,7 @@ static bool dem2di_fill_push(const dem2d_env *env, dem2di_picture *p, int *depth
     return true;
 }
 
-/* Mark the component of a pixel in question, run by run; *count pixels. */
+/* Mark the component of a selected pixel, run by run; *count gets its number of pixels. */
 static bool dem2di_fill(const dem2d_env *env, dem2di_picture *p, int row, int column, int *count) {
     int depth = 0;
     *count = 0;
@@ -4574,9 +4574,10 @@ static bool dem2di_fill(const dem2d_env *env, dem2di_picture *p, int row, int co
 
 /* --- thresholds ------------------------------------------------------------------------------- */
 
-/* The threshold (values below against the rest) with the greatest variance between the two
-   classes. Empty grey values give a range of equally good ones: its middle, so that the boundary
-   of a binary picture is halfway between pixels. 0 when there is but one grey value. */
+/* Otsu's threshold: it divides the values in two classes with the greatest variance between them.
+   Grey values without pixels give a range of equally good thresholds: the result is its middle, so
+   that the boundary in a binary picture is halfway between pixels. 0 if there is one grey value
+   only. */
 static int dem2di_otsu(const uint32_t *histogram, int levels) {
     double all = 0, total = 0, below = 0, sum = 0, best = -1;
     int first = 0, last = -1;
@@ -4588,7 +4589,7 @@ static int dem2di_otsu(const uint32_t *histogram, int levels) {
         below += histogram[t - 1];
         sum += (double)(t - 1) * histogram[t - 1];
         if (!(below > 0) || !(below < all)) continue;
-        /* w0 w1 (m0 - m1)^2 with w0 = below / all, m0 = sum / below, but for a factor */
+        /* w0 w1 (m0 - m1)^2 with w0 = below / all, m0 = sum / below, up to a constant factor */
         double gap = sum * all - below * total, variance = gap / below * (gap / (all - below));
         if (variance > best) {
             best = variance;
@@ -4600,7 +4601,7 @@ static int dem2di_otsu(const uint32_t *histogram, int levels) {
     return (first + last + 1) / 2;
 }
 
-/* Of the pixels that are not marked. */
+/* Histogram of the unmarked pixels. */
 static void dem2di_histogram(const dem2di_picture *p, uint32_t *histogram) {
     memset(histogram, 0, (size_t)dem2di_picture_levels(&p->desc) * sizeof *histogram);
     for (int row = 0; row < p->desc.height; row++)
@@ -4609,8 +4610,8 @@ static void dem2di_histogram(const dem2di_picture *p, uint32_t *histogram) {
                 histogram[dem2di_picture_value(p, row, column)]++;
 }
 
-/* Three classes by Otsu: below one edge, below the other, the rest, so that the sum of
-   w m^2 is greatest. In 256 steps of the values that occur: enough to tell a frame. */
+/* Three classes by Otsu: values below edge[0], below edge[1], and the rest, so that the sum of w
+   m^2 is greatest. The range of values is divided into 256 steps: enough to find a frame. */
 static void dem2di_three_classes(const uint32_t *histogram, int levels, int edge[2]) {
     double below[257] = {0}, sum[257] = {0}, best = -1;
     int low = 0, high = levels - 1, steps = 256;
@@ -4640,14 +4641,14 @@ static void dem2di_three_classes(const uint32_t *histogram, int levels, int edge
         }
 }
 
-/* The pixels of the border, around: i of 2 (width + height) of them, corners twice. */
+/* Border pixel i of 2 (width + height); corners occur twice. */
 static void dem2di_border_pixel(const dem2di_picture *p, int i, int *row, int *column) {
     int w = p->desc.width, h = p->desc.height;
     *row = i < 2 * w ? (i < w ? 0 : h - 1) : (i - 2 * w) % h;
     *column = i < 2 * w ? i % w : (i < 2 * w + h ? 0 : w - 1);
 }
 
-/* Mark the frame: what is connected with the border in the class that most of the border has. */
+/* Mark the frame: pixels of the most frequent class of the border that are connected with it. */
 static bool dem2di_mark_frame(const dem2d_env *env, dem2di_picture *p, const uint32_t *histogram) {
     int edge[2], votes[3] = {0, 0, 0}, levels = dem2di_picture_levels(&p->desc), most = 0;
     int around = 2 * (p->desc.width + p->desc.height), row, column, unused;
@@ -4669,7 +4670,7 @@ static bool dem2di_mark_frame(const dem2d_env *env, dem2di_picture *p, const uin
     return true;
 }
 
-/* Marks of all pixels, none set. */
+/* Allocate the marks, none set. */
 static bool dem2di_marks_make(const dem2d_env *env, dem2di_picture *p) {
     size_t size = dem2di_picture_index(p, p->desc.height, 0);
     p->marks = (uint8_t *)dem2di_allocate(env, size, 1);
@@ -4685,7 +4686,7 @@ static void dem2di_marks_release(const dem2d_env *env, dem2di_picture *p) {
     p->capacity = 0;
 }
 
-/* Otsu's threshold, without the frame if that is asked for and anything else is there. */
+/* Otsu's threshold; with ignore_frame of the pixels outside the frame, if they have two values. */
 static bool dem2di_find_threshold(const dem2d_env *env, dem2di_picture *p, int *threshold) {
     int levels = dem2di_picture_levels(&p->desc);
     size_t room = (size_t)levels;
@@ -4722,26 +4723,26 @@ DEM2D_API dem2d_result dem2d_image_threshold(const dem2d_image_desc *desc, int *
 
 /* --- components ------------------------------------------------------------------------------- */
 
-/* A component of pixels in question, and what decides whether it is a grain. */
+/* A component of selected pixels, with the properties that decide whether it is a grain. */
 typedef struct dem2di_component {
     dem2d_outline grain;
-    int left, right, bottom; /* of its box; its top is the grain's row */
-    int own;                 /* pixels, holes not filled */
+    int left, right, bottom; /* of its bounding box; its top is the grain's row */
+    int own;                 /* pixels without holes */
     bool border;             /* touches the region's border */
 } dem2di_component;
 
-/* Why components were dropped, and what was found suspicious. */
+/* Counts for the messages to the log. */
 typedef struct dem2di_findings {
-    int border, small, large, frames; /* dropped */
+    int border, small, large, frames; /* components dropped, by reason */
     int frame_row, frame_column;      /* of the first frame */
-    int repeated, label;              /* grains whose label was there before, the first such */
+    int repeated, label;              /* grains with the label of another; the first such label */
     uint8_t labels[65536 / 8];        /* a bit for each label that a grain has */
 } dem2di_findings;
 
-/* How far from a grain's pixel towards a ground pixel beside it the boundary is, of the distance
-   of their centres: where the grey value, interpolated linearly, is threshold - 1/2. No pixel has
-   that value, so the result is inside (0, 1). At the region's border it is the pixel's side, and
-   of labels as well: they are names. */
+/* Position of the boundary between a grain's pixel and a background pixel beside it, as a fraction
+   of the distance of their centres: where the linearly interpolated grey value is threshold - 1/2.
+   No pixel has that value, so the result is inside (0, 1). At the region's border, and with labels,
+   which can't be interpolated, it is 1/2: the side of the pixel. */
 static double dem2di_crack_fraction(const dem2di_picture *p, int row, int column, int next_row,
                                     int next_column) {
     if (p->desc.labels || next_row < 0 || next_column < 0 || next_row >= p->desc.height ||
@@ -4752,20 +4753,19 @@ static double dem2di_crack_fraction(const dem2di_picture *p, int row, int column
     return (grey - (p->desc.threshold - 0.5)) / (grey - next);
 }
 
-/* A pixel beside the boundary. */
+/* Extend the bounding box to a pixel. */
 static void dem2di_component_widen(dem2di_component *part, int row, int column) {
     if (column < part->left) part->left = column;
     if (column > part->right) part->right = column;
     if (row > part->bottom) part->bottom = row;
 }
 
-/* Once around the outer boundary of a component from the left side of its topmost, then leftmost
-   pixel, the component on the left hand: one step per crack, a side between one of its pixels and
-   ground. Marks the pixels (if `mark`), counts grain.count cracks and grain.pixels inside, finds
-   the box and whether the border is met, and writes a point per crack (points may be NULL).
-
-   The points are those of marching squares: each lies inside a segment between two neighbouring
-   pixel centres, two that follow each other in one square of four centres. Where a square has two
+/* Follow the outer boundary of a component once, from the left side of its topmost, then leftmost
+   pixel, with the component on the left: one step for each crack, a side between one of its pixels
+   and the background. Sets grain.count (cracks), grain.pixels (inside), the bounding box and
+   `border`; marks the pixels if `mark`; writes a point for each crack (points may be NULL). The
+   points are those of marching squares: each lies inside a segment between two neighbouring pixel
+   centres, and two successive points are in one square of four centres. Where a square has two
    pieces of boundary, each cuts off its own grain corner. So no points coincide and no pieces
    cross. */
 static void dem2di_trace(const dem2di_picture *p, dem2di_component *part, bool mark,
@@ -4777,7 +4777,7 @@ static void dem2di_trace(const dem2di_picture *p, dem2di_component *part, bool m
     part->left = part->right = column;
     part->bottom = row;
     do {
-        int side = (heading + 3) % 4; /* what is on the right hand is ground */
+        int side = (heading + 3) % 4; /* background is on the right */
         int out_row = row + down[side], out_column = column + right[side];
         if (points != NULL) {
             double t = dem2di_crack_fraction(p, row, column, out_row, out_column);
@@ -4787,14 +4787,14 @@ static void dem2di_trace(const dem2di_picture *p, dem2di_component *part, bool m
         }
         count++;
         dem2di_component_widen(part, row, column);
-        if (heading == 0) pixels -= column; /* rows from left sides to right sides: holes count */
+        if (heading == 0) pixels -= column; /* rows from left to right sides, holes included */
         if (heading == 2) pixels += column + 1;
         if (mark && heading % 2 == 0)
             p->marks[dem2di_picture_index(p, row, column)] |=
                 (uint8_t)(heading == 0 ? DEM2DI_ENTRY : DEM2DI_EXIT);
         int ahead_row = row + down[heading], ahead_column = column + right[heading];
         if (!dem2di_is_grain(p, ahead_row, ahead_column)) {
-            heading = (heading + 1) % 4; /* also where two grain pixels touch by a corner */
+            heading = (heading + 1) % 4; /* also where two grain pixels touch at a corner */
         } else if (!dem2di_is_grain(p, ahead_row + down[side], ahead_column + right[side])) {
             row = ahead_row;
             column = ahead_column;
@@ -4810,9 +4810,10 @@ static void dem2di_trace(const dem2di_picture *p, dem2di_component *part, bool m
                    part->right == width - 1;
 }
 
-/* Rectangular, hollow, around much of the region, and not empty. No grain known is all of these: a
-   disc fills 0.79 of its box. A quarter: a square frame is up to 1/15 of its side thick. A
-   component that is met is above and left of what it encloses: that is still new. */
+/* Is a component a frame: rectangular, hollow, around much of the region, with grains inside? No
+   known grain is all of these: a disc fills 0.79 of its box. Less than a quarter of its pixels
+   means that a square frame is at most 1/15 of its side thick. A component is found before what it
+   encloses, whose pixels are therefore still unmarked. */
 static bool dem2di_is_frame(const dem2di_picture *p, const dem2di_component *part) {
     double filled = part->grain.pixels, region = (double)p->desc.width * p->desc.height;
     double box = (double)(part->right - part->left + 1) * (part->bottom - part->grain.row + 1);
@@ -4825,7 +4826,7 @@ static bool dem2di_is_frame(const dem2di_picture *p, const dem2di_component *par
     return inside >= p->desc.min_pixels;
 }
 
-/* Whether a component is a grain; if not, why. */
+/* Is a component a grain? If not, the reason is counted. */
 static bool dem2di_is_kept(const dem2di_picture *p, const dem2di_component *part,
                            dem2di_findings *found) {
     bool frame = dem2di_is_frame(p, part);
@@ -4843,20 +4844,20 @@ static bool dem2di_is_kept(const dem2di_picture *p, const dem2di_component *part
     return !frame && !border && !small && !large;
 }
 
-/* A label for the second time? */
+/* Note the label of a grain, and whether another grain has it. */
 static void dem2di_note_label(dem2di_findings *found, int label) {
     uint8_t bit = (uint8_t)(1 << label % 8);
     if ((found->labels[label / 8] & bit) != 0 && found->repeated++ == 0) found->label = label;
     found->labels[label / 8] |= bit;
 }
 
-/* The values in question: of all grains, or of the one that has a pixel. */
+/* Select the values of all grains, or of the one with a label. */
 static void dem2di_picture_range(dem2di_picture *p, int label) {
     p->low = p->desc.labels ? label : p->desc.bright ? p->desc.threshold : 0;
     p->high = p->desc.labels ? label : p->desc.bright ? INT_MAX : p->desc.threshold - 1;
 }
 
-/* The component of a new pixel goes into the set if it is a grain. */
+/* Add the component of an unmarked pixel to the set if it is a grain. */
 static bool dem2di_take_component(dem2d_outline_set *set, dem2di_picture *p, int row, int column,
                                   dem2di_findings *found) {
     dem2di_component part;
@@ -4876,13 +4877,13 @@ static bool dem2di_take_component(dem2d_outline_set *set, dem2di_picture *p, int
     if (p->desc.labels)
         dem2di_note_label(found, p->low);
     else
-        dem2di_trace(p, &part, true, NULL); /* what is inside belongs to it */
+        dem2di_trace(p, &part, true, NULL); /* all that is inside belongs to it */
     return true;
 }
 
-/* The grains of one row that begin there. Along a row the outer boundaries of kept grains are
-   entered and left by turns; what is between, holes and grains in holes too, belongs to the grain.
-   Labels mark no boundaries: a grain inside another is found like any. */
+/* Find the grains whose first row is this one. Along a row the scan enters and leaves the outer
+   boundaries of kept grains in turn; all between, with holes and grains in holes, belongs to the
+   grain. With labels no boundaries are marked: a grain inside another is found like any. */
 static bool dem2di_scan_row(dem2d_outline_set *set, dem2di_picture *p, int row,
                             dem2di_findings *found) {
     const uint8_t *mark = p->marks + dem2di_picture_index(p, row, 0);
@@ -4901,8 +4902,8 @@ static bool dem2di_scan_row(dem2d_outline_set *set, dem2di_picture *p, int row,
     return true;
 }
 
-/* Find the grains, then, knowing how many points there are, trace those that stay once more. Rows
-   and columns are the whole picture's at last. */
+/* Find the grains and the number of their points, then trace the kept grains again for the points.
+   Rows and columns of the result count in the whole picture. */
 static bool dem2di_scan_picture(dem2d_outline_set *set, dem2di_picture *p, dem2di_findings *found) {
     size_t next = 0;
     bool room = dem2di_marks_make(&set->env, p);
@@ -4926,7 +4927,7 @@ static bool dem2di_scan_picture(dem2d_outline_set *set, dem2di_picture *p, dem2d
     return true;
 }
 
-/* Does an outline fill its box and much of the region, as the ground in a frame does? */
+/* Does an outline fill its box and much of the region, as the background in a frame does? */
 static bool dem2di_is_like_background(const dem2di_picture *p, const dem2d_outline *grain) {
     dem2d_vec low = grain->points[0], high = low;
     for (int i = 1; i < grain->count; i++) {
@@ -4939,7 +4940,7 @@ static bool dem2di_is_like_background(const dem2di_picture *p, const dem2d_outli
     return !p->desc.labels && grain->pixels > region / 4 && grain->pixels > 0.9 * box;
 }
 
-/* Tell the log what was found suspicious, and why nothing was found. */
+/* Report to the log what is suspicious, and why no grain was found. */
 static void dem2di_report_findings(const dem2d_outline_set *set, const dem2di_picture *p,
                                    const dem2di_findings *found) {
     const dem2d_env *env = &set->env;
@@ -4992,7 +4993,7 @@ static dem2d_result dem2di_check_search(const dem2d_env *env, const dem2d_image_
     return DEM2D_OK;
 }
 
-/* All outlines of a valid picture. */
+/* All outlines of a checked picture. */
 static bool dem2di_outline_picture(dem2d_outline_set *set, const dem2d_image_desc *desc) {
     dem2di_picture p = dem2di_picture_crop(desc);
     dem2di_findings found;
@@ -5062,30 +5063,29 @@ typedef struct dem2di_side {
 
 /* --- outlines that cross themselves ----------------------------------------------------------- */
 
-/* An outline is good if no two edges cross and it winds around every point once or not at all. It
-   may then touch itself, at points and along edges that it goes back on, as outlines from pixels
-   do. The windings tell what is wrong where edges meet at corners or lie on each other.
-
-   A line sweeps over the plane by x, then y (Shamos and Hoey 1976). The edges that it cuts are kept
-   in their order along it, in a tree that chance balances (a treap): O(n log n). Edges that become
-   neighbours are tested for a crossing inside both. At a point of the outline the edges through it
-   are put in their order beyond the point, and so the windings between them are known. Points
-   within a rounding of an edge are on it: what touches then does not cross. */
-#define DEM2DI_SWEEP_ROUNDING (64 * DBL_EPSILON) /* of the coordinates: some turns and sums */
+/* An outline is valid if no two edges cross and it winds around every point once or not at all. It
+   may touch itself, at points and along edges that it traverses twice, as outlines from pixels do.
+   Winding numbers decide where edges meet at corners or lie on each other. A line sweeps over the
+   plane by x, then y (Shamos and Hoey 1976). The edges that it cuts are kept in their order along
+   it, in a tree balanced by random priorities (a treap): O(n log n). Edges that become neighbours
+   are tested for a crossing inside both. At a point of the outline the edges through it are sorted
+   by their order after the point, which gives the winding numbers between them. Points within
+   rounding errors of an edge are on it: edges that touch do not cross. */
+#define DEM2DI_SWEEP_ROUNDING (64 * DBL_EPSILON) /* of the coordinates: some products and sums */
 
 typedef struct dem2di_sweep_edge {
-    dem2d_vec left, right; /* in the order of the sweep; the edge goes up from left, for "above" */
-    double slack;          /* rounding times length */
+    dem2d_vec left, right; /* in the order of the sweep; of a vertical edge left is below */
+    double slack;          /* rounding error times length */
     int sign;              /* 1 if the outline goes from left to right, else -1 */
-    int winding;           /* just above the edge */
+    int winding;           /* winding number just above the edge */
     int name;              /* index of the outline's point where the edge begins */
     int below, above;      /* neighbours on the line, or -1 */
     int parent, child[2];  /* in the tree, or -1 */
-    uint32_t chance;       /* a parent's is not less than its children's */
-    bool cut;              /* by the line */
+    uint32_t priority;     /* random; a parent's is not less than its children's */
+    bool cut;              /* by the sweep line */
 } dem2di_sweep_edge;
 
-/* A point of the outline, from which the edge of this index goes on. */
+/* A point of the outline; the edge with this index begins there. */
 typedef struct dem2di_sweep_point {
     dem2d_vec at;
     int index;
@@ -5094,7 +5094,7 @@ typedef struct dem2di_sweep_point {
 typedef struct dem2di_sweep {
     dem2di_sweep_edge *edges;   /* count */
     dem2di_sweep_point *points; /* count */
-    int count, room;            /* without points that coincide with the one before; with them */
+    int count, room;            /* points that differ from the one before; all points */
     double rounding;            /* of coordinates, which are relative to origin and size */
     dem2d_vec origin;
     double size;
@@ -5104,14 +5104,14 @@ typedef struct dem2di_sweep {
     dem2d_vec where;
 } dem2di_sweep;
 
-/* Is p above an edge (1), below (-1), on its line to rounding (0)? */
+/* Is p above an edge (1), below (-1), or on its line within rounding errors (0)? */
 static int dem2di_sweep_side(const dem2di_sweep *s, int edge, dem2d_vec p) {
     const dem2di_sweep_edge *e = &s->edges[edge];
     double turn = dem2di_cross(dem2di_sub(e->right, e->left), dem2di_sub(p, e->left));
     return (turn > e->slack) - (turn < -e->slack);
 }
 
-/* An edge of the tree takes its parent's place. */
+/* Rotate the tree: an edge takes its parent's place. */
 static void dem2di_sweep_rotate(dem2di_sweep *s, int edge) {
     dem2di_sweep_edge *e = &s->edges[edge], *p = &s->edges[e->parent];
     int parent = e->parent, grand = p->parent, k = p->child[1] == edge, inner = e->child[!k];
@@ -5126,7 +5126,7 @@ static void dem2di_sweep_rotate(dem2di_sweep *s, int edge) {
         s->edges[grand].child[s->edges[grand].child[1] == parent] = edge;
 }
 
-/* Between two neighbours on the line; -1 is an end of it. */
+/* Make two edges neighbours on the sweep line; -1 is an end of the line. */
 static void dem2di_sweep_link(dem2di_sweep *s, int below, int above) {
     if (below >= 0)
         s->edges[below].above = above;
@@ -5135,8 +5135,8 @@ static void dem2di_sweep_link(dem2di_sweep *s, int below, int above) {
     if (above >= 0) s->edges[above].below = below;
 }
 
-/* Does an edge that begins at the line go above another there? Where it begins, or, if that is on
-   the other, at the end that both reach. Edges that lie on each other have no order. */
+/* Is an edge that begins at the sweep line above another edge? Decided at its start or, if that is
+   on the other edge, at the nearer of their ends. Edges that lie on each other have no order. */
 static bool dem2di_sweep_goes_above(const dem2di_sweep *s, int edge, int other) {
     const dem2di_sweep_edge *e = &s->edges[edge], *o = &s->edges[other];
     int side = dem2di_sweep_side(s, other, e->left);
@@ -5165,14 +5165,15 @@ static void dem2di_sweep_insert(dem2di_sweep *s, int edge) {
         s->root = edge;
     else
         s->edges[parent].child[k] = edge;
-    while (e->parent >= 0 && s->edges[e->parent].chance < e->chance) dem2di_sweep_rotate(s, edge);
+    while (e->parent >= 0 && s->edges[e->parent].priority < e->priority)
+        dem2di_sweep_rotate(s, edge);
 }
 
 static void dem2di_sweep_remove(dem2di_sweep *s, int edge) {
     dem2di_sweep_edge *e = &s->edges[edge];
-    while (e->child[0] >= 0 || e->child[1] >= 0) { /* down to a leaf */
+    while (e->child[0] >= 0 || e->child[1] >= 0) { /* rotate it down to a leaf */
         int low = e->child[0], high = e->child[1];
-        bool up = low < 0 || (high >= 0 && s->edges[high].chance > s->edges[low].chance);
+        bool up = low < 0 || (high >= 0 && s->edges[high].priority > s->edges[low].priority);
         dem2di_sweep_rotate(s, up ? high : low);
     }
     if (e->parent < 0)
@@ -5206,7 +5207,7 @@ static bool dem2di_sweep_found(dem2di_sweep *s, int first, int second, dem2d_vec
     return false;
 }
 
-/* Do neighbours, or no edge (-1) and one, not cross inside both? */
+/* Test two neighbours (-1: no edge) for a crossing inside both; false if they cross. */
 static bool dem2di_sweep_pair(dem2di_sweep *s, int low, int high) {
     if (low < 0 || high < 0) return true;
     const dem2di_sweep_edge *a = &s->edges[low], *b = &s->edges[high];
@@ -5218,7 +5219,8 @@ static bool dem2di_sweep_pair(dem2di_sweep *s, int low, int high) {
     return dem2di_sweep_found(s, low, high, dem2di_along(a->left, t, along));
 }
 
-/* From one edge on the line, or below all (-1), to another above it, or above all: neighbours. */
+/* Test all neighbours from one edge on the sweep line (-1: below all) to another above it (-1:
+   above all). */
 static bool dem2di_sweep_pairs(dem2di_sweep *s, int from, int to) {
     int next;
     do {
@@ -5229,7 +5231,7 @@ static bool dem2di_sweep_pairs(dem2di_sweep *s, int from, int to) {
     return true;
 }
 
-/* Do two edges through a point lie on each other beyond it? */
+/* Do two edges through a point lie on each other after it? */
 static bool dem2di_sweep_overlap(const dem2di_sweep *s, int a, int b) {
     const dem2di_sweep_edge *e = &s->edges[a], *f = &s->edges[b];
     return dem2di_compare_points(&e->right, &f->right) <= 0
@@ -5237,7 +5239,7 @@ static bool dem2di_sweep_overlap(const dem2di_sweep *s, int a, int b) {
                : dem2di_sweep_side(s, a, f->right) == 0;
 }
 
-/* The windings between the edges through p, from the one above `below` to the one below `top`. */
+/* Winding numbers between the edges through p, which are those between `below` and `top`. */
 static bool dem2di_sweep_windings(dem2di_sweep *s, int below, int top, dem2d_vec p) {
     int winding = below >= 0 ? s->edges[below].winding : 0, before = -1;
     for (int e = dem2di_sweep_after(s, below); e != top && e >= 0; e = s->edges[e].above) {
@@ -5254,19 +5256,20 @@ static bool dem2di_sweep_windings(dem2di_sweep *s, int below, int top, dem2d_vec
     return true;
 }
 
-/* Points that are one, to rounding. */
+/* Do two points coincide within rounding errors? */
 static bool dem2di_sweep_same(const dem2di_sweep *s, dem2d_vec p, dem2d_vec q) {
     dem2d_vec apart = dem2di_sub(p, q);
     return dem2di_dot(apart, apart) <= 4 * s->rounding * s->rounding;
 }
 
-/* Edge i of those at the points, two at each: the one that goes on, the one that comes in. */
+/* Edge i of those at the sorted points, two for each point: the one that begins there, the one that
+   ends there. */
 static int dem2di_sweep_edge_at(const dem2di_sweep *s, int i) {
     int index = s->points[i / 2].index;
     return i % 2 == 0 ? index : index > 0 ? index - 1 : s->count - 1;
 }
 
-/* At points [from, to) of the outline, which are one. */
+/* The sweep line reaches points [from, to) of the outline, which coincide. */
 static bool dem2di_sweep_event(dem2di_sweep *s, int from, int to) {
     dem2d_vec p = s->points[from].at;
     int below = dem2di_sweep_below(s, p), top = dem2di_sweep_after(s, below);
@@ -5275,7 +5278,7 @@ static bool dem2di_sweep_event(dem2di_sweep *s, int from, int to) {
         if (dem2di_sweep_same(s, s->edges[top].right, p)) dem2di_sweep_remove(s, top);
         top = next;
     }
-    for (int i = 2 * from; i < 2 * to; i++) { /* none is left, but for rounding */
+    for (int i = 2 * from; i < 2 * to; i++) { /* only rounding errors leave any */
         int edge = dem2di_sweep_edge_at(s, i);
         bool ends = dem2di_compare_points(&s->edges[edge].right, &p) == 0;
         if (ends && s->edges[edge].cut && edge != below && edge != top)
@@ -5299,8 +5302,8 @@ static int dem2di_compare_sweep_points(const void *a, const void *b) {
     return order != 0 ? order : (p->index > q->index) - (p->index < q->index);
 }
 
-/* The points that differ from the one before, relative to origin and size; the last differs from
-   the first. */
+/* Take the points that differ from the one before, relative to origin and size; the last differs
+   from the first. */
 static void dem2di_sweep_points(dem2di_sweep *s, const dem2d_vec *points, int count) {
     dem2d_vec low = points[0], high = points[0];
     for (int i = 1; i < count; i++) {
@@ -5324,7 +5327,7 @@ static void dem2di_sweep_points(dem2di_sweep *s, const dem2d_vec *points, int co
         s->count--;
 }
 
-/* Edges from their points; chance from splitmix64's mixing of their numbers. */
+/* Edges from their points; priorities from splitmix64's mixing of their numbers. */
 static void dem2di_sweep_edges(dem2di_sweep *s) {
     for (int i = 0; i < s->count; i++) {
         dem2di_sweep_edge *e = &s->edges[i];
@@ -5332,7 +5335,7 @@ static void dem2di_sweep_edges(dem2di_sweep *s) {
         bool rises = dem2di_compare_points(&p, &q) < 0;
         uint64_t mixed = ((uint64_t)i + 1) * 0x9E3779B97F4A7C15u;
         mixed = (mixed ^ (mixed >> 30)) * 0xBF58476D1CE4E5B9u;
-        e->chance = (uint32_t)(mixed >> 32);
+        e->priority = (uint32_t)(mixed >> 32);
         e->left = rises ? p : q;
         e->right = rises ? q : p;
         e->sign = rises ? 1 : -1;
@@ -5342,7 +5345,7 @@ static void dem2di_sweep_edges(dem2di_sweep *s) {
     s->root = s->lowest = -1;
 }
 
-/* Whether the outline is good; if not, which edges cross, and where. */
+/* Is the outline valid? If not, first, second and where describe a crossing. */
 static bool dem2di_sweep_run(dem2di_sweep *s, const dem2d_vec *points, int count) {
     dem2di_sweep_points(s, points, count);
     dem2di_sweep_edges(s);
@@ -5356,7 +5359,7 @@ static bool dem2di_sweep_run(dem2di_sweep *s, const dem2d_vec *points, int count
     return true;
 }
 
-/* An outline of finite points must not wind around anything twice. */
+/* Check that an outline of finite points is valid. */
 static dem2d_result dem2di_check_crossing(const dem2d_env *env, const char *name,
                                           const dem2d_vec *points, int count) {
     dem2di_sweep s;
@@ -5390,7 +5393,8 @@ static dem2d_result dem2di_check_outline(const dem2d_env *env, const char *name,
     return DEM2D_OK;
 }
 
-/* That do so once: a figure of eight may have no area, so its crossing is told first. */
+/* The same for a valid outline: a figure of eight may have no area, so a crossing is reported
+   first. */
 static dem2d_result dem2di_check_good_outline(const dem2d_env *env, const char *name,
                                               const dem2d_vec *points, int count,
                                               dem2d_mass *mass) {
@@ -5400,7 +5404,7 @@ static dem2d_result dem2di_check_good_outline(const dem2d_env *env, const char *
     return dem2di_check_outline(env, name, points, count, mass);
 }
 
-/* The sides that have a length, counter-clockwise, relative to an origin. */
+/* The sides of nonzero length, counter-clockwise, relative to an origin. Returns their number. */
 static int dem2di_sides_make(const dem2d_vec *points, int count, dem2d_vec origin,
                              dem2di_side *sides) {
     bool reversed = dem2di_twice_area(points, count) < 0;
@@ -5434,9 +5438,9 @@ static double dem2di_side_square(const dem2di_side *side, dem2d_vec p) {
 
 /* --- Feret diameters and the least circle around ---------------------------------------------- */
 
-/* Rotating calipers: the corner farthest from each edge of the hull moves on as the edge does. The
-   least width is at an edge; the greatest distance is between corners that are opposite at some
-   edge. ends gets those two corners. */
+/* Rotating calipers: the corner farthest from an edge of the hull advances with the edge. The least
+   width is at an edge; the greatest distance is between an end of an edge and a corner farthest
+   from that edge. ends gets the two corners of the greatest distance. */
 static void dem2di_calipers(const dem2d_vec *hull, int count, dem2d_outline_info *info,
                             int ends[2]) {
     double most = 0;
@@ -5450,7 +5454,7 @@ static void dem2di_calipers(const dem2d_vec *hull, int count, dem2d_outline_info
         }
         double width = dem2di_cross(edge, dem2di_sub(hull[j], hull[i])) / dem2di_length(edge);
         if (i == 0 || width < info->feret_min) info->feret_min = width;
-        for (int k = 0; k < 4; k++) { /* j and after are equally far from a parallel edge */
+        for (int k = 0; k < 4; k++) { /* j and after are equally far if their edge is parallel */
             int one = k % 2 == 0 ? i : next, other = k < 2 ? j : after;
             dem2d_vec span = dem2di_sub(hull[one], hull[other]);
             if (!(dem2di_dot(span, span) > most)) continue;
@@ -5462,8 +5466,8 @@ static void dem2di_calipers(const dem2d_vec *hull, int count, dem2d_outline_info
     info->feret_max = sqrt(most);
 }
 
-/* The centre of the circle through count = 2 points (their middle) or 3; false when those are on
-   one line. */
+/* Centre of the circle through 3 points, false if they are on one line, or of the smallest circle
+   through 2. */
 static bool dem2di_circle_through(const dem2d_vec *p, int count, dem2d_vec *centre) {
     dem2d_vec b = dem2di_sub(p[1], p[0]);
     *centre = dem2di_along(p[0], 0.5, b);
@@ -5475,7 +5479,7 @@ static bool dem2di_circle_through(const dem2d_vec *p, int count, dem2d_vec *cent
     return dem2di_vec_finite(*centre);
 }
 
-/* Square of the greatest distance of a point from the centre; *at gets its index. */
+/* Square of the greatest distance of a point from the centre; *at gets the point's index. */
 static double dem2di_farthest_point(const dem2d_vec *points, int count, dem2d_vec centre, int *at) {
     double most = -1;
     for (int i = 0; i < count; i++) {
@@ -5488,9 +5492,9 @@ static double dem2di_farthest_point(const dem2d_vec *points, int count, dem2d_ve
     return most;
 }
 
-/* The least circle around all of count <= 4 points that has the last on it: of the circles through
-   it and one or two others, the centre whose farthest point is nearest. The points it stands on
-   move to the front; returns their number. */
+/* The smallest circle around count <= 4 points that passes through the last one: of the circles
+   through it and one or two others, the centre whose farthest point is nearest. The points on the
+   circle move to the front; returns their number. */
 static int dem2di_circle_update(dem2d_vec *p, int count, dem2d_vec *centre) {
     dem2d_vec chosen[3] = {{0, 0}, {0, 0}, {0, 0}};
     int best = 0, unused = 0, n = count - 1;
@@ -5514,8 +5518,8 @@ static int dem2di_circle_update(dem2d_vec *p, int count, dem2d_vec *centre) {
     return best;
 }
 
-/* Least circle around the hull (Elzinga and Hearn): the circle of two or three corners grows by
-   the corner farthest outside, until there is none or rounding stops the growth. */
+/* Smallest circle around the hull (Elzinga and Hearn): the circle of two or three corners grows by
+   the corner farthest outside, until there is none or the growth is within rounding errors. */
 static void dem2di_circumscribe(const dem2d_vec *hull, int count, const int ends[2],
                                 dem2d_outline_info *info) {
     dem2d_vec stand[4], centre = {0, 0}, found;
@@ -5529,7 +5533,7 @@ static void dem2di_circumscribe(const dem2d_vec *hull, int count, const int ends
         stand[size] = hull[at];
         int next = dem2di_circle_update(stand, size + 1, &found);
         double grown = dem2di_farthest_point(stand, next, found, &at);
-        if (!(grown > inner * (1 + 8 * DBL_EPSILON))) break; /* no more than rounding */
+        if (!(grown > inner * (1 + 8 * DBL_EPSILON))) break; /* within rounding errors */
         double around = dem2di_farthest_point(hull, count, found, &at);
         size = next;
         inner = grown;
@@ -5542,7 +5546,7 @@ static void dem2di_circumscribe(const dem2d_vec *hull, int count, const int ends
 
 /* --- the greatest circle inside --------------------------------------------------------------- */
 
-/* A side seen from the centre of a cell. */
+/* A side of the outline, relative to the centre of a cell. */
 typedef struct dem2di_near_side {
     dem2d_vec offset; /* from its nearest point to the centre */
     double square;    /* of the offset's length */
@@ -5552,13 +5556,13 @@ typedef struct dem2di_near_side {
 typedef struct dem2di_inscribe {
     const dem2di_side *sides;
     int count;
-    dem2di_near_side *near; /* the sides that matter to a cell come first */
+    dem2di_near_side *near; /* all sides; those that can be nearest in a cell come first */
     double best, tolerance; /* m */
     dem2d_vec at;
 } dem2di_inscribe;
 
-/* Is p inside, when this side is nearest? By the side alone, or, when the nearest point is a
-   corner, by both of its sides: a convex corner wants p left of both, another left of one. */
+/* Is p inside, if side k is nearest? The side decides or, if the nearest point is a corner, both of
+   its sides: at a convex corner p has to be left of both, at a reflex one left of one. */
 static bool dem2di_inside_of(const dem2di_inscribe *in, int k, dem2d_vec p) {
     const dem2di_side *side = &in->sides[k];
     dem2d_vec v = dem2di_sub(p, side->a);
@@ -5573,12 +5577,12 @@ static bool dem2di_inside_of(const dem2di_inscribe *in, int k, dem2d_vec p) {
     return convex ? left && left_too : left || left_too;
 }
 
-/* Upper bound of the distance from the boundary in the disc of radius s about the centre. With v_i
-   from boundary points to the centre, weights w_i >= 0 of sum 1 and |x| <= s:
-   min |v_i + x|^2 <= sum w_i |v_i|^2 + 2 s |sum w_i v_i| + s^2. Where boundary points pull in all
-   directions the middle term can vanish, and the bound is quadratic in s: few cells are left. The
-   weights come from steps of Gilbert's method towards the least |sum w_i v_i|. *pull is that sum,
-   a way towards greater distance. */
+/* Upper bound of the distance from the boundary in the disc of radius s about a cell's centre. With
+   v_i from boundary points to the centre, weights w_i >= 0 of sum 1 and |x| <= s: min |v_i + x|^2
+   <= sum w_i |v_i|^2 + 2 s |sum w_i v_i| + s^2. Where boundary points lie on all sides the middle
+   term can vanish, and the bound is quadratic in s: few cells are left. The weights come from steps
+   of Gilbert's method towards the least |sum w_i v_i|. *pull gets that sum, a direction in which
+   the distance grows. */
 static double dem2di_distance_bound(const dem2di_inscribe *in, int count, int nearest, double s,
                                     dem2d_vec *pull) {
     dem2d_vec sum = in->near[nearest].offset;
@@ -5594,7 +5598,7 @@ static double dem2di_distance_bound(const dem2di_inscribe *in, int count, int ne
         }
         dem2d_vec apart = dem2di_sub(sum, in->near[chosen].offset);
         double w = dem2di_dot(sum, apart) / dem2di_dot(apart, apart);
-        if (!(w > 0)) break; /* nothing lowers it; also 0 / 0 */
+        if (!(w > 0)) break; /* no lower sum; also 0 / 0 */
         if (w > 1) w = 1;
         sum = dem2di_along(sum, -w, apart);
         square += w * (in->near[chosen].square - square);
@@ -5606,7 +5610,7 @@ static double dem2di_distance_bound(const dem2di_inscribe *in, int count, int ne
     return bound;
 }
 
-/* Sides that can be nearest somewhere in the cell, to the front. */
+/* Move the sides that can be nearest somewhere in the cell to the front. Returns their number. */
 static int dem2di_near_keep(dem2di_inscribe *in, int count, double limit) {
     int kept = 0;
     for (int i = 0; i < count; i++) {
@@ -5618,8 +5622,8 @@ static int dem2di_near_keep(dem2di_inscribe *in, int count, double limit) {
     return kept;
 }
 
-/* Branch and bound in a square cell; `count` sides of the list can be nearest in it. The cells of
-   a cell permute only its part of the list. The quarter uphill comes first. */
+/* Branch and bound in a square cell; the first `count` sides can be nearest in it, and its quarters
+   permute only these. The quarter where the distance grows comes first. */
 static void dem2di_inscribe_cell(dem2di_inscribe *in, dem2d_vec centre, double half, int count,
                                  int depth) {
     int nearest = 0;
@@ -5643,7 +5647,7 @@ static void dem2di_inscribe_cell(dem2di_inscribe *in, dem2d_vec centre, double h
     count = dem2di_near_keep(in, count, distance + 2 * s);
     double x = uphill.x < 0 ? -half / 2 : half / 2, y = uphill.y < 0 ? -half / 2 : half / 2;
     bool level = fabs(uphill.x) > fabs(uphill.y);
-    for (int k = 0; k < 4; k++) { /* last the quarter downhill, the flatter neighbour second */
+    for (int k = 0; k < 4; k++) { /* second the neighbour that falls less, last the opposite one */
         bool flip = k == 1 || k == 3, other = k >= 2;
         dem2d_vec c = dem2di_vec(centre.x + ((level ? other : flip) ? -x : x),
                                  centre.y + ((level ? flip : other) ? -y : y));
@@ -5651,8 +5655,8 @@ static void dem2di_inscribe_cell(dem2di_inscribe *in, dem2d_vec centre, double h
     }
 }
 
-/* The greatest circle inside, to 1e-6 of the greatest diameter. Cells shrink to a quarter of that
-   at least: 22 halvings; a circle that is smaller is not found, the best so far is. */
+/* The largest inscribed circle, to 1e-6 of the greatest diameter. 22 halvings make the cells
+   smaller than a quarter of that; a smaller circle may be missed. */
 static bool dem2di_inscribed(const dem2d_env *env, const dem2di_side *sides, int count,
                              dem2d_outline_info *info) {
     dem2di_inscribe in;
@@ -5679,18 +5683,16 @@ static bool dem2di_inscribed(const dem2d_env *env, const dem2di_side *sides, int
 
 /* --- roundness -------------------------------------------------------------------------------- */
 
-/* Samples along an outline, so many for each turn of the greatest circle inside, and the passes of
-   a mean over five that smooth them: a standard deviation of sqrt(3 (25 - 1) / 12) = 2.45 samples,
-   2 pi 2.45 / 320 = 5 % of that circle's radius. On grains about 120 pixels across that is three
-   pixels: the staircase goes, the corners stay. Of 200 to 512 per turn, all of which follow the
-   published roundness of real grains as well, 320 leaves the least offset. */
+/* Number of samples along a circumference of the largest inscribed circle, and of passes of a mean
+   over five that smooth them: a standard deviation of sqrt(3 (25 - 1) / 12) = 2.45 samples, or 2 pi
+   2.45 / 320 = 5 % of that circle's radius. On grains about 120 pixels across that is three pixels:
+   it removes the steps of pixels and keeps the corners. 200 to 512 samples follow the published
+   roundness of real grains equally well, 320 with the least offset. */
 #define DEM2DI_SAMPLES_PER_TURN 320
-#define DEM2DI_SAMPLES                                                        \
-    2048 /* at most, the time grows as the square: needles get a coarser step \
-          */
+#define DEM2DI_SAMPLES 2048 /* at most, for needles: the time grows as the square */
 #define DEM2DI_PASSES 3
 
-/* Equal steps along the sides. */
+/* n samples in equal steps along the sides. */
 static void dem2di_resample(const dem2di_side *sides, int count, double perimeter,
                             dem2d_vec *samples, int n) {
     int k = 0;
@@ -5719,9 +5721,10 @@ static void dem2di_smooth(dem2d_vec *samples, dem2d_vec *spare, int n) {
     }
 }
 
-/* Radius of the greatest disc inside that touches at sample i: through sample j, on the inner
-   normal n, it is |v|^2 / (2 n.v) with v to the sample; the least of all. At a corner that is the
-   radius of curvature, elsewhere what the opposite side leaves. Compares fractions: no division. */
+/* Radius of the largest inscribed disc that touches at sample i. A disc on the inner normal n
+   through sample j has the radius |v|^2 / (2 n.v) with v from i to j; the least of these counts. At
+   a corner it is the radius of curvature, elsewhere the opposite side limits it. Compares fractions
+   without division. */
 static double dem2di_touching_radius(const dem2d_vec *samples, int n, int i, dem2d_vec normal) {
     double square = 1, across = 0;
     for (int j = 0; j < n; j++) {
@@ -5735,16 +5738,16 @@ static double dem2di_touching_radius(const dem2d_vec *samples, int n, int i, dem
     return across > 0 ? square / (2 * across) : DBL_MAX;
 }
 
-/* Wadell's roundness without a choice of corners: corners are where the touching disc is smaller
-   than the greatest one inside, and every direction that a corner turns through counts alike. A
-   corner that is an arc counts with its radius, as in Wadell's mean. samples is room for twice
-   DEM2DI_SAMPLES. */
+/* Wadell's roundness without choosing corners by hand: corners are where the touching disc is
+   smaller than the largest inscribed one, and their radii are averaged over the angle that they
+   turn by. A corner that is a circular arc counts with its radius, as in Wadell's mean. samples has
+   room for 2 DEM2DI_SAMPLES points. */
 static double dem2di_roundness(const dem2di_side *sides, int count, double perimeter,
                                double inscribed, dem2d_vec *samples) {
     double sum = 0, all = 0, turns = perimeter / (2 * DEM2DI_PI * inscribed);
     double most = (double)DEM2DI_SAMPLES / DEM2DI_SAMPLES_PER_TURN;
     int n = turns < most ? (int)(turns * DEM2DI_SAMPLES_PER_TURN) : DEM2DI_SAMPLES;
-    if (!(inscribed > 0)) return 0; /* too thin to tell */
+    if (!(inscribed > 0)) return 0; /* too thin to have an inscribed circle */
     dem2di_resample(sides, count, perimeter, samples, n);
     dem2di_smooth(samples, samples + DEM2DI_SAMPLES, n);
     for (int i = 0; i < n; i++) {
@@ -5753,7 +5756,7 @@ static double dem2di_roundness(const dem2di_side *sides, int count, double perim
         dem2d_rot rotation;
         rotation.c = dem2di_dot(in, out);
         rotation.s = dem2di_cross(in, out);
-        if (!(rotation.s > 0)) continue; /* hollow or straight */
+        if (!(rotation.s > 0)) continue; /* concave or straight */
         if (!dem2di_unit(dem2di_perp(dem2di_sub(after, before)), &normal)) continue;
         double radius = dem2di_touching_radius(samples, n, i, normal);
         if (!(radius < inscribed)) continue;
@@ -5764,7 +5767,7 @@ static double dem2di_roundness(const dem2di_side *sides, int count, double perim
     return all > 0 ? sum / all / inscribed : 1;
 }
 
-/* All but the mass; room holds count + 2 DEM2DI_SAMPLES points. */
+/* All measures but the mass; room is for count + 2 DEM2DI_SAMPLES points. */
 static dem2d_result dem2di_measure(const dem2d_env *env, const dem2d_vec *points, int count,
                                    dem2di_side *sides, dem2d_vec *room, dem2d_outline_info *info) {
     int corners = 0, ends[2] = {0, 0};
@@ -5809,26 +5812,26 @@ DEM2D_API dem2d_result dem2d_outline_measure(const dem2d_env *env, const dem2d_v
 
 /* --- area of the symmetric difference --------------------------------------------------------- */
 
-/* A side that is not level, from its lower end up. */
+/* A side that is not horizontal, from its lower to its upper end. */
 typedef struct dem2di_rise {
     double y, x, top, end; /* from (x, y) to (end, top) */
     double slope;          /* change of x over change of y */
     int of;                /* outline 0 or 1 */
 } dem2di_rise;
 
-/* A number to sort by and what it belongs to. */
+/* The y of a rise's lower end, to sort by. */
 typedef struct dem2di_level {
     double y;
     int rise;
 } dem2di_level;
 
-/* A rise in the slab between two levels: x on the lower and on the upper one. */
+/* The part of a rise in the slab between two levels: x on the lower and on the upper level. */
 typedef struct dem2di_strand {
     double low, high;
     int rise, of;
 } dem2di_strand;
 
-/* Room for two outlines of `room` points together. */
+/* Arrays for two outlines of `room` points together. */
 typedef struct dem2di_slabs {
     dem2di_rise *rises;
     dem2di_level *levels; /* 2 room */
@@ -5859,7 +5862,8 @@ static bool dem2di_slabs_make(const dem2d_env *env, size_t room, dem2di_slabs *s
     return false;
 }
 
-/* The same side of both outlines gives the same numbers, whichever way round they are. */
+/* Add the rises of an outline. A side that both outlines have gives the same numbers, whatever
+   their orientation. */
 static void dem2di_slabs_add(dem2di_slabs *slabs, const dem2d_vec *points, int count,
                              dem2d_vec origin, int of) {
     dem2d_vec from = dem2di_sub(points[count - 1], origin);
@@ -5882,7 +5886,8 @@ static void dem2di_slabs_add(dem2di_slabs *slabs, const dem2d_vec *points, int c
     }
 }
 
-/* Ends of the ascending runs; descending ones are turned first. */
+/* Find ascending runs, and reverse descending ones; ends gets where each run ends. Returns their
+   number. */
 static int dem2di_level_runs(dem2di_level *levels, int count, int *ends) {
     int runs = 0;
     for (int i = 0; i < count;) {
@@ -5899,7 +5904,7 @@ static int dem2di_level_runs(dem2di_level *levels, int count, int *ends) {
     return runs;
 }
 
-/* Merge sort that begins with the runs it finds: outlines go up and down only a few times. */
+/* Merge sort that begins with the runs it finds: outlines rise and fall only a few times. */
 static const dem2di_level *dem2di_levels_sort(dem2di_level *levels, int count, int *ends) {
     dem2di_level *from = levels, *to = levels + count;
     int runs = dem2di_level_runs(levels, count, ends);
@@ -5919,7 +5924,7 @@ static const dem2di_level *dem2di_levels_sort(dem2di_level *levels, int count, i
     return from;
 }
 
-/* Length inside one outline but not the other on the lower and the upper level, in this order. */
+/* Length inside exactly one outline: x on the lower level, y on the upper level. */
 static dem2d_vec dem2di_strands_width(const dem2di_strand *strands, int count) {
     dem2d_vec width = {0, 0};
     bool in[2] = {false, false};
@@ -5932,8 +5937,8 @@ static dem2d_vec dem2di_strands_width(const dem2di_strand *strands, int count) {
     return width;
 }
 
-/* The difference in a slab of height 1. The strands are in order on its lower level; from crossing
-   to crossing the width is linear. Each crossing puts one pair into the order of the upper
+/* Area inside exactly one outline in a slab of height 1. The strands are sorted on its lower level;
+   between crossings the width is linear. Each crossing swaps one pair into the order of the upper
    level. */
 static double dem2di_slab_area(dem2di_strand *strands, int count) {
     double area = 0, at = 0;
@@ -5944,7 +5949,7 @@ static double dem2di_slab_area(dem2di_strand *strands, int count) {
             double low = strands[i + 1].low - strands[i].low;
             double high = strands[i + 1].high - strands[i].high;
             if (!(high < 0)) continue;
-            double t = low / (low - high); /* rounding must not lead back */
+            double t = low / (low - high); /* with rounding errors it may be below at */
             t = t > at ? dem2di_min(t, 1) : at;
             if (swap >= 0 && !(t < next)) continue;
             swap = i;
@@ -5961,7 +5966,7 @@ static double dem2di_slab_area(dem2di_strand *strands, int count) {
     }
 }
 
-/* Before a slab: the strands that end there leave, the others go on from where they were. */
+/* Go to the next slab: remove the strands that end at y, continue the others from their upper x. */
 static int dem2di_strands_advance(const dem2di_slabs *slabs, int count, double y) {
     int kept = 0;
     for (int i = 0; i < count; i++) {
@@ -5973,8 +5978,9 @@ static int dem2di_strands_advance(const dem2di_slabs *slabs, int count, double y
     return kept;
 }
 
-/* x on the upper level, then the order of the lower one: by insertion, as it is nearly there. Equal
-   ones in the wrong order for the upper level are the first crossings. */
+/* Compute x on the upper level y, and sort by x on the lower one; insertion is fast, since the
+   strands are nearly sorted. Strands with equal x in the wrong order for the upper level give the
+   first crossings. */
 static void dem2di_strands_order(const dem2di_slabs *slabs, int count, double y) {
     dem2di_strand *strands = slabs->strands;
     for (int i = 0; i < count; i++) {
@@ -5987,8 +5993,8 @@ static void dem2di_strands_order(const dem2di_slabs *slabs, int count, double y)
     }
 }
 
-/* Area inside just one of the outlines: between the levels of neighbouring corners all sides are
-   straight, so slab by slab it is exact. */
+/* Area inside exactly one of the outlines. Between the levels of neighbouring corners all sides are
+   straight, so the area of each slab is exact. */
 static double dem2di_slabs_area(dem2di_slabs *slabs) {
     const dem2di_level *levels = dem2di_levels_sort(slabs->levels, slabs->count, slabs->ends);
     double area = 0;
@@ -6016,15 +6022,15 @@ static double dem2di_slabs_area(dem2di_slabs *slabs) {
 
 /* --- Hausdorff distance ----------------------------------------------------------------------- */
 
-/* Sides of an outline in groups of neighbours with a box around each. */
+/* Sides of an outline in groups of neighbours with a bounding box each. */
 typedef struct dem2di_side_groups {
     dem2di_side *sides;
     dem2d_vec *boxes; /* low and high corner of each group */
     int count;
 } dem2di_side_groups;
 
-/* Per group: a box costs about as much as a side, outlines have about 1000 sides, and the total is
-   least near the square root. */
+/* Sides in a group: a box costs about as much as a side, outlines have about 1000 sides, and the
+   total cost is least near the square root of that. */
 #define DEM2DI_GROUP 32
 
 static void dem2di_side_groups_boxes(dem2di_side_groups *grouped) {
@@ -6039,7 +6045,8 @@ static void dem2di_side_groups_boxes(dem2di_side_groups *grouped) {
     }
 }
 
-/* Nearest side, if it is nearer than `square` at side k; no further once within `enough`. */
+/* The side nearest to p, if its squared distance is below *square (that of side k), which it
+   lowers. Stops when *square is at most `enough`. */
 static int dem2di_side_groups_nearest(const dem2di_side_groups *grouped, dem2d_vec p, int k,
                                       double enough, double *square) {
     for (int start = 0; *square > enough && start < grouped->count; start += DEM2DI_GROUP) {
@@ -6081,12 +6088,12 @@ static double dem2di_side_groups_farthest(const dem2di_side_groups *grouped,
     return most;
 }
 
-/* Greatest distance of a corner of one from the other. */
+/* Greatest distance of a corner of one outline from the other. */
 static bool dem2di_hausdorff(const dem2d_env *env, const dem2d_vec *a, int a_count,
                              const dem2d_vec *b, int b_count, double *distance) {
     dem2di_side_groups grouped[2];
     size_t room = (size_t)a_count + (size_t)b_count;
-    size_t groups = 2 * (room / DEM2DI_GROUP + 2); /* each outline may have one not full */
+    size_t groups = 2 * (room / DEM2DI_GROUP + 2); /* two corners each; the last may not be full */
     dem2di_side *sides = (dem2di_side *)dem2di_allocate(env, room, sizeof *sides);
     dem2d_vec *boxes = NULL;
     if (sides != NULL) boxes = (dem2d_vec *)dem2di_allocate(env, groups, sizeof *boxes);
