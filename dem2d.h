@@ -6065,9 +6065,9 @@ static int dem2di_side_groups_nearest(const dem2di_side_groups *grouped, dem2d_v
     return k;
 }
 
-/* Greatest of `most` and the squares of the distances of corners from a grouped. The nearest side
-   is sought by walking on from the last corner's; only where that leaves the distance above `most`
-   are all sides asked. */
+/* The greatest of `most` and the squared distances of corners from an outline. The search for the
+   nearest side moves on from the last corner's; only if that leaves the distance above `most` are
+   all sides searched. */
 static double dem2di_side_groups_farthest(const dem2di_side_groups *grouped,
                                           const dem2di_side *corners, int count, double most) {
     int n = grouped->count, k = 0;
@@ -6149,7 +6149,7 @@ DEM2D_API dem2d_result dem2d_outline_compare(const dem2d_env *env, const dem2d_v
    uses: config, math, memory, hull, series, support, mass, shapes, outlines
    ============================================================================================ */
 
-/* An outline made ready: counter-clockwise, relative to the centroid of its hull. */
+/* An outline prepared for a fit: counter-clockwise, relative to the centroid of its hull. */
 typedef struct dem2di_outline {
     dem2d_vec *points; /* count */
     dem2d_vec *hull;   /* hull_count, counter-clockwise */
@@ -6189,7 +6189,7 @@ static dem2d_result dem2di_outline_make(const dem2d_env *env, const dem2d_vec *p
     return DEM2D_OK;
 }
 
-/* The hull's support corner in a direction, going on from a corner at or before it. */
+/* The hull's support corner in a direction, searched from a corner at or before it. */
 static int dem2di_hull_climb(const dem2di_outline *outline, int k, dem2d_vec u) {
     int n = outline->hull_count;
     for (int i = 0; i < n; i++) {
@@ -6229,7 +6229,7 @@ DEM2D_API dem2d_result dem2d_fourier_fit(const dem2d_env *env, const dem2d_vec *
         dem2d_vec u = dem2di_vec(z.c, z.s), power = dem2di_vec(1, 0);
         k = dem2di_hull_climb(&outline, k, u);
         double h = dem2di_dot(outline.hull[k], u) * 2 / samples;
-        for (int n = 0; n <= order; n++) { /* uniform samples: least squares is a sum */
+        for (int n = 0; n <= order; n++) { /* with uniform samples, least squares is a sum */
             a[n] += h * power.x;
             b[n] += h * power.y;
             power = dem2di_turn(z, power);
@@ -6287,17 +6287,17 @@ DEM2D_API dem2d_result dem2d_fourier_reduce(double *a, double *b, int order,
     return DEM2D_OK;
 }
 
-/* A joint of the polybezier: where, tangent, and the place in the outline it stands for. */
+/* A joint of the polybezier: point, tangent, and its place in the outline. */
 typedef struct dem2di_joint {
     dem2d_vec point, normal, tangent;
-    int corner;    /* of the hull: the support corner, or the first of an edge */
-    bool edge;     /* the direction is the normal of the edge from corner to the next */
+    int corner;    /* of the hull: the support corner, or the first corner of an edge */
+    bool edge;     /* the joint is on the hull's edge from corner to the next, with its normal */
     bool straight; /* an end of a straight arc along that edge */
-    int place;     /* in the outline */
+    int place;     /* index in the outline */
 } dem2di_joint;
 
-/* Angles below this count as "the direction is the edge's normal": tangent lines then meet the
-   edge within 1e-6 of its length, where control points could no longer be told apart. */
+/* With an angle below this a direction counts as an edge's normal: tangent lines would meet the
+   edge within 1e-6 of its length, and control points could not be distinguished. */
 #define DEM2DI_EDGE_ANGLE 1e-6
 
 static int dem2di_place_of(const dem2di_outline *outline, dem2d_vec point) {
@@ -6310,8 +6310,8 @@ static dem2d_vec dem2di_hull_edge(const dem2di_outline *outline, int from) {
     return dem2di_sub(outline->hull[(from + 1) % outline->hull_count], outline->hull[from]);
 }
 
-/* A joint at a fraction of a hull's edge: the outline below the edge is shared between the arcs
-   on both sides there. */
+/* A joint at a fraction of a hull's edge. It divides the outline below the edge between the arcs on
+   both sides. */
 static void dem2di_joint_on_edge(const dem2di_outline *outline, int from, double fraction,
                                  dem2di_joint *joint) {
     dem2d_vec start = outline->hull[from], edge = dem2di_hull_edge(outline, from);
@@ -6327,8 +6327,8 @@ static void dem2di_joint_on_edge(const dem2di_outline *outline, int from, double
     joint->place = place;
 }
 
-/* The support joint in a direction, from a hull's corner at or before it; where the direction is an
-   edge's normal, the edge's middle. Returns the corner. */
+/* The joint at the support point in a direction, searched from a hull's corner at or before it; at
+   an edge's middle if the direction is the edge's normal. Returns the support corner. */
 static int dem2di_joint_make(const dem2di_outline *outline, int k, dem2d_vec normal,
                              dem2di_joint *joint) {
     int n = outline->hull_count;
@@ -6347,12 +6347,12 @@ static int dem2di_joint_make(const dem2di_outline *outline, int k, dem2d_vec nor
     return k;
 }
 
-/* A hull's edge that becomes a straight arc, and the curved arcs from there to the next one. */
+/* An edge of the hull that becomes a straight arc, and the curved arcs from it to the next one. */
 typedef struct dem2di_straight {
     int edge; /* of the hull, from corner `edge` */
     double length;
-    double turn; /* angle to the normal of the next side */
-    int arcs;    /* that share it */
+    double turn; /* angle from its normal to that of the next straight edge */
+    int arcs;    /* curved arcs that divide this angle */
 } dem2di_straight;
 
 static dem2d_rot dem2di_edge_normal(const dem2di_outline *outline, int from) {
@@ -6364,9 +6364,9 @@ static dem2d_rot dem2di_edge_normal(const dem2di_outline *outline, int from) {
     return z;
 }
 
-/* Curved arcs for the turns between sides, in their order along the hull: one each, the rest where
-   an arc would turn most. False where one would turn by more than a third of a turn, as three arcs
-   without sides do. */
+/* Distribute curved arcs over the turns between straight edges, which are sorted along the hull:
+   one each, further ones where an arc turns most. False if an arc would turn by more than a third
+   of a full turn, which three arcs without straight edges do. */
 static bool dem2di_distribute_arcs(const dem2di_outline *outline, dem2di_straight *sides, int count,
                                    int arcs) {
     for (int j = 0; j < count; j++) {
@@ -6382,19 +6382,19 @@ static bool dem2di_distribute_arcs(const dem2di_outline *outline, dem2di_straigh
         int most = 0;
         for (int j = 1; j < count; j++)
             if (sides[j].turn * sides[most].arcs > sides[most].turn * sides[j].arcs) most = j;
-        if (i == arcs) return sides[most].turn <= 2.1 * sides[most].arcs; /* 2 pi/3, and a bit */
+        if (i == arcs) return sides[most].turn <= 2.1 * sides[most].arcs; /* just above 2 pi/3 */
         sides[most].arcs++;
     }
     return false; /* more sides than arcs */
 }
 
-/* What is cut off a corner that is rounded, at most: a twentieth of the size. */
+/* Greatest length that rounding a corner cuts off its edges: a twentieth of the size. */
 static double dem2di_corner_reach(const dem2di_outline *outline) {
     return 0.05 * outline->radius;
 }
 
-/* Joints in uniform directions; with sides, at both ends of each, and in uniform directions
-   between them. */
+/* Joints in uniform directions; with straight edges, at both ends of each edge, and in uniform
+   directions between them. */
 static void dem2di_joints_make(const dem2di_outline *outline, int arcs,
                                const dem2di_straight *sides, int count, dem2di_joint *joints) {
     int k = dem2di_hull_start(outline);
@@ -6421,7 +6421,7 @@ static void dem2di_joints_make(const dem2di_outline *outline, int arcs,
     }
 }
 
-/* Lengths from both ends of an arc to where its tangent lines meet. */
+/* Distances from both ends of an arc to the point where its tangent lines meet. */
 static void dem2di_tangent_lengths(const dem2di_joint *from, const dem2di_joint *to, double *l1,
                                    double *l2) {
     dem2d_vec chord = dem2di_sub(to->point, from->point);
@@ -6430,9 +6430,9 @@ static void dem2di_tangent_lengths(const dem2di_joint *from, const dem2di_joint 
     *l2 = dem2di_max(0, dem2di_cross(from->tangent, chord) / sine);
 }
 
-/* A corner that several directions share would get arcs without length. Its joints go onto a
-   circle that touches the tangent lines of the first and the last direction at a distance
-   `reach` from the corner. A direction along one of its edges keeps the edge's middle. */
+/* If several directions had the same corner as support point, arcs would have no length. Their
+   joints are moved onto a circle that touches the tangent lines of the first and the last direction
+   at a distance `reach` from the corner. A joint in the middle of an edge stays there. */
 static void dem2di_round_corner(const dem2di_outline *outline, dem2di_joint *joints, int arcs,
                                 int first, int last, int low, int high) {
     dem2di_joint *start = &joints[low % arcs], *end = &joints[high % arcs];
@@ -6446,7 +6446,7 @@ static void dem2di_round_corner(const dem2di_outline *outline, dem2di_joint *joi
         after = dem2di_length(dem2di_sub(corner, end->point));
     else
         dem2di_tangent_lengths(end, &joints[(high + 1) % arcs], &after, &unused);
-    if (start->straight) before *= 2; /* it ends where the rounding begins */
+    if (start->straight) before *= 2; /* a straight arc may end where the circle begins */
     if (end->straight) after *= 2;
     reach = dem2di_min(reach, dem2di_min(before, after) / 2);
     if (!dem2di_unit(dem2di_add(start->normal, end->normal), &bisector)) return;
@@ -6462,7 +6462,7 @@ static void dem2di_round_corner(const dem2di_outline *outline, dem2di_joint *joi
 
 static void dem2di_round_corners(const dem2di_outline *outline, dem2di_joint *joints, int arcs) {
     int n = outline->hull_count, begin = 0;
-    /* begin after a change of corner, so that no run is cut by the end of the array */
+    /* begin after a change of corner, so that no run continues past the end of the array */
     for (int i = 0; i < arcs; i++) {
         dem2di_joint *last = &joints[(i + arcs - 1) % arcs];
         if (joints[i].edge || last->edge || last->corner != joints[i].corner) begin = i;
@@ -6485,13 +6485,13 @@ static void dem2di_round_corners(const dem2di_outline *outline, dem2di_joint *jo
     }
 }
 
-/* One arc beside the outline between its joints, both relative to its first joint. */
+/* One arc and the part of the outline between its joints, both relative to its first joint. */
 typedef struct dem2di_section {
     const dem2di_outline *outline;
     const dem2di_joint *from, *to;
     double l1, l2;  /* tangent lengths */
-    double rho_max; /* greatest radius of curvature asked for, m; HUGE_VAL: any */
-    double bend;    /* least curvature searched for, 1/m */
+    double rho_max; /* bound of the radius of curvature, m; HUGE_VAL: none */
+    double bend;    /* bound of the curvature in the penalty, 1/m */
 } dem2di_section;
 
 static dem2di_arc dem2di_section_arc(const dem2di_section *section, double f1, double f2) {
@@ -6515,7 +6515,8 @@ static double dem2di_arc_sweep(const dem2di_arc *arc, double t0, double t1) {
     return 1.5 * half * sum;
 }
 
-/* Side of an arc's point of a line, as a cubic: its value at 0 and its control differences. */
+/* Distance (scaled) of an arc's point from a line, a cubic in the arc's parameter: its value at 0
+   and its control differences. */
 typedef struct dem2di_cubic {
     double start, q0, q1, q2;
 } dem2di_cubic;
@@ -6525,8 +6526,8 @@ static double dem2di_cubic_value(const dem2di_cubic *f, double t) {
            t * t * t * f->q2;
 }
 
-/* The one zero between low and high, where the values have different signs: Newton's steps, or
-   halving where they leave the bracket. 2^-40 of an arc is far below the error of any fit. */
+/* The zero between low and high, where the values have different signs: Newton's steps, or halving
+   where they leave the bracket. 2^-40 of an arc is far below the error of any fit. */
 static double dem2di_cubic_zero(const dem2di_cubic *f, double low, double high) {
     bool rising = dem2di_cubic_value(f, low) < 0;
     double t = (low + high) / 2;
@@ -6545,8 +6546,8 @@ static double dem2di_cubic_zero(const dem2di_cubic *f, double low, double high) 
     return t;
 }
 
-/* Parameters where an arc crosses the segment p + [0, 1) edge, in the segment's order: at most
-   two for a convex arc. The arc's point farthest along the line's normal separates them. */
+/* Parameters where an arc crosses the segment p + [0, 1) edge, in the segment's order: at most two,
+   as the arc is convex. The arc's point farthest along the segment's normal is between them. */
 static int dem2di_arc_crossings(const dem2di_arc *arc, dem2d_vec p, dem2d_vec edge, double t[2]) {
     dem2di_cubic f;
     f.start = dem2di_cross(edge, dem2di_sub(arc->start, p));
@@ -6558,7 +6559,7 @@ static int dem2di_arc_crossings(const dem2di_arc *arc, dem2d_vec p, dem2d_vec ed
     bool above = side[0] > 0 && side[1] > 0 && side[2] > 0 && side[3] > 0;
     bool below = side[0] < 0 && side[1] < 0 && side[2] < 0 && side[3] < 0;
     if (above || below || square == 0) return 0;
-    /* towards the line: the edge's left normal when the arc bulges there, else its right one */
+    /* the edge's left normal if the arc bulges to the left, else the right one */
     dem2d_vec normal = dem2di_perp(edge);
     if (f.q0 < 0 || f.q2 > 0) normal = dem2di_negate(normal);
     double split = dem2di_arc_parameter(dem2di_dot(arc->d0, normal), dem2di_dot(arc->d1, normal),
@@ -6582,8 +6583,8 @@ static int dem2di_arc_crossings(const dem2di_arc *arc, dem2d_vec p, dem2d_vec ed
     return found;
 }
 
-/* Adds the loop of the arc from t0 to t1 and the outline's sweep beside it: its area, and how that
-   changes with both fractions: the arc sweeps dB x B', of degree 5 again. */
+/* Add the area between the arc from t0 to t1 and the outline, whose sweep is `loop`, and its
+   derivatives by both fractions: the integrand dB x B' has degree 5 as well. */
 static void dem2di_section_loop(const dem2di_section *section, const dem2di_arc *arc, double t0,
                                 double t1, double loop, double *area, double slope[2]) {
     double sweep = dem2di_arc_sweep(arc, t0, t1) - loop, half = (t1 - t0) / 2;
@@ -6600,10 +6601,11 @@ static void dem2di_section_loop(const dem2di_section *section, const dem2di_arc 
     }
 }
 
-/* Where a point lies beside an arc: the arc's parameter level with it along the chord, and how far
-   it is outside, across the chord. Only for arcs that go forward along their chord. */
+/* A point beside an arc: the parameter of the arc's point at the same place along the chord, and
+   how far the point is outside of it across the chord. Only for arcs that go forward along the
+   chord. */
 typedef struct dem2di_foot {
-    bool level; /* else beyond the ends, or not known */
+    bool level; /* t and outside are known */
     double t, outside;
 } dem2di_foot;
 
@@ -6620,7 +6622,7 @@ static dem2di_foot dem2di_arc_foot(const dem2di_arc *arc, dem2d_vec chord, dem2d
         double s = 1 - t, value = dem2di_cubic_value(&f, t);
         double slope = 3 * (s * s * f.q0 + 2 * s * t * f.q1 + t * t * f.q2);
         double next = dem2di_max(0, dem2di_min(1, t - value / slope));
-        foot.level = fabs(next - t) < 1e-6; /* its square is left: below rounding of a side */
+        foot.level = fabs(next - t) < 1e-6; /* the error is its square: below rounding errors */
         t = next;
     }
     foot.t = t;
@@ -6628,26 +6630,26 @@ static dem2di_foot dem2di_arc_foot(const dem2di_arc *arc, dem2d_vec chord, dem2d
     return foot;
 }
 
-/* Can the segment between two points cross the arc? Not when both are inside (it is convex), nor
-   when both are outside by more than the arc bulges between their feet, |B''| dt^2/8. */
+/* Can the segment between two points cross the arc? Not if both are inside (the arc is convex), nor
+   if both are outside by more than the arc bulges between them, |B''| dt^2/8. */
 static bool dem2di_may_cross(const dem2di_arc *arc, const dem2di_foot *a, const dem2di_foot *b) {
     if (!a->level || !b->level || (a->outside < 0) != (b->outside < 0)) return true;
     if (a->outside < 0) return false;
     double bend = dem2di_max(dem2di_length(dem2di_sub(arc->d1, arc->d0)),
                              dem2di_length(dem2di_sub(arc->d2, arc->d1)));
     double reach = b->t - a->t, bulge = 6 * bend * reach * reach / 8;
-    /* seen across the chord it is longer by 1/cos of at most 60 degrees */
+    /* measured across the chord it is longer by 1/cos of at most 60 degrees */
     return dem2di_min(a->outside, b->outside) <= 2 * bulge;
 }
 
-/* Samples of an arc's curvature, and by how much the curvature that is asked for is overdone, so
-   that it holds between them as well. */
+/* Number of samples of an arc's curvature, and a factor on the curvature asked for, so that the
+   bound holds between the samples as well. */
 #define DEM2DI_BEND_SAMPLES 32
 #define DEM2DI_BEND_MARGIN 1.02
 
-/* The penalty for what is flatter than asked for, m2: the mean square of the part of the curvature
-   that is missing, times the square of the chord. It costs about as much as the flat arc can gain,
-   the bulge, at a miss of DEM2DI_BEND_MARGIN. Adds its slopes. */
+/* Penalty for arcs flatter than the bound, m2: the mean square of the missing fraction of the
+   curvature, times the square of the chord: about the area that a flatter arc can gain. Adds its
+   derivatives to slope. */
 static double dem2di_section_penalty(const dem2di_section *section, const dem2di_arc *arc,
                                      double slope[2]) {
     dem2d_vec chord = dem2di_sub(section->to->point, section->from->point), d[2];
@@ -6675,9 +6677,9 @@ static double dem2di_section_penalty(const dem2di_section *section, const dem2di
     return weight * sum;
 }
 
-/* Area between arc and outline: the two cross in points that cut both into loops; the area of
-   each loop is the difference of two sweeps. Exact when arc and outline meet the crossings in
-   one order. */
+/* Area between arc and outline: their crossings divide both into loops, and the area of each loop
+   is the difference of two sweeps. Exact if arc and outline pass the crossings in the same
+   order. */
 static double dem2di_section_area(const dem2di_section *section, const double f[2],
                                   double slope[2]) {
     const dem2di_outline *outline = section->outline;
@@ -6689,7 +6691,7 @@ static double dem2di_section_area(const dem2di_section *section, const double f[
     dem2d_vec chord = dem2di_vec(0, 0);
     dem2di_foot before = {false, 0, 0};
     slope[0] = slope[1] = 0;
-    /* feet need an arc that stays within 60 degrees of its chord; without a chord there are none */
+    /* dem2di_arc_foot needs an arc within 60 degrees of its chord; a zero chord switches it off */
     (void)dem2di_unit(dem2di_sub(section->to->point, origin), &chord);
     if (dem2di_dot(chord, section->from->tangent) < 0.5 ||
         dem2di_dot(chord, section->to->tangent) < 0.5)
@@ -6723,8 +6725,8 @@ static double dem2di_fraction(double f) {
     return dem2di_max(1e-4, dem2di_min(1, f));
 }
 
-/* One step down along -H slope, halved until the area falls; false when it does not within 2^-8.
-   A fraction at its bound that would leave stays. */
+/* One step along -H slope, halved until the area falls; false if it does not within 2^-8. A
+   fraction at its bound stays there if the step points outside. */
 static bool dem2di_section_descend(const dem2di_section *section, double inverse[3], double f[2],
                                    double slope[2], double *area) {
     double d[2], g[2], next[2];
@@ -6732,7 +6734,7 @@ static bool dem2di_section_descend(const dem2di_section *section, double inverse
     d[1] = -(inverse[1] * slope[0] + inverse[2] * slope[1]);
     for (int j = 0; j < 2; j++)
         if (dem2di_fraction(f[j] + d[j]) == f[j]) d[j] = 0;
-    /* what the step promises: 1e-5 of the area is about 1e-7 of the grain's */
+    /* the expected decrease: 1e-5 of this area is about 1e-7 of the grain's */
     if (-(d[0] * slope[0] + d[1] * slope[1]) <= 1e-5 * *area) return false;
     for (double factor = 1; factor > 1.0 / 256; factor /= 2) {
         for (int j = 0; j < 2; j++) g[j] = dem2di_fraction(f[j] + factor * d[j]);
@@ -6756,8 +6758,8 @@ static bool dem2di_section_descend(const dem2di_section *section, double inverse
     return false;
 }
 
-/* Least area over both fractions: quasi-Newton steps, begun afresh from the last place until that
-   brings nothing more. Returns the number of areas computed, about. */
+/* Least area over both fractions: quasi-Newton steps, restarted from the best place until a restart
+   gains nothing. Returns the number of steps. */
 static int dem2di_fit_section(const dem2di_section *section, double f[2]) {
     double slope[2], area = dem2di_section_area(section, f, slope);
     int steps = 0;
@@ -6776,9 +6778,9 @@ static int dem2di_fit_section(const dem2di_section *section, double f[2]) {
     return steps;
 }
 
-/* Least area with a bound of the radius of curvature. A penalty is overdone somewhere and not
-   enough elsewhere: where the bound does not hold yet, more is asked for. Keeps the roundest where
-   it cannot hold, and returns the number of steps. */
+/* Least area with a bound of the radius of curvature. A penalty does not enforce the bound exactly:
+   while it does not hold, more curvature is asked for. If it never holds, the result is the arc
+   with the least radius. Returns the number of steps. */
 static int dem2di_fit_curved(dem2di_section *section, double f[2]) {
     double least = 0, g[2];
     int steps = 0;
@@ -6814,7 +6816,7 @@ typedef struct dem2di_swarm {
     uint64_t seed;
 } dem2di_swarm;
 
-/* The picture of one section: pixels inside its outline closed by the chord. */
+/* A picture of one section: pixels inside its outline, which the chord closes. */
 typedef struct dem2di_raster {
     dem2d_vec lower;     /* corner of pixel (0, 0) */
     double pixel;        /* m */
@@ -6826,7 +6828,7 @@ typedef struct dem2di_raster {
 #define DEM2DI_SWARM_BIRDS 256 /* at most */
 #define DEM2DI_SWARM_POINTS 48 /* chords of an arc: flatter than a pixel of the default size */
 
-/* One row of the closed polygon's picture into raster->row. */
+/* Draw one row of a closed polygon into raster->row. */
 static void dem2di_raster_row(const dem2di_raster *raster, const dem2d_vec *points, int count,
                               int y) {
     double height = raster->lower.y + (y + 0.5) * raster->pixel;
@@ -6845,7 +6847,7 @@ static void dem2di_raster_row(const dem2di_raster *raster, const dem2d_vec *poin
     for (int x = 1; x <= raster->width; x++) raster->row[x] ^= raster->row[x - 1];
 }
 
-/* Pixels in which the arc's picture differs from the section's. */
+/* Number of pixels where the arc's picture differs from the section's. */
 static int dem2di_raster_cost(const dem2di_raster *raster, const dem2di_arc *arc) {
     dem2d_vec points[DEM2DI_SWARM_POINTS + 1];
     int cost = 0;
@@ -6893,8 +6895,8 @@ static void dem2di_swarm_search(const dem2di_section *section, const dem2di_rast
         }
 }
 
-/* [P] sec. 4 step 4 for one section: the arc, unless it is flatter than the bound and the one that
-   is known is not. iterations counts moves of the swarm. */
+/* [P] sec. 4 step 4 for one section. *arc is replaced unless the new arc is flatter than both the
+   bound and *arc. iterations counts moves of the swarm. */
 static dem2d_result dem2di_swarm_section(const dem2d_env *env, const dem2di_section *section,
                                          const dem2di_swarm *swarm, uint64_t *random,
                                          dem2di_arc *arc, int *iterations) {
@@ -6919,7 +6921,7 @@ static dem2d_result dem2di_swarm_section(const dem2d_env *env, const dem2di_sect
     dem2di_raster raster;
     raster.lower = lower;
     raster.pixel = 2 * outline->radius / swarm->pixels;
-    /* a needle may be much longer than the circle of its size */
+    /* a needle may be much longer than the circle of its area: limit the number of pixels */
     raster.pixel = dem2di_max(raster.pixel, dem2di_max(upper.x - lower.x, upper.y - lower.y) /
                                                 (8.0 * swarm->pixels));
     raster.width = (int)ceil((upper.x - lower.x) / raster.pixel) + 1;
@@ -6946,14 +6948,14 @@ static dem2d_result dem2di_swarm_section(const dem2d_env *env, const dem2di_sect
     return DEM2D_OK;
 }
 
-/* A polybezier under way: joints, and the fractions of each arc. */
+/* A candidate polybezier: joints, and the fractions of each arc. */
 typedef struct dem2di_bezier_plan {
     const dem2di_outline *outline;
     int arcs, iterations;
-    double rho_max;       /* greatest radius of curvature asked for, m; HUGE_VAL: any */
+    double rho_max;       /* bound of the radius of curvature, m; HUGE_VAL: none */
     dem2di_joint *joints; /* arcs */
     double *fractions;    /* 2 arcs */
-    double area, rho;     /* reached: between all arcs and the outline, greatest radius */
+    double area, rho;     /* result: area between arcs and outline, greatest radius */
 } dem2di_bezier_plan;
 
 static bool dem2di_plan_section(const dem2di_bezier_plan *plan, int i, dem2di_section *section) {
@@ -6972,7 +6974,7 @@ static bool dem2di_plan_section(const dem2di_bezier_plan *plan, int i, dem2di_se
     return !straight;
 }
 
-/* Least area for the plan's joints. Arcs start from those of a circle, which have x/l =
+/* Least area for the plan's joints. The search starts from the arcs of a circle, which have x/l =
    (4/3) tan(phi/4) / tan(phi/2) = (4/3) cos(phi/2) / (1 + cos(phi/2)). */
 static void dem2di_plan_fit(dem2di_bezier_plan *plan) {
     double unused[2];
@@ -6980,7 +6982,7 @@ static void dem2di_plan_fit(dem2di_bezier_plan *plan) {
     for (int i = 0; i < plan->arcs; i++) {
         dem2di_section section;
         double *f = &plan->fractions[2 * i];
-        f[0] = f[1] = 1.0 / 3; /* straight: even speed */
+        f[0] = f[1] = 1.0 / 3; /* straight: constant speed */
         bool curved = dem2di_plan_section(plan, i, &section);
         if (curved) {
             double cosine = sqrt((1 + dem2di_dot(section.from->normal, section.to->normal)) / 2);
@@ -6994,9 +6996,9 @@ static void dem2di_plan_fit(dem2di_bezier_plan *plan) {
     }
 }
 
-/* Hull edges that may become straight arcs, the longest first: those of a fifth of the size and
-   more; as many as there is room for, at least one. An arc of 20 times the size along a shorter one
-   loses less than 1e-5 of the grain's area, L^3/(12 rho). Returns how many. */
+/* Edges of the hull that may become straight arcs, the longest first, at most `room` >= 1 of them:
+   those not shorter than a fifth of the size. Along a shorter edge, an arc with the greatest radius
+   loses less than 1e-5 of the grain's area, L^3/(12 rho). Returns their number. */
 static int dem2di_find_sides(const dem2di_outline *outline, dem2di_straight *sides, int room) {
     int count = 0;
     for (int k = 0; k < outline->hull_count; k++) {
@@ -7014,7 +7016,7 @@ static int dem2di_find_sides(const dem2di_outline *outline, dem2di_straight *sid
     return count;
 }
 
-/* The first sides of those found, in their order along the hull. */
+/* The first `count` edges found, sorted along the hull. */
 static void dem2di_sort_sides(const dem2di_straight *found, int count, dem2di_straight *sides) {
     for (int i = 0; i < count; i++) {
         int j = i;
@@ -7023,14 +7025,14 @@ static void dem2di_sort_sides(const dem2di_straight *found, int count, dem2di_st
     }
 }
 
-/* Is a plan better than another? What meets the bound goes before what does not. */
+/* Is a plan better than another? Plans that keep the bound are better than plans that do not. */
 static bool dem2di_plan_better(const dem2di_bezier_plan *a, const dem2di_bezier_plan *b) {
     bool met_a = a->rho <= a->rho_max, met_b = b->rho <= b->rho_max;
     if (met_a && met_b) return a->area < b->area;
     return met_a != met_b ? met_a : a->rho < b->rho;
 }
 
-/* The plan with no side, then with more and more of them, the longest first; the best is kept. */
+/* Fit plans with 0, 1, 2, ... straight edges, the longest first, and keep the best. */
 static void dem2di_plan_search(dem2di_bezier_plan *plan, dem2di_bezier_plan *spare,
                                dem2di_straight *found, dem2di_straight *sides) {
     int room = plan->arcs - 3, count = 0;
@@ -7050,8 +7052,8 @@ static void dem2di_plan_search(dem2di_bezier_plan *plan, dem2di_bezier_plan *spa
     }
 }
 
-/* [P] sec. 4 on an outline made ready, relative to its centre. With a swarm by that, else (NULL)
-   by exact area; the greatest radius of curvature that is asked for may be HUGE_VAL. */
+/* [P] sec. 4 on a prepared outline, relative to its centre, by a swarm or (NULL) by exact area.
+   rho_max bounds the radius of curvature; HUGE_VAL for none. */
 static dem2d_result dem2di_bezier_fit(const dem2d_env *env, const dem2di_outline *outline, int arcs,
                                       double rho_max, const dem2di_swarm *swarm, dem2d_vec *control,
                                       int *iterations) {
@@ -7090,7 +7092,7 @@ static dem2d_result dem2di_bezier_fit(const dem2d_env *env, const dem2di_outline
     return result;
 }
 
-/* The greatest radius of curvature of a fit unless told, of the size. */
+/* Default bound of the radius of curvature of a fit, of the size. */
 #define DEM2DI_FIT_RHO_MAX 20
 
 DEM2D_API dem2d_result dem2d_bezier_fit(const dem2d_env *env, const dem2d_vec *points, int count,
@@ -7112,8 +7114,9 @@ DEM2D_API dem2d_result dem2d_bezier_fit(const dem2d_env *env, const dem2d_vec *p
     return result;
 }
 
-/* Least objective by compass search: each coordinate in turn up and down by its step; steps are
-   halved when nothing helps, until they are `least` of what they were. */
+/* Least objective by compass search: change each coordinate in turn by plus and minus its step;
+   halve the steps when no change helps, until they are `least` of the first. Returns the number of
+   calls. */
 typedef double dem2di_objective_fn(void *data, const double *x);
 
 static int dem2di_compass(dem2di_objective_fn *objective, void *data, double *x,
@@ -7141,9 +7144,9 @@ static int dem2di_compass(dem2di_objective_fn *objective, void *data, double *x,
 
 /* ---- Fourier series with rho >= margin: the nearest series in the mean square ---- */
 
-/* The coefficients of a convex polygon's support function, closed form: rho is its edge lengths
-   at the edge normals, p_n = rho_n / (1 - n^2); n = 1 is the Steiner point, an integral over the
-   normals of each corner. */
+/* Coefficients of a convex polygon's support function in closed form: rho has a Dirac peak with the
+   length of each edge at its normal, and p_n = rho_n / (1 - n^2). n = 1 is the Steiner point, an
+   integral over the normals at each corner. */
 static void dem2di_hull_series(const dem2di_outline *outline, int order, double *a, double *b) {
     int n = outline->hull_count;
     for (int k = 0; k <= order; k++) a[k] = b[k] = 0;
@@ -7160,7 +7163,7 @@ static void dem2di_hull_series(const dem2di_outline *outline, int order, double 
         turn.c = last.x * z.c + last.y * z.s;
         turn.s = last.x * z.s - last.y * z.c;
         double angle = dem2d_rot_angle(turn);
-        double sine = z.c * z.s - last.x * last.y; /* of twice the angle, / 2 */
+        double sine = z.c * z.s - last.x * last.y; /* half the difference of sin(2 angle) */
         double cosine = last.x * last.x - last.y * last.y - z.c * z.c + z.s * z.s;
         dem2d_vec power = dem2di_vec(1, 0);
         a[0] += length / DEM2DI_PI;
@@ -7178,7 +7181,8 @@ static void dem2di_hull_series(const dem2di_outline *outline, int order, double 
     }
 }
 
-/* The search for the nearest series: angles where rho is held at the margin, with multipliers. */
+/* The search for the nearest series: angles where rho is constrained to the margin, and their
+   multipliers. */
 typedef struct dem2di_nearest_series {
     int order, count, room;
     double margin;         /* of a0/2 */
@@ -7186,11 +7190,11 @@ typedef struct dem2di_nearest_series {
     double *a, *b;
     double *angle, *multiplier, *gap, *trial; /* room */
     double *matrix, *factor;                  /* room x room */
-    bool *held;                               /* room: the multiplier may be above 0 */
+    bool *held;                               /* room: active, the multiplier may be above 0 */
 } dem2di_nearest_series;
 
-/* Product of the constraints at two angles: the metric is the mean square of p, in which a0/2
-   counts twice as much as the other coefficients. */
+/* Scalar product of the constraints at two angles that differ by `angle`. The metric is the mean
+   square of p, in which a0/2 counts twice as much as the other coefficients. */
 static double dem2di_constraint_product(const dem2di_nearest_series *s, double angle) {
     dem2d_rot z = dem2d_rot_make(angle);
     dem2d_vec power = dem2di_vec(z.c, z.s);
@@ -7235,9 +7239,9 @@ static double dem2di_slack(const dem2di_nearest_series *s, const double *a, cons
     return value - s->margin * a[0] / 2;
 }
 
-/* Multipliers of the constraints in `held` with which their slack is 0: Cholesky's factors of the
-   symmetric system, row by row. A pivot that rounding has eaten belongs to a constraint that hangs
-   on the others: it gets 0. */
+/* Multipliers with which the slack of all active constraints is 0, by Cholesky factorisation row by
+   row. A pivot within rounding errors belongs to a constraint that depends on the others: its
+   multiplier is 0. */
 static void dem2di_nearest_equal(dem2di_nearest_series *s, const bool *held, double *x) {
     int n = s->count, room = s->room;
     double *factor = s->factor;
@@ -7264,8 +7268,8 @@ static void dem2di_nearest_equal(dem2di_nearest_series *s, const bool *held, dou
 }
 
 /* Multipliers >= 0 with which no constraint is violated (C. Lawson and R. Hanson, Solving Least
-   Squares Problems, ch. 23): hold the most violated one; where a multiplier would turn negative,
-   go as far as it allows and let go of it. */
+   Squares Problems, ch. 23): activate the most violated constraint; if a multiplier would become
+   negative, go until it is 0 and deactivate its constraint. */
 static void dem2di_nearest_solve(dem2di_nearest_series *s) {
     double unused, scale = s->a0[0], *x = s->trial;
     int n = s->count, last = -1;
@@ -7304,14 +7308,14 @@ static void dem2di_nearest_solve(dem2di_nearest_series *s) {
             violation = slack;
             worst = i;
         }
-        if (worst < 0 || worst == last) break; /* done, or let go of again at once */
+        if (worst < 0 || worst == last) break; /* done, or just deactivated */
         s->held[worst] = true;
         last = worst;
     }
     dem2di_nearest_apply(s);
 }
 
-/* The minimum of the slack next to a sample that is below its neighbours: halving by the slope. */
+/* The minimum of the slack near a sample that is below its neighbours, by halving on its slope. */
 static double dem2di_slack_minimum(const dem2di_nearest_series *s, double low, double high) {
     double slope;
     for (int i = 0; i < 40; i++) { /* 2^-40 of the spacing of samples */
@@ -7325,7 +7329,7 @@ static double dem2di_slack_minimum(const dem2di_nearest_series *s, double low, d
     return (low + high) / 2;
 }
 
-/* A constraint at an angle; one that is there already, within `near`, only moves. */
+/* Add a constraint at an angle, or move an existing one that is within `near`. */
 static void dem2di_constrain(dem2di_nearest_series *s, double angle, double near) {
     for (int i = 0; i < s->count; i++) {
         double apart = fabs(s->angle[i] - angle);
@@ -7338,10 +7342,10 @@ static void dem2di_constrain(dem2di_nearest_series *s, double angle, double near
     s->multiplier[s->count++] = 0;
 }
 
-/* Exchange of constraints: those that no longer push are dropped, the minima of rho below the
-   margin are added, until rho is nowhere below the margin by more than the tolerance. A new
-   minimum takes the place of one close by, which converges fast; where two such minima are needed
-   that would go round in circles, so later ones stand beside. */
+/* Exchange of constraints: drop those with multiplier 0, add the minima of rho below the margin,
+   until rho is nowhere below the margin by more than the tolerance. A new minimum replaces a nearby
+   constraint, which converges fast. Where two constraints so close are needed this would cycle, so
+   later minima are added. */
 static int dem2di_nearest_search(dem2di_nearest_series *s) {
     int samples = 16 * s->order + 16, round = 0;
     double width = 2 * DEM2DI_PI / samples, slope;
@@ -7364,20 +7368,20 @@ static int dem2di_nearest_search(dem2di_nearest_series *s) {
             worst = dem2di_min(worst, value);
             if (value < 0) dem2di_constrain(s, angle, (round < 20 ? 0.1 : 1e-3) * width);
         }
-        if (worst >= -1e-5 * s->a[0]) break; /* the rest is made up for by a0 */
+        if (worst >= -1e-5 * s->a[0]) break; /* a0 makes up for the rest */
         dem2di_nearest_solve(s);
     }
     return round;
 }
 
-/* The series nearest to (a, b) with rho >= margin a0/2; order >= 2. In place. */
+/* Replace (a, b) by the nearest series with rho >= margin a0/2; order >= 2. */
 static dem2d_result dem2di_constrain_series(const dem2d_env *env, double *a, double *b, int order,
                                             double margin, int *iterations) {
     dem2di_nearest_series s;
     s.order = order;
     s.margin = margin;
     s.count = 0;
-    s.room = 8 * order + 16; /* at most `order` minima, each held by a few points */
+    s.room = 8 * order + 16; /* at most `order` minima, with a few constraints each */
     size_t room = (size_t)s.room, terms = (size_t)order + 1;
     size_t cells = 2 * terms + 5 * room + 2 * room * room; /* the flags fit into the fifth */
     double *memory = (double *)dem2di_allocate(env, cells, sizeof *memory);
@@ -7406,7 +7410,7 @@ static dem2d_result dem2di_constrain_series(const dem2d_env *env, double *a, dou
 
 /* ---- fits of all models, with a report ---- */
 
-/* A fit under way. */
+/* A fit of one of the models. */
 typedef struct dem2di_fit {
     const dem2d_env *env;
     const dem2d_vec *points; /* as given */
@@ -7414,14 +7418,14 @@ typedef struct dem2di_fit {
     dem2di_outline outline;
     dem2d_mass mass; /* of the outline, about outline.centre */
     const dem2d_fit_desc *desc;
-    int count;                   /* being tried */
+    int count;                   /* of this attempt */
     dem2d_vec *buffer;           /* candidate outline: DEM2DI_FIT_POINTS */
     dem2d_result compare_result; /* of a comparison */
     dem2d_shape *shape;
     dem2d_fit_report report;
 } dem2di_fit;
 
-/* Points of a smooth candidate's outline: its area is short by (2 pi/1440)^2/6 = 3e-6. */
+/* Points of a smooth candidate's outline; its area is too small by (2 pi/1440)^2/6 = 3e-6. */
 #define DEM2DI_FIT_POINTS 1440
 
 static void dem2di_fit_resize(const dem2di_fit *fit, double *a, double *b, int order) {
@@ -7504,8 +7508,8 @@ static double dem2di_fit_difference(dem2di_fit *fit, const dem2d_vec *points, in
     return HUGE_VAL;
 }
 
-/* x: centre, half axes, angle. A hundred and twenty points lose 5e-4 of an ellipse's area alike
-   for all candidates; the ellipse of their polygon's area is taken for the points. */
+/* x is centre, half axes, angle. The polygon of 120 points would have 5e-4 less area than the
+   ellipse: it is scaled to the ellipse's area. */
 static double dem2di_ellipse_objective(void *data, const double *x) {
     const int count = 120;
     dem2di_fit *fit = (dem2di_fit *)data;
@@ -7521,7 +7525,7 @@ static double dem2di_ellipse_objective(void *data, const double *x) {
     return dem2di_fit_difference(fit, fit->buffer, count);
 }
 
-/* From the hull's moments: half axes of the ellipse with its area and second moments. */
+/* The search starts from the ellipse with the area and second moments of the hull. */
 static dem2d_result dem2di_fit_ellipse(dem2di_fit *fit) {
     double xx = 0, xy = 0, yy = 0, size = fit->outline.radius;
     const dem2d_vec *hull = fit->outline.hull;
@@ -7551,7 +7555,7 @@ static bool dem2di_is_convex(const dem2d_vec *points, int count) {
     for (int i = 0; i < count; i++) {
         dem2d_vec a = dem2di_sub(points[(i + 1) % count], points[i]);
         dem2d_vec b = dem2di_sub(points[(i + 2) % count], points[(i + 1) % count]);
-        double rounding = 1e-6 * dem2di_length(a) * dem2di_length(b); /* a corner of 1e-6 rad */
+        double rounding = 1e-6 * dem2di_length(a) * dem2di_length(b); /* a turn of 1e-6 rad */
         if (!(dem2di_cross(a, b) > rounding)) return false;
     }
     return dem2di_turns_once(points, count);
@@ -7564,8 +7568,8 @@ static double dem2di_polygon_objective(void *data, const double *x) {
     return dem2di_fit_difference(fit, fit->buffer, fit->count);
 }
 
-/* Corners of the hull are dropped one by one, each time the one whose triangle with its
-   neighbours is least; the corners that are left then move to the least difference. */
+/* Corners of the hull are dropped one by one, each time the one with the smallest triangle with its
+   neighbours; compass search then moves the remaining corners to the least difference. */
 static dem2d_result dem2di_fit_polygon(dem2di_fit *fit) {
     int n = fit->outline.hull_count, m = fit->count;
     size_t room = 2 * (size_t)(n > m ? n : m);
@@ -7636,7 +7640,7 @@ static dem2d_result dem2di_fit_once(dem2di_fit *fit) {
     return DEM2D_OK;
 }
 
-#define DEM2DI_FIT_COUNT 64 /* the largest that is tried for a coverage, as declared */
+#define DEM2DI_FIT_COUNT 64 /* the greatest count tried for a coverage, see dem2d_outline_fit */
 
 /* A count that is 0 for its default, or from least to most. */
 static dem2d_result dem2di_check_setting(const dem2d_env *env, const char *field, int value,
@@ -7688,7 +7692,7 @@ static dem2d_result dem2di_check_fit(const dem2d_env *env, const dem2d_fit_desc 
     return dem2di_fail(env, DEM2D_OUT_OF_RANGE, -1, "count = %d", desc->count);
 }
 
-/* The fit of a given count, or of the least one that has the coverage. */
+/* The fit with the given count, or with the least one that reaches the coverage. */
 static dem2d_result dem2di_fit_counts(dem2di_fit *fit) {
     const dem2d_fit_desc *desc = fit->desc;
     bool counted = desc->model != DEM2D_CIRCLE && desc->model != DEM2D_ELLIPSE;
@@ -7732,7 +7736,7 @@ DEM2D_API dem2d_result dem2d_outline_fit(const dem2d_env *env, const dem2d_vec *
     }
     if (result == DEM2D_OK) {
         fit.report.pose.position = dem2di_add(fit.report.pose.position, fit.outline.centre);
-        fit.shape->offset = dem2di_vec(0, 0); /* the report says where it lies */
+        fit.shape->offset = dem2di_vec(0, 0); /* report.pose is relative to the centroid */
         *shape = fit.shape;
         if (report != NULL) *report = fit.report;
     }
@@ -7741,7 +7745,7 @@ DEM2D_API dem2d_result dem2d_outline_fit(const dem2d_env *env, const dem2d_vec *
     return result;
 }
 
-/* Distance from the origin to the outermost crossing of the outline with a ray. */
+/* Distance from the centre to the outermost crossing of the outline with a ray along u. */
 static double dem2di_ray_reach(const dem2d_vec *points, int count, dem2d_vec centre, dem2d_vec u) {
     double reach = 0;
     dem2d_vec p = dem2di_sub(points[count - 1], centre);
@@ -7832,7 +7836,8 @@ DEM2D_API dem2d_result dem2d_fourier_virtual(const dem2d_virtual_desc *desc, int
         a[n] = amplitude * phase.c;
         b[n] = n == 0 ? 0 : amplitude * phase.s;
     }
-    /* rho - 1 without a0: its minimum times a common factor must not be below margin - 1 */
+    /* with a0/2 = 1 the series gives rho - 1: its minimum times the common factor must not be below
+       margin - 1 */
     dem2di_series radius = dem2di_series_make(a, b, order, true, 1);
     double least = dem2di_series_minimum(&radius, 1e-12 * radius.size).lower;
     double factor = -least > 1 - margin ? (1 - margin) / -least : 1, area = 1;
