@@ -7856,39 +7856,42 @@ DEM2D_API dem2d_result dem2d_fourier_virtual(const dem2d_virtual_desc *desc, int
 }
 
 /* ============================================================================================
-   >>gjk  Distance of two shapes, or the proof that they overlap: Gilbert-Johnson-Keerthi
+   >>gjk  Distance of two shapes, or a proof that they overlap: Gilbert-Johnson-Keerthi
    uses: config, math, support
    ============================================================================================ */
 
-/* Two shapes seen from the centre of A, and the support function of A minus B minus d. */
+/* Two shapes relative to the centre of A: their difference A minus B minus d has the support value
+   h(u) = h_A(u) + h_B(-u) - d.u. */
 typedef struct dem2di_pair {
     const dem2d_shape *a, *b;
     dem2d_rot ra, rb;
     double scale_a, scale_b;
     dem2d_vec d;     /* centre of A to centre of B */
     double distance; /* |d| */
-    double size;     /* R_A + R_B + |d|: what rounding is relative to */
-    int calls;       /* of the support function */
+    double size;     /* R_A + R_B + |d|: rounding errors are relative to it */
+    int calls;       /* evaluations of the support function */
 } dem2di_pair;
 
-/* A point of A minus B minus d, and the two points it comes from, each from its own centre. */
+/* A point w of A minus B minus d, and the points a and b that it comes from, each relative to its
+   own centre. */
 typedef struct dem2di_vertex {
     dem2d_vec w, a, b;
 } dem2di_vertex;
 
-/* What meets of two polygons: an edge of one and a corner of the other, or two corners. */
+/* The features of two polygons in contact: an edge of one and a corner of the other, or two
+   corners. */
 typedef struct dem2di_feature {
-    int own;       /* whose edge: 0 A's, 1 B's; -1: none, or not known */
-    int corner[2]; /* of both: the corner, or the first of the edge; -1: not known */
+    int own;       /* whose edge: 0 for A, 1 for B; -1: none, or not known */
+    int corner[2]; /* of A and B: the corner, or the first corner of the edge; -1: not known */
 } dem2di_feature;
 
-/* What a search knows: h(normal) = upper is the least support value met, the true depth is not
-   below lower; points on both shapes that belong to it. */
+/* State and result of a search: h(normal) = upper is the least support value found, the true depth
+   is not below lower; a and b are the witness points. */
 typedef struct dem2di_search {
     dem2d_contact_state state;
     int iterations;
-    int count;                /* of the simplex */
-    dem2di_vertex simplex[3]; /* GJK's last; it holds the origin when they overlap */
+    int count;                /* vertices of the simplex */
+    dem2di_vertex simplex[3]; /* of GJK; contains the origin if the shapes overlap */
     dem2d_vec normal;
     double upper, lower;
     double residual; /* of EPA */
@@ -7897,7 +7900,7 @@ typedef struct dem2di_search {
     dem2di_feature feature;
 } dem2di_search;
 
-/* d in one place: a periodic cell would change only this. */
+/* From centre a to centre b: the only place that a periodic cell would change. */
 static dem2d_vec dem2di_centre_line(dem2d_vec a, dem2d_vec b) {
     return dem2di_sub(b, a);
 }
@@ -7918,8 +7921,8 @@ static dem2di_pair dem2di_pair_make(const dem2d_shape *a, const dem2d_pose *pose
     return pair;
 }
 
-/* The vertex of A minus B minus d that two support points make. Through a pointer: a returned
-   struct would be copied in pieces wider than those it was written in, which stalls. */
+/* The vertex of two support points. Written through a pointer: a returned struct would be read in
+   wider pieces than it was written in, which stalls the processor. */
 static inline void dem2di_vertex_set(const dem2di_pair *pair, dem2d_vec a, dem2d_vec b,
                                      dem2di_vertex *v) {
     v->a = a;
@@ -7928,7 +7931,7 @@ static inline void dem2di_vertex_set(const dem2di_pair *pair, dem2d_vec a, dem2d
     v->w.y = (a.y - b.y) - pair->d.y;
 }
 
-/* Support point of A minus B minus d; rho, if asked for, gets the radii of curvature of A and B. */
+/* Support point of A minus B minus d; rho (may be NULL) gets the radii of curvature of A and B. */
 static inline void dem2di_minkowski(dem2di_pair *pair, dem2d_vec u, double rho[2],
                                     dem2di_vertex *v) {
     double *rho_a = rho, *rho_b = rho != NULL ? rho + 1 : NULL;
@@ -7940,16 +7943,16 @@ static inline void dem2di_minkowski(dem2di_pair *pair, dem2d_vec u, double rho[2
                       dem2di_scale(dem2di_turn(pair->rb, b), pair->scale_b), v);
 }
 
-/* The line of centres; of concentric shapes any direction. */
+/* Direction of the line of centres; (1, 0) for concentric shapes. */
 static dem2d_vec dem2di_centres(const dem2di_pair *pair) {
     dem2d_vec u = dem2di_vec(1, 0);
     (void)dem2di_unit(pair->d, &u);
     return u;
 }
 
-/* Distance of the origin from the segment v[0] v[1]; the unit direction from there to the origin
-   comes from the edge itself, so that it stays right when the distance goes to 0. Drops the end
-   that does not matter. */
+/* Distance of the origin from the segment v[0] v[1], and the unit direction from the nearest point
+   to the origin. Inside the segment this is the segment's normal, which stays accurate as the
+   distance goes to 0. If an end is nearest, the other one is dropped. */
 static double dem2di_nearest(dem2di_vertex *v, int *count, dem2d_vec *direction) {
     dem2d_vec edge = dem2di_sub(v[1].w, v[0].w);
     double before = dem2di_dot(v[0].w, edge), after = dem2di_dot(v[1].w, edge);
@@ -7966,16 +7969,16 @@ static double dem2di_nearest(dem2di_vertex *v, int *count, dem2d_vec *direction)
     return dem2di_length(v[0].w);
 }
 
-/* Is the origin in the triangle? Borders count. */
+/* Is the origin in the triangle, boundary included? */
 static bool dem2di_triangle_holds(const dem2di_vertex *v) {
     double ab = dem2di_cross(v[0].w, v[1].w), bc = dem2di_cross(v[1].w, v[2].w);
     double ca = dem2di_cross(v[2].w, v[0].w);
-    if (ab == 0 && bc == 0 && ca == 0) return false; /* all on a line with the origin */
+    if (ab == 0 && bc == 0 && ca == 0) return false; /* all on one line with the origin */
     return (ab >= 0 && bc >= 0 && ca >= 0) || (ab <= 0 && bc <= 0 && ca <= 0);
 }
 
-/* The simplex with a new vertex, cut down to the part nearest to the origin. Returns true when
-   it holds the origin. */
+/* Add a vertex to the simplex, and reduce it to the part nearest to the origin. True if the simplex
+   contains the origin. */
 static bool dem2di_simplex_add(dem2di_search *search, dem2di_vertex v, double *distance,
                                dem2d_vec *direction) {
     dem2di_vertex *simplex = search->simplex;
@@ -8005,7 +8008,7 @@ static bool dem2di_simplex_add(dem2di_search *search, dem2di_vertex v, double *d
     return false;
 }
 
-/* Support value at u: keeps the least one met. */
+/* Evaluate the support function at u; the search keeps the least value. */
 static dem2di_vertex dem2di_evaluate(dem2di_pair *pair, dem2di_search *search, dem2d_vec u) {
     dem2di_vertex v;
     dem2di_minkowski(pair, u, NULL, &v);
@@ -8019,7 +8022,7 @@ static dem2di_vertex dem2di_evaluate(dem2di_pair *pair, dem2di_search *search, d
     return v;
 }
 
-/* Points on both shapes where the segment of two vertices comes nearest to the origin. */
+/* Witness points: where the segment of two vertices is nearest to the origin. */
 static void dem2di_witness(dem2di_search *search, const dem2di_vertex *v0,
                            const dem2di_vertex *v1) {
     dem2d_vec edge = dem2di_sub(v1->w, v0->w);
@@ -8034,17 +8037,17 @@ static void dem2di_feature_clear(dem2di_search *search) {
     search->feature.own = search->feature.corner[0] = search->feature.corner[1] = -1;
 }
 
-/* The state when the sign is known: rounding is taken into account. */
+/* The state of a resolved pair: the sign of the depth, outside rounding errors. */
 static dem2d_contact_state dem2di_state_of(const dem2di_pair *pair, const dem2di_search *search) {
     double rounding = DEM2DI_ROUNDING * pair->size;
     if (search->upper < -rounding) return DEM2D_SEPARATED;
     return search->upper > rounding ? DEM2D_PENETRATING : DEM2D_TOUCHING;
 }
 
-/* GJK ([P] sec. 3.1, steps 1-7) in the plane. With `detect` it stops at the first direction that
-   separates; otherwise it goes on until distance and separation agree to the tolerance (m).
-   Overlap (origin in the simplex, or within rounding of it) is reported as PENETRATING with
-   lower = 0: EPA finds the depth. */
+/* GJK ([P] sec. 3.1, steps 1-7) in the plane. With `detect` it stops at the first separating
+   direction; otherwise it continues until distance and separation agree within the tolerance (m).
+   Overlap (the origin is in the simplex, or within rounding errors of it) gives PENETRATING with
+   lower = 0: EPA then finds the depth. */
 static void dem2di_gjk(dem2di_pair *pair, dem2d_vec start, double tolerance, int cap, bool detect,
                        dem2di_search *search) {
     double rounding = DEM2DI_ROUNDING * pair->size, distance;
@@ -8090,11 +8093,12 @@ static void dem2di_gjk(dem2di_pair *pair, dem2d_vec start, double tolerance, int
    uses: config, math, support, gjk
    ============================================================================================ */
 
-/* Vertices and edges that fit on the stack; each iteration adds one of each. */
+/* Room for vertices and edges on the stack; each iteration adds one of each. */
 #define DEM2DI_EPA_ITERATIONS 250
 #define DEM2DI_EPA_ROOM (DEM2DI_EPA_ITERATIONS + 8)
 
-/* An edge of the polytope: a bound of the depth for the directions between those of its ends. */
+/* An edge of the polytope: its distance bounds the depth for directions between those of its
+   ends. */
 typedef struct dem2di_edge {
     int from, to;
     dem2d_vec normal; /* outward */
@@ -8103,13 +8107,13 @@ typedef struct dem2di_edge {
 
 typedef struct dem2di_polytope {
     int vertices, edges;
-    bool arcs; /* branch and bound: edges of the shapes eroded by what rho is at least */
+    bool arcs; /* branch and bound: edges of the shapes eroded by their least rho */
     dem2di_vertex vertex[DEM2DI_EPA_ROOM];
-    dem2d_vec direction[DEM2DI_EPA_ROOM]; /* that the vertex is the support of */
+    dem2d_vec direction[DEM2DI_EPA_ROOM]; /* in which the vertex is the support point */
     dem2di_edge edge[DEM2DI_EPA_ROOM];
 } dem2di_polytope;
 
-/* Least rho of the pair over the directions between two, at most half a turn apart. */
+/* Lower bound of the pair's rho over the directions between two, at most half a turn apart. */
 static double dem2di_pair_least_rho_between(const dem2di_pair *pair, dem2d_vec from, dem2d_vec to) {
     double a = dem2di_least_rho_between(pair->a, dem2di_turn_back(pair->ra, from),
                                         dem2di_turn_back(pair->ra, to));
@@ -8118,14 +8122,15 @@ static double dem2di_pair_least_rho_between(const dem2di_pair *pair, dem2d_vec f
     return a * pair->scale_a + b * pair->scale_b;
 }
 
-/* Is a direction, of any length, inside the arc between two, at most half a turn apart? */
+/* Is a direction (of any length) inside the arc between two others, at most half a turn apart? */
 static bool dem2di_inside(dem2d_vec u, dem2d_vec from, dem2d_vec to) {
     return dem2di_cross(from, u) > 0 && dem2di_cross(u, to) > 0;
 }
 
-/* Bound of the depth on an arc of directions. With r the least rho there, h - r is the support
-   value of a convex body and at least max(p.u, q.u) of its points p, q at both ends. That has its
-   minima at the ends, across the chord of p and q, and opposite to p and q if on the arc. */
+/* Lower bound of the depth on an arc of directions. With r the least rho there, h - r is the
+   support value of a convex body, so it is not below max(p.u, q.u) with its support points p, q at
+   both ends. The minima of that are at the ends, across the chord of p and q, and opposite to p and
+   q, if these directions are on the arc. */
 static bool dem2di_arc_set(const dem2di_pair *pair, dem2di_polytope *polytope, int slot, int from,
                            int to) {
     dem2di_edge *edge = &polytope->edge[slot];
@@ -8147,7 +8152,7 @@ static bool dem2di_arc_set(const dem2di_pair *pair, dem2di_polytope *polytope, i
         double value = i == 2 ? dem2di_dot(q, n) : dem2di_dot(p, n);
         if (!(value < least)) continue;
         least = value;
-        /* so near to an end that nothing would be cut off: the middle */
+        /* near an end nothing would be cut off: take the middle */
         double width = 1e-3 * dem2di_cross(u, v);
         bool end = dem2di_cross(u, n) < width || dem2di_cross(n, v) < width;
         if (!end || !dem2di_unit(dem2di_add(u, v), &edge->normal)) edge->normal = n;
@@ -8156,7 +8161,8 @@ static bool dem2di_arc_set(const dem2di_pair *pair, dem2di_polytope *polytope, i
     return true;
 }
 
-/* Put an edge into a slot; one shorter than rounding has no normal and covers no direction. */
+/* Put an edge into a slot. False for one shorter than rounding errors: it has no normal and covers
+   no directions. */
 static bool dem2di_edge_set(const dem2di_pair *pair, dem2di_polytope *polytope, int slot, int from,
                             int to) {
     if (polytope->arcs) return dem2di_arc_set(pair, polytope, slot, from, to);
@@ -8171,7 +8177,7 @@ static bool dem2di_edge_set(const dem2di_pair *pair, dem2di_polytope *polytope, 
     return true;
 }
 
-/* Append a vertex counter-clockwise, with the edge from the one before. */
+/* Append a vertex counter-clockwise, with the edge from the vertex before. */
 static void dem2di_polytope_push(const dem2di_pair *pair, dem2di_polytope *polytope,
                                  dem2di_vertex v, dem2d_vec u) {
     int last = polytope->vertices;
@@ -8191,8 +8197,8 @@ static void dem2di_polytope_close(const dem2di_pair *pair, dem2di_polytope *poly
         polytope->edges++;
 }
 
-/* A polytope around (or touching) the origin from GJK's last simplex. A triangle is taken as it
-   is, a segment gets both supports across it, a point those in four directions. */
+/* A polytope around (or touching) the origin from GJK's last simplex: the triangle, or a segment
+   with the support points across it, or the support points in four directions. */
 static void dem2di_polytope_start(dem2di_pair *pair, dem2di_search *search,
                                   dem2di_polytope *polytope) {
     const dem2di_vertex *s = search->simplex;
@@ -8223,15 +8229,15 @@ static int dem2di_nearest_edge(const dem2di_polytope *polytope) {
     return best;
 }
 
-/* Expand the nearest edge until its distance and the least support value agree to the tolerance
+/* Expand the nearest edge until its distance and the least support value agree within the tolerance
    (m). The nearest edge bounds the depth from below (the polytope is inside), each support value
-   from above. Witness points are those of the last edge, or with arcs of the least value met. */
+   from above. The witness points are those of the last edge, or, with arcs, of the least value. */
 static void dem2di_epa(dem2di_pair *pair, dem2di_polytope *polytope, double tolerance, int cap,
                        dem2di_search *search) {
     search->state = DEM2D_UNRESOLVED;
     search->proof = DEM2D_BY_NOTHING;
     search->lower = -pair->size;
-    if (polytope->edges == 0) return; /* supports that are not finite, or all one point */
+    if (polytope->edges == 0) return; /* support points that are not finite or all coincide */
     if (cap > DEM2DI_EPA_ITERATIONS) cap = DEM2DI_EPA_ITERATIONS;
     double rounding = DEM2DI_ROUNDING * pair->size;
     for (int iteration = 0;; iteration++) {
@@ -8240,7 +8246,7 @@ static void dem2di_epa(dem2di_pair *pair, dem2di_polytope *polytope, double tole
         search->lower = dem2di_min(search->upper, edge.distance);
         if (polytope->arcs && search->upper - edge.distance <= tolerance &&
             (search->upper < -rounding || edge.distance >= -rounding))
-            break; /* and the sign is sure */
+            break; /* the sign is certain, too */
         if (iteration == cap) return;
         search->iterations++;
         dem2di_vertex v = dem2di_evaluate(pair, search, edge.normal);
@@ -8261,7 +8267,7 @@ static void dem2di_epa(dem2di_pair *pair, dem2di_polytope *polytope, double tole
         bool second = dem2di_edge_set(pair, polytope, first ? last : nearest, added, edge.to);
         if (first && second) polytope->edges++;
         if (first || second) continue;
-        polytope->edge[nearest] = polytope->edge[--polytope->edges]; /* met within rounding */
+        polytope->edge[nearest] = polytope->edge[--polytope->edges]; /* within rounding errors */
         if (polytope->edges == 0) break;
     }
     search->state = dem2di_state_of(pair, search);
@@ -8269,12 +8275,12 @@ static void dem2di_epa(dem2di_pair *pair, dem2di_polytope *polytope, double tole
 }
 
 /* ============================================================================================
-   >>edges  Two polygons, sharp or rounded, or one and a circle: exact, by edges and corners
+   >>edges  Two polygons, sharp or rounded, or a polygon and a circle: exact, by edges and corners
    uses: config, math, support, gjk
    ============================================================================================ */
 
-/* The cone of directions about d in which the depth can be below h: discs of the inscribed radii
-   bound it by i_A + i_B - d.u elsewhere. False when that says nothing. */
+/* The cone of directions about d that can have a support value below h: elsewhere the inscribed
+   circles, with the value i_A + i_B - d.u, exclude it. False if they exclude too little. */
 static bool dem2di_cone(const dem2di_pair *pair, double h, dem2d_vec end[2]) {
     double inner = pair->a->inscribed * pair->scale_a + pair->b->inscribed * pair->scale_b;
     double c = inner - h;
@@ -8287,24 +8293,24 @@ static bool dem2di_cone(const dem2di_pair *pair, double h, dem2d_vec end[2]) {
     return dem2di_vec_finite(end[0]) && dem2di_vec_finite(end[1]);
 }
 
-/* A start this near (sine) to the normal of an edge is taken there: contacts rest on edges, and
-   the edge turns with its polygon. */
+/* A start direction this near (sine) to the normal of an edge is moved there: contacts rest on
+   edges, and the edge turns with its polygon. */
 #define DEM2DI_SNAP 0.01
 
-/* Polygons and circles are a sharp polygon or a point, grown by a radius. */
+/* Has a shape a core, a sharp polygon or a point, that is grown by a radius? */
 static bool dem2di_has_core(const dem2d_shape *shape) {
     return shape->type == DEM2D_CIRCLE || shape->type == DEM2D_POLYGON;
 }
 
-/* The sharp polygon inside a polygon, or the centre of a circle. B is reflected through its
-   centre, so that both turn with the direction: A minus B is the sum of the two. */
+/* The core of a shape. B is reflected through its centre: A minus B is then the sum of both cores,
+   and the corners of both advance counter-clockwise with the direction. */
 typedef struct dem2di_core {
     const dem2d_vec *corners, *tangents;
     int count;
     dem2d_rot q;
     double scale, sign; /* both negative for B */
-    double radius;      /* that it is grown by */
-    double behind;      /* of the first: see dem2di_walk_on */
+    double radius;      /* by which it is grown */
+    double behind;      /* of the first core: see dem2di_cores_set */
 } dem2di_core;
 
 static void dem2di_core_set(const dem2d_shape *shape, dem2d_rot q, double scale, double sign,
@@ -8322,25 +8328,26 @@ static void dem2di_core_set(const dem2d_shape *shape, dem2d_rot q, double scale,
     core->behind = 0;
 }
 
-/* The two edges of a segment are half a turn apart: when one has just been passed, the sign of a
-   cross product can't tell an edge parallel to it from the other. Where the next tangents are on
-   one line to rounding, the other core's comes first: right when they are opposite, and as good as
-   the other order when they are not. */
+/* The two edges of a segment are half a turn apart: after one of them, the sign of a cross product
+   can't distinguish an edge parallel to it from its other edge. So if the next tangents of both
+   cores are on one line within rounding errors, the edge of the other core comes first (behind):
+   that is right if they are opposite, and either order is right if they are not. */
 static void dem2di_cores_set(const dem2di_pair *pair, dem2di_core core[2]) {
     dem2di_core_set(pair->a, pair->ra, pair->scale_a, 1, &core[0]);
     dem2di_core_set(pair->b, pair->rb, pair->scale_b, -1, &core[1]);
     core[0].behind = ((core[0].count == 2) - (core[1].count == 2)) * (8 * DBL_EPSILON);
 }
 
-/* A corner of A minus B minus d: one corner of each core, and to one side the tangents of the
-   edges that come next, always counter-clockwise; 0 where a core has no edges. */
+/* A walk along the boundary of A minus B minus d, at a corner w: corner k[] of each core at p[],
+   and the counter-clockwise tangents t[] of the edges that come next on one side; 0 if a core has
+   none. */
 typedef struct dem2di_walk {
     int k[2];
     dem2d_vec p[2], t[2], w;
 } dem2di_walk;
 
-/* An edge of A minus B passed on a walk: the one of core `own` that leaves (side +1) or comes to
-   (-1) corners k, which are at p; its other end is at `to`. */
+/* An edge of A minus B passed on a walk: the edge of core `own` after (side 1) or before (-1) its
+   corner k[own]. The corners k[] are at p[], the other end of the edge is at `to`. */
 typedef struct dem2di_passed_edge {
     int k[2], own, side;
     dem2d_vec p[2], to;
@@ -8377,10 +8384,10 @@ static void dem2di_walk_set(const dem2di_pair *pair, const dem2di_core core[2], 
     walk->w.y = (walk->p[0].y + walk->p[1].y) - pair->d.y;
 }
 
-/* The edge that comes next to a side, and along it to its other end. */
+/* Walk along the next edge to its other end. */
 static inline void dem2di_walk_on(const dem2di_pair *pair, const dem2di_core core[2], int side,
                                   dem2di_walk *walk, dem2di_passed_edge *edge) {
-    /* no short circuits: which comes first can't be predicted */
+    /* no short circuits: branches could not be predicted */
     int first = side * dem2di_cross(walk->t[0], walk->t[1]) > core[0].behind;
     int i = 1 - ((first & (core[0].count > 1)) | (core[1].count == 1));
     edge->own = i;
@@ -8406,7 +8413,8 @@ static dem2d_vec dem2di_right(dem2d_vec tangent) {
     return dem2di_vec(tangent.y, -tangent.x);
 }
 
-/* The answer for the shapes: an overlap of the cores along a normal, at points of theirs. */
+/* The result for the shapes, from an overlap of the cores along a normal, at their points p and
+   q. */
 static void dem2di_core_report(const dem2di_core core[2], dem2d_vec p, dem2d_vec q,
                                dem2d_vec normal, double overlap, dem2di_search *search) {
     search->normal = normal;
@@ -8415,15 +8423,15 @@ static void dem2di_core_report(const dem2di_core core[2], dem2d_vec p, dem2d_vec
     search->b = dem2di_negate(dem2di_along(q, core[1].radius, normal));
 }
 
-/* The foot of the origin on an edge, as a part of it from its first end. */
+/* The foot of the origin on an edge, as a fraction of the edge from its first end. */
 static double dem2di_edge_foot(const dem2di_pair *pair, const dem2di_passed_edge *edge) {
     dem2d_vec w = dem2di_sub(dem2di_add(edge->p[0], edge->p[1]), pair->d);
     dem2d_vec along = dem2di_sub(edge->to, edge->p[edge->own]);
     return -dem2di_dot(w, along) / dem2di_dot(along, along);
 }
 
-/* The same at the foot of the origin on an edge. Where an edge of A and one of B are parallel they
-   follow each other, and the foot may be on the other. */
+/* The result at the foot of the origin on an edge. If an edge of A and one of B are parallel they
+   follow each other, and the foot may be on the second one. */
 static void dem2di_edge_report(const dem2di_pair *pair, const dem2di_core core[2],
                                const dem2di_passed_edge *edge, dem2di_search *search) {
     dem2di_passed_edge next;
@@ -8444,7 +8452,7 @@ static void dem2di_edge_report(const dem2di_pair *pair, const dem2di_core core[2
     t = dem2di_max(0, dem2di_min(1, t));
     dem2d_vec p[2] = {{edge->p[0].x, edge->p[0].y}, {edge->p[1].x, edge->p[1].y}};
     p[edge->own] = dem2di_along(p[edge->own], t, dem2di_sub(edge->to, p[edge->own]));
-    /* a foot beyond the end all the same is on a third edge in line: of the other core */
+    /* a foot still outside is on a third edge in line, of the other core */
     double off = dem2di_dot(dem2di_sub(dem2di_add(p[0], p[1]), pair->d), edge->tangent);
     if (fabs(off) > DEM2DI_ROUNDING * pair->size)
         p[1 - edge->own] = dem2di_along(p[1 - edge->own], -off, edge->tangent);
@@ -8456,8 +8464,8 @@ static void dem2di_edge_report(const dem2di_pair *pair, const dem2di_core core[2
     dem2di_core_report(core, p[0], p[1], dem2di_right(edge->tangent), edge->h, search);
 }
 
-/* Cores apart: from a corner that a separating direction u leads to, down to the point of A minus
-   B nearest to the origin. In front of it the distance has one minimum. */
+/* Separated cores: from the support corner of a separating direction u, walk to the point of A
+   minus B nearest to the origin. The distance has one minimum on the side that faces the origin. */
 static void dem2di_cores_apart(const dem2di_pair *pair, const dem2di_core core[2], int ka, int kb,
                                dem2d_vec u, dem2di_search *search) {
     double rounding = DEM2DI_ROUNDING * pair->size;
@@ -8469,7 +8477,7 @@ static void dem2di_cores_apart(const dem2di_pair *pair, const dem2di_core core[2
             dem2di_passed_edge edge;
             dem2di_walk next = walk;
             dem2di_walk_on(pair, core, side, &next, &edge);
-            /* an edge seen from behind, or one that leads away */
+            /* an edge that faces away from the origin, or leads away from it */
             if (edge.h > rounding || !(side * dem2di_dot(walk.w, edge.tangent) < 0)) break;
             walk = next;
             moved = true;
@@ -8478,7 +8486,7 @@ static void dem2di_cores_apart(const dem2di_pair *pair, const dem2di_core core[2
             return;
         }
     }
-    /* two corners; so close that rounding hides the direction, the separating one is kept */
+    /* two corners; if rounding errors hide the direction, the separating one is kept */
     dem2d_vec away;
     if (dem2di_length(walk.w) > rounding && dem2di_unit(walk.w, &away)) u = dem2di_negate(away);
     search->feature.own = -1;
@@ -8487,18 +8495,18 @@ static void dem2di_cores_apart(const dem2di_pair *pair, const dem2di_core core[2
     dem2di_core_report(core, walk.p[0], walk.p[1], u, dem2di_dot(walk.w, u), search);
 }
 
-/* Are all directions from the normal n of the edge last passed to v (of a length), the end of the
-   cone on this side, worse than the least overlap met? There h is at least the support value of
-   the corner w that was reached, and that is at least `least` at both ends. */
+/* Can no direction from the normal n of the last passed edge to v (of a length), the end of the
+   cone on this side, have an overlap below `least`? There h is not below the support value of the
+   reached corner w, which is not below `least` at both ends. */
 static bool dem2di_walk_excludes(dem2d_vec w, dem2d_vec n, int side, dem2d_vec v, double length,
                                  double least) {
     if (side * dem2di_cross(n, v) > 0) return dem2di_dot(w, v) >= least * length;
-    return dem2di_dot(n, v) > 0; /* past the end */
+    return dem2di_dot(n, v) > 0; /* n is past the end */
 }
 
-/* The same on both sides, with the corners beside a minimum, for a cone of a right angle to each
-   side of d, which holds the true one where the depth is below the inscribed radii: most faces
-   need no more. */
+/* The same on both sides of a minimum, for the cone of a right angle to each side of d: it contains
+   the cone of dem2di_cone if the depth is below the inscribed radii. Most contacts of edges need no
+   more. */
 static bool dem2di_corners_exclude(const dem2di_pair *pair, const dem2d_vec w[2],
                                    const dem2d_vec n[2], double least, double depth) {
     double inner = pair->a->inscribed * pair->scale_a + pair->b->inscribed * pair->scale_b;
@@ -8507,7 +8515,7 @@ static bool dem2di_corners_exclude(const dem2di_pair *pair, const dem2d_vec w[2]
            dem2di_walk_excludes(w[0], n[0], -1, dem2di_negate(across), pair->distance, least);
 }
 
-/* Of the edges before and after corner k, the one whose normal is nearer to v, named by its first
+/* Of the edges before and after corner k, the one whose normal is nearer to v, given by its first
    corner; returns the sine between them. */
 static inline double dem2di_edge_near(const dem2di_core *core, int k, dem2d_vec v, int *edge) {
     if (core->count == 1) return HUGE_VAL;
@@ -8518,20 +8526,20 @@ static inline double dem2di_edge_near(const dem2di_core *core, int k, dem2d_vec 
     return dem2di_min(ahead, back);
 }
 
-/* An edge of one core and the corner of the other that is farthest along its normal n: the answer
-   when the origin's foot is on the edge, and the cores are apart or the edge's ends outweigh the
-   rest of a right angle to each side of d; that holds the true cone where the depth is below the
-   inscribed radii. Along n and the tangent t lengths need no corner turned but the other core's.
-   With `look` the corner is checked first. */
+/* An edge of one core and the corner of the other that is farthest along its normal n. They are the
+   answer if the origin's foot is on the edge and if the cores are separated, or the ends of the
+   edge exclude all other directions within a right angle to each side of d (see
+   dem2di_corners_exclude). In coordinates along n and the tangent t only the other core's corner
+   has to be rotated. With `check` the corner is checked first. */
 static bool dem2di_feature_holds(const dem2di_pair *pair, const dem2di_core core[2],
-                                 const dem2di_feature *feature, bool look, dem2di_search *search) {
+                                 const dem2di_feature *feature, bool check, dem2di_search *search) {
     int i = feature->own, edge = feature->corner[i], k = feature->corner[1 - i];
     const dem2di_core *own = &core[i], *other = &core[1 - i];
     dem2d_vec t, p, along = own->tangents[edge], c0 = own->corners[edge];
     dem2d_vec c1 = own->corners[dem2di_around(own->count, edge, 1)];
     dem2di_core_tangent(own, edge, 1, &t);
     dem2d_vec n = dem2di_right(t);
-    if (look && other->count > 1) {
+    if (check && other->count > 1) {
         dem2d_vec v = dem2di_turn_back(other->q, dem2di_scale(n, other->sign));
         bool ahead = dem2di_dot(other->tangents[k], v) <= 0;
         if (!(ahead & (dem2di_dot(other->tangents[dem2di_around(other->count, k, -1)], v) >= 0)))
@@ -8540,7 +8548,7 @@ static bool dem2di_feature_holds(const dem2di_pair *pair, const dem2di_core core
     dem2di_core_corner(other, k, &p);
     double scale = own->scale * own->sign, height = dem2di_cross(c0, along) * scale;
     double dn = dem2di_dot(pair->d, n), dt = dem2di_dot(pair->d, t);
-    dem2d_vec from = dem2di_sub(pair->d, p); /* the edge passes here where the depth is 0 */
+    dem2d_vec from = dem2di_sub(pair->d, p); /* on the edge if the depth is 0 */
     double at = dem2di_dot(from, t);
     double low = dem2di_dot(c0, along) * scale - at, high = dem2di_dot(c1, along) * scale - at;
     double h = height - dem2di_dot(from, n);
@@ -8555,8 +8563,8 @@ static bool dem2di_feature_holds(const dem2di_pair *pair, const dem2di_core core
     return true;
 }
 
-/* A start near an edge's normal, as contacts of faces have it. The corners k are the farthest along
-   the start, which is v in the coordinates of each core. */
+/* Try a start direction near an edge's normal, which is frequent. The corners k[] are the farthest
+   along the start direction, which is v[] in the coordinates of each core. */
 static bool dem2di_edge_warm(const dem2di_pair *pair, const dem2di_core core[2], const int k[2],
                              const dem2d_vec v[2], dem2di_search *search) {
     dem2di_feature near;
@@ -8573,7 +8581,7 @@ static bool dem2di_edge_warm(const dem2di_pair *pair, const dem2di_core core[2],
            dem2di_feature_holds(pair, core, &near, false, search);
 }
 
-/* The feature of the last step, where it still is the answer; false says nothing. */
+/* Try the feature of the last step; false if it is not known to be the answer. */
 static bool dem2di_edge_last(const dem2di_pair *pair, const dem2di_core core[2],
                              const dem2di_feature *last, dem2di_search *search) {
     return last != NULL && (unsigned)last->own < 2 && core[last->own].count > 1 &&
@@ -8582,14 +8590,14 @@ static bool dem2di_edge_last(const dem2di_pair *pair, const dem2di_core core[2],
            dem2di_feature_holds(pair, core, last, true, search);
 }
 
-/* Edges passed to each side before branch and bound is cheaper, measured: 24 take as long as the
-   15 support pairs it needs for polygons of 64 corners. */
+/* Edges passed to each side before branch and bound is cheaper, measured: 24 take as long as the 15
+   support evaluations it needs for polygons of 64 corners. */
 #define DEM2DI_MANY_EDGES 24
 
-/* Least overlap or greatest gap. Overlapping cores: the least support value is at an edge's
-   normal. Edges are passed to both sides of the start until their ends outweigh what is left of
-   the cone; with `beside` the better of the next two is known to be the one. False when there are
-   too many: large polygons far from round. */
+/* Least overlap or greatest gap. If the cores overlap, the least support value is at an edge's
+   normal: walk to both sides of the start until the reached corners exclude the rest of the cone.
+   With `beside` the better of the next two edges is known to be the one. False if there are too
+   many edges, as for large polygons that are not round. */
 static bool dem2di_edges_solve(dem2di_pair *pair, const dem2di_feature *last, dem2d_vec u,
                                bool beside, dem2di_search *search) {
     dem2di_core core[2];
@@ -8602,7 +8610,7 @@ static bool dem2di_edges_solve(dem2di_pair *pair, const dem2di_feature *last, de
     pair->calls++;
     search->proof = DEM2D_BY_FORM;
     if (dem2di_edge_last(pair, core, last, search)) return true;
-    /* from behind both sides would seem to be past the cone */
+    /* from a start behind, both sides would seem to be past the cone */
     if (!(dem2di_dot(u, pair->d) > 0)) u = dem2di_centres(pair);
     int k[2] = {0, 0};
     dem2d_vec v[2];
@@ -8640,7 +8648,7 @@ static bool dem2di_edges_solve(dem2di_pair *pair, const dem2di_feature *last, de
         dem2d_vec w[2] = {{walk[0].w.x, walk[0].w.y}, {walk[1].w.x, walk[1].w.y}};
         if (!open || i == all || beside ||
             (i == 0 && dem2di_corners_exclude(pair, w, n, edge[best].h, depth))) {
-            if (!(edge[best].h < HUGE_VAL)) return false; /* all overflow: none was kept */
+            if (!(edge[best].h < HUGE_VAL)) return false; /* all values overflow */
             dem2di_edge_report(pair, core, &edge[best], search);
             return true;
         }
