@@ -8663,16 +8663,17 @@ static bool dem2di_edges_solve(dem2di_pair *pair, const dem2di_feature *last, de
    uses: config, math, support, gjk, epa, edges
    ============================================================================================ */
 
-/* One look at h(u) = s(u).u and dh/du = s(u).perp(u). On the normal of an edge both ends are kept:
-   v[0] is the support from the clockwise side, v[1] from the other; elsewhere v[0]. */
+/* An evaluation of h(u) = s(u).u and its slope s(u).perp(u). On the normal of an edge there are two
+   support points: v[0] from the clockwise side, v[1] from the counter-clockwise side; elsewhere
+   only v[0] is used. */
 typedef struct dem2di_eval {
     dem2d_vec u;
     dem2di_vertex v[2];
     bool edge;
     double h, slope[2]; /* slopes on both sides */
-    double rho[2];      /* of A and of B, apart from the edge */
-    int part[2][2];     /* of A and of B where they have edges, for v[0] and v[1] */
-    bool no_step;       /* at rest: nothing is known of what is beside it */
+    double rho[2];      /* of A and of B, without the edge */
+    int part[2][2];     /* of A and of B, if the pair has edges, for v[0] and v[1] */
+    bool no_step;       /* stationary, but Newton's last step is not safe there */
 } dem2di_eval;
 
 static inline void dem2di_eval_smooth(dem2di_pair *pair, dem2d_vec u, dem2di_eval *eval) {
@@ -8685,8 +8686,8 @@ static inline void dem2di_eval_smooth(dem2di_pair *pair, dem2d_vec u, dem2di_eva
     eval->slope[0] = eval->slope[1] = u.x * v->w.y - u.y * v->w.x;
 }
 
-/* One shape of a pair: polygons and polybeziers with straight arcs have edges, whose normals no
-   step of Newton would hit. */
+/* One shape of a pair that has edges: polygons, or polybeziers with straight arcs. Newton's steps
+   would never hit the normals of edges exactly. */
 typedef struct dem2di_member {
     const dem2d_shape *shape;
     dem2d_rot q;
@@ -8703,7 +8704,7 @@ static dem2di_member dem2di_member_of(const dem2di_pair *pair, int own) {
     return m;
 }
 
-/* A direction of the pair in the coordinates of a member, and back. */
+/* A direction of the pair in the coordinates of a member. */
 static dem2d_vec dem2di_member_direction(const dem2di_member *m, dem2d_vec u) {
     return dem2di_turn_back(m->q, m->own == 0 ? u : dem2di_negate(u));
 }
@@ -8713,7 +8714,7 @@ static dem2d_vec dem2di_member_normal(const dem2di_member *m, int edge) {
     return m->own == 0 ? u : dem2di_negate(u);
 }
 
-/* The support of one member in u, at both ends of an edge (-1: none), else of a part. */
+/* Support points s[] of one member in u: both ends of an edge, or (edge -1) the point of a part. */
 static void dem2di_member_eval(const dem2di_member *m, dem2d_vec u, int part, int edge,
                                dem2di_eval *eval, dem2d_vec s[2]) {
     const dem2d_shape *shape = m->shape;
@@ -8740,7 +8741,7 @@ static void dem2di_member_eval(const dem2di_member *m, dem2d_vec u, int part, in
     eval->rho[m->own] = rho * m->scale;
 }
 
-/* A look at edges (-1: none) and parts of both. */
+/* Evaluation at u, with the edge (-1: none) or the part of each member. */
 static void dem2di_eval_parts(dem2di_pair *pair, const dem2di_member member[2], dem2d_vec u,
                               const int part[2], const int edge[2], dem2di_eval *eval) {
     dem2d_vec a[2], b[2];
@@ -8756,14 +8757,14 @@ static void dem2di_eval_parts(dem2di_pair *pair, const dem2di_member member[2], 
     pair->calls++;
 }
 
-/* The part of a member that holds its support point in u; 0 when it has none. */
+/* The part of a member that has its support point in u; 0 if the member has no parts. */
 static inline int dem2di_member_part(const dem2di_member *m, dem2d_vec u) {
     if (!dem2di_has_parts(m->shape)) return 0;
     return dem2di_part_find(m->shape, dem2di_member_direction(m, u));
 }
 
-/* The edge beside a part whose normal is nearest to u, and the sine between them; -1 when there is
-   none in front. */
+/* The edge beside a part whose normal is nearest to u, with a sine below *sine, which gets the sine
+   between them; -1 if there is none that faces u. */
 static int dem2di_member_near(const dem2di_member *m, dem2d_vec u, int part, double *sine) {
     int nearest = -1;
     if (!m->shape->flat) return -1;
@@ -8779,10 +8780,10 @@ static int dem2di_member_near(const dem2di_member *m, dem2d_vec u, int part, dou
     return nearest;
 }
 
-/* Normals as near as that (sine) are one: the faces of both are met together. */
+/* Edges are parallel if the sine between their normals is below this. */
 #define DEM2DI_PARALLEL (8 * DBL_EPSILON)
 
-/* A look along the normal of an edge of one member, with the other's if that is parallel. */
+/* Evaluation at the normal of an edge of one member, with the other's edge if that is parallel. */
 static void dem2di_eval_edge(dem2di_pair *pair, const dem2di_member member[2], int own, int found,
                              dem2di_eval *eval) {
     int part[2] = {0, 0}, edge[2] = {-1, -1}, other = 1 - own;
@@ -8794,7 +8795,7 @@ static void dem2di_eval_edge(dem2di_pair *pair, const dem2di_member member[2], i
     dem2di_eval_parts(pair, member, u, part, edge, eval);
 }
 
-/* The first look: along the normal of an edge nearby, if there is one. */
+/* The first evaluation: at u, or at the normal of an edge nearby. */
 static void dem2di_eval_first(dem2di_pair *pair, const dem2di_member member[2], dem2d_vec u,
                               dem2di_eval *eval) {
     static const int none[2] = {-1, -1};
@@ -8811,18 +8812,18 @@ static void dem2di_eval_first(dem2di_pair *pair, const dem2di_member member[2], 
         dem2di_eval_parts(pair, member, u, part, none, eval);
 }
 
-/* The last edge of a member passed on the way to one of its parts, turning to a side; -1: none. */
+/* The last edge of a member between two of its parts, turning to a side; -1 if there is none. */
 static inline int dem2di_member_passed(const dem2di_member *m, int from, int to, int side) {
     if (!m->shape->flat || from == to) return -1;
     int edge = dem2di_edge_beside(m->shape, to, -side), n = m->shape->parts;
     if (m->shape->type == DEM2D_POLYGON) return edge;
-    /* how far back are it and the start? */
+    /* is it between the two parts? */
     int back = side * (to - edge), all = side * (to - from);
     return back + (back < 0 ? n : 0) < all + (all < 0 ? n : 0) ? edge : -1;
 }
 
-/* The last edge of both on the way from the last look to u, where the parts are: -1 when there is
-   none. */
+/* The last edge of both members between the last evaluation and u, whose parts are part[]; -1 if
+   there is none. */
 static int dem2di_edge_passed(const dem2di_member member[2], dem2d_vec u, const int part[2],
                               const dem2di_eval *eval, int *own) {
     int side = dem2di_cross(eval->u, u) > 0 ? 1 : -1, found = -1;
@@ -8839,8 +8840,7 @@ static int dem2di_edge_passed(const dem2di_member member[2], dem2d_vec u, const 
     return found;
 }
 
-/* From the last look towards a direction: there, or along the normal of the last edge on the way.
- */
+/* The next evaluation, towards u: at u, or at the normal of the last edge before it. */
 static void dem2di_eval_towards(dem2di_pair *pair, const dem2di_member member[2], dem2d_vec u,
                                 dem2di_eval *eval) {
     static const int none[2] = {-1, -1};
@@ -8853,14 +8853,14 @@ static void dem2di_eval_towards(dem2di_pair *pair, const dem2di_member member[2]
         dem2di_eval_parts(pair, member, u, part, none, eval);
 }
 
-/* From an edge to its end on a side, beyond which the minimum is. */
+/* Reduce an evaluation at an edge to the edge's end on the side of the minimum. */
 static void dem2di_leave_edge(const dem2di_pair *pair, int side, dem2di_eval *eval) {
     eval->v[0] = eval->v[side];
     eval->slope[0] = eval->slope[1] = eval->slope[side];
     eval->edge = false;
     for (int i = 0; i < 2; i++) {
         const dem2d_shape *shape = i == 0 ? pair->a : pair->b;
-        bool met = eval->part[i][0] != eval->part[i][1]; /* this one's edge */
+        bool met = eval->part[i][0] != eval->part[i][1]; /* the edge is this shape's */
         eval->part[i][0] = eval->part[i][1] = eval->part[i][side];
         if (!met || shape->type != DEM2D_BEZIER) continue;
         double scale = i == 0 ? pair->scale_a : pair->scale_b;
@@ -8868,15 +8868,14 @@ static void dem2di_leave_edge(const dem2di_pair *pair, int side, dem2di_eval *ev
     }
 }
 
-/* A descent: the directions between which the minimum is, and what was seen there. */
+/* The directions between which the minimum is, and the support points there if evaluated. */
 typedef struct dem2di_bracket {
     dem2d_vec end[2];
     dem2di_vertex at[2];
     bool known, evaluated[2], chord;
 } dem2di_bracket;
 
-/* The bracket with the last look as one of its ends. A look outside of it changes nothing: false.
- */
+/* Make the last evaluation an end of the bracket; false if it is outside of the bracket. */
 static bool dem2di_bracket_cut(const dem2di_pair *pair, const dem2di_eval *eval,
                                dem2di_bracket *bracket) {
     dem2d_vec u = eval->u;
@@ -8900,34 +8899,34 @@ static bool dem2di_bracket_holds(const dem2di_bracket *bracket, dem2d_vec u) {
     return dem2di_inside(u, bracket->end[0], bracket->end[1]);
 }
 
-/* The next direction where Newton's has left the bracket: the normal of the chord of both ends,
-   which finds flat faces, or the middle; at once the middle where Newton's steps are slow. False
-   when there is nothing between the ends. */
+/* The next direction if Newton's step leaves the bracket or is slow: the normal of the chord of
+   both ends (not if slow), which finds edges, or the middle. False if there is no direction between
+   the ends. */
 static bool dem2di_bracket_next(dem2di_bracket *bracket, bool slow, dem2d_vec *u) {
     const dem2d_vec *end = bracket->end;
     bracket->chord = !slow && bracket->evaluated[0] && bracket->evaluated[1] &&
                      dem2di_unit(dem2di_right(dem2di_sub(bracket->at[1].w, bracket->at[0].w)), u) &&
                      dem2di_bracket_holds(bracket, *u);
     if (bracket->chord) return true;
-    /* wider than a right angle: the quarter turns inwards, which do not cancel there */
+    /* wider than a right angle: add the inward perpendiculars, which do not cancel there */
     dem2d_vec middle = dem2di_add(end[0], end[1]);
     if (dem2di_dot(end[0], end[1]) < 0)
         middle = dem2di_sub(dem2di_perp(end[0]), dem2di_perp(end[1]));
-    /* one end that was never seen, closed in upon: the minimum is beyond it */
+    /* narrow, but one end was never evaluated: the minimum is outside */
     bool narrow = dem2di_dot(end[0], end[1]) > 0 && dem2di_cross(end[0], end[1]) < 1e-6;
     if (narrow && !(bracket->evaluated[0] && bracket->evaluated[1])) return false;
     return dem2di_unit(middle, u) && dem2di_bracket_holds(bracket, *u);
 }
 
-/* A minimum that Newton's step can find: h curves upward there. A radius so large that its circle
-   is straight to rounding across the whole pair is a face. */
+/* Does h curve upward, so that Newton's step can find a minimum? Not if the radius is so large that
+   its circle is straight within rounding errors over the size of the pair: that is an edge. */
 static bool dem2di_curves_up(const dem2di_pair *pair, double bend) {
     return bend > 0 && bend * DEM2DI_ROUNDING < pair->size;
 }
 
-/* Is h stationary at the last look? On an edge when the slope changes sign there; on a chord of
-   the bracket that is a face of the shapes; elsewhere when Newton's step is below `angle`, and
-   lowers h by less than half the tolerance. */
+/* Is h stationary at the last evaluation? At an edge: if the slope changes sign there. At the
+   normal of the bracket's chord: if the chord is an edge within rounding errors. Elsewhere: if
+   Newton's step is below `angle`, and lowers h by less than half the tolerance. */
 static inline bool dem2di_stationary(const dem2di_pair *pair, const dem2di_bracket *bracket,
                                      double angle, dem2di_eval *eval) {
     if (eval->edge) {
@@ -8950,9 +8949,9 @@ static inline bool dem2di_stationary(const dem2di_pair *pair, const dem2di_brack
     return eval->slope[0] <= 0 && eval->slope[1] >= 0;
 }
 
-/* Newton's step without angles, to the direction in which the centre of the osculating circle is
-   seen: (rho u - s)/|rho u - s|, that is u + e t with e = -slope/bend, made unit. For small e the
-   root is its series, whose next term is below 5/16 e^6 = 3e-19. */
+/* Newton's step without angles: u <- (rho u - s)/|rho u - s|, the direction to the centre of the
+   osculating circle, which is u + e t with e = -slope/bend, normalised. For small e the root is
+   replaced by its series, whose next term is below 5/16 e^6 = 3e-19. */
 static inline dem2d_vec dem2di_newton(const dem2di_eval *eval, double bend) {
     double e = -eval->slope[0] / bend, square = e * e, f;
     f = square < 1e-6 ? 1 - square * (0.5 - 0.375 * square) : 1 / sqrt(1 + square);
@@ -8960,20 +8959,20 @@ static inline dem2d_vec dem2di_newton(const dem2di_eval *eval, double bend) {
     return dem2di_vec((ux - e * uy) * f, (uy + e * ux) * f);
 }
 
-/* May a face begin beside a direction without a sign of it? Of custom shapes nothing is known. */
+/* May a shape have edges that the search does not know? Custom shapes may. */
 static bool dem2di_edges_unknown(const dem2d_shape *shape) {
     return shape->type == DEM2D_CUSTOM;
 }
 
-/* A rest that is taken as it is must be nearer: a thousandth of the angle, and where shapes are
-   nearly straight also of a circle of their size. */
+/* A stationary direction without Newton's last step has to be closer to the minimum: by a
+   thousandth of the angle, and where shapes are nearly straight as for a circle of their size. */
 static inline bool dem2di_stationary_close(const dem2di_pair *pair, double angle, double bend,
                                            const dem2di_eval *eval) {
     return fabs(eval->slope[0]) <= 1e-3 * angle * dem2di_min(bend, pair->size);
 }
 
-/* May Newton's last step end where rho is so large that h is higher there by more than what the
-   angle leaves? By rho e^2/2 at most. */
+/* May Newton's last step raise h by more than the tolerance? By rho e^2/2 at most, with the
+   greatest rho. */
 static inline bool dem2di_step_rises(const dem2di_pair *pair, double angle, double bend,
                                      const dem2di_eval *eval) {
     double most = pair->a->rho_max * pair->scale_a + pair->b->rho_max * pair->scale_b;
@@ -8981,9 +8980,9 @@ static inline bool dem2di_step_rises(const dem2di_pair *pair, double angle, doub
     return !(step * step * most <= 2 * pair->size);
 }
 
-/* Is it known what is beside a rest, so far as Newton's last step turns? Not past an edge. Past the
-   end of an arc rho may be any, and before an edge that was seen it may grow without bound: the
-   rest is taken as it is. */
+/* Is a stationary direction close enough to the minimum, with or without (no_step) Newton's last
+   step, for a pair with edges? The step must not pass an edge. It is left out if it passes the end
+   of an arc, where rho may change, or if h may rise. An edge outside the bracket is excluded. */
 static bool dem2di_step_known(const dem2di_pair *pair, const dem2di_member member[2],
                               const dem2di_bracket *bracket, double angle, double bend,
                               dem2di_eval *eval) {
@@ -9004,8 +9003,8 @@ static bool dem2di_step_known(const dem2di_pair *pair, const dem2di_member membe
     return dem2di_stationary_close(pair, angle, bend, eval);
 }
 
-/* The same of a pair without edges. A step of a length s (as the witness points go) past the end of
-   an arc leaves the outline by at most s^2/(2 rho): below the default tolerance it does no harm. */
+/* The same for a pair without edges. If the witness points move by s past the end of an arc, they
+   leave the outline by at most s^2/(2 rho): that is allowed below the default tolerance. */
 static inline bool dem2di_step_smooth(const dem2di_pair *pair, double angle, double bend,
                                       dem2di_eval *eval) {
     double r = dem2di_min(pair->a->rho_min * pair->scale_a, pair->b->rho_min * pair->scale_b);
@@ -9021,14 +9020,14 @@ static inline bool dem2di_step_smooth(const dem2di_pair *pair, double angle, dou
     return !eval->no_step || dem2di_stationary_close(pair, angle, bend, eval);
 }
 
-/* Down from a direction to a local minimum of h, by Newton's step on the osculating circle,
-   u <- (rho u - s)/|rho u - s|, kept inside a bracket. With `detect` the first direction that
-   separates is enough. False when the cap comes first. */
+/* Descend from a direction to a local minimum of h by Newton's steps inside a bracket. With
+   `detect` it stops at the first separating direction. False if `cap` evaluations do not
+   suffice. */
 static bool dem2di_descend(dem2di_pair *pair, dem2d_vec u, double angle, int cap, bool detect,
                            dem2di_eval *eval, dem2di_search *search) {
     dem2di_bracket bracket;
     bool edges = pair->a->flat || pair->b->flat;
-    double turned[2] = {HUGE_VAL, HUGE_VAL}; /* by the last two steps of Newton */
+    double turned[2] = {HUGE_VAL, HUGE_VAL}; /* tangents of the last two Newton steps */
     dem2di_member member[2];
     bracket.known = bracket.evaluated[0] = bracket.evaluated[1] = bracket.chord = false;
     if (edges) {
@@ -9055,10 +9054,10 @@ static bool dem2di_descend(dem2di_pair *pair, dem2d_vec u, double angle, int cap
                 return true;
         }
         bool bends = dem2di_curves_up(pair, bend);
-        /* a small step needs no bracket, unless it has not helped before */
+        /* small steps need no bracket, unless there are many */
         bool near = bends && fabs(slope) < 0.2 * bend && i < 4;
         bool outside = (bracket.known || !near) && !dem2di_bracket_cut(pair, eval, &bracket);
-        /* where rho grows without bound Newton's step jumps to and fro: it has to halve in two */
+        /* where rho has no bound Newton's steps may oscillate: each two have to halve the step */
         double turn = bends ? fabs(slope) / bend : HUGE_VAL;
         bool slow =
             bracket.known && bracket.evaluated[0] && bracket.evaluated[1] && turn > 0.5 * turned[0];
@@ -9073,15 +9072,15 @@ static bool dem2di_descend(dem2di_pair *pair, dem2d_vec u, double angle, int cap
             dem2di_eval_towards(pair, member, u, eval);
         else
             dem2di_eval_smooth(pair, u, eval);
-        /* an edge on the way to the chord's normal is not the chord */
+        /* the evaluation was at an edge before the chord's normal */
         if (eval->u.x != u.x || eval->u.y != u.y) bracket.chord = false;
     }
     return false;
 }
 
-/* The minimum at rest: along an edge the foot of the origin; else Newton's last step, on the
-   osculating circle, which leaves the square of its angle. Where a face may begin beside the last
-   look there is no step. */
+/* The result of a descent at a stationary direction: the foot of the origin on an edge; else
+   Newton's last step on the osculating circle, which leaves an error of its angle squared, unless
+   no_step. */
 static void dem2di_descend_finish(const dem2di_eval *eval, dem2di_search *search) {
     const dem2di_vertex *v = eval->v;
     double ux = eval->u.x, uy = eval->u.y, slope = eval->slope[0];
@@ -9094,11 +9093,12 @@ static void dem2di_descend_finish(const dem2di_eval *eval, dem2di_search *search
         search->b = dem2di_along(v[0].b, t, dem2di_sub(v[1].b, v[0].b));
         return;
     }
-    /* tan of the angle; for small e sine e, 1 - cosine and the fall of h, bend e^2/2, to e^4 */
+    /* e is the tangent of the angle; for small e the sine is e, and 1 - cosine and the decrease of
+       h, bend e^2/2, have errors of e^4 */
     double e = -slope / (eval->rho[0] + eval->rho[1] - eval->h), fall = e * e / 2, half = 0.5;
     if (eval->no_step) e = fall = 0;
     double tangent = e;
-    if (fall > 1e-8) { /* a tolerance above 1e-6 was asked for */
+    if (fall > 1e-8) { /* only with a tolerance above 1e-6 */
         double root = sqrt(1 + e * e);
         half = 1 / (1 + root);
         fall = e * e * half / root;
@@ -9106,7 +9106,7 @@ static void dem2di_descend_finish(const dem2di_eval *eval, dem2di_search *search
     }
     double dx = -e * uy - fall * ux, dy = e * ux - fall * uy;
     double nx = ux + dx, ny = uy + dy;
-    double f = 1.5 - (nx * nx + ny * ny) / 2; /* steps and warm starts let the length drift */
+    double f = 1.5 - (nx * nx + ny * ny) / 2; /* normalises: steps and starts change the length */
     search->normal.x = nx * f;
     search->normal.y = ny * f;
     search->upper = eval->h + slope * tangent * half;
@@ -9116,7 +9116,8 @@ static void dem2di_descend_finish(const dem2di_eval *eval, dem2di_search *search
     search->b.y = v->b.y - eval->rho[1] * dy;
 }
 
-/* The same of a pair. */
+/* Lower bounds of the pair's rho over one sector's width from u: [0] clockwise, [1]
+   counter-clockwise. */
 static inline void dem2di_pair_least_rho(const dem2di_pair *pair, dem2d_vec u, double rho[2]) {
     double a[2], b[2];
     dem2di_least_rho(pair->a, dem2di_turn_back(pair->ra, u), a);
@@ -9124,15 +9125,15 @@ static inline void dem2di_pair_least_rho(const dem2di_pair *pair, dem2d_vec u, d
     for (int i = 0; i < 2; i++) rho[i] = a[i] * pair->scale_a + b[i] * pair->scale_b;
 }
 
-/* Steps of the march below turn by 2 atan(1/64), which is less than any sector of least_rho. */
+/* Steps below turn by 2 atan(1/64), which is less than any sector of least_rho. */
 #define DEM2DI_MARCH_COS (4095.0 / 4097)
 #define DEM2DI_MARCH_SIN (128.0 / 4097)
 
-/* Is h nowhere below its value at rest (less the tolerance), from there to the end v (of a length)
-   of the cone on one side (0 clockwise, 1 counter-clockwise)? With rho at least r, h is at least
-   the support value of a circle of radius r that fits value and slope, and so on from sector to
-   sector; r is given for the first. Where the support point reached keeps above the value up to v,
-   nothing in between is below it. */
+/* Is h nowhere below its stationary value (less the tolerance) from there to v (of a length), the
+   end of the cone on one side (0 clockwise, 1 counter-clockwise)? Where rho is at least r, h is at
+   least the support value of a circle of radius r with the same value and slope; this is repeated
+   from sector to sector, and r is given for the first one. As soon as the support point of these
+   circles has no lower value at v, all directions up to v are excluded. */
 static bool dem2di_side_excludes(const dem2di_pair *pair, const dem2di_eval *eval, int side,
                                  double r, dem2d_vec v, double length, double tolerance) {
     int turn = side > 0 ? 1 : -1;
@@ -9143,7 +9144,7 @@ static bool dem2di_side_excludes(const dem2di_pair *pair, const dem2di_eval *eva
     dem2d_rot step;
     step.c = c;
     step.s = turn * s;
-    /* at rest but for a last small slope, which lowers h by slope^2/(2 (r - h)) */
+    /* the remaining slope lowers h by slope^2/(2 (r - h)) */
     if (!(eval->edge ? slope >= 0 : slope * slope <= 2 * tolerance * (r - h))) return false;
     for (int i = 0; i < 20; i++) { /* 20 steps are 36 degrees: a support point farther is rare */
         double next = r + (h - r) * c + slope * s, rest = ahead * c - along * s;
@@ -9161,18 +9162,19 @@ static bool dem2di_side_excludes(const dem2di_pair *pair, const dem2di_eval *eva
     return false;
 }
 
-/* How far the ends of a face are below its support value: a chord across a curved outline is taken
-   for a face where that is within rounding, and the minimum may be as much lower. */
+/* How far the ends of an edge are below its support value. A chord of a curved outline counts as an
+   edge if that is within rounding errors, and the minimum may be lower by as much. */
 static inline double dem2di_face_gap(const dem2di_eval *eval) {
     if (!eval->edge) return 0;
     double first = dem2di_dot(eval->v[0].w, eval->u), last = dem2di_dot(eval->v[1].w, eval->u);
     return dem2di_max(0, eval->h - dem2di_min(first, last));
 }
 
-/* Is the minimum at rest the least of all? With r <= rho everywhere, r - |s - r u| <= depth (A
-   minus B eroded by r is convex, and its distance from the origin bounds the depth); else the
-   boundary beside it must outweigh the cone: a right angle to each side of d, which does for
-   depths below the inscribed radii and needs no root, or the true one. */
+/* Is a stationary value the least of all? With r <= rho everywhere, r - |s - r u| <= depth: A minus
+   B eroded by r is convex, and its distance from the origin bounds the depth. Else the least radii
+   beside the minimum have to exclude the cone: that of a right angle to each side of d, which needs
+   no root and contains the cone of dem2di_cone for depths below the inscribed radii, or that
+   one. */
 static bool dem2di_certify(const dem2di_pair *pair, const dem2di_eval *eval, double tolerance,
                            dem2di_search *search) {
     double r = pair->a->rho_min * pair->scale_a + pair->b->rho_min * pair->scale_b;
@@ -9200,12 +9202,12 @@ static bool dem2di_certify(const dem2di_pair *pair, const dem2di_eval *eval, dou
     return true;
 }
 
-/* How far the parts of both may be from the arcs that were given. */
+/* Greatest distance of the parts of both shapes from the caller's arcs. */
 static double dem2di_pair_deviation(const dem2di_pair *pair) {
     return pair->a->deviation * pair->scale_a + pair->b->deviation * pair->scale_b;
 }
 
-/* A direction seen by the descent below, how steeply h falls on in the sense of that, and h. */
+/* An evaluation of the bisection below: h and its slope in the sense of rotation of the search. */
 typedef struct dem2di_probe {
     dem2d_vec u;
     dem2di_vertex v;
@@ -9220,12 +9222,13 @@ static bool dem2di_probe_at(dem2di_pair *pair, dem2d_vec way, int turn, dem2di_p
     return true;
 }
 
-/* From the least value met down to a minimum beside it, by halves to rounding: for outlines on
-   which Newton's steps do not come to rest. h falls at `near` and is above it, or rises, at `far`:
-   there is a minimum between. The supports of two directions as near as rounding are the ends of a
-   face, or of so short an arc that its chord is on the outline (length x angle / 8). */
+/* From the direction of the least value to a minimum beside it, by bisection down to rounding
+   errors: for outlines on which Newton's steps do not converge. h falls at `near`, and is higher or
+   rises at `far`, so there is a minimum between them. The support points of the last two directions
+   are the ends of an edge, or of so short an arc that its chord is on the outline (length x angle /
+   8). */
 static void dem2di_branch_bisect(dem2di_pair *pair, dem2di_search *search) {
-    /* values are no surer than the shapes */
+    /* the values also have the deviation of the shapes */
     const double rounding = DEM2DI_ROUNDING * pair->size + dem2di_pair_deviation(pair);
     dem2di_probe near, far, at;
     if (!dem2di_probe_at(pair, search->normal, 1, &near)) return;
@@ -9250,8 +9253,8 @@ static void dem2di_branch_bisect(dem2di_pair *pair, dem2di_search *search) {
     dem2di_witness(search, &near.v, &far.v);
 }
 
-/* From the least value met down to rest, as exactly as shapes allow: not higher by more than the
-   tolerance, and with the sign that is sure. */
+/* From the direction of the least value to a stationary one, as exactly as the shapes allow. False
+   if there is none whose value is within the tolerance and has the certain sign. */
 static bool dem2di_branch_refine(dem2di_pair *pair, double tolerance, double angle, int cap,
                                  dem2di_search *search) {
     double rounding = DEM2DI_ROUNDING * pair->size, most = search->upper + tolerance;
@@ -9266,7 +9269,7 @@ static bool dem2di_branch_refine(dem2di_pair *pair, double tolerance, double ang
         if (!dem2di_descend(pair, search->normal, angle, cap, false, &eval, &last)) return false;
         dem2di_descend_finish(&eval, &last);
         if (last.upper > most) return false;
-        /* what Newton's last step takes away was not attained: as unsure as what is below */
+        /* Newton's last step gives a value that was not attained: it widens the lower bound, too */
         last.upper = dem2di_max(last.upper, search->lower);
         last.lower = dem2di_min(search->lower, 2 * last.upper - eval.h);
     }
@@ -9274,15 +9277,16 @@ static bool dem2di_branch_refine(dem2di_pair *pair, double tolerance, double ang
     return true;
 }
 
-/* Branch and bound over arcs of directions, from the least value met so far; then down to rest. */
+/* Branch and bound over arcs of directions, from the least value so far; then to a stationary
+   direction. */
 static void dem2di_branch(dem2di_pair *pair, double tolerance, double angle, int cap,
                           dem2di_search *search) {
     dem2di_polytope polytope;
     dem2d_vec end[2], u = search->normal;
-    (void)dem2di_unit(search->normal, &u); /* steps and warm starts let the length drift */
+    (void)dem2di_unit(search->normal, &u); /* steps and starts change the length */
     polytope.vertices = polytope.edges = 0;
     polytope.arcs = true;
-    search->upper = HUGE_VAL; /* the least value again, with its points */
+    search->upper = HUGE_VAL; /* evaluate the least value again, with its witness points */
     (void)dem2di_evaluate(pair, search, u);
     bool cone = dem2di_cone(pair, search->upper, end) && dem2di_dot(end[0], end[1]) > -0.9;
     if (cone) {
@@ -9306,16 +9310,16 @@ static void dem2di_branch(dem2di_pair *pair, double tolerance, double angle, int
     search->state = dem2di_state_of(pair, search);
 }
 
-/* Looks that a warm start gets: two for the normal of the last step, and some for a corner passed
-   or an edge that was not where it was. */
+/* Limit of evaluations from a warm start: two for the normal of the last step, and some more for
+   corners passed and edges turned. */
 #define DEM2DI_WARM_EVALUATIONS 6
 
-/* Least overlap or greatest gap, certified. With `detect` any direction that separates will do. */
+/* Least overlap or greatest gap, certified. With `detect` any separating direction is enough. */
 static void dem2di_certified(dem2di_pair *pair, const dem2di_feature *last, dem2d_vec start,
                              double tolerance, int cap, bool detect, dem2di_search *search) {
-    /* Newton's last step leaves about the square of its angle in the normal: a hundredth of the
-       tolerance; a tenth in a step (`detect`), where that saves every fifth look. 64 looks are more
-       than halving the cone down to rounding needs. */
+    /* Newton's last step leaves an error of about its angle squared in the normal: a hundredth of
+       the tolerance, or a tenth in a time step (`detect`), where that saves every fifth evaluation.
+       64 evaluations are more than bisection of the cone needs. */
     double relative = dem2di_max(tolerance, DEM2DI_ROUNDING);
     double absolute = relative * pair->size, angle = (detect ? 0.3 : 0.1) * sqrt(relative);
     if (dem2di_edges_unknown(pair->a) || dem2di_edges_unknown(pair->b)) angle *= 0.01;
@@ -9332,13 +9336,13 @@ static void dem2di_certified(dem2di_pair *pair, const dem2di_feature *last, dem2
         dem2di_branch(pair, absolute, angle, cap, search);
         return;
     }
-    /* A start that does not settle at once was none: then from the line of centres. Where bounds
-       that are good to the tolerance leave the sign open, a third time, from there to rounding. */
+    /* If the start does not converge at once, start from the line of centres. If bounds within the
+       tolerance leave the sign open, descend a third time, from there down to rounding errors. */
     double rounding = DEM2DI_ROUNDING * pair->size;
     for (int i = 0; i < 3; i++) {
         dem2di_eval eval;
-        int looks = i == 0 ? DEM2DI_WARM_EVALUATIONS : cap < 64 ? cap : 64;
-        bool rest = dem2di_descend(pair, i == 1 ? dem2di_centres(pair) : start, angle, looks,
+        int evaluations = i == 0 ? DEM2DI_WARM_EVALUATIONS : cap < 64 ? cap : 64;
+        bool rest = dem2di_descend(pair, i == 1 ? dem2di_centres(pair) : start, angle, evaluations,
                                    detect, &eval, search);
         if (detect && search->upper < -rounding) {
             search->lower = -HUGE_VAL;
