@@ -9371,29 +9371,29 @@ static void dem2di_certified(dem2di_pair *pair, const dem2di_feature *last, dem2
    uses: config, math, support, gjk
    ============================================================================================ */
 
-/* A face of a shape beside a contact along u, without its rounding: places are along perp(u),
-   heights along u. */
+/* A face of a shape beside a contact along u, without the rounding radius: x is along perp(u),
+   heights are along u. */
 typedef struct dem2di_face {
-    double x0, x1;       /* from here to there, x0 < x1 */
-    double near;         /* the contact: on the face, or on a round end beyond */
-    double top;          /* height of the shape, rounding included */
-    double height, rise; /* of its line at place 0; for each place */
+    double x0, x1;       /* its ends, x0 < x1 */
+    double near;         /* x of the contact: on the face, or on a curved end beside it */
+    double top;          /* height of the shape, with the rounding radius */
+    double height, rise; /* of its line: height at x = 0, slope */
     double square;       /* of its length */
     double rounding;
-    int corner0, corner1; /* at its ends, as in dem2d_contact_point; */
-    bool endless;         /* or a half-plane, which has none */
+    int corner0, corner1; /* at its ends, as in dem2d_contact_point */
+    bool endless;         /* a half-plane, which has no ends */
 } dem2di_face;
 
-/* A straight arc whose end is round counts up to this angle (sine): a tenth of a radian is tilt, a
-   third is another contact. */
+/* Greatest angle (sine) between a straight arc and a contact, if the arc is to be its face: a tenth
+   of a radian is a tilted face, a third is another contact. */
 #define DEM2DI_FLAT_ANGLE 0.3
 
-/* An edge so near to the contact (sine) is on both sides of its support point: it is the one that
-   the contact is along, or an expanding polytope found it but for its tolerance. */
+/* An edge this near (sine) to a contact counts for both sides of it: the contact is on this edge,
+   up to the tolerance of EPA. */
 #define DEM2DI_ALONG 1e-4
 
-/* Of the edges beside corner k the one on a side, 1 is counter-clockwise; -1 when it is more than
-   45 degrees off v: no face of the contact. */
+/* The edge beside corner k on a side (1: counter-clockwise), as a face of a contact along v; -1 if
+   it is more than 45 degrees off. */
 static inline int dem2di_polygon_face(const dem2d_shape *shape, dem2d_vec v, int k, int side) {
     int edge[2] = {k, dem2di_around(shape->count, k, -1)}, other = side < 0;
     double sine[2];
@@ -9405,8 +9405,9 @@ static inline int dem2di_polygon_face(const dem2d_shape *shape, dem2d_vec v, int
     return sine[other] < 1 ? edge[other] : -1;
 }
 
-/* Of the straight arcs beside the arc at v the one on a side, or -1: as with edges, so that a face
-   which turns away gives way to the next where both hold the same energy. */
+/* The straight arc beside the arc at v on a side, as a face of a contact along v, or -1. Chosen as
+   with edges, so that a face that turns away is replaced by the next one where both have the same
+   energy. */
 static int dem2di_arc_face(const dem2d_shape *shape, dem2d_vec v, int side) {
     int k = dem2di_sector_find(shape, v), edge[2];
     double sine[2];
@@ -9419,15 +9420,15 @@ static int dem2di_arc_face(const dem2d_shape *shape, dem2d_vec v, int side) {
     return sine[other] < DEM2DI_FLAT_ANGLE ? edge[other] : -1;
 }
 
-/* The edge or arc of a shape that is its face towards v on a side, or -1; of a polygon, beside a
-   corner that is known or -1. */
+/* The edge or straight arc of a shape that is its face towards v on a side, or -1. For a polygon,
+   `corner` is the support corner, or -1 if it is not known. */
 static inline int dem2di_face_find(const dem2d_shape *shape, dem2d_vec v, int corner, int side) {
     if (shape->type != DEM2D_POLYGON) return dem2di_arc_face(shape, v, side);
     return dem2di_polygon_face(shape, v, corner < 0 ? dem2di_polygon_corner(shape, v) : corner,
                                side);
 }
 
-/* A face that was found, of a shape of a scale, seen from its centre. */
+/* The face on edge `found` of a shape with a scale, relative to its centre. */
 static void dem2di_face_set(const dem2d_shape *shape, double scale, dem2d_vec v, int found,
                             dem2di_face *face) {
     dem2d_vec from = dem2di_edge_end(shape, found, false);
@@ -9446,13 +9447,13 @@ static void dem2di_face_set(const dem2d_shape *shape, double scale, dem2d_vec v,
     face->square = dem2di_dot(way, way) * (scale * scale);
     face->rounding = shape->rounding * scale;
     face->endless = false;
-    /* a corner between two faces is named by the one before it */
+    /* a corner between two faces has the number of the face before it */
     face->corner0 = 2 * dem2di_edge_beside(shape, dem2di_edge_part(shape, found, -1), -1);
     face->corner1 = 2 * found;
     if (face->corner0 == face->corner1) face->corner0 += 2 * shape->parts; /* the only face */
 }
 
-/* B's face towards -u, seen along u from A's centre. */
+/* Transform B's face towards -u to heights along u relative to A's centre. */
 static void dem2di_face_turn(dem2d_vec d, dem2d_vec u, dem2di_face *face) {
     double place = dem2di_cross(u, d), left = place - face->x1;
     face->height = dem2di_dot(u, d) - (face->height + face->rise * place);
@@ -9468,24 +9469,25 @@ static double dem2di_face_height(const dem2di_face *face, double x) {
     return face->height + face->rise * x;
 }
 
-/* The shallower end of the common part of two faces: a corner of one meets the other, the base, at
-   a right angle. */
+/* The second contact point: the shallower end of the common part of two faces, where a corner of
+   one shape is at a right angle to the face of the other, the base. The deeper end is the first
+   point. */
 typedef struct dem2di_second_point {
-    int side;                  /* 1 or -1: beyond or before the deeper end */
-    int base;                  /* whose face is met: 0 for A's, 1 for B's */
-    int corner, corner_deep;   /* at both ends */
-    double x_deep, level;      /* the deeper end: place, middle between both surfaces there */
-    double x, core;            /* the corner, which may be rounded: place, height */
-    double place, y;           /* the point, in the middle between both surfaces there */
-    double rise;               /* of the base */
-    double slope;              /* length of the base for each place */
+    int side;                  /* 1: after the deeper end, -1: before it */
+    int base;                  /* whose face the base is: 0 for A, 1 for B */
+    int corner, corner_deep;   /* at the second point and at the deeper end */
+    double x_deep, level;      /* deeper end: x, and height of the middle between both surfaces */
+    double x, core;            /* corner of the second point, without rounding radius: x, height */
+    double place, y;           /* second point: x, and height of the middle between both surfaces */
+    double rise;               /* slope of the base */
+    double slope;              /* length of the base for each unit of x */
     double depth;              /* at a right angle to the base */
-    double width;              /* along the base, from below the deeper end to below the corner */
-    double energy;             /* over kn, beside that of the deeper end, depth^2/2 */
-    double deep, press, slide; /* forces over kn: deeper end, along and across the base's normal */
+    double width;              /* along the base, between the deeper end and the corner */
+    double energy;             /* over kn, in addition to that of the deeper end, depth^2/2 */
+    double deep, press, slide; /* forces over kn: deeper end; second point, normal and along base */
 } dem2di_second_point;
 
-/* The deeper end, where the later of both faces begins, or ends. */
+/* The deeper end: where the second of both faces begins, or the first one ends. */
 static void dem2di_second_deep(const dem2di_face *a, const dem2di_face *b, int side,
                                dem2di_second_point *end) {
     double xa = side > 0 ? dem2di_min(a->x0, a->near) : dem2di_max(a->x1, a->near);
@@ -9496,10 +9498,10 @@ static void dem2di_second_deep(const dem2di_face *a, const dem2di_face *b, int s
     end->corner_deep = side > 0 ? face->corner0 : face->corner1;
 }
 
-/* The end on a side of two faces that meet in a contact of a depth; false when they do not touch
-   there: tilted by more than 45 degrees, or to the other side. Whose corner it is changes where
-   both are on the line that halves the angle between the normals: they are then as deep in each
-   other. */
+/* The second point on a side of two faces in contact with a depth; false if they do not overlap
+   there: they are tilted by more than 45 degrees, or the other way. The base changes from one face
+   to the other where both corners are on the bisector of the two normals: both overlaps are then
+   equal. */
 static bool dem2di_second_place(const dem2di_face *a, const dem2di_face *b, double depth,
                                 double size, int side, dem2di_second_point *end) {
     double tilt = side * (b->rise - a->rise);
@@ -9529,19 +9531,19 @@ static bool dem2di_second_place(const dem2di_face *a, const dem2di_face *b, doub
     return end->depth > 0 && end->width > 0;
 }
 
-/* Up from 0 to 1 for x in [0, 1]: value and slope. */
+/* A smooth step from 0 to 1 for x in [0, 1]: value and slope. */
 static double dem2di_ramp(double x, double *slope) {
     *slope = 6 * x * (1 - x);
     return x * x * (3 - 2 * x);
 }
 
-/* The second point is all there where the common part is at least this part of the shorter face:
-   bricks that overlap by half have room to slide. */
+/* The second point has its full weight if the common part is at least this part of the shorter
+   face: bricks that overlap by half can slide without a change. */
 #define DEM2DI_FULL_WIDTH 0.25
 
-/* The share of the second point that a depth leaves. Half of it goes while the depth grows from a
-   16th of the shorter face to all of it, as faces shorter than that make a round shape, and the
-   rest up to four of it: over narrower ranges the force would fall on the way. */
+/* Weight of the second point by depth: it falls from 1 to 1/2 while the depth grows from a 16th of
+   the shorter face to its length, because a shape with shorter faces is practically round, and to 0
+   at four lengths. Over narrower ranges the force would decrease with the depth. */
 static double dem2di_share_left(double length, double depth, double *slope) {
     const double log16 = 2.7725887222397811, log4 = log16 / 2;
     double share = 1;
@@ -9557,8 +9559,8 @@ static double dem2di_share_left(double length, double depth, double *slope) {
     return share;
 }
 
-/* How far the second point is there: 1 where two faces meet, 0 where two corners do, with its
-   slopes for each metre of width and of depth. */
+/* Weight of the second point, 1 where two faces meet, 0 where two corners meet, and its derivatives
+   by width and depth (1/m). */
 static double dem2di_second_share(double square, double width, double depth, double *by_width,
                                   double *by_depth) {
     *by_width = *by_depth = 0;
@@ -9572,12 +9574,12 @@ static double dem2di_second_share(double square, double width, double depth, dou
     return left * there;
 }
 
-/* Forces of a contact of two points, by the energy kn/2 (d^2 + a s^2 + b s^4/d^2) of both depths,
-   so that none is won or lost. For faces a = 1, b = 0: two springs. As the share c of the second
-   point falls, b = 4/3 c (1 - c) and a = max(0, 2c - 1)^2: down to c = 1/2 then a + 2b = 1 - b, so
-   that both forces are the same where the depths are, and the moment is steady where faces that
-   are parallel tilt to either side. Below, where little is common, it cannot be without one of the
-   forces being attractive. */
+/* Forces of a contact with two points of depths d and s. They conserve energy, because they follow
+   from the energy kn/2 (d^2 + a s^2 + b s^4/d^2). For faces a = 1, b = 0: two springs. With a
+   weight c of the second point, b = 4/3 c (1 - c) and a = max(0, 2c - 1)^2. Down to c = 1/2 then a
+   + 2b = 1 - b: both forces are equal if the depths are, and the moment is continuous when parallel
+   faces tilt to either side. For smaller c that is impossible without attraction at one of the
+   points. */
 static void dem2di_second_forces(double square, double depth, dem2di_second_point *end) {
     double by_width, by_depth, s = end->depth, mean = (depth + s) / 2;
     double share = dem2di_second_share(square, end->width, mean, &by_width, &by_depth);
@@ -9588,19 +9590,19 @@ static void dem2di_second_forces(double square, double depth, dem2di_second_poin
     end->energy = s * s * (a + b * ratio) / 2;
     end->deep = depth * (1 - b * ratio * ratio) + by_mean;
     end->press = dem2di_max(0, s * (a + 2 * b * ratio) + by_mean);
-    /* the width falls as the corner is pushed along the base, towards the deeper end */
+    /* the width decreases if the corner moves along the base towards the deeper end */
     end->slide = by_share * by_width * end->side * (end->base ? 1 : -1);
 }
 
-/* No second point: all of it is 0, so are its energy and force. */
+/* No second point: zero energy, zero force. */
 static dem2di_second_point dem2di_second_none(void) {
     dem2di_second_point none;
     memset(&none, 0, sizeof none);
     return none;
 }
 
-/* The second point of two faces on a side, if it takes more energy than the one known so far: of
-   three corners that touch two count, and the energy is steady where the third takes over. */
+/* Replace the second point by that of two faces on a side if that has more energy: if three corners
+   overlap two count, and the energy is continuous where the third one replaces the second. */
 static void dem2di_second_try(const dem2di_face *a, const dem2di_face *b, double depth, double size,
                               int side, dem2di_second_point *best) {
     dem2di_second_point end;
@@ -9609,14 +9611,14 @@ static void dem2di_second_try(const dem2di_face *a, const dem2di_face *b, double
     if (end.energy > best->energy) *best = end;
 }
 
-/* The two points of a contact along u, by its second one. */
+/* The two points of a contact along u, from its second point. */
 static void dem2di_two_points(const dem2di_second_point *end, double depth, dem2d_vec u,
                               dem2d_contact_point points[2]) {
     dem2d_vec across = dem2di_perp(u), force; /* on B, along perp(u) and u */
     force.x = (end->slide - end->press * end->rise) / end->slope;
     force.y = (end->press + end->slide * end->rise) / end->slope;
     double size = dem2di_length(force), up = end->y - end->core;
-    /* of what slides, which acts on the corner, the moment goes into the place of the deeper end */
+    /* the force along the base acts at the corner: its moment moves the point of the deeper end */
     double place = end->x_deep + up * end->slope * end->slide / end->deep;
     dem2d_contact_point *one = &points[place > end->place];
     dem2d_contact_point *other = &points[!(place > end->place)];
@@ -9636,7 +9638,7 @@ static void dem2di_two_points(const dem2di_second_point *end, double depth, dem2
     other->corner = end->corner;
 }
 
-/* The one point of a contact. */
+/* The point of a contact with one point. */
 static void dem2di_one_point(dem2d_vec position, double depth, dem2d_vec u,
                              dem2d_contact_point *point) {
     point->position.x = position.x;
@@ -9649,7 +9651,7 @@ static void dem2di_one_point(dem2d_vec position, double depth, dem2d_vec u,
     point->corner = -1;
 }
 
-/* The second point of an overlapping pair, on either side; `best` stays as it is without one. */
+/* The second point of an overlapping pair, on either side; without one `best` is not changed. */
 static void dem2di_pair_second(const dem2di_pair *pair, const dem2di_search *search,
                                dem2di_second_point *best) {
     const int *corner = search->feature.corner;
@@ -9665,17 +9667,17 @@ static void dem2di_pair_second(const dem2di_pair *pair, const dem2di_search *sea
         dem2di_face_turn(pair->d, u, &b);
         dem2di_second_try(&a, &b, search->upper, pair->size, side, best);
     }
-    /* of polygons only a segment has two corners */
+    /* the only polygon with two corners is a segment wall */
     if (best->energy > 0 && pair->b->type == DEM2D_POLYGON && pair->b->count == 2) {
-        best->slide = 0; /* the end of a segment may be a joint, which pushes nothing aside */
+        best->slide = 0; /* the end of a segment may be a joint, which has no such force */
         if (best->base == 0) {
-            best->place = best->x; /* and is told by its place */
+            best->place = best->x; /* joints are found by the position of their point */
             best->y = best->core + best->depth / 2;
         }
     }
 }
 
-/* Contact points of an overlapping pair, from A's centre: how many. */
+/* Contact points of an overlapping pair, relative to A's centre. Returns their number. */
 static int dem2di_pair_points(const dem2di_pair *pair, const dem2di_search *search,
                               dem2d_contact_point points[2]) {
     dem2d_vec u = search->normal;
@@ -9692,8 +9694,8 @@ static int dem2di_pair_points(const dem2di_pair *pair, const dem2di_search *sear
     return 1;
 }
 
-/* The same with a wall along u whose surface is at a height along u from A's centre. The points
-   are on the surface. */
+/* The same for a shape and a half-plane whose surface is at a height along u from the shape's
+   centre. The points are on the surface. */
 static int dem2di_wall_points(const dem2d_shape *shape, dem2d_rot q, double scale, dem2d_vec u,
                               double surface, dem2d_vec support, double depth,
                               dem2d_contact_point points[2]) {
@@ -9734,8 +9736,8 @@ static void dem2di_gjk_epa(dem2di_pair *pair, dem2d_vec start, double tolerance,
     search->lower = dem2di_max(search->lower, dem2di_min(0, search->upper)); /* by GJK */
 }
 
-/* Depth when shapes overlap, else separation (with `detect`) or distance. What met in the last step
-   (may be NULL) is tried first; any feature of any pair is safe, 0 too. */
+/* Depth of overlapping shapes, else separation (with `detect`) or distance. The feature of the last
+   step (may be NULL) is tried first; it may be that of any pair, or all 0. */
 static void dem2di_contact_again(dem2di_pair *pair, dem2d_solver solver, const dem2di_feature *last,
                                  dem2d_vec start, double tolerance, int cap, bool detect,
                                  dem2di_search *search) {
@@ -9750,7 +9752,8 @@ static void dem2di_contact_solve(dem2di_pair *pair, dem2d_solver solver, dem2d_v
     dem2di_contact_again(pair, solver, NULL, start, tolerance, cap, detect, search);
 }
 
-/* Two circles in closed form: centres apart by d. Concentric circles get the normal (1, 0). */
+/* Depth of two circles in closed form, with d from centre to centre. Concentric circles get the
+   normal (1, 0). */
 static double dem2di_circle_contact(dem2d_vec d, double distance, double radii, dem2d_vec *normal) {
     if (distance > 1e-140) { /* its square is a normal number */
         normal->x = d.x / distance;
@@ -9761,15 +9764,15 @@ static double dem2di_circle_contact(dem2d_vec d, double distance, double radii, 
     return radii - distance;
 }
 
-/* The witness points of a search on the shapes as they were given; the sign of the depth is known
-   beyond how far both may deviate. */
+/* Move the witness points to the caller's arcs. The sign of the depth is certain only outside the
+   deviation of both shapes. */
 static void dem2di_report_given(const dem2di_pair *pair, const dem2di_search *search,
                                 dem2d_contact *contact) {
     double deviation = dem2di_pair_deviation(pair);
     contact->error += deviation;
     if (contact->state != DEM2D_UNRESOLVED && fabs(search->upper) <= deviation) {
         contact->state = DEM2D_TOUCHING;
-        contact->error += fabs(search->upper); /* and 0 is within it */
+        contact->error += fabs(search->upper); /* 0 is within it */
     }
     for (int i = 0; i < 2; i++) {
         dem2di_member m = dem2di_member_of(pair, i);
@@ -9809,13 +9812,13 @@ static void dem2di_contact_report(const dem2di_pair *pair, const dem2di_search *
         contact->points[i].position = dem2di_add(contact->points[i].position, pose_a->position);
 }
 
-/* Squares of sizes, and of their rounding, are normal numbers. */
+/* Are squares of the size, and of its rounding error, normal numbers? */
 static bool dem2di_pair_sound(const dem2di_pair *pair) {
     double square = pair->size * pair->size;
     return dem2di_finite(square) && square * DEM2DI_ROUNDING * DEM2DI_ROUNDING > DBL_MIN;
 }
 
-/* What all pair queries check and prepare. */
+/* Checks of all pair queries; `used` gets the desc with its defaults. */
 static dem2d_result dem2di_query_prepare(const dem2d_shape *a, dem2d_pose *pose_a,
                                          const dem2d_shape *b, dem2d_pose *pose_b,
                                          const dem2d_contact_desc *desc,
@@ -9861,7 +9864,7 @@ static dem2d_vec dem2di_start(const dem2di_pair *pair, dem2d_vec start) {
     return dem2di_unit(start, &u) ? u : dem2di_centres(pair);
 }
 
-/* GJK alone: up to the sign (`detect`) or to the distance. */
+/* A query by GJK alone: overlap (`detect`) or distance. */
 static dem2d_result dem2di_query_gjk(const dem2d_shape *a, dem2d_pose pose_a, const dem2d_shape *b,
                                      dem2d_pose pose_b, const dem2d_contact_desc *desc, bool detect,
                                      dem2d_contact *contact) {
@@ -9919,8 +9922,8 @@ DEM2D_API dem2d_result dem2d_pair_contact(const dem2d_shape *a, dem2d_pose pose_
     return DEM2D_OK;
 }
 
-/* Overlap of a shape at a pose with the half-plane below `point`, whose outward unit normal is
-   -u, by the support point along u, relative to the shape's centre. */
+/* Overlap of a shape at a pose with the half-plane through `point` with the outward unit normal -u.
+   `support` is the support point along u, relative to the shape's centre. */
 static double dem2di_wall_depth(const dem2d_pose *pose, dem2d_vec point, dem2d_vec u,
                                 dem2d_vec support) {
     return dem2di_dot(dem2di_add(dem2di_sub(pose->position, point), support), u);
@@ -9968,7 +9971,7 @@ DEM2D_API dem2d_result dem2d_wall_contact(const dem2d_shape *shape, dem2d_pose p
    uses: config, math
    ============================================================================================ */
 
-/* Two partners: slots of particles, the one with the lower id first; or a particle and a wall. */
+/* A pair: slots of two particles, the one with the lower id first; or a particle and a wall. */
 typedef struct dem2di_key {
     int a, b;
 } dem2di_key;
@@ -9981,25 +9984,26 @@ typedef struct dem2di_disc {
     bool circle;  /* two circles are a pair of the first kind, others of the second */
 } dem2di_disc;
 
-/* The discs sorted by the cells of their centres. The arrays are the caller's. */
+/* The discs sorted by the cells of their centres, with a hash table of cells. The arrays are the
+   caller's. */
 typedef struct dem2di_grid {
     dem2di_disc *discs;
-    int *slot;   /* of the table, for each disc; once sorted, its place in sorted */
+    int *slot;   /* for each disc its slot of the table; after the sort its index in sorted */
     int *sorted; /* discs by slot */
     int *heads;  /* table + 1: where each slot begins in sorted */
     int count, table;
     double size;      /* of the cells of level 0 */
-    dem2d_vec origin; /* cells are counted from here, so that far scenes lose nothing */
-    uint32_t levels;  /* bit mask of those in use */
+    dem2d_vec origin; /* cells are counted from here, so that distant scenes keep their digits */
+    uint32_t levels;  /* bit mask of the levels in use */
 } dem2di_grid;
 
 #define DEM2DI_LEVELS 31
 
-/* Cells are a little wider than two reaches, so that the rounding of a cell number up to 2^42 can't
-   part two discs that overlap by more than one cell. */
+/* Cells are a little wider than two reaches, so that in spite of rounding errors of cell numbers up
+   to 2^42 two discs that overlap are at most one cell apart. */
 #define DEM2DI_CELL (2 * (1 + 1.0 / 1024))
 
-/* Slots for so many discs: a power of two, so that about one disc is in each. */
+/* Slots for `count` discs: a power of two, with about one disc in each slot. */
 static int dem2di_grid_table(int count) {
     int table = 64;
     while (table < count) table *= 2;
@@ -10010,7 +10014,8 @@ static double dem2di_cell_size(const dem2di_grid *grid, int level) {
     return grid->size / (double)((uint32_t)1 << level);
 }
 
-/* Cell number of a coordinate; far beyond 2^62 cells all are one, which is slow but right. */
+/* Cell number of a coordinate. From 2^62 cells on all coordinates share a cell: slow but
+   correct. */
 static inline int64_t dem2di_cell_of(double coordinate, double size) {
     double cell = coordinate / size, limit = 4611686018427387904.0;
     if (!(fabs(cell) < limit)) return cell > 0 ? (int64_t)1 << 62 : -((int64_t)1 << 62);
@@ -10029,9 +10034,9 @@ static inline dem2di_cell dem2di_cell_at(const dem2di_grid *grid, dem2d_vec poin
     return cell;
 }
 
-/* Slot of a cell: squares of 8 x 8 cells are scattered by a hash, the cells of a square lie side
-   by side, so that neighbours in space are neighbours in memory. Of 8 cells in a row no two share
-   a slot, whatever the hash does. */
+/* Slot of a cell: a hash scatters squares of 8 x 8 cells; the cells of a square are consecutive, so
+   that neighbours in space are neighbours in memory. No two of 8 cells in a row share a slot,
+   whatever the hash is. */
 static int dem2di_cell_slot(const dem2di_grid *grid, int64_t x, int64_t y, int level) {
     uint64_t cx = (uint64_t)x, cy = (uint64_t)y;
     uint64_t h = (cx >> 3) * 0x9E3779B97F4A7C15u; /* 2^64 / golden ratio, and a shift between */
@@ -10056,7 +10061,7 @@ static void dem2di_grid_place(const dem2di_grid *grid, int begin, int end) {
     }
 }
 
-/* Counts to starts: each number becomes the sum of those before it. Returns the sum of all. */
+/* Exclusive prefix sums: each number becomes the sum of those before it. Returns the sum of all. */
 static int dem2di_starts(int *numbers, int count) {
     int sum = 0;
     for (int i = 0; i < count; i++) {
@@ -10086,14 +10091,14 @@ static void dem2di_grid_sort(dem2di_grid *grid) {
     grid->heads[grid->table] = grid->count;
 }
 
-/* Where the partners of a disc go: counted by kind, and written as (own, other) where there is
- * room. */
+/* The partners of a disc that were found: counted by kind, and written as (own, other) if there is
+   an array. */
 typedef struct dem2di_finds {
     int own, count[2];
     dem2di_key *to[2]; /* or NULL */
 } dem2di_finds;
 
-/* The partners among the discs from begin to end of those sorted. */
+/* Find partners among the sorted discs from begin to end. */
 static inline void dem2di_grid_range(const dem2di_grid *grid, int begin, int end, int level,
                                      dem2di_finds *finds) {
     const dem2di_disc *own = &grid->discs[finds->own];
@@ -10113,7 +10118,7 @@ static inline void dem2di_grid_range(const dem2di_grid *grid, int begin, int end
     }
 }
 
-/* The cells of a row from x0 to x1: those of one square at once. */
+/* Find partners in the cells of a row from x0 to x1; the cells of a square are done together. */
 static void dem2di_grid_row(const dem2di_grid *grid, int64_t x0, int64_t x1, int64_t y, int level,
                             dem2di_finds *finds) {
     while (x0 <= x1) {
@@ -10125,9 +10130,9 @@ static void dem2di_grid_row(const dem2di_grid *grid, int64_t x0, int64_t x1, int
     }
 }
 
-/* All partners of a disc that it finds: on its level those that come after it, in its cell, to the
-   right and above; on coarser levels all around. Two discs that overlap are at most one cell apart:
-   linear for any mixture of sizes. */
+/* Find the partners of a disc so that each pair is found once: on its own level the discs after it
+   in its cell, and those in cells to the right and above; on coarser levels all around. Discs that
+   overlap are at most one cell apart, so the cost is linear for any mixture of sizes. */
 static void dem2di_grid_partners(const dem2di_grid *grid, dem2di_finds *finds) {
     const dem2di_disc *own = &grid->discs[finds->own];
     finds->count[0] = finds->count[1] = 0;
@@ -10148,7 +10153,7 @@ static void dem2di_grid_partners(const dem2di_grid *grid, dem2di_finds *finds) {
     }
 }
 
-/* A number to sort by and what it stands for. */
+/* A key to sort by, and its item. */
 typedef struct dem2di_order {
     uint64_t key;
     int value;
@@ -10168,7 +10173,7 @@ static void dem2di_sort(dem2di_order *items, dem2di_order *spare, int count) {
     }
 }
 
-/* The low 16 bits of x at the even places. */
+/* The low 32 bits of x at the even bit positions. */
 static uint64_t dem2di_spread_bits(uint64_t x) {
     x = (x | x << 16) & 0x0000FFFF0000FFFFu;
     x = (x | x << 8) & 0x00FF00FF00FF00FFu;
@@ -10177,8 +10182,8 @@ static uint64_t dem2di_spread_bits(uint64_t x) {
     return (x | x << 1) & 0x5555555555555555u;
 }
 
-/* Place along the Z-shaped curve through a square with a corner and a size: of 2^20 x 2^20 cells.
- */
+/* Position along the Z-order curve through the 2^20 x 2^20 cells of a square with a corner and a
+   size. */
 static uint64_t dem2di_curve_place(dem2d_vec corner, double size, dem2d_vec point) {
     double f = size > 0 ? 1048575 / size : 0;
     uint64_t x = (uint64_t)((point.x - corner.x) * f), y = (uint64_t)((point.y - corner.y) * f);
@@ -15003,7 +15008,7 @@ DEM2D_API dem2d_result dem2d_world_inertial_number(const dem2d_world *world, dou
    uses: config, memory
    ============================================================================================ */
 
-/* Bytes on their way to a callback or a file, and whether all went well. */
+/* Where bytes are written, a callback or a file, and whether all writes succeeded. */
 typedef struct dem2di_writer {
     dem2d_write_fn *write;
     void *user;
@@ -15032,7 +15037,7 @@ static void dem2di_writer_find_sign(dem2di_writer *writer) {
     memcpy(writer->sign, half + 1, (size_t)length);
 }
 
-/* Ready to write to a callback or a file, of which one must be given. */
+/* Open a writer to a callback or a file; exactly one of them must be given. */
 static dem2d_result dem2di_writer_open(const dem2d_env *env, dem2d_write_fn *write, void *user,
                                        const char *path, bool append, dem2di_writer *writer) {
     if (path == NULL && write == NULL) return dem2di_fail_null(env, "path and write");
@@ -15055,7 +15060,7 @@ static dem2d_result dem2di_writer_close(const dem2d_env *env, const char *path,
 }
 
 /* ============================================================================================
-   >>snapshot  State hash, snapshots: one list of fields for all that is done with them
+   >>snapshot  State hash, snapshots: one list of fields for hash, save and load
    uses: config, memory, support, shapes, broad, law, motion, world, list, measures, output
    ============================================================================================ */
 
@@ -16063,12 +16068,12 @@ DEM2D_API dem2d_result dem2d_world_load(const dem2d_load_desc *desc, const char 
    uses: config, math, memory, mass, shapes, broad, law, world, measures, output
    ============================================================================================ */
 
-/* Text as it is, of any length. */
+/* Write text without formatting, of any length. */
 static void dem2di_put(dem2di_writer *writer, const char *text) {
     dem2di_put_bytes(writer, text, strlen(text));
 }
 
-/* Puts text with a point for each decimal sign of the locale. */
+/* Write text with a point for each decimal sign of the locale. */
 static void dem2di_put_points(dem2di_writer *writer, const char *text, int length) {
     int sign = writer->sign_length, begin = 0;
     for (int i = 0; sign > 0 && i + sign <= length; i++) {
@@ -16081,8 +16086,8 @@ static void dem2di_put_points(dem2di_writer *writer, const char *text, int lengt
     dem2di_put_bytes(writer, text + begin, (size_t)(length - begin));
 }
 
-/* Short text with numbers in it, the same in every locale. The decimal sign may be a comma there: a
-   comma that is meant goes through dem2di_put. */
+/* Write a short formatted text with numbers, the same in every locale. The locale's decimal sign
+   may be a comma: literal commas have to go through dem2di_put. */
 DEM2DI_PRINTF(2, 3)
 static void dem2di_print(dem2di_writer *writer, const char *format, ...) {
     char text[512];
@@ -16098,18 +16103,18 @@ static void dem2di_print(dem2di_writer *writer, const char *format, ...) {
     dem2di_put_points(writer, text, length);
 }
 
-/* All digits of a number: it reads back as the same bits. */
+/* Write a number with all digits: reading it gives the same bits. */
 static void dem2di_put_number(dem2di_writer *writer, double value) {
     dem2di_print(writer, "%.17g", value);
 }
 
-/* Points of an outline: 3 at least, 0 for the default. */
+/* Check outline_points: at least 3, or 0 for the default. */
 static dem2d_result dem2di_check_outline_points(const dem2d_env *env, int points) {
     if (points == 0 || points >= 3) return DEM2D_OK;
     return dem2di_fail(env, DEM2D_OUT_OF_RANGE, -1, "outline_points = %d", points);
 }
 
-/* Points to draw a shape with: the corners of sharp polygons, `points` of all else. */
+/* Number of points to draw a shape: the corners of a sharp polygon, else `points`, 0 for 64. */
 static int dem2di_drawn_points(const dem2d_shape *shape, int points) {
     if (shape->type == DEM2D_POLYGON && shape->rounding == 0) return shape->count;
     return points == 0 ? 64 : points;
@@ -16131,8 +16136,8 @@ static void dem2di_box_grow(dem2d_box *all, bool first, dem2d_vec lower, dem2d_v
     all->upper.y = first ? upper.y : dem2di_max(all->upper.y, upper.y);
 }
 
-/* The box grows to a half-plane beside it, if that is no farther off than a third of its size: what
-   is farther would make all else small. */
+/* Extend the box to a half-plane beside it, if the distance is at most a third of its size: farther
+   ones would make the rest of the picture small. */
 static void dem2di_box_reach(const dem2d_world *world, int j, double size, dem2d_box *all) {
     dem2d_vec n = world->walls[j].desc.normal, nearest;
     nearest.x = n.x > 0 ? all->lower.x : all->upper.x;
@@ -16143,8 +16148,8 @@ static void dem2di_box_reach(const dem2d_world *world, int j, double size, dem2d
     dem2di_box_grow(all, false, foot, foot);
 }
 
-/* The box of all particles and segments, and, if asked for, of half-planes beside them, with a
-   margin of a twentieth of the larger side; a unit square without any. */
+/* The bounding box of particles and segments and, if `beside`, of half-planes beside them, with a
+   margin of a twentieth of the larger side; a unit square if there are none. */
 static dem2d_box dem2di_scene_box(const dem2d_world *world, bool beside) {
     dem2d_box all = {{0, 0}, {1, 1}};
     bool first = true;
@@ -16174,7 +16179,7 @@ static dem2d_box dem2di_scene_box(const dem2d_world *world, bool beside) {
     return all;
 }
 
-/* Narrow the part of a line from t[0] to t[1] to where start + t rate is within low and high. */
+/* Clip the range t[0] to t[1] of a line to where start + t rate is between low and high. */
 static void dem2di_line_cut(double start, double rate, double low, double high, double t[2]) {
     if (rate == 0) {
         if (start < low || start > high) t[1] = t[0] - 1;
@@ -16185,7 +16190,7 @@ static void dem2di_line_cut(double start, double rate, double low, double high, 
     t[1] = dem2di_min(t[1], dem2di_max(a, b));
 }
 
-/* The part of a wall's line inside a box. One that misses the box gets the part beside it, and
+/* The part of a wall's line inside a box. If the line misses the box: the part beside it, and
    false. */
 static bool dem2di_wall_line(const dem2d_world *world, int j, const dem2d_box *box,
                              dem2d_vec ends[2]) {
@@ -16217,7 +16222,7 @@ typedef struct dem2di_view {
     dem2d_box box;
     double factor;        /* pixels per metre */
     double width, height; /* of the box */
-    double strip;         /* height of what is below it, for the scale bar */
+    double strip;         /* height of the strip below it, for the scale bar */
 } dem2di_view;
 
 static dem2d_vec dem2di_pixel(const dem2di_view *view, dem2d_vec p) {
@@ -16251,7 +16256,7 @@ static dem2di_view dem2di_view_make(const dem2d_world *world, const dem2d_svg_de
     return view;
 }
 
-/* By model; of those that do not move by forces, by motion. */
+/* Fill colour: by model, or by motion for particles that are not free. */
 static const char *dem2di_fill_of(const dem2di_body *body, const dem2d_shape *shape) {
     static const char *const colour[] = {"#e8c468", "#8fb9d8", "#b9a3d6",
                                          "#94c99b", "#e59a83", "#c9c9c9"};
@@ -16259,7 +16264,7 @@ static const char *dem2di_fill_of(const dem2di_body *body, const dem2d_shape *sh
     return body->motion == DEM2D_DRIVEN ? "url(#dem2d-driven)" : colour[shape->type];
 }
 
-/* Is the circle around a particle off the view? */
+/* Is the bounding circle of a particle outside the view? */
 static bool dem2di_off_view(const dem2d_world *world, const dem2di_view *view, int slot) {
     dem2d_vec c = world->before[slot].x;
     const dem2di_body *body = &world->bodies[slot];
@@ -16268,7 +16273,7 @@ static bool dem2di_off_view(const dem2d_world *world, const dem2di_view *view, i
            c.y + r < view->box.lower.y || c.y - r > view->box.upper.y;
 }
 
-/* One particle as a path: exact corners for sharp polygons, points for all else. */
+/* Draw one particle: a circle, or a path through its outline points. */
 static void dem2di_draw_particle(const dem2d_world *world, const dem2di_view *view, int points,
                                  int i, dem2di_writer *writer) {
     const dem2d_shape *shape = dem2di_shape_of(world, &world->bodies[i]);
@@ -16309,7 +16314,7 @@ static void dem2di_draw_walls(const dem2d_world *world, const dem2di_view *view,
     dem2di_print(writer, "</g>\n");
 }
 
-/* Pixels, of the smaller particle of a contact. */
+/* Radius in pixels of the smaller particle of a contact. */
 static double dem2di_drawn_radius(const dem2d_world *world, const dem2di_view *view,
                                   const dem2di_tour *walk) {
     const dem2di_key *key = &world->list.keys[walk->contact];
@@ -16318,9 +16323,9 @@ static double dem2di_drawn_radius(const dem2d_world *world, const dem2di_view *v
     return radius * view->factor;
 }
 
-/* Force chains: from centre to centre (or wall contact point). The mean force is a quarter of the
-   mean radius wide, so that lines leave room for grains however many there are; 1/400 of the
-   picture is enough to be seen. The strongest are as wide as their smaller grain is high. */
+/* Force chains: lines from centre to centre, or to the contact point at a wall. The line of the
+   mean force is as wide as a quarter of the mean radius, so that grains stay visible, or 1/400 of
+   the picture if that is less. No line is wider than the radius of the smaller grain. */
 static void dem2di_draw_chains(const dem2d_world *world, const dem2di_view *view,
                                dem2di_writer *writer) {
     double sum = 0, radii = 0;
@@ -16350,8 +16355,8 @@ static void dem2di_draw_chains(const dem2d_world *world, const dem2di_view *view
     dem2di_print(writer, "</g>\n");
 }
 
-/* The greatest of 1, 2, 5, 10, .. times a power of ten that is not above a length; 0 if that is no
-   normal number. */
+/* The greatest of 1, 2 and 5 times a power of ten that is not above a length; 0 if the length is
+   not a normal number. */
 static double dem2di_round_length(double length) {
     double unit = 1;
     if (!(length >= DBL_MIN && length <= DBL_MAX)) return 0;
@@ -16360,7 +16365,7 @@ static double dem2di_round_length(double length) {
     return unit * 5 <= length ? unit * 5 : unit * 2 <= length ? unit * 2 : unit;
 }
 
-/* Below the scene, where it hides nothing: a line between two ticks, and its length. */
+/* Draw the scale bar below the scene: a line between two ticks, and its length. */
 static void dem2di_draw_scale(const dem2di_view *view, dem2di_writer *writer) {
     double metres = dem2di_round_length(0.3 * view->width / view->factor);
     double tick = view->strip / 8, y = view->height + view->strip / 2, line = view->width / 400;
@@ -16385,13 +16390,13 @@ static void dem2di_draw(const dem2d_world *world, const dem2d_svg_desc *desc,
                  "viewBox=\"0 0 %.2f %.2f\">\n<rect width=\"100%%\" height=\"100%%\" "
                  "fill=\"white\"/>\n",
                  view.width, height, view.width, height);
-    dem2di_print(writer, /* hatches, a hundred across the picture */
+    dem2di_print(writer, /* hatching, a hundred lines across the picture */
                  "<defs><pattern id=\"dem2d-driven\" width=\"%.3f\" height=\"9\" "
                  "patternUnits=\"userSpaceOnUse\" patternTransform=\"rotate(45)\">"
                  "<rect width=\"100%%\" height=\"9\" fill=\"#dcdcdc\"/>"
                  "<rect width=\"%.3f\" height=\"9\" fill=\"#6c6c6c\"/></pattern></defs>\n",
                  view.width / 100, view.width / 300);
-    /* an inner picture cuts off what is beyond the view */
+    /* an inner picture clips all that is outside the view */
     dem2di_print(writer,
                  "<svg width=\"%.2f\" height=\"%.2f\">\n"
                  "<g stroke=\"#333\" stroke-width=\"%.3f\">\n",
@@ -16429,12 +16434,12 @@ DEM2D_API dem2d_result dem2d_world_write_svg(const dem2d_world *world, const dem
 /* --- files for VTK ------------------------------------------------------------------------------
  */
 
-/* An item of a .vtp file (VTK's cells): a particle, a contact or a wall, one after the other. */
+/* An iterator over the items of a .vtp file (VTK's cells): particles, contacts or walls. */
 typedef struct dem2di_item {
     dem2d_vtp_part part;
     int outline_points;
     dem2d_box box;    /* of the scene, for walls */
-    int index;        /* where it goes on, of particles and walls */
+    int index;        /* the next particle or wall */
     int slot;         /* of the particle, or number of the wall */
     dem2di_tour walk; /* contacts of particles, then with walls */
 } dem2di_item;
@@ -16474,14 +16479,14 @@ static int dem2di_item_points(const dem2d_world *world, const dem2di_item *item)
                                item->outline_points);
 }
 
-/* An array of what cells have: whole numbers of 32 bits, or doubles. */
+/* An array of cell data: integers of 32 bits, or doubles. */
 typedef struct dem2di_array {
     const char *name; /* NULL after the last */
     int components;
     bool whole;
 } dem2di_array;
 
-/* Of all arrays of a part together, in their order. */
+/* Greatest number of components of all arrays of a part. */
 #define DEM2DI_ITEM_NUMBERS 21
 
 static const dem2di_array *dem2di_arrays_of(dem2d_vtp_part part) {
@@ -16586,7 +16591,7 @@ static void dem2di_item_numbers(const dem2d_world *world, const dem2di_item *ite
         dem2di_wall_numbers(world, item->slot, numbers);
 }
 
-/* Doubles of one item or point. Those too small to be normal become 0: some readers stop there. */
+/* Write the doubles of one item or point. Subnormal numbers become 0: some readers reject them. */
 static void dem2di_vtp_doubles(dem2di_writer *writer, const double *numbers, int count) {
     for (int k = 0; k < count; k++) {
         if (k > 0) dem2di_put(writer, " ");
@@ -16649,7 +16654,7 @@ static void dem2di_vtp_cell_data(const dem2d_world *world, const dem2d_vtp_desc 
     dem2di_put(writer, "</CellData>\n");
 }
 
-/* Points of all items, one after the other, and the cells that join those of each. */
+/* Write the points of all items, and the cells that connect the points of each. */
 static void dem2di_vtp_cells(const dem2d_world *world, const dem2d_vtp_desc *desc, int64_t points,
                              dem2di_writer *writer) {
     const char *kind = desc->part == DEM2D_VTP_PARTICLES ? "Polys" : "Lines";
@@ -16703,7 +16708,7 @@ DEM2D_API dem2d_result dem2d_world_write_vtp(const dem2d_world *world, const dem
     return dem2di_writer_close(env, path, &writer);
 }
 
-/* Text as the value of an attribute. */
+/* Write text as the value of an attribute. */
 static void dem2di_put_escaped(dem2di_writer *writer, const char *text) {
     while (*text != '\0') {
         size_t plain = strcspn(text, "&<>\"'");
@@ -16719,7 +16724,7 @@ static void dem2di_put_escaped(dem2di_writer *writer, const char *text) {
     }
 }
 
-/* Values of a caller that belong to names: there, finite; names there, without unwanted bytes. */
+/* Check the caller's names and values: not NULL, values finite, names without unwanted bytes. */
 static dem2d_result dem2di_check_named(const dem2d_env *env, const char *const *names,
                                        const char *what, const double *values, const char *of,
                                        int count, const char *unwanted) {
@@ -16739,7 +16744,7 @@ static dem2d_result dem2di_check_named(const dem2d_env *env, const char *const *
     return DEM2D_OK;
 }
 
-/* Bytes that XML has no place for. */
+/* Control characters, which XML does not allow. */
 #define DEM2DI_CONTROL                                                 \
     "\001\002\003\004\005\006\007\010\011\012\013\014\015\016\017\020" \
     "\021\022\023\024\025\026\027\030\031\032\033\034\035\036\037"
@@ -16803,7 +16808,7 @@ static void dem2di_csv_values(const dem2d_world *world, double values[DEM2DI_CSV
 
 #define DEM2DI_CSV_LEDGER 11
 
-/* Without a ledger: nothing. */
+/* The columns of the ledger; returns their number, 0 for a world without a ledger. */
 static int dem2di_csv_ledger(const dem2d_world *world, double values[DEM2DI_CSV_LEDGER]) {
     dem2d_ledger l;
     if (!world->ledger.kept) return 0;
