@@ -80,8 +80,8 @@ LIMITS
     * The rotation of a step has an error of angle^5/120: a particle should not turn by more than
       0.01 in a step.
     * A particle that moves or turns by more than its inscribed radius in a step may pass through
-      others. dem2d_stats.fast_motion counts the list rebuilds that found such a particle; the log
-      gets the first one.
+      others. dem2d_stats.fast_motion counts the checks that found such a particle (first step,
+      after edits, every 160th step); the log gets the first one.
     * A custom support function that is not convex can't be detected; contacts are then wrong.
     * Where two faces meet, two points carry the contact, and their forces follow from an energy.
       The moment jumps when the deeper point changes sides, in two cases: the common part is shorter
@@ -247,7 +247,7 @@ HOW TO
                          by DEM2D_FIT_REDUCTION and DEM2D_FIT_SWARM, unbounded; local_damping = 0.7
                          ([P]) or global_damping = 0.7 ([F]). Example: examples/biaxial.c --papers.
     choose a time step   dem2d_world_time_step_bounds on a settled scene. The world checks its time
-                         step whenever it rebuilds its neighbour list.
+                         step in the first step, after edits that can matter, and in every 160th.
     lose energy          damping_ratio of the materials, from dem2d_damping_ratio(restitution);
                          rolling_friction for grains that should not roll; else friction, damping.
     use a law of yours   dem2d_world_desc.law: it gets the depth, the velocities at the contact and
@@ -1430,7 +1430,7 @@ typedef struct dem2d_stats {
     int64_t proofs[DEM2D_PROOF_COUNT]; ///< of the other looks, by what proves them
     int64_t not_converged;             ///< contacts whose search reached its cap, in all steps
     int64_t slow_time_step;            ///< checks that found the time step above the safe bound
-    int64_t fast_motion;               ///< lists that found a particle fast enough to pass others
+    int64_t fast_motion;               ///< checks that found a particle fast enough to pass others
     int particles;                     ///< alive
     int walls;                         ///< alive
     int pairs;                         ///< in the list, walls included
@@ -1489,8 +1489,8 @@ DEM2D_API dem2d_result dem2d_world_drive_particle(dem2d_world *world, dem2d_part
 /// Add a wall.
 DEM2D_API dem2d_result dem2d_world_add_wall(dem2d_world *world, const dem2d_wall_desc *desc,
                                             dem2d_wall_id *id);
-/// Replace a wall's description. Its contacts keep their history if the normal stays the same and
-/// the wall moves by less than the skin.
+/// Replace a wall's description. Its contacts keep their history, unless the wall turns by a right
+/// angle or more, or changes between half-plane and segment.
 DEM2D_API dem2d_result dem2d_world_set_wall(dem2d_world *world, dem2d_wall_id id,
                                             const dem2d_wall_desc *desc);
 /// Remove a wall that no other wall spans to (else IN_USE).
@@ -10202,14 +10202,15 @@ typedef struct dem2di_arms {
     double a_n, a_t, b_n, b_t; /* m */
 } dem2di_arms;
 
-/* A contact. Closed (depth <= 0) ones keep the normal for the next warm start. */
+/* A contact. While the two are apart, normal and feature are those of the last search: what they
+   were is no part of the results. */
 typedef struct dem2di_link {
-    dem2d_vec normal; /* from A to B; 0 before the first look */
+    dem2d_vec normal; /* from A to B; 0 before the first search */
     dem2di_arms arms;
-    double depth;           /* m; closed: at most 0 */
+    double depth;           /* m; below 0 apart; 0: overlap that does not count, see joints */
     double force;           /* normal, N/m */
     double shear;           /* on B along perp(normal), N/m: the tangential spring */
-    double budget;          /* the pair is apart until both have travelled this far together */
+    double budget;          /* separation bound: see dem2di_link_apart */
     dem2di_feature feature; /* of two polygons, that carried it: tried first in the next step */
 } dem2di_link;
 
@@ -10791,6 +10792,7 @@ struct dem2d_world {
     dem2d_face_rule faces;
 
     bool check_time_step;
+    bool check_due;  /* an edit since the last check of the time step and the speeds can matter */
     bool list_stale; /* the list must be built before the next force pass */
     bool list_worn;  /* because something has left its skin */
     bool skin_fixed; /* as the caller wants it */
@@ -11304,7 +11306,7 @@ DEM2D_API dem2d_result dem2d_world_set_pair(dem2d_world *world, dem2d_material_i
     dem2d_result result = dem2di_check_law(&world->env, desc);
     if (result != DEM2D_OK) return result;
     dem2di_law_set(world, (int)a.index, (int)b.index, desc);
-    world->list_stale = true; /* so that the time step is checked */
+    world->list_stale = world->check_due = true;
     world->ledger.edited = true;
     return DEM2D_OK;
 }
@@ -11433,7 +11435,7 @@ DEM2D_API dem2d_result dem2d_world_add_particle(dem2d_world *world, const dem2d_
 
     world->list.first[slot + 1] = world->list.first[slot]; /* no contacts yet */
     world->body_count++;
-    world->list_stale = true;
+    world->list_stale = world->check_due = true;
     world->ledger.edited = true;
     id->index = (uint32_t)body.index;
     id->generation = world->names[body.index].generation;
@@ -11715,6 +11717,7 @@ DEM2D_API dem2d_result dem2d_world_move_particle(dem2d_world *world, dem2d_parti
     world->now[slot].x = position;
     world->now[slot].q = dem2di_orientation(world, angle);
     world->before[slot] = world->now[slot];
+    world->check_due = true;
     dem2di_forget(world, slot);
     return DEM2D_OK;
 }
@@ -11730,6 +11733,17 @@ static bool dem2di_redirect(dem2d_world *world, int slot, dem2d_vec v, double w)
     return true;
 }
 
+/* Does it move by more than its inscribed radius in a step? Two of which neither does come to
+   overlap before one's centre has passed the other's. */
+static bool dem2di_outruns(const dem2d_world *world, int slot) {
+    const dem2di_state *now = &world->now[slot];
+    const dem2d_shape *shape = dem2di_shape_of(world, &world->bodies[slot]);
+    double speed = dem2di_length(now->v), inner = shape->inscribed;
+    if (!(inner > 0)) inner = shape->circumscribed; /* of a custom one it may be unknown */
+    if (shape->type != DEM2D_CIRCLE) speed += fabs(now->w) * now->radius;
+    return speed * world->time_step > inner * world->bodies[slot].scale;
+}
+
 DEM2D_API dem2d_result dem2d_world_drive_particle(dem2d_world *world, dem2d_particle_id id,
                                                   dem2d_motion motion, dem2d_vec velocity,
                                                   double angular_velocity) {
@@ -11742,6 +11756,8 @@ DEM2D_API dem2d_result dem2d_world_drive_particle(dem2d_world *world, dem2d_part
         return dem2di_out_of_memory(world, "velocities");
     world->now[slot].v = velocity;
     world->now[slot].w = angular_velocity;
+    if (motion != (dem2d_motion)world->bodies[slot].motion || dem2di_outruns(world, slot))
+        world->check_due = true;
     world->bodies[slot].motion = (uint8_t)motion;
     if (motion == DEM2D_FIXED) dem2di_forget_fixed(world, slot);
     world->inverse[slot] = dem2di_inverse_of(world, &world->bodies[slot]);
@@ -11867,6 +11883,7 @@ DEM2D_API dem2d_result dem2d_world_add_wall(dem2d_world *world, const dem2d_wall
     memset(&world->wall_now[slot], 0, sizeof *world->wall_now);
     if (desc->mode == DEM2D_WALL_MOVING) world->wall_now[slot].velocity = desc->velocity;
     dem2di_wall_place(world, slot, desc);
+    world->check_due = true;
     if (slot == world->wall_count) world->wall_count++;
     id->index = (uint32_t)slot;
     id->generation = wall->generation;
@@ -11909,13 +11926,11 @@ DEM2D_API dem2d_result dem2d_world_set_wall(dem2d_world *world, dem2d_wall_id id
     if (!dem2di_line_make(world, desc)) return DEM2D_OUT_OF_MEMORY;
     dem2di_wall *wall = &world->walls[id.index];
     dem2di_wall old = *wall;
-    dem2d_vec moved = dem2di_sub(desc->point, world->wall_now[id.index].point);
     dem2di_wall_unspan(world, wall);
     dem2di_wall_place(world, (int)id.index, desc);
-    bool turned = old.desc.normal.x != wall->desc.normal.x ||
-                  old.desc.normal.y != wall->desc.normal.y || old.desc.segment != desc->segment ||
-                  old.extent != wall->extent;
-    if (turned || dem2di_wall_way(&old, moved) > wall->skin)
+    if (old.desc.material.index != desc->material.index || old.desc.segment != desc->segment)
+        world->check_due = true;
+    if (old.desc.segment != desc->segment || !(dem2di_dot(old.desc.normal, wall->desc.normal) > 0))
         dem2di_forget_wall(world, (int)id.index);
     return DEM2D_OK;
 }
@@ -11994,9 +12009,10 @@ DEM2D_API dem2d_result dem2d_world_set_time_step(dem2d_world *world, double time
         world->timed = dem2di_time(world);
         world->timed_at = world->steps;
     }
+    if (time_step > world->time_step) world->check_due = true;
     world->time_step = time_step;
     if (world->steps == 0) world->made_step = time_step;
-    world->list_stale = true; /* so that the step is checked */
+    world->list_stale = true;
     world->ledger.edited = true;
     return DEM2D_OK;
 }
@@ -12346,17 +12362,15 @@ static dem2di_plan dem2di_plan_make(const dem2d_world *world) {
     return plan;
 }
 
-/* How far apart the two of a contact are now, along its normal or line of centres. */
+/* How far apart the bounding circles of a listed pair are now. */
 static double dem2di_gap_now(const dem2d_world *world, int contact) {
     const dem2di_key *key = &world->list.keys[contact];
-    const dem2di_state *a = &world->now[key->a];
-    if (contact >= world->list.pairs) return dem2di_wall_distance(world, key->b, a->x) - a->radius;
-    const dem2di_state *b = &world->now[key->b];
+    const dem2di_state *a = &world->now[key->a], *b = &world->now[key->b];
     return dem2di_length(dem2di_centre_line(a->x, b->x)) - (a->radius + b->radius);
 }
 
-/* The skin of a particle, wide enough for the contacts of the last force pass: they stay listed for
-   the queries, however far apart by now. */
+/* The skin of a particle, wide enough for its contacts with others in the last force pass: they
+   stay listed for the queries, however far apart by now. */
 static double dem2di_skin_make(const dem2d_world *world, int slot) {
     const dem2di_list *list = &world->list;
     const dem2di_state *now = &world->now[slot];
@@ -12364,7 +12378,7 @@ static double dem2di_skin_make(const dem2d_world *world, int slot) {
     for (int k = list->first[slot]; k < list->first[slot + 1]; k++) {
         int contact = list->incident[k] / 2;
         dem2di_link link;
-        if (contact == list->count || list->keys[contact].a < 0) continue;
+        if (contact >= list->pairs || list->keys[contact].a < 0) continue;
         double gap = dem2di_gap_now(world, contact);
         if (gap > skin && dem2di_link_at(world, contact, false, &link))
             skin = gap * (1 + DEM2DI_ROUNDING);
@@ -12372,28 +12386,11 @@ static double dem2di_skin_make(const dem2d_world *world, int slot) {
     return skin;
 }
 
-/* Does it move by more than its inscribed radius in a step? Two of which neither does come to
-   overlap before one's centre has passed the other's. */
-static bool dem2di_outruns(const dem2d_world *world, int slot) {
-    const dem2di_state *now = &world->now[slot];
-    const dem2d_shape *shape = dem2di_shape_of(world, &world->bodies[slot]);
-    double speed = dem2di_length(now->v), inner = shape->inscribed;
-    if (!(inner > 0)) inner = shape->circumscribed; /* of a custom one it may be unknown */
-    if (shape->type != DEM2D_CIRCLE) speed += fabs(now->w) * now->radius;
-    return speed * world->time_step > inner * world->bodies[slot].scale;
-}
-
-/* The one of lower id of two slots; -1 is none. */
-static int dem2di_first_of(const dem2d_world *world, int one, int other) {
-    if (one < 0 || other < 0) return one < 0 ? other : one;
-    return world->bodies[one].index < world->bodies[other].index ? one : other;
-}
-
 static void dem2di_disc_task(void *context, int begin, int end) {
     dem2di_build *build = (dem2di_build *)context;
     dem2d_world *world = build->world;
     for (int block = begin; block < end; block++) {
-        int first = block * DEM2DI_BLOCK, fast = -1;
+        int first = block * DEM2DI_BLOCK;
         double largest = 0;
         for (int i = first; i < dem2di_block_end(first, DEM2DI_BLOCK, world->body_count); i++) {
             const dem2di_body *body = &world->bodies[i];
@@ -12405,12 +12402,10 @@ static void dem2di_disc_task(void *context, int begin, int end) {
             disc->reach = world->now[i].radius + skin;
             disc->fixed = body->motion == DEM2D_FIXED;
             disc->circle = dem2di_shape_of(world, body)->type == DEM2D_CIRCLE &&
-                          dem2di_has_disc_kernel(world, &build->plan);
+                           dem2di_has_disc_kernel(world, &build->plan);
             largest = dem2di_max(largest, disc->reach);
-            if (dem2di_outruns(world, i)) fast = dem2di_first_of(world, fast, i);
         }
         world->tallies[block].most = largest;
-        world->tallies[block].fast = fast;
     }
 }
 
@@ -12427,21 +12422,36 @@ static void dem2di_grid_task(void *context, int begin, int end) {
     dem2di_grid_sort(&((dem2di_build *)context)->grid);
 }
 
-/* Walls within the skins of a particle: counted, and written where there is room. */
+/* Is a wall within the skins of a particle? */
+static bool dem2di_wall_is_near(const dem2d_world *world, const dem2di_disc *disc, int wall) {
+    const dem2di_wall *w = &world->walls[wall];
+    return w->alive && dem2di_wall_distance(world, wall, disc->centre) < disc->reach + w->skin;
+}
+
+static void dem2di_find_add(const dem2d_world *world, int slot, int wall, dem2di_order *to,
+                            int *count) {
+    if (to != NULL) {
+        to[*count].key = (uint64_t)wall << 32 | (uint64_t)world->bodies[slot].index;
+        to[*count].value = slot;
+    }
+    (*count)++;
+}
+
+/* The walls near a particle, and those that it had a contact with in the last force pass, wherever
+   they are now: these stay listed for the queries. Counted, and written where there is room. */
 static int dem2di_find_walls(const dem2d_world *world, const dem2di_disc *disc, int slot,
                              dem2di_order *to) {
+    const dem2di_list *list = &world->list;
     int count = 0;
     if (disc->fixed) return 0;
-    for (int j = 0; j < world->wall_count; j++) {
-        const dem2di_wall *wall = &world->walls[j];
-        if (!wall->alive ||
-            !(dem2di_wall_distance(world, j, disc->centre) < disc->reach + wall->skin))
-            continue;
-        if (to != NULL) {
-            to[count].key = (uint64_t)j << 32 | (uint64_t)world->bodies[slot].index;
-            to[count].value = slot;
-        }
-        count++;
+    for (int j = 0; j < world->wall_count; j++)
+        if (dem2di_wall_is_near(world, disc, j)) dem2di_find_add(world, slot, j, to, &count);
+    for (int k = list->first[slot]; k < list->first[slot + 1]; k++) {
+        int contact = list->incident[k] / 2;
+        if (contact < list->pairs || contact == list->count || list->keys[contact].a < 0) continue;
+        if (!(list->links[contact - list->discs].depth > 0)) continue;
+        if (!dem2di_wall_is_near(world, disc, list->keys[contact].b))
+            dem2di_find_add(world, slot, list->keys[contact].b, to, &count);
     }
     return count;
 }
@@ -13073,14 +13083,38 @@ static inline void dem2di_link_keep(const dem2di_link *last, dem2di_link *link) 
     link->feature = last->feature;
 }
 
-/* A pair found apart by a gap (m) stays so until its particles have travelled as far together.
-   GJK and EPA take every pair anew, as in the papers. */
+/* Part of a gap that proves nothing: nearer to each other than this (m), two shapes may be found in
+   contact by one search and apart by another. */
+static double dem2di_gap_unsure(const dem2d_world *world, double size) {
+    return (dem2di_max(world->tolerance, DEM2DI_ROUNDING) + DEM2DI_ROUNDING) * size;
+}
+
+/* A pair is apart by a gap (m): its separation bound. Until the accumulated displacements of both
+   particles reach it, any search would find them apart. GJK and EPA take every pair anew, as in the
+   papers. */
 static void dem2di_link_apart(const dem2d_world *world, int a, int b, double gap, double size,
                               dem2di_link *link) {
     link->depth = -1;
-    link->budget = world->solver == DEM2D_GJK_EPA
-                       ? 0
-                       : world->travel[a] + world->travel[b] + (gap - DEM2DI_ROUNDING * size);
+    link->budget = world->solver == DEM2D_GJK_EPA ? 0
+                                                  : world->travel[a] + world->travel[b] +
+                                                        (gap - dem2di_gap_unsure(world, size));
+}
+
+/* The search of one pair. A contact goes on from its own last normal and feature. Other pairs start
+   from the line of centres, so that the result does not depend on when the pair was listed or
+   collided before. Such a pair may first try what the last collision found, but only to prove a
+   gap. */
+static void dem2di_pair_search(const dem2d_world *world, dem2di_pair *pair, const dem2di_link *last,
+                               dem2di_search *search) {
+    bool known = last->normal.x != 0 || last->normal.y != 0;
+    pair->calls = 0;
+    if (known && world->solver != DEM2D_GJK_EPA) {
+        dem2di_contact_again(pair, world->solver, &last->feature, last->normal, world->tolerance,
+                             world->max_iterations, true, search);
+        if (last->depth >= 0 || -search->upper > dem2di_gap_unsure(world, pair->size)) return;
+    }
+    dem2di_contact_again(pair, world->solver, NULL, dem2di_centres(pair), world->tolerance,
+                         world->max_iterations, true, search);
 }
 
 /* A look at two shapes: the contact's normal, depth and points, or their gap. Returns the number of
@@ -13090,11 +13124,7 @@ static int dem2di_shapes_look(const dem2d_world *world, dem2di_pair *pair, const
                               dem2di_count *count) {
     dem2di_search search;
     count->looks++;
-    pair->calls = 0;
-    bool warm = world->solver != DEM2D_GJK_EPA && (last->normal.x != 0 || last->normal.y != 0);
-    dem2di_contact_again(pair, world->solver, &last->feature,
-                         warm ? last->normal : dem2di_centres(pair), world->tolerance,
-                         world->max_iterations, true, &search);
+    dem2di_pair_search(world, pair, last, &search);
     count->calls += pair->calls;
     link->normal.x = search.normal.x; /* not as one: it has just been stored in two */
     link->normal.y = search.normal.y;
@@ -13529,9 +13559,9 @@ static void dem2di_joint_yield(const dem2d_world *world, int a, int b) {
     bool flat = fabs(one.c * other.s - one.s * other.c) <= DEM2DI_CORNER;
     bool both = side[0] && side[1] && near[0] >= 0 && near[1] >= 0;
     if (ends[0] || ends[1])
-        link[ends[1] ? 1 : 0]->depth = -1;
+        link[ends[1] ? 1 : 0]->depth = 0;
     else if (both && !two[0] && !two[1])
-        link[1]->depth = -1;
+        link[1]->depth = 0;
     for (int k = 0; k < 2; k++)
         if (side[k] && two[k] && near[k] >= 0 && (flat || (k == 1 && both)))
             dem2di_drop_point(world, contact[k], near[k]);
@@ -14080,13 +14110,13 @@ static double dem2di_rocking(const dem2d_world *world, int contact, int side, bo
     return e > 0 ? link->force * (p * (e / (p + e))) : 0;
 }
 
-/* Stiffness of the contacts of a particle for the limit (0) and for the safe bound (1), which
-   counts those between two free particles twice. One that slides does not resist, and may not that
-   rolls, or by the caller's law: it counts for the safe bound only. */
-static void dem2di_stiffness_sum(const dem2d_world *world, int slot, bool next,
-                                 dem2di_stiffness sum[2]) {
+/* Stiffness of the contacts of a particle for the limit (bound 0) or for the safe bound (1), which
+   counts those between two free particles twice. A contact that slides does not resist, and may not
+   when it rolls, or by the caller's law: it counts for the safe bound only. */
+static dem2di_stiffness dem2di_stiffness_sum(const dem2d_world *world, int slot, bool next,
+                                             int bound) {
     const dem2di_list *list = &world->list;
-    memset(sum, 0, 2 * sizeof *sum);
+    dem2di_stiffness sum = {0, 0, 0, 0, 0, 0};
     for (int k = list->first[slot]; k < list->first[slot + 1]; k++) {
         int i = list->incident[k] / 2, side = list->incident[k] & 1;
         dem2di_link link;
@@ -14098,24 +14128,22 @@ static void dem2di_stiffness_sum(const dem2d_world *world, int slot, bool next,
                       world->bodies[key->b].motion == DEM2D_FREE;
         bool sticks = world->law == NULL && fabs(link.shear) < law->friction * link.force;
         bool rubs = law->friction > 0 || world->law != NULL;
-        double kn = law->normal_stiffness, kt = law->tangential_stiffness;
+        double f = bound == 1 && shared ? 2 : 1, kn = f * law->normal_stiffness;
+        double slide = sticks || (bound == 1 && rubs) ? f * law->tangential_stiffness : 0;
         double arm_n = side ? link.arms.b_n : link.arms.a_n;
         double arm_t = side ? link.arms.b_t : link.arms.a_t;
-        for (int bound = 0; bound < 2; bound++) {
-            double f = bound == 1 && shared ? 2 : 1;
-            double slide = sticks || (bound == 1 && rubs) ? f * kt : 0;
-            if (bound == 1 && law->rolling_friction > 0)
-                sum[1].rr += f * dem2di_rolling_stiffness(law, dem2di_reduced_radius(world, i));
-            if (ends == NULL || bound == 1)
-                sum[bound].rr += f * (bound == 1 ? DEM2DI_ROCKING_SPARE : 1) *
-                                 dem2di_rocking(world, i, side, next, &link, bound == 1);
-            for (int p = 0; p < (ends != NULL ? 2 : 1); p++) {
-                double w = ends != NULL ? ends->weight[p] : 1;
-                double at = ends != NULL ? arm_t + ends->offset[p] : arm_t;
-                dem2di_stiffness_point(w * f * kn, w * slide, link.normal, arm_n, at, &sum[bound]);
-            }
+        if (bound == 1 && law->rolling_friction > 0)
+            sum.rr += f * dem2di_rolling_stiffness(law, dem2di_reduced_radius(world, i));
+        if (ends == NULL || bound == 1)
+            sum.rr += f * (bound == 1 ? DEM2DI_ROCKING_SPARE : 1) *
+                      dem2di_rocking(world, i, side, next, &link, bound == 1);
+        for (int p = 0; p < (ends != NULL ? 2 : 1); p++) {
+            double w = ends != NULL ? ends->weight[p] : 1;
+            double at = ends != NULL ? arm_t + ends->offset[p] : arm_t;
+            dem2di_stiffness_point(w * kn, w * slide, link.normal, arm_n, at, &sum);
         }
     }
+    return sum;
 }
 
 /* The greater of what is known and one more: of equal ones the lower id's, so that the order of the
@@ -14163,7 +14191,8 @@ static bool dem2di_surely_soft(const dem2d_world *world, int slot, double stiffn
 }
 
 /* Over free particles; with `loose` those without a contact count for the safe bound as if they had
-   one with their own kind. Eigenvalues below `enough` need not be known: their sum bounds them. */
+   one with their own kind. Eigenvalues below `enough` need not be known: their sum bounds them, and
+   that of the safe bound the one of the limit. */
 static void dem2di_stiffest_range(const dem2d_world *world, int begin, int end, bool next,
                                   bool loose, double enough, dem2di_stiffest *stiffest) {
     stiffest->value[0] = stiffest->value[1] = 0;
@@ -14171,21 +14200,22 @@ static void dem2di_stiffest_range(const dem2d_world *world, int begin, int end, 
     double stiffness = enough > 0 ? dem2di_greatest_stiffness(world) : 0;
     for (int i = begin; i < end; i++) {
         const dem2di_body *body = &world->bodies[i];
-        dem2di_stiffness sum[2];
         if (body->shape_index < 0 || body->motion != DEM2D_FREE) continue;
         if (enough > 0 && dem2di_surely_soft(world, i, stiffness, enough)) continue;
-        dem2di_stiffness_sum(world, i, next, sum);
         double mass = dem2di_body_mass(world, body), inertia = dem2di_body_inertia(world, body);
         double lag = dem2di_dashpot_lag(world, i, next);
-        for (int bound = 0; bound < 2; bound++) {
-            const dem2di_stiffness *k = &sum[bound];
-            double value = (k->xx + k->yy) / mass + k->rr / inertia;
-            if (k->xx + k->yy > 0 && (value > enough || lag > 0))
-                value = dem2di_largest_eigenvalue(k, mass, inertia);
+        bool touched = false;
+        for (int bound = 1; bound >= 0; bound--) {
+            const dem2di_stiffness k = dem2di_stiffness_sum(world, i, next, bound);
+            double value = (k.xx + k.yy) / mass + k.rr / inertia;
+            touched = touched || k.xx + k.yy > 0;
+            if (touched && (value > enough || lag > 0))
+                value = dem2di_largest_eigenvalue(&k, mass, inertia);
             if (bound == 1) value = dem2di_lagging(value, lag);
             dem2di_stiffest_meet(world, stiffest, bound, value, i);
+            if (value <= enough) break;
         }
-        if (!loose || sum[1].xx + sum[1].yy > 0) continue;
+        if (!loose || touched) continue;
         const dem2d_pair_desc *law = dem2di_law(world, body->material, body->material);
         double arm = world->now[i].radius * world->now[i].radius / inertia;
         double kt = law->friction > 0 ? law->tangential_stiffness : 0;
@@ -14194,25 +14224,58 @@ static void dem2di_stiffest_range(const dem2d_world *world, int begin, int end, 
     }
 }
 
-static void dem2di_stiffest_task(void *context, int begin, int end) {
+/* --- the check of the time step and of the speeds ------------------------------------------------
+   Made in the first step, in the next step after an edit that can matter, and in every so many
+   steps. It does not depend on when the list is rebuilt. */
+
+/* A check takes as long as 0.7 (circles) to 1.4 steps (Fourier series), measured: with this many
+   steps between two, less than 1 % of the time. */
+#define DEM2DI_CHECK_STEPS 160
+
+static bool dem2di_check_is_due(const dem2d_world *world) {
+    return world->check_due || world->steps % DEM2DI_CHECK_STEPS == 0;
+}
+
+/* The one of lower id of two slots; -1 is none. */
+static int dem2di_first_of(const dem2d_world *world, int one, int other) {
+    if (one < 0 || other < 0) return one < 0 ? other : one;
+    return world->bodies[one].index < world->bodies[other].index ? one : other;
+}
+
+static void dem2di_check_task(void *context, int begin, int end) {
     dem2d_world *world = (dem2d_world *)context;
     double enough = 4 / (world->time_step * world->time_step);
     for (int block = begin; block < end; block++) {
-        int first = block * DEM2DI_BLOCK;
-        dem2di_stiffest_range(world, first,
-                              dem2di_block_end(first, DEM2DI_BLOCK, world->body_count), true, false,
-                              enough, &world->tallies[block].stiffest);
+        int first = block * DEM2DI_BLOCK, fast = -1;
+        int last = dem2di_block_end(first, DEM2DI_BLOCK, world->body_count);
+        for (int i = first; i < last; i++)
+            if (dem2di_outruns(world, i)) fast = dem2di_first_of(world, fast, i);
+        world->tallies[block].fast = fast;
+        if (world->check_time_step)
+            dem2di_stiffest_range(world, first, last, true, false, enough,
+                                  &world->tallies[block].stiffest);
     }
+}
+
+/* Is there a particle that may pass through others? The first time the log is told. */
+static bool dem2di_check_motions(const dem2d_world *world) {
+    int fast = -1;
+    for (int k = 0; k < dem2di_blocks(world->body_count, DEM2DI_BLOCK); k++)
+        fast = dem2di_first_of(world, fast, world->tallies[k].fast);
+    if (fast >= 0 && world->fast_motion == 0)
+        (void)dem2di_fail(&world->env, DEM2D_WARNING, world->bodies[fast].index,
+                          "particle %d moves by more than its inscribed radius in a step: it may "
+                          "pass through others",
+                          world->bodies[fast].index);
+    return fast >= 0;
 }
 
 /* The step that is about to be made against both bounds: beyond the greater one it is refused,
    between the two it is noted. */
-static dem2d_result dem2di_check_step(dem2d_world *world, bool *slow) {
+static dem2d_result dem2di_check_stiffness(const dem2d_world *world, bool *slow) {
     double dt = world->time_step;
     dem2di_stiffest all = {{0, 0}, {-1, -1}};
-    int blocks = dem2di_blocks(world->body_count, DEM2DI_BLOCK);
-    dem2di_run(world, DEM2D_PHASE_LIST, blocks, dem2di_stiffest_task, world);
-    for (int k = 0; k < blocks; k++)
+    for (int k = 0; k < dem2di_blocks(world->body_count, DEM2DI_BLOCK); k++)
         for (int bound = 0; bound < 2; bound++) {
             const dem2di_stiffest *one = &world->tallies[k].stiffest;
             dem2di_stiffest_meet(world, &all, bound, one->value[bound], one->at[bound]);
@@ -14232,18 +14295,12 @@ static dem2d_result dem2di_check_step(dem2d_world *world, bool *slow) {
     return DEM2D_OK;
 }
 
-/* Did the list that was just renewed find a particle that may pass through others? The first time
-   the log is told. */
-static bool dem2di_check_motions(const dem2d_world *world) {
-    int fast = -1;
-    for (int k = 0; k < dem2di_blocks(world->body_count, DEM2DI_BLOCK); k++)
-        fast = dem2di_first_of(world, fast, world->tallies[k].fast);
-    if (fast >= 0 && world->fast_motion == 0)
-        (void)dem2di_fail(&world->env, DEM2D_WARNING, world->bodies[fast].index,
-                          "particle %d moves by more than its inscribed radius in a step: it may "
-                          "pass through others",
-                          world->bodies[fast].index);
-    return fast >= 0;
+/* Of the step that is about to be made, whose contacts are known. */
+static dem2d_result dem2di_check_step(dem2d_world *world, bool *slow, bool *fast) {
+    dem2di_run(world, DEM2D_PHASE_LIST, dem2di_blocks(world->body_count, DEM2DI_BLOCK),
+               dem2di_check_task, world);
+    *fast = dem2di_check_motions(world);
+    return world->check_time_step ? dem2di_check_stiffness(world, slow) : DEM2D_OK;
 }
 
 DEM2D_API dem2d_result dem2d_world_time_step_bounds(const dem2d_world *world, double *safe,
@@ -14295,12 +14352,11 @@ static dem2d_result dem2di_step(dem2d_world *world) {
     if (listed) {
         dem2d_result result = dem2di_build_list(world);
         if (result != DEM2D_OK) return result;
-        fast = dem2di_check_motions(world);
     }
     world->list_stale = listed; /* should the step fail, the next try begins with a list as well */
     dem2di_contact_pass(world, &count);
-    if (listed && world->check_time_step) {
-        dem2d_result result = dem2di_check_step(world, &slow);
+    if (dem2di_check_is_due(world)) {
+        dem2d_result result = dem2di_check_step(world, &slow, &fast);
         if (result != DEM2D_OK) return result;
     }
     dem2di_wall_sums(world);
@@ -14329,6 +14385,7 @@ static dem2d_result dem2di_step(dem2d_world *world) {
     world->count = count;
     world->slow_time_step += slow;
     world->fast_motion += fast;
+    world->check_due = false;
     dem2di_commit(world);
     return DEM2D_OK;
 }
@@ -15598,6 +15655,7 @@ DEM2D_API uint64_t dem2d_world_hash(const dem2d_world *world) {
 /* What of the list outlives it. */
 static void dem2di_archive_progress(dem2di_archive *ar, dem2d_world *w) {
     dem2di_archive_bool(ar, "redirected", &w->redirected);
+    dem2di_archive_bool(ar, "check_due", &w->check_due);
     dem2di_archive_bool(ar, "list_stale", &w->list_stale);
     dem2di_archive_bool(ar, "list_worn", &w->list_worn);
     dem2di_archive_bool(ar, "skin_fixed", &w->skin_fixed);
@@ -15613,6 +15671,7 @@ static void dem2di_archive_progress(dem2di_archive *ar, dem2d_world *w) {
     dem2di_archive_expect(ar, w->listed_at <= w->steps, "listed_at is to come");
     dem2di_archive_tally(ar, "list_rebuilds", &w->rebuilds);
     dem2di_archive_tally(ar, "slow_time_step", &w->slow_time_step);
+    dem2di_archive_tally(ar, "fast_motion", &w->fast_motion);
     dem2di_archive_tally(ar, "support_calls", &w->count.calls);
     dem2di_archive_tally(ar, "looks", &w->count.looks);
     dem2di_archive_tally(ar, "gaps", &w->count.gaps);
@@ -16885,7 +16944,7 @@ DEM2D_API dem2d_result dem2d_world_write_csv(const dem2d_world *world, const dem
 
    CHANGES
      0.6.0  Runs differ from those of 0.5.0 with friction between circles, dashpots, polybeziers,
-            two contact points with friction, and servo walls. Snapshots of version 3.
+            two contact points with friction, and servo walls. Snapshots of version 4.
             Papers: the manual lists what differs from each of their equations and steps. A world
             with DEM2D_GJK_EPA takes every pair anew in every step, circles too, from the line of
             centres; DEM2D_ONE_POINT takes the middle at walls, too. dem2d_contact.residual is

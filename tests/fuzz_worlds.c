@@ -14,9 +14,7 @@ static int64_t met[WITH_COUNT][WITH_COUNT];
 
 /* Two that can't be used together. */
 static bool exclusive(int a, int b) {
-    static const int never[][2] = {{WITH_LAW, WITH_TWO_POINTS},  {WITH_TWO_POINTS, WITH_ONE_POINT},
-                                   {WITH_TWO_POINTS, WITH_AREA}, {WITH_ONE_POINT, WITH_AREA},
-                                   {WITH_AREA, WITH_SEGMENT},    {WITH_AREA, WITH_CHAIN}};
+    static const int never[][2] = {{WITH_LAW, WITH_TWO_POINTS}, {WITH_TWO_POINTS, WITH_ONE_POINT}};
     for (size_t k = 0; k < sizeof never / sizeof *never; k++)
         if (never[k][0] == a && never[k][1] == b) return true;
     return false;
