@@ -613,10 +613,10 @@ extern "C" {
     X(ZERO_AREA, "the area is zero")                                       \
     X(NOT_SMOOTH, "two arcs do not share their tangent")                   \
     X(NEGATIVE_CURVATURE, "the radius of curvature is negative somewhere") \
-    X(STALE_ID, "the id does not name a living object of this world")      \
-    X(IN_USE, "the object is still used by another")                       \
+    X(STALE_ID, "no object of this world has this id")                     \
+    X(IN_USE, "another object uses this object")                           \
     X(TIME_STEP, "the time step is above the stable limit")                \
-    X(STATE, "the step would give a state that is not finite")             \
+    X(STATE, "the state after the step would not be finite")               \
     X(NOT_REACHED, "the coverage asked for was not reached")               \
     X(IO, "reading or writing failed")                                     \
     X(FORMAT, "not a snapshot, or damaged")                                \
@@ -2135,6 +2135,10 @@ static dem2d_result dem2di_fail_null(const dem2d_env *env, const char *name) {
     return dem2di_fail(env, DEM2D_NULL_ARGUMENT, -1, "%s is NULL", name);
 }
 
+static dem2d_result dem2di_fail_memory(const dem2d_env *env, int count, const char *what) {
+    return dem2di_fail(env, DEM2D_OUT_OF_MEMORY, -1, "no memory for %d %s", count, what);
+}
+
 /* Only both callbacks together replace malloc and free. */
 static bool dem2di_env_allocates(const dem2d_env *env) {
     return env != NULL && env->allocate != NULL && env->release != NULL;
@@ -2277,13 +2281,13 @@ DEM2D_API dem2d_result dem2d_polygon_hull(const dem2d_env *env, const dem2d_vec 
     if (hull == NULL || hull_count == NULL) return dem2di_fail_null(env, "hull");
     size_t room = 2 * (size_t)count + 2; /* sorted copy, and a chain of count + 1 */
     dem2d_vec *sorted = (dem2d_vec *)dem2di_allocate(env, room, sizeof *sorted);
-    if (sorted == NULL) return dem2di_fail(env, DEM2D_OUT_OF_MEMORY, -1, "hull of %d", count);
+    if (sorted == NULL) return dem2di_fail_memory(env, count, "points of a hull");
     dem2d_vec *chain = sorted + count;
     memcpy(sorted, points, (size_t)count * sizeof *sorted);
     qsort(sorted, (size_t)count, sizeof *sorted, dem2di_compare_points);
     int length = dem2di_monotone_chain(sorted, count, chain);
     if (length < 3) {
-        result = dem2di_fail(env, DEM2D_ZERO_AREA, -1, "the points are on one line");
+        result = dem2di_fail(env, DEM2D_ZERO_AREA, -1, "all points are on one line");
     } else {
         memcpy(hull, chain, (size_t)length * sizeof *hull);
         *hull_count = length;
@@ -2359,8 +2363,8 @@ static dem2d_result dem2di_clean_polygon(const dem2d_env *env, dem2d_vec *points
         index[i] = i;
         double edge = dem2di_length(dem2di_sub(points[(i + 1) % n], points[i]));
         if (edge <= 4 * DBL_EPSILON * size)
-            return dem2di_fail(env, DEM2D_DUPLICATE_POINT, i, "points[%d] and the next coincide",
-                               i);
+            return dem2di_fail(env, DEM2D_DUPLICATE_POINT, i,
+                               "points[%d] and the next point coincide", i);
     }
     double area = dem2di_twice_area(points, n);
     if (fabs(area) <= 8 * DBL_EPSILON * size * extent)
@@ -2375,9 +2379,10 @@ static dem2d_result dem2di_clean_polygon(const dem2d_env *env, dem2d_vec *points
             return dem2di_fail(env, DEM2D_NOT_CONVEX, bad, "points[%d] is not a convex corner",
                                bad);
     } while (*count < n && *count >= 3);
-    if (*count < 3) return dem2di_fail(env, DEM2D_ZERO_AREA, -1, "the points are on one line");
+    if (*count < 3) return dem2di_fail(env, DEM2D_ZERO_AREA, -1, "all points are on one line");
     if (!dem2di_turns_once(points, *count))
-        return dem2di_fail(env, DEM2D_NOT_CONVEX, -1, "the polygon winds more than once");
+        return dem2di_fail(env, DEM2D_NOT_CONVEX, -1,
+                           "the polygon winds around its points more than once");
     return DEM2D_OK;
 }
 
@@ -3063,7 +3068,8 @@ static dem2d_shape *dem2di_shape_allocate(const dem2d_env *env, dem2d_shape_type
     dem2di_shape_layout(&plan);
     dem2d_shape *shape = (dem2d_shape *)dem2di_allocate(env, 1, plan.bytes);
     if (shape == NULL) {
-        (void)dem2di_fail(env, DEM2D_OUT_OF_MEMORY, -1, "shape of %.0f bytes", (double)plan.bytes);
+        (void)dem2di_fail(env, DEM2D_OUT_OF_MEMORY, -1, "no memory for a shape of %.0f bytes",
+                          (double)plan.bytes);
         return NULL;
     }
     memset((void *)shape, 0, plan.bytes);
@@ -3120,7 +3126,7 @@ DEM2D_API dem2d_result dem2d_shape_create_circle(const dem2d_env *env, double ra
     if (shape == NULL) return dem2di_fail_null(env, "shape");
     dem2d_result result = dem2di_check_not_negative(env, "radius", radius);
     if (result != DEM2D_OK) return result;
-    if (radius == 0) return dem2di_fail(env, DEM2D_ZERO_AREA, -1, "radius = 0");
+    if (radius == 0) return dem2di_fail(env, DEM2D_ZERO_AREA, -1, "radius = 0 must be above 0");
     double area = DEM2DI_PI * radius * radius, polar = area * radius * radius / 2;
     result = dem2di_check_mass(env, area, polar);
     if (result != DEM2D_OK) return result;
@@ -3170,7 +3176,8 @@ DEM2D_API dem2d_result dem2d_shape_create_ellipse(const dem2d_env *env, double a
     if (result == DEM2D_OK) result = dem2di_check_not_negative(env, "b", b);
     if (result != DEM2D_OK) return result;
     if (a == 0 || b == 0)
-        return dem2di_fail(env, DEM2D_ZERO_AREA, -1, "half axes a = %g, b = %g", a, b);
+        return dem2di_fail(env, DEM2D_ZERO_AREA, -1, "half axes a = %g, b = %g must be above 0", a,
+                           b);
     double area = DEM2DI_PI * a * b, polar = area * (a * a + b * b) / 4;
     result = dem2di_check_mass(env, area, polar);
     if (result == DEM2D_OK) result = dem2di_check_mass(env, a * a, b * b);
@@ -3228,7 +3235,7 @@ DEM2D_API dem2d_result dem2d_shape_create_polygon(const dem2d_env *env, const de
     if (result != DEM2D_OK) return result;
     size_t n = (size_t)count, size = sizeof(dem2d_vec) + sizeof(int);
     dem2d_vec *corners = (dem2d_vec *)dem2di_allocate(env, n, size);
-    if (corners == NULL) return dem2di_fail(env, DEM2D_OUT_OF_MEMORY, -1, "%d points", count);
+    if (corners == NULL) return dem2di_fail_memory(env, count, "corners");
     memcpy(corners, points, n * sizeof *corners);
     result = dem2di_clean_polygon(env, corners, (int *)(void *)(corners + count), &count);
     dem2d_shape *made = NULL;
@@ -3469,7 +3476,8 @@ static dem2d_result dem2di_check_arcs(const dem2d_env *env, const dem2di_arc *ar
         const dem2di_arc *arc = &arcs[k];
         double kink;
         if (dem2di_arc_side(arc, limits.rounding, false) == NULL)
-            return dem2di_fail(env, DEM2D_DUPLICATE_POINT, place, "arc %d is a point", place);
+            return dem2di_fail(env, DEM2D_DUPLICATE_POINT, place,
+                               "all control points of arc %d coincide", place);
         bool tiny = dem2di_arc_length(arc) <= limits.tiny;
         if (!tiny && !dem2di_arc_convex(arc, limits.rounding))
             return dem2di_fail(env, DEM2D_NOT_CONVEX, place, "arc %d is not convex", place);
@@ -3804,7 +3812,7 @@ static dem2d_result dem2di_bezier_parts(const dem2d_env *env, const dem2di_arc *
     dem2di_chain chain;
     size_t n = (size_t)count, size = 4 * sizeof(dem2d_vec) + 3 * sizeof(bool);
     chain.start = (dem2d_vec *)dem2di_allocate(env, n, size);
-    if (chain.start == NULL) return dem2di_fail(env, DEM2D_OUT_OF_MEMORY, -1, "%d arcs", count);
+    if (chain.start == NULL) return dem2di_fail_memory(env, count, "arcs");
     chain.d = chain.start + n;
     chain.tied = (bool *)(void *)(chain.d + 3 * n);
     chain.limits = limits;
@@ -3814,7 +3822,7 @@ static dem2d_result dem2di_bezier_parts(const dem2d_env *env, const dem2di_arc *
     *moved = chain.cornered + chain.aligned + chain.parted;
     dem2di_release(env, chain.start, n, size);
     if (good) return DEM2D_OK;
-    return dem2di_fail(env, DEM2D_NOT_CONVEX, -1, "the arcs are not convex to a sine of %g",
+    return dem2di_fail(env, DEM2D_NOT_CONVEX, -1, "the arcs are not convex within a sine of %g",
                        DEM2DI_SMOOTH);
 }
 
@@ -3910,7 +3918,7 @@ static dem2d_result dem2di_bezier_make(const dem2d_env *env, dem2di_arc *arcs, i
     dem2di_bezier_tangents(made, limits.rounding);
     if (dem2di_bezier_turns(made) != 1) {
         dem2d_shape_destroy(made);
-        return dem2di_fail(env, DEM2D_NOT_CONVEX, -1, "the arcs do not turn exactly once");
+        return dem2di_fail(env, DEM2D_NOT_CONVEX, -1, "the arcs do not make exactly one turn");
     }
     dem2di_finish_bezier(made);
     return dem2di_shape_finish(made, shape);
@@ -3923,7 +3931,7 @@ DEM2D_API dem2d_result dem2d_shape_create_bezier(const dem2d_env *env, const dem
                                                  int arcs, dem2d_shape **shape) {
     if (shape == NULL) return dem2di_fail_null(env, "shape");
     if (arcs < 2 || arcs > DEM2DI_MAX_ARCS)
-        return dem2di_fail(env, DEM2D_TOO_FEW_POINTS, -1, "arcs = %d, from 2 to %d", arcs,
+        return dem2di_fail(env, DEM2D_TOO_FEW_POINTS, -1, "arcs = %d is not 2 to %d", arcs,
                            DEM2DI_MAX_ARCS);
     dem2d_result result = dem2di_check_points(env, "control", control, 3 * arcs, 6);
     if (result != DEM2D_OK) return result;
@@ -3932,13 +3940,13 @@ DEM2D_API dem2d_result dem2d_shape_create_bezier(const dem2d_env *env, const dem
         extent = dem2di_max(extent, dem2di_length(dem2di_sub(control[i], control[0])));
     area = dem2di_twice_area(control, 3 * arcs);
     if (fabs(area) <= 8 * DBL_EPSILON * size * extent)
-        return dem2di_fail(env, DEM2D_ZERO_AREA, -1, "control polygon's area %g", area / 2);
+        return dem2di_fail(env, DEM2D_ZERO_AREA, -1, "the control polygon's area is %g", area / 2);
     dem2di_limits limits;
     limits.rounding = 8 * DBL_EPSILON * size;
     limits.tiny = dem2di_max(DEM2DI_TINY * extent, 4 * limits.rounding); /* has a direction */
     size_t n = (size_t)arcs, each = 4 * sizeof(dem2di_arc); /* an arc, and room for three parts */
     dem2di_arc *work = (dem2di_arc *)dem2di_allocate(env, n, each);
-    if (work == NULL) return dem2di_fail(env, DEM2D_OUT_OF_MEMORY, -1, "%d arcs", arcs);
+    if (work == NULL) return dem2di_fail_memory(env, arcs, "arcs");
     dem2di_arcs_from_control(control, arcs, area < 0, work);
     result = dem2di_check_arcs(env, work, arcs, area < 0, limits);
     if (result == DEM2D_OK) result = dem2di_bezier_make(env, work, arcs, limits, work + n, shape);
@@ -4043,7 +4051,7 @@ DEM2D_API dem2d_result dem2d_shape_create_fourier(const dem2d_env *env, const do
     /* a1, b1 move the shape: the copy has at least order 1, so that it can be recentred */
     int terms = order > 1 ? order + 1 : 2;
     double *copy = (double *)dem2di_allocate(env, (size_t)terms, 2 * sizeof *copy);
-    if (copy == NULL) return dem2di_fail(env, DEM2D_OUT_OF_MEMORY, -1, "order %d", order);
+    if (copy == NULL) return dem2di_fail_memory(env, order, "terms");
     double *ca = copy, *cb = copy + terms;
     for (int n = 0; n < terms; n++) {
         ca[n] = n <= order ? a[n] : 0;
@@ -4098,10 +4106,11 @@ DEM2D_API dem2d_result dem2d_shape_create_custom(const dem2d_env *env,
     made->inscribed = dem2di_min(desc->inscribed, dem2di_min(x, y));
     made->rho_min = desc->rho_min;
     if (!dem2di_finite(made->mass.area))
-        result = dem2di_fail(env, DEM2D_NOT_FINITE, -1, "support gives a non-finite point");
+        result = dem2di_fail(env, DEM2D_NOT_FINITE, -1,
+                             "the support function gives points that are not finite");
     else if (!(made->mass.area > 0 && made->mass.polar_moment > 0 && x > 0 && y > 0))
-        result =
-            dem2di_fail(env, DEM2D_ZERO_AREA, -1, "support gives an area of %g", made->mass.area);
+        result = dem2di_fail(env, DEM2D_ZERO_AREA, -1, "the support function gives an area of %g",
+                             made->mass.area);
     if (result != DEM2D_OK) {
         dem2d_shape_destroy(made);
         return result;
@@ -4945,23 +4954,23 @@ static void dem2di_report_findings(const dem2d_outline_set *set, const dem2di_pi
                                    const dem2di_findings *found) {
     const dem2d_env *env = &set->env;
     if (found->frames > 0)
-        (void)dem2di_fail(env, DEM2D_WARNING, -1,
-                          "%d frame%s left out, the first from row %d, column %d: what is inside "
-                          "counts by itself",
-                          found->frames, found->frames > 1 ? "s" : "",
-                          found->frame_row + p->desc.crop_top,
-                          found->frame_column + p->desc.crop_left);
+        (void)dem2di_fail(
+            env, DEM2D_WARNING, -1,
+            "%d frame%s left out, the first from row %d, column %d; the grains inside "
+            "are kept",
+            found->frames, found->frames > 1 ? "s" : "", found->frame_row + p->desc.crop_top,
+            found->frame_column + p->desc.crop_left);
     for (int i = 0; i < set->count; i++)
         if (dem2di_is_like_background(p, &set->grains[i]))
-            (void)dem2di_fail(env, DEM2D_WARNING, i,
-                              "outline %d has %d of %d by %d pixels, nearly all of its box: the "
-                              "ground in a frame? (threshold %d; crop, ignore_frame, bright)",
-                              i, set->grains[i].pixels, p->desc.width, p->desc.height,
-                              p->desc.threshold);
+            (void)dem2di_fail(
+                env, DEM2D_WARNING, i,
+                "outline %d has %d of %d by %d pixels, nearly all of its box: is it the "
+                "background in a frame? (threshold %d; crop, ignore_frame, bright)",
+                i, set->grains[i].pixels, p->desc.width, p->desc.height, p->desc.threshold);
     if (found->repeated > 0)
         (void)dem2di_fail(env, DEM2D_WARNING, -1,
-                          "%d grain%s with a label that another has, the first %d", found->repeated,
-                          found->repeated > 1 ? "s" : "", found->label);
+                          "%d grain%s with the label of another grain, the first %d",
+                          found->repeated, found->repeated > 1 ? "s" : "", found->label);
     if (set->count == 0 && found->border + found->small + found->large > 0)
         (void)dem2di_fail(
             env, DEM2D_WARNING, -1,
@@ -5024,8 +5033,8 @@ DEM2D_API dem2d_result dem2d_image_outlines(const dem2d_env *env, const dem2d_im
     }
     if (!room) {
         dem2d_outline_set_destroy(made);
-        return dem2di_fail(env, DEM2D_OUT_OF_MEMORY, -1, "outlines of %d by %d pixels", desc->width,
-                           desc->height);
+        return dem2di_fail(env, DEM2D_OUT_OF_MEMORY, -1,
+                           "no memory for outlines of %d by %d pixels", desc->width, desc->height);
     }
     *set = made;
     return DEM2D_OK;
@@ -5370,13 +5379,15 @@ static dem2d_result dem2di_check_crossing(const dem2d_env *env, const char *name
     if (s.edges != NULL)
         s.points = (dem2di_sweep_point *)dem2di_allocate(env, room, sizeof *s.points);
     if (s.points == NULL) {
-        result = dem2di_fail(env, DEM2D_OUT_OF_MEMORY, -1, "%s: %d points", name, count);
+        result =
+            dem2di_fail(env, DEM2D_OUT_OF_MEMORY, -1, "%s: no memory for %d points", name, count);
     } else if (!dem2di_sweep_run(&s, points, count)) {
         dem2d_vec where = dem2di_along(s.origin, s.size, s.where);
-        result = dem2di_fail(env, DEM2D_CROSSING, s.first,
-                             "%s: edges %d and %d cross, or go the same way, at (%.9g, %.9g); edge "
-                             "i begins at point i",
-                             name, s.first, s.second, where.x, where.y);
+        result =
+            dem2di_fail(env, DEM2D_CROSSING, s.first,
+                        "%s: edges %d and %d cross or overlap at (%.9g, %.9g); edge i begins at "
+                        "point i",
+                        name, s.first, s.second, where.x, where.y);
     }
     dem2di_release(env, s.points, room, sizeof *s.points);
     dem2di_release(env, s.edges, room, sizeof *s.edges);
@@ -5389,7 +5400,8 @@ static dem2d_result dem2di_check_outline(const dem2d_env *env, const char *name,
     dem2d_result result = dem2di_check_points(env, name, points, count, 3);
     if (result != DEM2D_OK) return result;
     result = dem2d_polygon_mass(points, count, mass);
-    if (result != DEM2D_OK) return dem2di_fail(env, result, -1, "%s: no area", name);
+    if (result != DEM2D_OK)
+        return dem2di_fail(env, result, -1, "%s: the outline has no area", name);
     return DEM2D_OK;
 }
 
@@ -5784,8 +5796,7 @@ static dem2d_result dem2di_measure(const dem2d_env *env, const dem2d_vec *points
     int n = dem2di_sides_make(points, count, info->mass.centroid, sides);
     for (int i = 0; i < n; i++) info->perimeter += dem2di_length(sides[i].e);
     info->circularity = 4 * DEM2DI_PI * info->mass.area / (info->perimeter * info->perimeter);
-    if (!dem2di_inscribed(env, sides, n, info))
-        return dem2di_fail(env, DEM2D_OUT_OF_MEMORY, -1, "inscribed circle of %d sides", n);
+    if (!dem2di_inscribed(env, sides, n, info)) return dem2di_fail_memory(env, n, "sides");
     info->roundness = dem2di_roundness(sides, n, info->perimeter, info->inscribed, room);
     return DEM2D_OK;
 }
@@ -5803,7 +5814,7 @@ DEM2D_API dem2d_result dem2d_outline_measure(const dem2d_env *env, const dem2d_v
     if (room != NULL)
         result = dem2di_measure(env, points, count, sides, room, &found);
     else
-        result = dem2di_fail(env, DEM2D_OUT_OF_MEMORY, -1, "measures of %d points", count);
+        result = dem2di_fail_memory(env, count, "points to measure");
     dem2di_release(env, room, size, sizeof *room);
     dem2di_release(env, sides, n, sizeof *sides);
     if (result == DEM2D_OK) *info = found;
@@ -6138,8 +6149,9 @@ DEM2D_API dem2d_result dem2d_outline_compare(const dem2d_env *env, const dem2d_v
             dem2di_hausdorff(env, reference, reference_count, other, other_count, &found.hausdorff);
     }
     if (!room)
-        return dem2di_fail(env, DEM2D_OUT_OF_MEMORY, -1, "difference of %d and %d points",
-                           reference_count, other_count);
+        return dem2di_fail(env, DEM2D_OUT_OF_MEMORY, -1,
+                           "no memory for the difference of %d and %d points", reference_count,
+                           other_count);
     *difference = found;
     return DEM2D_OK;
 }
@@ -6169,8 +6181,7 @@ static dem2d_result dem2di_outline_make(const dem2d_env *env, const dem2d_vec *p
     size_t n = (size_t)count;
     outline->count = count;
     outline->points = (dem2d_vec *)dem2di_allocate(env, 2 * n, sizeof(dem2d_vec));
-    if (outline->points == NULL)
-        return dem2di_fail(env, DEM2D_OUT_OF_MEMORY, -1, "outline of %d points", count);
+    if (outline->points == NULL) return dem2di_fail_memory(env, count, "points of an outline");
     outline->hull = outline->points + count;
     result = dem2d_polygon_hull(env, points, count, outline->hull, &outline->hull_count);
     if (result != DEM2D_OK) {
@@ -6214,10 +6225,11 @@ DEM2D_API dem2d_result dem2d_fourier_fit(const dem2d_env *env, const dem2d_vec *
                                          int order, int samples, double *a, double *b) {
     if (a == NULL || b == NULL) return dem2di_fail_null(env, "a or b");
     if (order < 0 || order > (1 << 20))
-        return dem2di_fail(env, DEM2D_OUT_OF_RANGE, order, "order = %d", order);
+        return dem2di_fail(env, DEM2D_OUT_OF_RANGE, order, "order = %d is not 0 to %d", order,
+                           1 << 20);
     if (samples == 0) samples = 16 * order + 64;
     if (samples <= 2 * order)
-        return dem2di_fail(env, DEM2D_OUT_OF_RANGE, samples, "samples = %d, above %d needed",
+        return dem2di_fail(env, DEM2D_OUT_OF_RANGE, samples, "samples = %d must be above %d",
                            samples, 2 * order);
     dem2di_outline outline;
     dem2d_result result = dem2di_outline_make(env, points, count, &outline);
@@ -6909,7 +6921,8 @@ static dem2d_result dem2di_swarm_section(const dem2d_env *env, const dem2di_sect
     dem2d_vec upper = dem2di_vec(dem2di_max(0, corner.x), dem2di_max(0, corner.y));
     size_t count = (size_t)inner + 2;
     dem2d_vec *points = (dem2d_vec *)dem2di_allocate(env, count, sizeof *points);
-    if (points == NULL) return dem2di_fail(env, DEM2D_OUT_OF_MEMORY, -1, "a section's picture");
+    if (points == NULL)
+        return dem2di_fail(env, DEM2D_OUT_OF_MEMORY, -1, "no memory for a picture of a section");
     points[0] = dem2di_vec(0, 0);
     for (int i = 0; i <= inner; i++) {
         dem2d_vec q =
@@ -6943,7 +6956,7 @@ static dem2d_result dem2di_swarm_section(const dem2d_env *env, const dem2di_sect
     }
     dem2di_release(env, points, count, sizeof *points);
     if (raster.mask == NULL)
-        return dem2di_fail(env, DEM2D_OUT_OF_MEMORY, -1, "a section's picture");
+        return dem2di_fail(env, DEM2D_OUT_OF_MEMORY, -1, "no memory for a picture of a section");
     dem2di_release(env, raster.mask, pixels, 1);
     return DEM2D_OK;
 }
@@ -7060,7 +7073,7 @@ static dem2d_result dem2di_bezier_fit(const dem2d_env *env, const dem2di_outline
     size_t count = (size_t)arcs;
     size_t size = sizeof(dem2di_joint) + sizeof(dem2di_straight) + 2 * sizeof(double);
     dem2di_joint *memory = (dem2di_joint *)dem2di_allocate(env, 2 * count, size);
-    if (memory == NULL) return dem2di_fail(env, DEM2D_OUT_OF_MEMORY, -1, "%d joints", arcs);
+    if (memory == NULL) return dem2di_fail_memory(env, arcs, "joints");
     dem2di_bezier_plan plan, spare;
     memset(&plan, 0, sizeof plan);
     plan.outline = outline;
@@ -7099,7 +7112,8 @@ DEM2D_API dem2d_result dem2d_bezier_fit(const dem2d_env *env, const dem2d_vec *p
                                         int arcs, dem2d_vec *control) {
     if (control == NULL) return dem2di_fail_null(env, "control");
     if (arcs < 3 || arcs > (1 << 20))
-        return dem2di_fail(env, DEM2D_OUT_OF_RANGE, arcs, "arcs = %d", arcs);
+        return dem2di_fail(env, DEM2D_OUT_OF_RANGE, arcs, "arcs = %d is not 3 to %d", arcs,
+                           1 << 20);
     dem2di_outline outline;
     int iterations = 0;
     dem2d_result result = dem2di_outline_make(env, points, count, &outline);
@@ -7385,7 +7399,7 @@ static dem2d_result dem2di_constrain_series(const dem2d_env *env, double *a, dou
     size_t room = (size_t)s.room, terms = (size_t)order + 1;
     size_t cells = 2 * terms + 5 * room + 2 * room * room; /* the flags fit into the fifth */
     double *memory = (double *)dem2di_allocate(env, cells, sizeof *memory);
-    if (memory == NULL) return dem2di_fail(env, DEM2D_OUT_OF_MEMORY, -1, "order %d", order);
+    if (memory == NULL) return dem2di_fail_memory(env, order, "terms");
     s.a0 = memory;
     s.b0 = memory + terms;
     memcpy(memory, a, terms * sizeof *memory);
@@ -7449,7 +7463,7 @@ static dem2d_result dem2di_fit_fourier(dem2di_fit *fit) {
     const dem2d_fit_desc *desc = fit->desc;
     size_t terms = (size_t)order + 1;
     double *a = (double *)dem2di_allocate(fit->env, terms, 2 * sizeof *a);
-    if (a == NULL) return dem2di_fail(fit->env, DEM2D_OUT_OF_MEMORY, -1, "order %d", order);
+    if (a == NULL) return dem2di_fail_memory(fit->env, order, "terms");
     double *b = a + terms;
     dem2d_result result = DEM2D_OK;
     dem2d_reduction_desc reduction = {DEM2D_SUFFICIENT, 0, 0};
@@ -7479,8 +7493,7 @@ static dem2d_result dem2di_fit_fourier(dem2di_fit *fit) {
 static dem2d_result dem2di_fit_bezier(dem2di_fit *fit) {
     size_t count = 3 * (size_t)fit->count;
     dem2d_vec *control = (dem2d_vec *)dem2di_allocate(fit->env, count, sizeof *control);
-    if (control == NULL)
-        return dem2di_fail(fit->env, DEM2D_OUT_OF_MEMORY, -1, "%d arcs", fit->count);
+    if (control == NULL) return dem2di_fail_memory(fit->env, fit->count, "arcs");
     const dem2d_fit_desc *desc = fit->desc;
     dem2di_swarm swarm;
     swarm.birds = desc->birds > 0 ? desc->birds : 30;
@@ -7574,7 +7587,7 @@ static dem2d_result dem2di_fit_polygon(dem2di_fit *fit) {
     int n = fit->outline.hull_count, m = fit->count;
     size_t room = 2 * (size_t)(n > m ? n : m);
     double *x = (double *)dem2di_allocate(fit->env, room, 2 * sizeof *x);
-    if (x == NULL) return dem2di_fail(fit->env, DEM2D_OUT_OF_MEMORY, -1, "%d corners", n);
+    if (x == NULL) return dem2di_fail_memory(fit->env, n, "corners");
     double *steps = x + room;
     dem2d_vec *corners = fit->outline.hull;
     if (n < m) { /* the hull itself has fewer corners */
@@ -7704,8 +7717,9 @@ static dem2d_result dem2di_fit_counts(dem2di_fit *fit) {
         if (result != DEM2D_OK || fit->report.coverage >= desc->coverage) return result;
         dem2d_shape_destroy(fit->shape);
     }
-    return dem2di_fail(fit->env, DEM2D_NOT_REACHED, -1, "coverage %g: %g is the last reached",
-                       desc->coverage, fit->report.coverage);
+    return dem2di_fail(fit->env, DEM2D_NOT_REACHED, -1,
+                       "coverage = %g is not reached, but %g with count %d", desc->coverage,
+                       fit->report.coverage, DEM2DI_FIT_COUNT);
 }
 
 DEM2D_API dem2d_result dem2d_outline_fit(const dem2d_env *env, const dem2d_vec *points, int count,
@@ -7728,7 +7742,7 @@ DEM2D_API dem2d_result dem2d_outline_fit(const dem2d_env *env, const dem2d_vec *
     if (result == DEM2D_OK) {
         fit.buffer = (dem2d_vec *)dem2di_allocate(env, room, sizeof *fit.buffer);
         if (fit.buffer == NULL)
-            result = dem2di_fail(env, DEM2D_OUT_OF_MEMORY, -1, "a candidate's outline");
+            result = dem2di_fail_memory(env, DEM2DI_FIT_POINTS, "points of a candidate");
     }
     if (result == DEM2D_OK) {
         fit.mass = dem2di_polygon_mass(fit.outline.points, count);
@@ -7769,9 +7783,10 @@ DEM2D_API dem2d_result dem2d_radial_compare(const dem2d_env *env, const dem2d_ve
     dem2d_result result = dem2di_check_good_outline(env, "points", points, count, &mass);
     if (result != DEM2D_OK) return result;
     if (order < 0 || order > (rays - 1) / 2)
-        return dem2di_fail(env, DEM2D_OUT_OF_RANGE, order, "order = %d", order);
+        return dem2di_fail(env, DEM2D_OUT_OF_RANGE, order, "order = %d is not 0 to %d", order,
+                           (rays - 1) / 2);
     dem2d_vec *fitted = (dem2d_vec *)dem2di_allocate(env, 2 * (size_t)rays, sizeof *fitted);
-    if (fitted == NULL) return dem2di_fail(env, DEM2D_OUT_OF_MEMORY, -1, "radial series");
+    if (fitted == NULL) return dem2di_fail_memory(env, rays, "rays");
     double *r = (double *)(void *)(fitted + rays), *sum = r + rays;
     for (int i = 0; i < rays; i++) {
         dem2d_rot z = dem2d_rot_make(2 * DEM2DI_PI * i / rays);

@@ -1204,7 +1204,7 @@ static void check_message(const test_env *env, const dem2d_vec *p, int n) {
     dem2d_vec at;
     assert_result(env->log.result, DEM2D_CROSSING);
     assert_int_equal(sscanf(env->log.text,
-                            "points: edges %d and %d cross, or go the same way, at (%lf, %lf)",
+                            "points: edges %d and %d cross or overlap at (%lf, %lf)",
                             &edge[0], &edge[1], &at.x, &at.y),
                      4);
     assert_int_equal(env->log.index, edge[0]);
