@@ -1,11 +1,13 @@
 /* stress [--quick] [CASE] - tries to break the solver: steps at their limit, ratios of stiffness,
    mass and size, speeds, overlaps, long runs, tall piles, needles, far places, units, changes in
-   the middle of a run, jamming, servo walls. Each row has a criterion that was fixed before it was
+   the middle of a run, jamming, servo walls; reversal, turning frames, load cycles, vibrations
+   (stress_motion.h). Each row has a criterion that was fixed before it was
    first run; a row that fails stays, and is told. CASE: only those whose name begins so. Exit
    status: 0, 1 if a row failed, 2 for bad usage. */
 #define DEM2D_IMPLEMENTATION
 #include "dem2d.h"
 #include "stress.h"
+#include "stress_motion.h"
 
 #include <time.h>
 
@@ -364,7 +366,7 @@ static void case_overlap(void) {
 static void case_gas(void) {
     for (int kind = 0; kind < KINDS; kind++) {
         char name[64];
-        stress_scene s = make_gas(kind, 1e-3, 1.0 / 200, 0);
+        stress_scene s = make_gas(kind, 1e-3, 1.0 / 200, 0, 1);
         const int64_t steps = quick ? 200000 : 1000000;
         const double worst = drift(&s, steps, 1000);
         const double most = kind == SHARP ? 1e-2 : 1e-4;
@@ -994,14 +996,26 @@ typedef struct stress_case {
 } stress_case;
 
 static const stress_case cases[] = {
-    {"step", case_step},       {"stiffness", case_stiffness},
-    {"mass", case_mass},       {"size", case_size},
-    {"speed", case_speed},     {"overlap", case_overlap},
-    {"gas", case_gas},         {"rest", case_rest},
-    {"pile", case_pile},       {"needle", case_needle},
-    {"far", case_far},         {"units", case_units},
-    {"gravity", case_gravity}, {"exchange", case_exchange},
-    {"squeeze", case_squeeze}, {"servo", case_servo},
+    {"step", case_step},
+    {"stiffness", case_stiffness},
+    {"mass", case_mass},
+    {"size", case_size},
+    {"speed", case_speed},
+    {"overlap", case_overlap},
+    {"gas", case_gas},
+    {"rest", case_rest},
+    {"pile", case_pile},
+    {"needle", case_needle},
+    {"far", case_far},
+    {"units", case_units},
+    {"gravity", case_gravity},
+    {"exchange", case_exchange},
+    {"squeeze", case_squeeze},
+    {"servo", case_servo},
+    {"reversal", case_reversal},
+    {"objectivity", case_objectivity},
+    {"ratcheting", case_ratcheting},
+    {"spectrum", case_spectrum},
 };
 
 int main(int argc, char **argv) {

@@ -261,7 +261,8 @@ static dem2d_world_desc pile_desc(void) {
 
 /* 64 grains of a kind, or of all (-1), fill 0.3 of a box. Two that meet head on overlap by this
    part of the radius; time steps are a part of the contact time. */
-static stress_scene make_gas(int kind, double overlap, double step_part, double tolerance) {
+static stress_scene make_gas(int kind, double overlap, double step_part, double tolerance,
+                             uint64_t seed) {
     enum { SIDE = 8, GRAINS = SIDE * SIDE };
     dem2d_world_desc d = {0};
     const double r = 0.5, area = PI * r * r, mass = glass.density * area;
@@ -270,6 +271,7 @@ static stress_scene make_gas(int kind, double overlap, double step_part, double 
     d.time_step = contact_time(mass, glass.normal_stiffness, true) * step_part;
     d.contact_tolerance = tolerance;
     stress_scene s = make_scene(&d, &glass);
+    random_state = seed;
     for (int i = 0; i < GRAINS; i++) {
         const dem2d_rot way = dem2d_rot_make(uniform(0, 2 * PI));
         const int variant = (kind >= 0 ? i : i / KINDS) % VARIANTS;
