@@ -1,7 +1,7 @@
 /* stress [--quick] [CASE] - tries to break the solver: steps at their limit, ratios of stiffness,
    mass and size, speeds, overlaps, long runs, tall piles, needles, far places, units, changes in
-   the middle of a run, jamming, servo walls; reversal, turning frames, load cycles, vibrations
-   (stress_motion.h). Each row has a criterion that was fixed before it was
+   the middle of a run, jamming, servo walls; motion there and back, in turning frames, under load
+   cycles and in its modes (stress_motion.h). Each row has a criterion that was fixed before it was
    first run; a row that fails stays, and is told. CASE: only those whose name begins so. Exit
    status: 0, 1 if a row failed, 2 for bad usage. */
 #define DEM2D_IMPLEMENTATION
