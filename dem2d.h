@@ -1425,9 +1425,9 @@ typedef struct dem2d_stats {
     double time;           ///< s, the sum of their time steps
     int64_t list_rebuilds; ///< of the pair list
     int64_t support_calls; ///< in all steps
-    int64_t looks; ///< collisions of pairs whose bounding circles overlap, not skipped, all steps
-    int64_t gaps;  ///< looks that found them apart
-    int64_t proofs[DEM2D_PROOF_COUNT]; ///< of the other looks, by what proves them
+    int64_t collisions;  ///< of pairs whose bounding circles overlap and are not skipped, all steps
+    int64_t separations; ///< collisions that found the pair separated
+    int64_t proofs[DEM2D_PROOF_COUNT]; ///< number of the other collisions, by their proof
     int64_t not_converged;             ///< contacts whose search reached its cap, in all steps
     int64_t slow_time_step;            ///< checks that found the time step above the safe bound
     int64_t fast_motion;               ///< checks that found a particle fast enough to pass others
@@ -10699,7 +10699,7 @@ typedef struct dem2di_list {
 
 /* What the contact passes count. */
 typedef struct dem2di_count {
-    int64_t calls, looks, gaps, proofs[DEM2D_PROOF_COUNT];
+    int64_t calls, collisions, separations, proofs[DEM2D_PROOF_COUNT];
     int64_t unsound; /* forces that are not finite */
 } dem2di_count;
 
@@ -13088,7 +13088,7 @@ static void dem2di_disc_range(const dem2d_world *world, int begin, int end, dem2
         else
             closed += dem2di_disc_batch(world, first, n, false, false, plan->one_law);
     }
-    count->looks += closed;
+    count->collisions += closed;
     count->proofs[DEM2D_BY_FORM] += closed;
 }
 
@@ -13138,14 +13138,14 @@ static int dem2di_shapes_look(const dem2d_world *world, dem2di_pair *pair, const
                               dem2di_link *link, dem2d_contact_point points[2], double *gap,
                               dem2di_count *count) {
     dem2di_search search;
-    count->looks++;
+    count->collisions++;
     dem2di_pair_search(world, pair, last, &search);
     count->calls += pair->calls;
     link->normal.x = search.normal.x; /* not as one: it has just been stored in two */
     link->normal.y = search.normal.y;
     link->feature = search.feature;
     if (!(search.upper > 0)) {
-        count->gaps++;
+        count->separations++;
         *gap = -search.upper;
         return 0;
     }
@@ -13163,7 +13163,7 @@ static int dem2di_round_geometry(const dem2di_state *a, const dem2di_state *b, d
     link->normal = round.normal;
     link->depth = round.depth;
     points[0].position = dem2di_vec(0, 0); /* what circles have follows from the depth */
-    count->looks++;
+    count->collisions++;
     count->proofs[DEM2D_BY_FORM]++;
     return round.depth > 0;
 }
@@ -13648,8 +13648,8 @@ static void dem2di_contact_task(void *context, int begin, int end) {
 
 static void dem2di_count_add(dem2di_count *sum, const dem2di_count *part) {
     sum->calls += part->calls;
-    sum->looks += part->looks;
-    sum->gaps += part->gaps;
+    sum->collisions += part->collisions;
+    sum->separations += part->separations;
     sum->unsound += part->unsound;
     for (int k = 0; k < DEM2D_PROOF_COUNT; k++) sum->proofs[k] += part->proofs[k];
 }
@@ -14470,8 +14470,8 @@ DEM2D_API dem2d_result dem2d_world_stats(const dem2d_world *world, dem2d_stats *
     stats->time = dem2di_time(world);
     stats->list_rebuilds = world->rebuilds;
     stats->support_calls = world->count.calls;
-    stats->looks = world->count.looks;
-    stats->gaps = world->count.gaps;
+    stats->collisions = world->count.collisions;
+    stats->separations = world->count.separations;
     memcpy(stats->proofs, world->count.proofs, sizeof stats->proofs);
     stats->not_converged = world->count.proofs[DEM2D_BY_NOTHING];
     stats->slow_time_step = world->slow_time_step;
@@ -15688,8 +15688,8 @@ static void dem2di_archive_progress(dem2di_archive *ar, dem2d_world *w) {
     dem2di_archive_tally(ar, "slow_time_step", &w->slow_time_step);
     dem2di_archive_tally(ar, "fast_motion", &w->fast_motion);
     dem2di_archive_tally(ar, "support_calls", &w->count.calls);
-    dem2di_archive_tally(ar, "looks", &w->count.looks);
-    dem2di_archive_tally(ar, "gaps", &w->count.gaps);
+    dem2di_archive_tally(ar, "collisions", &w->count.collisions);
+    dem2di_archive_tally(ar, "separations", &w->count.separations);
     dem2di_archive_tally(ar, "unsound", &w->count.unsound);
     for (int k = 0; k < DEM2D_PROOF_COUNT; k++)
         dem2di_archive_tally(ar, "proofs", &w->count.proofs[k]);
@@ -16994,6 +16994,7 @@ DEM2D_API dem2d_result dem2d_world_write_csv(const dem2d_world *world, const dem
             Writers: an SVG picture has a view, half-planes beside the grains, marks of fixed and
             driven grains, and chains no wider than grains. Numbers have a decimal point in every
             locale. desc may be NULL in dem2d_world_write_svg and dem2d_world_load.
+            Names: dem2d_stats.looks -> collisions, gaps -> separations.
             Log and compilers: warnings have the result DEM2D_WARNING. The header refuses the parts
             of -ffast-math that the compiler tells it of. After the implementation clang is back at
             the contraction of its command line, on every target.

@@ -741,7 +741,7 @@ typedef struct figure {
 
 /* Of the pairs found in contact, those proved in a way. */
 static double share(const dem2d_stats *stats, dem2d_proof proof) {
-    const double found = (double)(stats->looks - stats->gaps);
+    const double found = (double)(stats->collisions - stats->separations);
     return found > 0 ? 100 * (double)stats->proofs[proof] / found : 0;
 }
 
@@ -792,7 +792,7 @@ static bool report(const job *j, const options *o, double strain) {
     for (int i = 0; i < j->block_count; i++) peak = fmax(peak, j->blocks[i]);
     dem2d_stats stats;
     must(dem2d_world_stats(j->world, &stats), "stats");
-    const double looks = stats.looks > 0 ? (double)stats.looks : 1;
+    const double collisions = stats.collisions > 0 ? (double)stats.collisions : 1;
     const loading end = measure_loading(j);
     const dem2d_fabric *f = &end.fabric;
     const double degree = 3.141592653589793 / 180;
@@ -829,11 +829,12 @@ static bool report(const job *j, const options *o, double strain) {
         {"anisotropy_shear_forces", f->tangential_forces.coefficient, "-", FINITE, FINITE},
         {"mean_normal_force", f->mean_force, "N/m", FINITE, FINITE},
         {"mean_shear_force", end.shear, "N/m", FINITE, FINITE},
-        {"looks_per_step", (double)stats.looks / steps, "-", FINITE, FINITE},
-        {"support_calls_per_look", (double)stats.support_calls / looks, "-", FINITE, FINITE},
+        {"collisions_per_step", (double)stats.collisions / steps, "-", FINITE, FINITE},
+        {"support_calls_per_collision", (double)stats.support_calls / collisions, "-", FINITE,
+         FINITE},
         {"near_pairs_skipped_percent",
          j->near_pairs > 0
-             ? 100 - 100 * (double)stats.gaps / steps * j->near_samples / j->near_pairs
+             ? 100 - 100 * (double)stats.separations / steps * j->near_samples / j->near_pairs
              : 0,
          "%", FINITE, FINITE},
         {"proved_by_form_percent", share(&stats, DEM2D_BY_FORM), "%", FINITE, FINITE},

@@ -259,8 +259,9 @@ static void case_size(void) {
     const double worst = drift(&s, steps, 100);
     const bool in = inside_box(&s, 2.1);
     const dem2d_stats n = stats_of(&s.base);
-    row(worst < 1e-4 && in && n.looks > 0, "ratio of size 1e3: gas", "energy to 1e-4, none lost",
-        "%.1e, %s; %d looks", worst, in ? "none" : "LOST", (int)n.looks);
+    row(worst < 1e-4 && in && n.collisions > 0, "ratio of size 1e3: gas",
+        "energy to 1e-4, none lost", "%.1e, %s; %d collisions", worst, in ? "none" : "LOST",
+        (int)n.collisions);
     end_scene(&s);
 }
 
@@ -536,7 +537,7 @@ static void needles(bool ellipse) {
         ellipse ? "needle: gas of ellipses, 50:1" : "needle: gas of polygons, 50:1",
         ellipse ? "energy to 1e-4, all converged, none lost"
                 : "energy to 1e-2, all converged, none lost",
-        "%.1e, %lld; %.1e looks", worst, (long long)n.not_converged, (double)n.looks);
+        "%.1e, %lld; %.1e collisions", worst, (long long)n.not_converged, (double)n.collisions);
     end_scene(&s);
 }
 

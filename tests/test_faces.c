@@ -1589,14 +1589,14 @@ static int step_and_compare(const gas *g) {
 
 static void assert_counts(const scene *s) {
     const dem2d_stats n = stats(s);
-    int64_t sum = n.gaps;
+    int64_t sum = n.separations;
     for (int i = 0; i < DEM2D_PROOF_COUNT; i++) {
         assert_true(n.proofs[i] >= 0);
         sum += n.proofs[i];
     }
-    assert_true(n.looks > 0 && n.gaps > 0);
-    assert_true(n.looks == sum);
-    assert_true(n.looks <= (int64_t)GRAINS * GRAINS / 2 * n.steps);
+    assert_true(n.collisions > 0 && n.separations > 0);
+    assert_true(n.collisions == sum);
+    assert_true(n.collisions <= (int64_t)GRAINS * GRAINS / 2 * n.steps);
 }
 
 /* Every overlap is met in the step where it begins, for all shapes, solvers and rules; and of some
@@ -1634,7 +1634,7 @@ static void test_no_contact_is_late(void **state) {
     }
 }
 
-/* --- skipped looks --------------------------------------------------------------------------- */
+/* --- skipped collisions ---------------------------------------------------------------------- */
 
 enum { ROW = 8 };
 
@@ -1652,8 +1652,8 @@ static scene make_lattice(dem2d_particle_id *ids) {
     return s;
 }
 
-/* Gaps are 0.1 and more, the way in 5000 steps is 0.01: a few looks would do. */
-static void test_skipped_looks(void **state) {
+/* Gaps are 0.1 and more, the way in 5000 steps is 0.01: a few collisions would do. */
+static void test_skipped_collisions(void **state) {
     (void)state;
     dem2d_particle_id ids[ROW * ROW];
     const scene s = make_lattice(ids);
@@ -1661,10 +1661,10 @@ static void test_skipped_looks(void **state) {
     const dem2d_stats n = stats(&s);
     assert_true(n.pairs >= 2 * ROW * (ROW - 1)); /* or there was nothing to skip */
     assert_int_equal(n.contacts, 0);
-    assert_true(n.looks >= n.gaps);
-    print_message("skipped looks: %lld at %d pairs in %lld steps\n", (long long)n.looks, n.pairs,
-                  (long long)n.steps);
-    assert_true(n.looks <= (int64_t)20 * n.pairs);
+    assert_true(n.collisions >= n.separations);
+    print_message("skipped collisions: %lld at %d pairs in %lld steps\n", (long long)n.collisions,
+                  n.pairs, (long long)n.steps);
+    assert_true(n.collisions <= (int64_t)20 * n.pairs);
     dem2d_world_destroy(s.world);
 }
 
@@ -1733,7 +1733,7 @@ int main(void) {
         cmocka_unit_test(test_reports),
         cmocka_unit_test(test_one_point_reports),
         cmocka_unit_test(test_no_contact_is_late),
-        cmocka_unit_test(test_skipped_looks),
+        cmocka_unit_test(test_skipped_collisions),
         cmocka_unit_test(test_skips_end_at_once),
     };
     return cmocka_run_group_tests(tests, make_shapes, destroy_shapes);

@@ -495,9 +495,9 @@ static void put_stats(numbers *n, const dem2d_world *world) {
     dem2d_stats s;
     assert_ok(dem2d_world_stats(world, &s));
     for (int i = 0; i < DEM2D_PROOF_COUNT; i++) PUT(n, (double)s.proofs[i]);
-    PUT(n, (double)s.steps, (double)s.list_rebuilds, (double)s.support_calls, (double)s.looks,
-        (double)s.gaps, (double)s.not_converged, (double)s.slow_time_step, (double)s.fast_motion,
-        s.particles, s.walls, s.pairs, s.contacts, s.wall_contacts);
+    PUT(n, (double)s.steps, (double)s.list_rebuilds, (double)s.support_calls, (double)s.collisions,
+        (double)s.separations, (double)s.not_converged, (double)s.slow_time_step,
+        (double)s.fast_motion, s.particles, s.walls, s.pairs, s.contacts, s.wall_contacts);
 }
 
 static void put_state(numbers *n, const run *r) {

@@ -229,8 +229,9 @@ static void run(const scene *s, int power, numbers *n) {
         put_walls(n, world, walls, s->chain ? WALLS : 4);
     }
     assert_ok(dem2d_world_stats(world, &stats));
-    PUT(n, "counters", 0, (double)stats.looks, (double)stats.gaps, (double)stats.support_calls,
-        (double)stats.list_rebuilds, stats.pairs, stats.contacts, stats.wall_contacts);
+    PUT(n, "counters", 0, (double)stats.collisions, (double)stats.separations,
+        (double)stats.support_calls, (double)stats.list_rebuilds, stats.pairs, stats.contacts,
+        stats.wall_contacts);
     assert_true(contacts > 30 && stats.wall_contacts > 3 && stats.list_rebuilds > 1);
     dem2d_world_destroy(world);
 }
