@@ -26,6 +26,7 @@ CONTENTS (search for the anchor, ">>" and the word)
     Implementation  compiler, constants, floating point                     >>config
                     vectors, rotations, sine and cosine                     >>math
                     allocation, log, growing arrays                         >>memory
+                    fields of structs and their ranges                      >>fields
                     convex hulls, polygon checks                            >>hull
                     trigonometric polynomials                               >>series
                     support kernels                                         >>support
@@ -767,8 +768,8 @@ DEM2D_API dem2d_result dem2d_shape_create_polygon(const dem2d_env *env, const de
 /// straight within the rounding of its coordinates. Their distance from the given arcs is the
 /// `deviation` of dem2d_shape_info; the error of every contact includes it. Mass, outline, bounding
 /// box, dem2d_shape_support and dem2d_wall_contact use the given arcs. Errors: NOT_FINITE,
-/// TOO_FEW_POINTS (also too many arcs), NOT_CONVEX, NOT_SMOOTH, DUPLICATE_POINT (all control points
-/// of an arc coincide), ZERO_AREA.
+/// TOO_FEW_POINTS, OUT_OF_RANGE (too many arcs), NOT_CONVEX, NOT_SMOOTH, DUPLICATE_POINT (all
+/// control points of an arc coincide), ZERO_AREA.
 DEM2D_API dem2d_result dem2d_shape_create_bezier(const dem2d_env *env, const dem2d_vec *control,
                                                  int arcs, dem2d_shape **shape);
 /// Support function p(t) = a[0]/2 + sum over n = 1..order of a[n] cos nt + b[n] sin nt ([F]
@@ -1721,10 +1722,10 @@ typedef struct dem2d_load_desc {
 /// storage order, skin, compiler and machine. Not included: counters, the neighbour list,
 /// callbacks, free ids. 0 for NULL.
 DEM2D_API uint64_t dem2d_world_hash(const dem2d_world *world);
-/// Write all of a world to desc->write, or to a file if path is not NULL. The file is written as
-/// path + ".part", then renamed: an old file is replaced only by a complete one. The bytes are the
-/// same on any machine. Allocates only the file name. Errors: NULL_ARGUMENT, OUT_OF_RANGE (both
-/// path and write), OUT_OF_MEMORY, IO.
+/// Write all of a world to desc->write, or to a file if path is not NULL (desc may then be NULL).
+/// The file is written as path + ".part", then renamed: an old file is replaced only by a complete
+/// one. The bytes are the same on any machine. Allocates only the file name. Errors: NULL_ARGUMENT,
+/// OUT_OF_RANGE (both path and write), OUT_OF_MEMORY, IO.
 DEM2D_API dem2d_result dem2d_world_save(const dem2d_world *world, const dem2d_save_desc *desc,
                                         const char *path);
 /// Create the world of a snapshot. All ids stay valid, and its steps and statistics (except bytes)
@@ -1800,7 +1801,8 @@ DEM2D_API dem2d_result dem2d_world_write_svg(const dem2d_world *world, const dem
 /// material, motion, contacts (walls not counted), velocity (mean of the half steps),
 /// angular_velocity, angle, mass, radius (equivalent), stress (3 x 3); of contacts: a, b, wall
 /// (indices, or -1), points, normal, force (on B), position, normal_force, tangential_force,
-/// moment, depth; of walls: id, mode, velocity (mean of the half steps), force, stress.
+/// moment, depth; of walls: id, mode, velocity (mean of the half steps), force, stress. desc may be
+/// NULL: all zero.
 DEM2D_API dem2d_result dem2d_world_write_vtp(const dem2d_world *world, const dem2d_vtp_desc *desc,
                                              const char *path);
 /// Write a collection of files that make a series in time. env (may be NULL) gets the messages.
@@ -1809,7 +1811,7 @@ DEM2D_API dem2d_result dem2d_pvd_write(const dem2d_env *env, const dem2d_pvd_des
 /// Write a row: step, time (dem2d_stats), translational, rotational, normal, tangential, rolling,
 /// potential (dem2d_energy), kinetic_ratio, mean_speed, max_speed, unbalanced (dem2d_equilibrium),
 /// coordination, coordination_loaded, rattlers (dem2d_packing), contacts, wall_contacts,
-/// max_overlap, then the caller's columns.
+/// max_overlap, then the caller's columns. desc may be NULL: all zero.
 DEM2D_API dem2d_result dem2d_world_write_csv(const dem2d_world *world, const dem2d_csv_desc *desc,
                                              const char *path);
 
@@ -2099,7 +2101,7 @@ static dem2d_principal dem2di_tensor_principal(dem2di_tensor t) {
 
 /* ============================================================================================
    >>memory  Allocation by the environment, results and the log
-   uses: config, math
+   uses: config
    ============================================================================================ */
 
 DEM2D_API int dem2d_version(void) {
@@ -2189,29 +2191,154 @@ static bool dem2di_reserve(const dem2d_env *env, void **array, int *capacity, in
     return true;
 }
 
-/* Errors of numbers: each names the field and the value. */
-static dem2d_result dem2di_check_finite(const dem2d_env *env, const char *name, double value) {
-    if (dem2di_finite(value)) return DEM2D_OK;
-    return dem2di_fail(env, DEM2D_NOT_FINITE, -1, "%s = %g is not finite", name, value);
+/* ============================================================================================
+   >>fields  Fields of structs as data: name, place, type, range; one check for all of them
+   uses: config, math, memory
+
+   Each desc has a table with a row for each field, in their order. One function checks a desc by
+   its table; rules between fields are code beside the table. To add a field, declare it in the
+   struct with its comment and give it a row: tests/test_header.c then says which line the manual's
+   OPTIONS needs, and tests/test_misuse.c tries what is out of its range.
+   ============================================================================================ */
+
+/* Both components of a vector are in the range. Any value is right for the last three. */
+typedef enum dem2di_type {
+    DEM2DI_DOUBLE,
+    DEM2DI_VEC,
+    DEM2DI_INT,
+    DEM2DI_ENUM,
+    DEM2DI_POINTER, /* as a number 1, NULL 0 */
+    DEM2DI_BOOL,
+    DEM2DI_ID,
+    DEM2DI_UINT64
+} dem2di_type;
+
+enum { DEM2DI_ABOVE = 1, DEM2DI_BELOW = 2, DEM2DI_OR_0 = 4 }; /* not low; not high; 0 as well */
+
+typedef struct dem2di_field {
+    const char *name; /* in a struct inside: "view.lower" */
+    double low, high; /* DBL_MAX: no bound */
+    uint8_t flags, type, size;
+    uint16_t offset;
+#ifdef DEM2DI_FIELD_TEXTS
+    const char *text; /* for OPTIONS: "unit default; note" */
+#endif
+} dem2di_field;
+
+#ifdef DEM2DI_FIELD_TEXTS
+#define DEM2DI_FIELD_TEXT(text) , text
+#else
+#define DEM2DI_FIELD_TEXT(text)
+#endif
+#define DEM2DI_ROW(of, field, range, text) \
+    { #field, range, sizeof(((of *)0)->field), offsetof(of, field) DEM2DI_FIELD_TEXT(text) }
+#define DEM2DI_ALL(fields) fields, (int)(sizeof(fields) / sizeof *(fields))
+
+/* Ranges: low, high, flags, type. */
+#define DEM2DI_NUMBER(low, high, flags) low, high, flags, DEM2DI_DOUBLE
+#define DEM2DI_FINITE DEM2DI_NUMBER(-DBL_MAX, DBL_MAX, 0)
+#define DEM2DI_POSITIVE DEM2DI_NUMBER(0, DBL_MAX, DEM2DI_ABOVE)
+#define DEM2DI_FROM_0 DEM2DI_NUMBER(0, DBL_MAX, 0)
+#define DEM2DI_FRACTION DEM2DI_NUMBER(0, 1, DEM2DI_BELOW)
+#define DEM2DI_VECTOR -DBL_MAX, DBL_MAX, 0, DEM2DI_VEC
+#define DEM2DI_WHOLE(low, high) low, high, 0, DEM2DI_INT
+#define DEM2DI_WHOLE_OR_0(low, high) low, high, DEM2DI_OR_0, DEM2DI_INT
+#define DEM2DI_COUNT DEM2DI_WHOLE(0, DBL_MAX)
+#define DEM2DI_TAG DEM2DI_WHOLE(-DBL_MAX, DBL_MAX)
+#define DEM2DI_CHOICE(count) 0, (int)(count)-1, 0, DEM2DI_ENUM
+#define DEM2DI_REQUIRED 1, 1, 0, DEM2DI_POINTER
+#define DEM2DI_OPTIONAL 0, 1, 0, DEM2DI_POINTER
+#define DEM2DI_SWITCH 0, 0, 0, DEM2DI_BOOL
+#define DEM2DI_HANDLE 0, 0, 0, DEM2DI_ID
+#define DEM2DI_SEED 0, 0, 0, DEM2DI_UINT64
+
+/* A field's number, or a component of its vector. Where enums are short they take one byte. */
+static double dem2di_field_value(const dem2di_field *field, const void *of, int part) {
+    static const char null[2 * sizeof(void *)] = {0};
+    const char *at = (const char *)of + field->offset;
+    double number = 0;
+    int whole;
+    if (field->type == DEM2DI_DOUBLE || field->type == DEM2DI_VEC) {
+        memcpy(&number, at + (size_t)part * sizeof number, sizeof number);
+    } else if (field->type == DEM2DI_INT || field->type == DEM2DI_ENUM) {
+        if (field->size < sizeof whole) return *(const unsigned char *)at;
+        memcpy(&whole, at, sizeof whole);
+        number = whole;
+    } else if (field->type == DEM2DI_POINTER) {
+        number = memcmp(at, null, field->size) != 0;
+    }
+    return number;
+}
+
+/* What is not finite is in no range. */
+static bool dem2di_in_range(const dem2di_field *field, double value) {
+    bool above = (field->flags & DEM2DI_ABOVE) != 0, below = (field->flags & DEM2DI_BELOW) != 0;
+    if (value == 0 && (field->flags & DEM2DI_OR_0) != 0) return true;
+    return (above ? value > field->low : value >= field->low) &&
+           (below ? value < field->high : value <= field->high);
+}
+
+/* A range as text: "> 0", "in [0, 1)", "0 or 2 to 256". */
+static void dem2di_range_text(const dem2di_field *field, char text[64]) {
+    bool above = (field->flags & DEM2DI_ABOVE) != 0, below = (field->flags & DEM2DI_BELOW) != 0;
+    const char *zero = (field->flags & DEM2DI_OR_0) != 0 ? "0 or " : "";
+    if (field->high == DBL_MAX)
+        (void)snprintf(text, 64, "%s%s %.10g", zero, above ? ">" : ">=", field->low);
+    else if (above || below)
+        (void)snprintf(text, 64, "%sin %c%.10g, %.10g%c", zero, above ? '(' : '[', field->low,
+                       field->high, below ? ')' : ']');
+    else
+        (void)snprintf(text, 64, "%s%.10g to %.10g", zero, field->low, field->high);
+}
+
+static dem2d_result dem2di_check_value(const dem2d_env *env, const dem2di_field *field,
+                                       double value) {
+    char range[64];
+    if (dem2di_in_range(field, value)) return DEM2D_OK;
+    if (field->type == DEM2DI_POINTER) return dem2di_fail_null(env, field->name);
+    if (!dem2di_finite(value))
+        return dem2di_fail(env, DEM2D_NOT_FINITE, -1, "%s = %g is not finite", field->name, value);
+    if (env == NULL) return DEM2D_OUT_OF_RANGE;
+    dem2di_range_text(field, range);
+    return dem2di_fail(env, DEM2D_OUT_OF_RANGE, -1, "%s = %.10g is not %s", field->name, value,
+                       range);
+}
+
+/* The error names the first field that is out of its range. */
+static dem2d_result dem2di_check_fields(const dem2d_env *env, const dem2di_field *fields, int count,
+                                        const void *of) {
+    dem2d_result result = DEM2D_OK;
+    for (int i = 0; i < count && result == DEM2D_OK; i++)
+        for (int k = 0; k <= (fields[i].type == DEM2DI_VEC) && result == DEM2D_OK; k++)
+            result = dem2di_check_value(env, &fields[i], dem2di_field_value(&fields[i], of, k));
+    return result;
+}
+
+/* A value for the field at this offset alone. */
+static dem2d_result dem2di_check_one(const dem2d_env *env, const dem2di_field *fields,
+                                     size_t offset, const void *value) {
+    while (fields->offset != offset) fields++;
+    dem2di_field field = *fields;
+    field.offset = 0;
+    return dem2di_check_fields(env, &field, 1, value);
+}
+
+/* A number that is no field, or whose range follows from other fields: the last four. */
+static dem2d_result dem2di_check_number(const dem2d_env *env, const char *name, double value,
+                                        double low, double high, int flags, dem2di_type type) {
+    dem2di_field field;
+    memset(&field, 0, sizeof field);
+    field.name = name;
+    field.low = low;
+    field.high = high;
+    field.flags = (uint8_t)flags;
+    field.type = (uint8_t)type;
+    return dem2di_check_value(env, &field, value);
 }
 
 static dem2d_result dem2di_check_vec(const dem2d_env *env, const char *name, dem2d_vec value) {
-    if (dem2di_vec_finite(value)) return DEM2D_OK;
-    return dem2di_fail(env, DEM2D_NOT_FINITE, -1, "%s = (%g, %g) is not finite", name, value.x,
-                       value.y);
-}
-
-static dem2d_result dem2di_check_positive(const dem2d_env *env, const char *name, double value) {
-    dem2d_result result = dem2di_check_finite(env, name, value);
-    if (result != DEM2D_OK || value > 0) return result;
-    return dem2di_fail(env, DEM2D_OUT_OF_RANGE, -1, "%s = %g must be above 0", name, value);
-}
-
-static dem2d_result dem2di_check_not_negative(const dem2d_env *env, const char *name,
-                                              double value) {
-    dem2d_result result = dem2di_check_finite(env, name, value);
-    if (result != DEM2D_OK || value >= 0) return result;
-    return dem2di_fail(env, DEM2D_OUT_OF_RANGE, -1, "%s = %g must not be negative", name, value);
+    dem2d_result result = dem2di_check_number(env, name, value.x, DEM2DI_FINITE);
+    return result == DEM2D_OK ? dem2di_check_number(env, name, value.y, DEM2DI_FINITE) : result;
 }
 
 /* Points of a caller: not NULL, at least `least` of them, finite. */
@@ -2230,7 +2357,7 @@ static dem2d_result dem2di_check_points(const dem2d_env *env, const char *name,
 
 /* ============================================================================================
    >>hull  Convex hulls and the checks of convex polygons
-   uses: config, math, memory
+   uses: config, math, memory, fields
    ============================================================================================ */
 
 static int dem2di_compare_points(const void *a, const void *b) {
@@ -2843,7 +2970,7 @@ static inline dem2d_vec dem2di_support(const dem2d_shape *shape, dem2d_vec u, do
 
 /* ============================================================================================
    >>mass  Area, centroid and polar moment: exact per model, and by interpolation
-   uses: config, math, memory, hull, series, support
+   uses: config, math, fields, hull, series, support
    ============================================================================================ */
 
 /* Area and moments about the origin, summed over pieces. */
@@ -3039,7 +3166,7 @@ DEM2D_API dem2d_result dem2d_shape_mass_interpolated(const dem2d_shape *shape, i
 
 /* ============================================================================================
    >>shapes  Creation with validation; queries that need only support points
-   uses: config, math, memory, hull, series, support, mass
+   uses: config, math, memory, fields, hull, series, support, mass
    ============================================================================================ */
 
 /* The sector table has four to eight entries for each corner or part, so that most look-ups need no
@@ -3124,7 +3251,7 @@ static double dem2di_half_width(const dem2d_shape *shape, double x, double y) {
 DEM2D_API dem2d_result dem2d_shape_create_circle(const dem2d_env *env, double radius,
                                                  dem2d_shape **shape) {
     if (shape == NULL) return dem2di_fail_null(env, "shape");
-    dem2d_result result = dem2di_check_not_negative(env, "radius", radius);
+    dem2d_result result = dem2di_check_number(env, "radius", radius, DEM2DI_FROM_0);
     if (result != DEM2D_OK) return result;
     if (radius == 0) return dem2di_fail(env, DEM2D_ZERO_AREA, -1, "radius = 0 must be above 0");
     double area = DEM2DI_PI * radius * radius, polar = area * radius * radius / 2;
@@ -3172,8 +3299,8 @@ static void dem2di_ellipse_least_rho(dem2d_shape *shape) {
 DEM2D_API dem2d_result dem2d_shape_create_ellipse(const dem2d_env *env, double a, double b,
                                                   dem2d_shape **shape) {
     if (shape == NULL) return dem2di_fail_null(env, "shape");
-    dem2d_result result = dem2di_check_not_negative(env, "a", a);
-    if (result == DEM2D_OK) result = dem2di_check_not_negative(env, "b", b);
+    dem2d_result result = dem2di_check_number(env, "a", a, DEM2DI_FROM_0);
+    if (result == DEM2D_OK) result = dem2di_check_number(env, "b", b, DEM2DI_FROM_0);
     if (result != DEM2D_OK) return result;
     if (a == 0 || b == 0)
         return dem2di_fail(env, DEM2D_ZERO_AREA, -1, "half axes a = %g, b = %g must be above 0", a,
@@ -3231,7 +3358,7 @@ DEM2D_API dem2d_result dem2d_shape_create_polygon(const dem2d_env *env, const de
                                                   int count, double rounding, dem2d_shape **shape) {
     if (shape == NULL) return dem2di_fail_null(env, "shape");
     dem2d_result result = dem2di_check_points(env, "points", points, count, 3);
-    if (result == DEM2D_OK) result = dem2di_check_not_negative(env, "rounding", rounding);
+    if (result == DEM2D_OK) result = dem2di_check_number(env, "rounding", rounding, DEM2DI_FROM_0);
     if (result != DEM2D_OK) return result;
     size_t n = (size_t)count, size = sizeof(dem2d_vec) + sizeof(int);
     dem2d_vec *corners = (dem2d_vec *)dem2di_allocate(env, n, size);
@@ -3930,10 +4057,9 @@ static dem2d_result dem2di_bezier_make(const dem2d_env *env, dem2di_arc *arcs, i
 DEM2D_API dem2d_result dem2d_shape_create_bezier(const dem2d_env *env, const dem2d_vec *control,
                                                  int arcs, dem2d_shape **shape) {
     if (shape == NULL) return dem2di_fail_null(env, "shape");
-    if (arcs < 2 || arcs > DEM2DI_MAX_ARCS)
-        return dem2di_fail(env, DEM2D_TOO_FEW_POINTS, -1, "arcs = %d is not 2 to %d", arcs,
-                           DEM2DI_MAX_ARCS);
-    dem2d_result result = dem2di_check_points(env, "control", control, 3 * arcs, 6);
+    if (arcs < 2) return dem2di_fail(env, DEM2D_TOO_FEW_POINTS, -1, "arcs = %d, 2 needed", arcs);
+    dem2d_result result = dem2di_check_number(env, "arcs", arcs, DEM2DI_WHOLE(2, DEM2DI_MAX_ARCS));
+    if (result == DEM2D_OK) result = dem2di_check_points(env, "control", control, 3 * arcs, 6);
     if (result != DEM2D_OK) return result;
     double area = 0, size = dem2di_coordinate_size(control, 3 * arcs), extent = 0;
     for (int i = 0; i < 3 * arcs; i++)
@@ -3959,12 +4085,15 @@ DEM2D_API dem2d_result dem2d_shape_create_bezier(const dem2d_env *env, const dem
 #define DEM2DI_SERIES_TOLERANCE 2e-14
 #define DEM2DI_SERIES_ROUNDING 6e-14
 
+/* Of a Fourier series. */
+#define DEM2DI_ORDER DEM2DI_WHOLE(0, 1 << 20)
+
 static dem2d_result dem2di_check_series(const dem2d_env *env, const double *a, const double *b,
                                         int order) {
     if (a == NULL) return dem2di_fail_null(env, "a");
     if (b == NULL) return dem2di_fail_null(env, "b");
-    if (order < 0 || order > (1 << 20))
-        return dem2di_fail(env, DEM2D_OUT_OF_RANGE, order, "order = %d", order);
+    dem2d_result result = dem2di_check_number(env, "order", order, DEM2DI_ORDER);
+    if (result != DEM2D_OK) return result;
     for (int n = 0; n <= order; n++) {
         if (!dem2di_finite(a[n]))
             return dem2di_fail(env, DEM2D_NOT_FINITE, n, "a[%d] = %g is not finite", n, a[n]);
@@ -4077,20 +4206,30 @@ DEM2D_API dem2d_result dem2d_shape_create_fourier(const dem2d_env *env, const do
     return result;
 }
 
+static const dem2di_field dem2di_custom_fields[] = {
+    DEM2DI_ROW(dem2d_custom_desc, support, DEM2DI_REQUIRED, "- none"),
+    DEM2DI_ROW(dem2d_custom_desc, user, DEM2DI_OPTIONAL, "- NULL"),
+    DEM2DI_ROW(dem2d_custom_desc, rho_min, DEM2DI_FROM_0, "m 0"),
+    DEM2DI_ROW(dem2d_custom_desc, inscribed, DEM2DI_FROM_0, "m 0"),
+    DEM2DI_ROW(dem2d_custom_desc, mass.area, DEM2DI_FROM_0, "m2 computed; 0: from outline_points"),
+    DEM2DI_ROW(dem2d_custom_desc, mass.centroid, DEM2DI_VECTOR, "m computed"),
+    DEM2DI_ROW(dem2d_custom_desc, mass.polar_moment, DEM2DI_FROM_0,
+               "m4 computed; > 0 with an area"),
+    DEM2DI_ROW(dem2d_custom_desc, outline_points, DEM2DI_WHOLE_OR_0(3, DBL_MAX), "- 1000"),
+    DEM2DI_ROW(dem2d_custom_desc, tag, DEM2DI_TAG, "- 0"),
+};
+
 DEM2D_API dem2d_result dem2d_shape_create_custom(const dem2d_env *env,
                                                  const dem2d_custom_desc *desc,
                                                  dem2d_shape **shape) {
     if (shape == NULL) return dem2di_fail_null(env, "shape");
-    if (desc == NULL || desc->support == NULL) return dem2di_fail_null(env, "desc->support");
-    dem2d_result result = dem2di_check_not_negative(env, "rho_min", desc->rho_min);
-    if (result == DEM2D_OK) result = dem2di_check_not_negative(env, "inscribed", desc->inscribed);
-    if (result == DEM2D_OK) result = dem2di_check_not_negative(env, "mass.area", desc->mass.area);
-    if (result == DEM2D_OK) result = dem2di_check_vec(env, "mass.centroid", desc->mass.centroid);
+    if (desc == NULL) return dem2di_fail_null(env, "desc");
+    dem2d_result result = dem2di_check_fields(env, DEM2DI_ALL(dem2di_custom_fields), desc);
     if (result == DEM2D_OK && desc->mass.area > 0)
-        result = dem2di_check_positive(env, "mass.polar_moment", desc->mass.polar_moment);
+        result =
+            dem2di_check_number(env, "mass.polar_moment", desc->mass.polar_moment, DEM2DI_POSITIVE);
     if (result != DEM2D_OK) return result;
     int points = desc->outline_points == 0 ? 1000 : desc->outline_points;
-    if (points < 3) return dem2di_fail(env, DEM2D_OUT_OF_RANGE, -1, "outline_points = %d", points);
     dem2d_shape *made = dem2di_shape_allocate(env, DEM2D_CUSTOM, 0, 0);
     if (made == NULL) return DEM2D_OUT_OF_MEMORY;
     made->function = desc->support;
@@ -4443,7 +4582,7 @@ DEM2D_API dem2d_result dem2d_shape_axis(const dem2d_shape *shape, double *angle,
 
 /* ============================================================================================
    >>outlines  Outlines from pixels, and their measures
-   uses: config, math, memory, hull, mass
+   uses: config, math, memory, fields, hull, mass
    ============================================================================================ */
 
 #define DEM2DI_PICTURE_SIDE 32768 /* 2^15 squared pixels: their number stays an int */
@@ -4478,36 +4617,51 @@ static int dem2di_picture_levels(const dem2d_image_desc *desc) {
     return desc->pixels16 != NULL ? 65536 : 256;
 }
 
-/* Check one direction of the region of interest: its start, and its length, 0 for the rest. */
-static dem2d_result dem2di_check_crop(const dem2d_env *env, const char *name, int size, int start,
-                                      int length) {
-    if (start < 0 || start >= size)
-        return dem2di_fail(env, DEM2D_OUT_OF_RANGE, -1, "crop_%s = %d, from 0 to %d",
-                           name[0] == 'w' ? "left" : "top", start, size - 1);
-    if (length < 0 || length > size - start)
-        return dem2di_fail(env, DEM2D_OUT_OF_RANGE, -1, "crop_%s = %d, from 0 to %d", name, length,
-                           size - start);
-    return DEM2D_OK;
-}
+static const dem2di_field dem2di_picture_fields[] = {
+    DEM2DI_ROW(dem2d_image_desc, pixels, DEM2DI_OPTIONAL, "- none; required, or pixels16"),
+    DEM2DI_ROW(dem2d_image_desc, pixels16, DEM2DI_OPTIONAL, "- none; not with pixels"),
+    DEM2DI_ROW(dem2d_image_desc, width, DEM2DI_WHOLE(1, DEM2DI_PICTURE_SIDE), "px none"),
+    DEM2DI_ROW(dem2d_image_desc, height, DEM2DI_WHOLE(1, DEM2DI_PICTURE_SIDE), "px none"),
+    DEM2DI_ROW(dem2d_image_desc, stride, DEM2DI_COUNT, "- width; 0 or at least the width"),
+    DEM2DI_ROW(dem2d_image_desc, crop_left, DEM2DI_COUNT, "px 0; below the width"),
+    DEM2DI_ROW(dem2d_image_desc, crop_top, DEM2DI_COUNT, "px 0; below the height"),
+    DEM2DI_ROW(dem2d_image_desc, crop_width, DEM2DI_COUNT, "px the rest; within the width"),
+    DEM2DI_ROW(dem2d_image_desc, crop_height, DEM2DI_COUNT, "px the rest; within the height"),
+};
+
+/* Of a picture of which outlines are taken. */
+static const dem2di_field dem2di_search_fields[] = {
+    DEM2DI_ROW(dem2d_image_desc, labels, DEM2DI_SWITCH, "- false; without the next three"),
+    DEM2DI_ROW(dem2d_image_desc, threshold, DEM2DI_WHOLE(0, 65535), "- Otsu; to 255 for pixels"),
+    DEM2DI_ROW(dem2d_image_desc, ignore_frame, DEM2DI_SWITCH, "- false; without a threshold"),
+    DEM2DI_ROW(dem2d_image_desc, bright, DEM2DI_SWITCH, "- false"),
+    DEM2DI_ROW(dem2d_image_desc, min_pixels, DEM2DI_COUNT, "- 16"),
+    DEM2DI_ROW(dem2d_image_desc, max_pixels, DEM2DI_COUNT, "- no limit"),
+    DEM2DI_ROW(dem2d_image_desc, keep_border, DEM2DI_SWITCH, "- false"),
+    DEM2DI_ROW(dem2d_image_desc, scale, DEM2DI_POSITIVE, "m/px none"),
+};
 
 static dem2d_result dem2di_check_picture(const dem2d_env *env, const dem2d_image_desc *desc) {
     if (desc == NULL || (desc->pixels == NULL && desc->pixels16 == NULL))
         return dem2di_fail_null(env, "desc or pixels");
     if (desc->pixels != NULL && desc->pixels16 != NULL)
         return dem2di_fail(env, DEM2D_OUT_OF_RANGE, -1, "pixels and pixels16: one of the two");
-    if (desc->width < 1 || desc->width > DEM2DI_PICTURE_SIDE)
-        return dem2di_fail(env, DEM2D_OUT_OF_RANGE, -1, "width = %d, from 1 to %d", desc->width,
-                           DEM2DI_PICTURE_SIDE);
-    if (desc->height < 1 || desc->height > DEM2DI_PICTURE_SIDE)
-        return dem2di_fail(env, DEM2D_OUT_OF_RANGE, -1, "height = %d, from 1 to %d", desc->height,
-                           DEM2DI_PICTURE_SIDE);
-    if (desc->stride != 0 && desc->stride < desc->width)
-        return dem2di_fail(env, DEM2D_OUT_OF_RANGE, -1, "stride = %d, 0 or at least width = %d",
-                           desc->stride, desc->width);
-    dem2d_result result =
-        dem2di_check_crop(env, "width", desc->width, desc->crop_left, desc->crop_width);
-    if (result != DEM2D_OK) return result;
-    return dem2di_check_crop(env, "height", desc->height, desc->crop_top, desc->crop_height);
+    int width = desc->width, height = desc->height, left = desc->crop_left, top = desc->crop_top;
+    dem2d_result result = dem2di_check_fields(env, DEM2DI_ALL(dem2di_picture_fields), desc);
+    if (result == DEM2D_OK)
+        result =
+            dem2di_check_number(env, "stride", desc->stride, DEM2DI_WHOLE_OR_0(width, DBL_MAX));
+    if (result == DEM2D_OK)
+        result = dem2di_check_number(env, "crop_left", left, DEM2DI_WHOLE(0, width - 1));
+    if (result == DEM2D_OK)
+        result = dem2di_check_number(env, "crop_top", top, DEM2DI_WHOLE(0, height - 1));
+    if (result == DEM2D_OK)
+        result =
+            dem2di_check_number(env, "crop_width", desc->crop_width, DEM2DI_WHOLE(0, width - left));
+    if (result == DEM2D_OK)
+        result = dem2di_check_number(env, "crop_height", desc->crop_height,
+                                     DEM2DI_WHOLE(0, height - top));
+    return result;
 }
 
 /* The region of a valid picture. */
@@ -4982,11 +5136,10 @@ static void dem2di_report_findings(const dem2d_outline_set *set, const dem2di_pi
 
 static dem2d_result dem2di_check_search(const dem2d_env *env, const dem2d_image_desc *desc) {
     int most = dem2di_picture_levels(desc) - 1;
-    dem2d_result result = dem2di_check_positive(env, "scale", desc->scale);
+    dem2d_result result = dem2di_check_fields(env, DEM2DI_ALL(dem2di_search_fields), desc);
+    if (result == DEM2D_OK)
+        result = dem2di_check_number(env, "threshold", desc->threshold, DEM2DI_WHOLE(0, most));
     if (result != DEM2D_OK) return result;
-    if (desc->threshold < 0 || desc->threshold > most)
-        return dem2di_fail(env, DEM2D_OUT_OF_RANGE, -1, "threshold = %d, from 0 to %d",
-                           desc->threshold, most);
     if (desc->ignore_frame && desc->threshold > 0)
         return dem2di_fail(env, DEM2D_OUT_OF_RANGE, -1,
                            "ignore_frame is for a threshold that is found, threshold = %d",
@@ -4995,10 +5148,6 @@ static dem2d_result dem2di_check_search(const dem2d_env *env, const dem2d_image_
         return dem2di_fail(env, DEM2D_OUT_OF_RANGE, -1,
                            "labels have no threshold = %d, ignore_frame = %d, bright = %d",
                            desc->threshold, desc->ignore_frame, desc->bright);
-    if (desc->min_pixels < 0 || desc->max_pixels < 0)
-        return dem2di_fail(env, DEM2D_OUT_OF_RANGE, -1,
-                           "min_pixels = %d, max_pixels = %d must not be negative",
-                           desc->min_pixels, desc->max_pixels);
     return DEM2D_OK;
 }
 
@@ -6158,7 +6307,7 @@ DEM2D_API dem2d_result dem2d_outline_compare(const dem2d_env *env, const dem2d_v
 
 /* ============================================================================================
    >>fitting  Templates from outlines, and virtual grains
-   uses: config, math, memory, hull, series, support, mass, shapes, outlines
+   uses: config, math, memory, fields, hull, series, support, mass, shapes, outlines
    ============================================================================================ */
 
 /* An outline prepared for a fit: counter-clockwise, relative to the centroid of its hull. */
@@ -6224,15 +6373,14 @@ static int dem2di_hull_start(const dem2di_outline *outline) {
 DEM2D_API dem2d_result dem2d_fourier_fit(const dem2d_env *env, const dem2d_vec *points, int count,
                                          int order, int samples, double *a, double *b) {
     if (a == NULL || b == NULL) return dem2di_fail_null(env, "a or b");
-    if (order < 0 || order > (1 << 20))
-        return dem2di_fail(env, DEM2D_OUT_OF_RANGE, order, "order = %d is not 0 to %d", order,
-                           1 << 20);
+    dem2d_result result = dem2di_check_number(env, "order", order, DEM2DI_ORDER);
+    if (result == DEM2D_OK)
+        result =
+            dem2di_check_number(env, "samples", samples, DEM2DI_WHOLE_OR_0(2 * order + 1, DBL_MAX));
+    if (result != DEM2D_OK) return result;
     if (samples == 0) samples = 16 * order + 64;
-    if (samples <= 2 * order)
-        return dem2di_fail(env, DEM2D_OUT_OF_RANGE, samples, "samples = %d must be above %d",
-                           samples, 2 * order);
     dem2di_outline outline;
-    dem2d_result result = dem2di_outline_make(env, points, count, &outline);
+    result = dem2di_outline_make(env, points, count, &outline);
     if (result != DEM2D_OK) return result;
     for (int n = 0; n <= order; n++) a[n] = b[n] = 0;
     int k = dem2di_hull_start(&outline);
@@ -6272,17 +6420,22 @@ static bool dem2di_test_holds(const double *a, const double *b, int order,
     return test == DEM2D_EXACT && dem2di_convexity(a, b, order).exact;
 }
 
+static const dem2di_field dem2di_reduction_fields[] = {
+    DEM2DI_ROW(dem2d_reduction_desc, test, DEM2DI_CHOICE(DEM2D_NO_TEST + 1), "- SUFFICIENT"),
+    DEM2DI_ROW(dem2d_reduction_desc, factor,
+               DEM2DI_NUMBER(0, 1, DEM2DI_ABOVE | DEM2DI_BELOW | DEM2DI_OR_0), "- 0.9"),
+    DEM2DI_ROW(dem2d_reduction_desc, tolerance, DEM2DI_FROM_0, "- 1e-6; relative to a0"),
+};
+
 DEM2D_API dem2d_result dem2d_fourier_reduce(double *a, double *b, int order,
                                             const dem2d_reduction_desc *desc, int *reductions) {
     dem2d_result result = dem2di_check_series(NULL, a, b, order);
     if (result != DEM2D_OK) return result;
     if (desc == NULL) return DEM2D_NULL_ARGUMENT;
+    result = dem2di_check_fields(NULL, DEM2DI_ALL(dem2di_reduction_fields), desc);
+    if (result != DEM2D_OK) return result;
     double factor = desc->factor == 0 ? 0.9 : desc->factor;
     double tolerance = desc->tolerance == 0 ? 1e-6 : desc->tolerance;
-    if (!dem2di_finite(factor) || !dem2di_finite(tolerance)) return DEM2D_NOT_FINITE;
-    if (!(factor > 0 && factor < 1) || tolerance < 0 || (int)desc->test < 0 ||
-        desc->test > DEM2D_NO_TEST)
-        return DEM2D_OUT_OF_RANGE;
     int done = 0, n = order;
     double least = tolerance * a[0];
     while (!dem2di_test_holds(a, b, n, desc->test)) {
@@ -7111,12 +7264,11 @@ static dem2d_result dem2di_bezier_fit(const dem2d_env *env, const dem2di_outline
 DEM2D_API dem2d_result dem2d_bezier_fit(const dem2d_env *env, const dem2d_vec *points, int count,
                                         int arcs, dem2d_vec *control) {
     if (control == NULL) return dem2di_fail_null(env, "control");
-    if (arcs < 3 || arcs > (1 << 20))
-        return dem2di_fail(env, DEM2D_OUT_OF_RANGE, arcs, "arcs = %d is not 3 to %d", arcs,
-                           1 << 20);
+    dem2d_result result = dem2di_check_number(env, "arcs", arcs, DEM2DI_WHOLE(3, 1 << 20));
+    if (result != DEM2D_OK) return result;
     dem2di_outline outline;
     int iterations = 0;
-    dem2d_result result = dem2di_outline_make(env, points, count, &outline);
+    result = dem2di_outline_make(env, points, count, &outline);
     if (result != DEM2D_OK) return result;
     result = dem2di_check_crossing(env, "points", points, count);
     if (result == DEM2D_OK)
@@ -7655,54 +7807,37 @@ static dem2d_result dem2di_fit_once(dem2di_fit *fit) {
 
 #define DEM2DI_FIT_COUNT 64 /* the greatest count tried for a coverage, see dem2d_outline_fit */
 
-/* A count that is 0 for its default, or from least to most. */
-static dem2d_result dem2di_check_setting(const dem2d_env *env, const char *field, int value,
-                                         int least, int most) {
-    if (value == 0 || (value >= least && value <= most)) return DEM2D_OK;
-    return dem2di_fail(env, DEM2D_OUT_OF_RANGE, -1, "%s = %d is not 0 or %d to %d", field, value,
-                       least, most);
-}
-
-static dem2d_result dem2di_check_swarm(const dem2d_env *env, const dem2d_fit_desc *desc) {
-    dem2d_result result = dem2di_check_setting(env, "birds", desc->birds, 2, DEM2DI_SWARM_BIRDS);
-    if (result == DEM2D_OK) result = dem2di_check_setting(env, "moves", desc->moves, 1, 100000);
-    return result == DEM2D_OK ? dem2di_check_setting(env, "pixels", desc->pixels, 8, 4096) : result;
-}
+static const dem2di_field dem2di_fit_fields[] = {
+    DEM2DI_ROW(dem2d_fit_desc, count, DEM2DI_WHOLE(0, 1024), "- coverage; 3 for polygon, bezier"),
+    DEM2DI_ROW(dem2d_fit_desc, coverage, DEM2DI_FROM_0, "- none; in (0, 1) if count is 0"),
+    DEM2DI_ROW(dem2d_fit_desc, model, DEM2DI_CHOICE(DEM2D_CUSTOM), "- CIRCLE; not CUSTOM"),
+    DEM2DI_ROW(dem2d_fit_desc, method, DEM2DI_CHOICE(DEM2D_FIT_SWARM + 1),
+               "- DEFAULT; of the model"),
+    DEM2DI_ROW(dem2d_fit_desc, scale, DEM2DI_CHOICE(DEM2D_SCALE_NONE + 1), "- HULL"),
+    DEM2DI_ROW(dem2d_fit_desc, min_radius, DEM2DI_FRACTION, "- 0.1; of a0/2"),
+    DEM2DI_ROW(dem2d_fit_desc, corners, DEM2DI_SWITCH, "- false"),
+    DEM2DI_ROW(dem2d_fit_desc, max_radius, DEM2DI_NUMBER(1, DBL_MAX, DEM2DI_OR_0),
+               "- 20; of the size"),
+    DEM2DI_ROW(dem2d_fit_desc, unbounded, DEM2DI_SWITCH, "- false"),
+    DEM2DI_ROW(dem2d_fit_desc, seed, DEM2DI_SEED, "- 0"),
+    DEM2DI_ROW(dem2d_fit_desc, birds, DEM2DI_WHOLE_OR_0(2, DEM2DI_SWARM_BIRDS), "- 30"),
+    DEM2DI_ROW(dem2d_fit_desc, moves, DEM2DI_WHOLE(0, 100000), "- 60"),
+    DEM2DI_ROW(dem2d_fit_desc, pixels, DEM2DI_WHOLE_OR_0(8, 4096), "px 256"),
+};
 
 static dem2d_result dem2di_check_fit(const dem2d_env *env, const dem2d_fit_desc *desc) {
-    static const int least[DEM2D_SHAPE_TYPE_COUNT] = {0, 0, 3, 3, 0, 0};
+    static const int least[DEM2D_SHAPE_TYPE_COUNT] = {0, 0, 3, 3, 1, 0};
     dem2d_fit_method method = desc->method;
     bool bezier = method == DEM2D_FIT_AREA || method == DEM2D_FIT_SWARM;
-    bool counted =
-        desc->model == DEM2D_POLYGON || desc->model == DEM2D_BEZIER || desc->model == DEM2D_FOURIER;
-    if ((int)desc->model < 0 || desc->model >= DEM2D_CUSTOM)
-        return dem2di_fail(env, DEM2D_OUT_OF_RANGE, -1, "model = %d", (int)desc->model);
-    if ((int)method < 0 || method > DEM2D_FIT_SWARM ||
-        (method != DEM2D_FIT_DEFAULT && desc->model != (bezier ? DEM2D_BEZIER : DEM2D_FOURIER)))
+    dem2d_result result = dem2di_check_fields(env, DEM2DI_ALL(dem2di_fit_fields), desc);
+    if (result != DEM2D_OK) return result;
+    if (method != DEM2D_FIT_DEFAULT && desc->model != (bezier ? DEM2D_BEZIER : DEM2D_FOURIER))
         return dem2di_fail(env, DEM2D_OUT_OF_RANGE, -1, "method = %d is not one of the model's",
                            (int)method);
-    if ((int)desc->scale < 0 || desc->scale > DEM2D_SCALE_NONE)
-        return dem2di_fail(env, DEM2D_OUT_OF_RANGE, -1, "scale = %d", (int)desc->scale);
-    dem2d_result result = dem2di_check_not_negative(env, "min_radius", desc->min_radius);
-    if (result == DEM2D_OK) result = dem2di_check_not_negative(env, "coverage", desc->coverage);
-    if (result == DEM2D_OK) result = dem2di_check_swarm(env, desc);
-    if (result == DEM2D_OK) result = dem2di_check_not_negative(env, "max_radius", desc->max_radius);
-    if (result != DEM2D_OK) return result;
-    if (desc->min_radius >= 1)
-        return dem2di_fail(env, DEM2D_OUT_OF_RANGE, -1, "min_radius = %g must be below 1",
-                           desc->min_radius);
-    if (desc->max_radius > 0 && desc->max_radius < 1)
-        return dem2di_fail(env, DEM2D_OUT_OF_RANGE, -1, "max_radius = %g must be 0, or 1 or more",
-                           desc->max_radius);
-    if (!counted) return DEM2D_OK;
-    bool search = desc->count == 0 && desc->coverage > 0;
-    if (search && desc->coverage < 1) return DEM2D_OK;
-    if (search)
-        return dem2di_fail(env, DEM2D_OUT_OF_RANGE, -1, "coverage = %g must be below 1",
-                           desc->coverage);
-    if (desc->count >= (least[desc->model] > 1 ? least[desc->model] : 1) && desc->count <= 1024)
-        return DEM2D_OK;
-    return dem2di_fail(env, DEM2D_OUT_OF_RANGE, -1, "count = %d", desc->count);
+    if (least[desc->model] == 0) return DEM2D_OK;
+    if (desc->count == 0 && desc->coverage > 0)
+        return dem2di_check_number(env, "coverage", desc->coverage, DEM2DI_FRACTION);
+    return dem2di_check_number(env, "count", desc->count, DEM2DI_WHOLE(least[desc->model], 1024));
 }
 
 /* The fit with the given count, or with the least one that reaches the coverage. */
@@ -7782,9 +7917,8 @@ DEM2D_API dem2d_result dem2d_radial_compare(const dem2d_env *env, const dem2d_ve
     dem2d_mass mass;
     dem2d_result result = dem2di_check_good_outline(env, "points", points, count, &mass);
     if (result != DEM2D_OK) return result;
-    if (order < 0 || order > (rays - 1) / 2)
-        return dem2di_fail(env, DEM2D_OUT_OF_RANGE, order, "order = %d is not 0 to %d", order,
-                           (rays - 1) / 2);
+    result = dem2di_check_number(env, "order", order, DEM2DI_WHOLE(0, (rays - 1) / 2));
+    if (result != DEM2D_OK) return result;
     dem2d_vec *fitted = (dem2d_vec *)dem2di_allocate(env, 2 * (size_t)rays, sizeof *fitted);
     if (fitted == NULL) return dem2di_fail_memory(env, rays, "rays");
     double *r = (double *)(void *)(fitted + rays), *sum = r + rays;
@@ -7818,19 +7952,20 @@ static double dem2di_virtual_amplitude(const dem2d_virtual_desc *desc, int n) {
     return n < 8 ? desc->roundness * 9 / ((double)n * n) : desc->roughness * 64 / ((double)n * n);
 }
 
+static const dem2di_field dem2di_virtual_fields[] = {
+    DEM2DI_ROW(dem2d_virtual_desc, radius, DEM2DI_POSITIVE, "m none"),
+    DEM2DI_ROW(dem2d_virtual_desc, elongation, DEM2DI_FROM_0, "- 0"),
+    DEM2DI_ROW(dem2d_virtual_desc, roundness, DEM2DI_FROM_0, "- 0"),
+    DEM2DI_ROW(dem2d_virtual_desc, roughness, DEM2DI_FROM_0, "- 0"),
+    DEM2DI_ROW(dem2d_virtual_desc, spectrum, DEM2DI_OPTIONAL, "- NULL; order + 1 values >= 0"),
+    DEM2DI_ROW(dem2d_virtual_desc, min_radius, DEM2DI_FRACTION, "- 0.1; of a0/2"),
+    DEM2DI_ROW(dem2d_virtual_desc, seed, DEM2DI_SEED, "- 0"),
+};
+
 static dem2d_result dem2di_check_virtual(const dem2d_virtual_desc *desc, int order) {
-    double numbers[5];
-    numbers[0] = desc->radius;
-    numbers[1] = desc->elongation;
-    numbers[2] = desc->roundness;
-    numbers[3] = desc->roughness;
-    numbers[4] = desc->min_radius;
-    for (int i = 0; i < 5; i++) {
-        if (!dem2di_finite(numbers[i])) return DEM2D_NOT_FINITE;
-        if (numbers[i] < 0) return DEM2D_OUT_OF_RANGE;
-    }
-    if (!(desc->radius > 0) || desc->min_radius >= 1 || order < 0 || order > (1 << 20))
-        return DEM2D_OUT_OF_RANGE;
+    dem2d_result result = dem2di_check_fields(NULL, DEM2DI_ALL(dem2di_virtual_fields), desc);
+    if (result == DEM2D_OK) result = dem2di_check_number(NULL, "order", order, DEM2DI_ORDER);
+    if (result != DEM2D_OK) return result;
     for (int n = 2; desc->spectrum != NULL && n <= order; n++) {
         if (!dem2di_finite(desc->spectrum[n])) return DEM2D_NOT_FINITE;
         if (desc->spectrum[n] < 0) return DEM2D_OUT_OF_RANGE;
@@ -9736,7 +9871,7 @@ static int dem2di_wall_points(const dem2d_shape *shape, dem2d_rot q, double scal
 
 /* ============================================================================================
    >>contact  Contact of two shapes, of a shape and a wall
-   uses: config, math, shapes, gjk, epa, minimum, faces
+   uses: config, math, fields, shapes, gjk, epa, minimum, faces
    ============================================================================================ */
 
 /* [P] sec. 3: GJK, then EPA when the shapes overlap. */
@@ -9833,6 +9968,14 @@ static bool dem2di_pair_sound(const dem2di_pair *pair) {
     return dem2di_finite(square) && square * DEM2DI_ROUNDING * DEM2DI_ROUNDING > DBL_MIN;
 }
 
+static const dem2di_field dem2di_contact_fields[] = {
+    DEM2DI_ROW(dem2d_contact_desc, tolerance, DEM2DI_FROM_0, "- 1e-10; of R_A + R_B + |d|"),
+    DEM2DI_ROW(dem2d_contact_desc, max_iterations, DEM2DI_COUNT, "- 128"),
+    DEM2DI_ROW(dem2d_contact_desc, start, DEM2DI_VECTOR, "- centres; any direction"),
+    DEM2DI_ROW(dem2d_contact_desc, solver, DEM2DI_CHOICE(DEM2D_SOLVER_COUNT), "- CERTIFIED"),
+    DEM2DI_ROW(dem2d_contact_desc, skip_points, DEM2DI_SWITCH, "- false"),
+};
+
 /* Checks of all pair queries; `used` gets the desc with its defaults. */
 static dem2d_result dem2di_query_prepare(const dem2d_shape *a, dem2d_pose *pose_a,
                                          const dem2d_shape *b, dem2d_pose *pose_b,
@@ -9843,11 +9986,11 @@ static dem2d_result dem2di_query_prepare(const dem2d_shape *a, dem2d_pose *pose_
     if (result == DEM2D_OK) result = dem2di_check_pose(pose_b);
     if (result != DEM2D_OK) return result;
     memset(used, 0, sizeof *used);
-    if (desc != NULL) *used = *desc;
-    if (!dem2di_finite(used->tolerance) || !dem2di_vec_finite(used->start)) return DEM2D_NOT_FINITE;
-    if (used->tolerance < 0 || used->max_iterations < 0) return DEM2D_OUT_OF_RANGE;
-    if ((int)used->solver < 0 || (int)used->solver >= (int)DEM2D_SOLVER_COUNT)
-        return DEM2D_OUT_OF_RANGE;
+    if (desc != NULL) {
+        result = dem2di_check_fields(NULL, DEM2DI_ALL(dem2di_contact_fields), desc);
+        if (result != DEM2D_OK) return result;
+        *used = *desc;
+    }
     if (used->tolerance == 0) used->tolerance = 1e-10;
     used->tolerance = dem2di_max(used->tolerance, DEM2DI_ROUNDING);
     if (used->max_iterations == 0) used->max_iterations = 128;
@@ -10603,7 +10746,7 @@ static bool dem2di_state_finite(const dem2di_state *state) {
 
 /* ============================================================================================
    >>world  Objects with ids
-   uses: config, math, memory, shapes, gjk, broad, law, motion
+   uses: config, math, memory, fields, shapes, gjk, broad, law, motion
    ============================================================================================ */
 
 typedef struct dem2di_template {
@@ -11051,43 +11194,32 @@ DEM2D_API void dem2d_world_destroy(dem2d_world *world) {
     dem2di_release(&user, world, 1, sizeof *world);
 }
 
-static dem2d_result dem2di_check_count(const dem2d_env *env, const char *name, int value) {
-    if (value >= 0 && value <= (1 << 30)) return DEM2D_OK;
-    return dem2di_fail(env, DEM2D_OUT_OF_RANGE, -1, "%s = %d", name, value);
-}
-
-static dem2d_result dem2di_check_damping(const dem2d_env *env, double local, double global) {
-    dem2d_result result = dem2di_check_not_negative(env, "local_damping", local);
-    if (result == DEM2D_OK) result = dem2di_check_not_negative(env, "global_damping", global);
-    if (result != DEM2D_OK || local < 1) return result;
-    return dem2di_fail(env, DEM2D_OUT_OF_RANGE, -1, "local_damping = %g must be below 1", local);
-}
-
-static dem2d_result dem2di_check_world(const dem2d_env *env, const dem2d_world_desc *desc) {
-    dem2d_result result = dem2di_check_positive(env, "time_step", desc->time_step);
-    if (result == DEM2D_OK) result = dem2di_check_vec(env, "gravity", desc->gravity);
-    if (result == DEM2D_OK)
-        result = dem2di_check_damping(env, desc->local_damping, desc->global_damping);
-    if (result == DEM2D_OK) result = dem2di_check_not_negative(env, "skin", desc->skin);
-    if (result == DEM2D_OK)
-        result = dem2di_check_not_negative(env, "contact_tolerance", desc->contact_tolerance);
-    if (result == DEM2D_OK)
-        result = dem2di_check_count(env, "max_iterations", desc->max_iterations);
-    if (result == DEM2D_OK)
-        result = dem2di_check_count(env, "particle_capacity", desc->particle_capacity);
-    if (result == DEM2D_OK) result = dem2di_check_count(env, "pair_capacity", desc->pair_capacity);
-    if (result != DEM2D_OK) return result;
-    if ((int)desc->solver < 0 || (int)desc->solver >= (int)DEM2D_SOLVER_COUNT)
-        return dem2di_fail(env, DEM2D_OUT_OF_RANGE, -1, "solver = %d", (int)desc->solver);
-    if ((int)desc->faces < 0 || (int)desc->faces >= (int)DEM2D_FACE_RULE_COUNT)
-        return dem2di_fail(env, DEM2D_OUT_OF_RANGE, -1, "faces = %d", (int)desc->faces);
-    return DEM2D_OK;
-}
+static const dem2di_field dem2di_world_fields[] = {
+    DEM2DI_ROW(dem2d_world_desc, time_step, DEM2DI_POSITIVE, "s none"),
+    DEM2DI_ROW(dem2d_world_desc, gravity, DEM2DI_VECTOR, "m/s2 0"),
+    DEM2DI_ROW(dem2d_world_desc, local_damping, DEM2DI_FRACTION, "- 0"),
+    DEM2DI_ROW(dem2d_world_desc, global_damping, DEM2DI_FROM_0, "1/s 0"),
+    DEM2DI_ROW(dem2d_world_desc, skin, DEM2DI_FROM_0, "- by itself; of the particle radius"),
+    DEM2DI_ROW(dem2d_world_desc, contact_tolerance, DEM2DI_FROM_0, "- 1e-8; of R_A + R_B + |d|"),
+    DEM2DI_ROW(dem2d_world_desc, max_iterations, DEM2DI_WHOLE(0, 1 << 30), "- 128"),
+    DEM2DI_ROW(dem2d_world_desc, solver, DEM2DI_CHOICE(DEM2D_SOLVER_COUNT), "- CERTIFIED"),
+    DEM2DI_ROW(dem2d_world_desc, faces, DEM2DI_CHOICE(DEM2D_FACE_RULE_COUNT), "- TWO_POINTS"),
+    DEM2DI_ROW(dem2d_world_desc, particle_capacity, DEM2DI_WHOLE(0, 1 << 30), "- grows"),
+    DEM2DI_ROW(dem2d_world_desc, pair_capacity, DEM2DI_WHOLE(0, 1 << 30), "- grows"),
+    DEM2DI_ROW(dem2d_world_desc, skip_time_step_check, DEM2DI_SWITCH, "- false"),
+    DEM2DI_ROW(dem2d_world_desc, ledger, DEM2DI_SWITCH, "- false"),
+    DEM2DI_ROW(dem2d_world_desc, law, DEM2DI_OPTIONAL, "- NULL; springs and friction"),
+    DEM2DI_ROW(dem2d_world_desc, law_user, DEM2DI_OPTIONAL, "- NULL"),
+    DEM2DI_ROW(dem2d_world_desc, law_tag, DEM2DI_TAG, "- 0"),
+    DEM2DI_ROW(dem2d_world_desc, parallel_for, DEM2DI_OPTIONAL, "- NULL; one thread does all"),
+    DEM2DI_ROW(dem2d_world_desc, parallel_user, DEM2DI_OPTIONAL, "- NULL"),
+    DEM2DI_ROW(dem2d_world_desc, env, DEM2DI_OPTIONAL, "- NULL; copied"),
+};
 
 DEM2D_API dem2d_result dem2d_world_create(const dem2d_world_desc *desc, dem2d_world **world) {
     if (desc == NULL) return DEM2D_NULL_ARGUMENT;
     if (world == NULL) return dem2di_fail_null(desc->env, "world");
-    dem2d_result result = dem2di_check_world(desc->env, desc);
+    dem2d_result result = dem2di_check_fields(desc->env, DEM2DI_ALL(dem2di_world_fields), desc);
     if (result != DEM2D_OK) return result;
     dem2d_world *made = (dem2d_world *)dem2di_allocate(desc->env, 1, sizeof *made);
     if (made == NULL) return dem2di_fail(desc->env, DEM2D_OUT_OF_MEMORY, -1, "no memory for world");
@@ -11213,17 +11345,6 @@ static double dem2di_mean_stiffness(double a, double b) {
     return mean > 0 ? a * (b / mean) : 0;
 }
 
-/* How a material meets itself. */
-static dem2d_pair_desc dem2di_law_among(const dem2d_material_desc *material) {
-    dem2d_pair_desc law;
-    law.normal_stiffness = material->normal_stiffness;
-    law.tangential_stiffness = material->tangential_stiffness;
-    law.friction = material->friction;
-    law.damping_ratio = material->damping_ratio;
-    law.rolling_friction = material->rolling_friction;
-    return law;
-}
-
 static dem2d_pair_desc dem2di_mix(const dem2d_material_desc *a, const dem2d_material_desc *b) {
     dem2d_pair_desc law;
     law.normal_stiffness = dem2di_mean_stiffness(a->normal_stiffness, b->normal_stiffness);
@@ -11257,17 +11378,22 @@ static inline const dem2d_pair_desc *dem2di_law_of(const dem2d_world *world, int
     return dem2di_law(world, world->bodies[key->a].material, material);
 }
 
-static dem2d_result dem2di_check_law(const dem2d_env *env, const dem2d_pair_desc *law) {
-    dem2d_result result = dem2di_check_positive(env, "normal_stiffness", law->normal_stiffness);
-    if (result == DEM2D_OK)
-        result = dem2di_check_not_negative(env, "tangential_stiffness", law->tangential_stiffness);
-    if (result == DEM2D_OK) result = dem2di_check_not_negative(env, "friction", law->friction);
-    if (result == DEM2D_OK)
-        result = dem2di_check_not_negative(env, "damping_ratio", law->damping_ratio);
-    if (result == DEM2D_OK)
-        result = dem2di_check_not_negative(env, "rolling_friction", law->rolling_friction);
-    return result;
-}
+static const dem2di_field dem2di_material_fields[] = {
+    DEM2DI_ROW(dem2d_material_desc, density, DEM2DI_POSITIVE, "kg/m2 none; walls ignore it"),
+    DEM2DI_ROW(dem2d_material_desc, normal_stiffness, DEM2DI_POSITIVE, "N/m none"),
+    DEM2DI_ROW(dem2d_material_desc, tangential_stiffness, DEM2DI_FROM_0, "N/m 0"),
+    DEM2DI_ROW(dem2d_material_desc, friction, DEM2DI_FROM_0, "- 0"),
+    DEM2DI_ROW(dem2d_material_desc, damping_ratio, DEM2DI_FROM_0, "- 0"),
+    DEM2DI_ROW(dem2d_material_desc, rolling_friction, DEM2DI_FROM_0, "- 0"),
+};
+
+static const dem2di_field dem2di_pair_fields[] = {
+    DEM2DI_ROW(dem2d_pair_desc, normal_stiffness, DEM2DI_POSITIVE, "N/m none"),
+    DEM2DI_ROW(dem2d_pair_desc, tangential_stiffness, DEM2DI_FROM_0, "N/m 0"),
+    DEM2DI_ROW(dem2d_pair_desc, friction, DEM2DI_FROM_0, "- 0"),
+    DEM2DI_ROW(dem2d_pair_desc, damping_ratio, DEM2DI_FROM_0, "- 0"),
+    DEM2DI_ROW(dem2d_pair_desc, rolling_friction, DEM2DI_FROM_0, "- 0"),
+};
 
 /* Wider tables of laws with the old entries in place. */
 static bool dem2di_widen_laws(dem2d_world *world, int side) {
@@ -11290,11 +11416,8 @@ static bool dem2di_widen_laws(dem2d_world *world, int side) {
 DEM2D_API dem2d_result dem2d_world_add_material(dem2d_world *world, const dem2d_material_desc *desc,
                                                 dem2d_material_id *id) {
     if (world == NULL || desc == NULL || id == NULL) return DEM2D_NULL_ARGUMENT;
-    dem2d_result result = dem2di_check_positive(&world->env, "density", desc->density);
-    if (result == DEM2D_OK) {
-        dem2d_pair_desc own = dem2di_law_among(desc);
-        result = dem2di_check_law(&world->env, &own);
-    }
+    dem2d_result result =
+        dem2di_check_fields(&world->env, DEM2DI_ALL(dem2di_material_fields), desc);
     if (result != DEM2D_OK) return result;
     int slot = world->material_count;
     if (slot == DEM2DI_MATERIALS_MAX)
@@ -11318,7 +11441,7 @@ DEM2D_API dem2d_result dem2d_world_set_pair(dem2d_world *world, dem2d_material_i
     if (world == NULL || desc == NULL) return DEM2D_NULL_ARGUMENT;
     if (!dem2di_material_lives(world, a)) return dem2di_stale(world, "material", a.index);
     if (!dem2di_material_lives(world, b)) return dem2di_stale(world, "material", b.index);
-    dem2d_result result = dem2di_check_law(&world->env, desc);
+    dem2d_result result = dem2di_check_fields(&world->env, DEM2DI_ALL(dem2di_pair_fields), desc);
     if (result != DEM2D_OK) return result;
     dem2di_law_set(world, (int)a.index, (int)b.index, desc);
     world->list_stale = world->check_due = true;
@@ -11326,40 +11449,43 @@ DEM2D_API dem2d_result dem2d_world_set_pair(dem2d_world *world, dem2d_material_i
     return DEM2D_OK;
 }
 
-static dem2d_result dem2di_check_motion(const dem2d_env *env, dem2d_motion motion,
-                                        dem2d_vec velocity, double angular_velocity) {
-    dem2d_result result = dem2di_check_vec(env, "velocity", velocity);
-    if (result == DEM2D_OK) result = dem2di_check_finite(env, "angular_velocity", angular_velocity);
-    if (result != DEM2D_OK) return result;
-    if (motion != DEM2D_FREE && motion != DEM2D_FIXED && motion != DEM2D_DRIVEN)
-        return dem2di_fail(env, DEM2D_OUT_OF_RANGE, -1, "motion = %d", (int)motion);
-    bool moves = velocity.x != 0 || velocity.y != 0 || angular_velocity != 0;
-    if (motion == DEM2D_FIXED && moves)
-        return dem2di_fail(env, DEM2D_OUT_OF_RANGE, -1, "velocity of a fixed particle is not 0");
-    return DEM2D_OK;
+/* Angles beyond this have lost all their digits after 1e-7, and rotations are not defined. */
+#define DEM2DI_ANGLE DEM2DI_NUMBER(-1073741824.0, 1073741824.0, 0) /* 2^30 */
+
+static const dem2di_field dem2di_particle_fields[] = {
+    DEM2DI_ROW(dem2d_particle_desc, scale, DEM2DI_POSITIVE, "- none"),
+    DEM2DI_ROW(dem2d_particle_desc, shape, DEM2DI_HANDLE, "- none; a shape of this world"),
+    DEM2DI_ROW(dem2d_particle_desc, material, DEM2DI_HANDLE, "- none; a material of this world"),
+    DEM2DI_ROW(dem2d_particle_desc, motion, DEM2DI_CHOICE(DEM2D_DRIVEN + 1), "- FREE"),
+    DEM2DI_ROW(dem2d_particle_desc, position, DEM2DI_VECTOR, "m 0"),
+    DEM2DI_ROW(dem2d_particle_desc, angle, DEM2DI_ANGLE, "rad 0"),
+    DEM2DI_ROW(dem2d_particle_desc, velocity, DEM2DI_VECTOR, "m/s 0; 0 when FIXED"),
+    DEM2DI_ROW(dem2d_particle_desc, angular_velocity, DEM2DI_FINITE, "rad/s 0; 0 when FIXED"),
+};
+
+/* A particle as it is described, but for its ids. */
+static dem2d_result dem2di_check_motion(const dem2d_env *env, const dem2d_particle_desc *desc) {
+    dem2d_result result = dem2di_check_fields(env, DEM2DI_ALL(dem2di_particle_fields), desc);
+    bool moves = desc->velocity.x != 0 || desc->velocity.y != 0 || desc->angular_velocity != 0;
+    if (result != DEM2D_OK || desc->motion != DEM2D_FIXED || !moves) return result;
+    return dem2di_fail(env, DEM2D_OUT_OF_RANGE, -1, "velocity of a fixed particle is not 0");
 }
 
-/* Angles beyond this have lost all their digits after 1e-7, and rotations are not defined. */
-static dem2d_result dem2di_check_angle(const dem2d_env *env, double angle) {
-    dem2d_result result = dem2di_check_finite(env, "angle", angle);
-    if (result != DEM2D_OK || fabs(angle) <= 1073741824.0) return result;
-    return dem2di_fail(env, DEM2D_OUT_OF_RANGE, -1, "angle = %g, at most 2^30 allowed", angle);
+/* A good description, of which a caller changes a part. */
+static dem2d_particle_desc dem2di_particle_plain(void) {
+    dem2d_particle_desc desc;
+    memset(&desc, 0, sizeof desc);
+    desc.scale = 1;
+    return desc;
 }
 
 static dem2d_result dem2di_check_particle(const dem2d_world *world,
                                           const dem2d_particle_desc *desc) {
-    const dem2d_env *env = &world->env;
-    dem2d_result result = dem2di_check_positive(env, "scale", desc->scale);
-    if (result != DEM2D_OK) return result;
     if (!dem2di_shape_lives(world, desc->shape))
         return dem2di_stale(world, "shape", desc->shape.index);
     if (!dem2di_material_lives(world, desc->material))
         return dem2di_stale(world, "material", desc->material.index);
-    result = dem2di_check_vec(env, "position", desc->position);
-    if (result == DEM2D_OK) result = dem2di_check_angle(env, desc->angle);
-    if (result == DEM2D_OK)
-        result = dem2di_check_motion(env, desc->motion, desc->velocity, desc->angular_velocity);
-    return result;
+    return dem2di_check_motion(&world->env, desc);
 }
 
 /* The template of a body that is there. */
@@ -11726,8 +11852,10 @@ DEM2D_API dem2d_result dem2d_world_move_particle(dem2d_world *world, dem2d_parti
     if (world == NULL) return DEM2D_NULL_ARGUMENT;
     int slot = dem2di_slot(world, id);
     if (slot < 0) return dem2di_stale(world, "particle", id.index);
-    dem2d_result result = dem2di_check_vec(&world->env, "position", position);
-    if (result == DEM2D_OK) result = dem2di_check_angle(&world->env, angle);
+    dem2d_particle_desc moved = dem2di_particle_plain();
+    moved.position = position;
+    moved.angle = angle;
+    dem2d_result result = dem2di_check_motion(&world->env, &moved);
     if (result != DEM2D_OK) return result;
     world->now[slot].x = position;
     world->now[slot].q = dem2di_orientation(world, angle);
@@ -11765,7 +11893,11 @@ DEM2D_API dem2d_result dem2d_world_drive_particle(dem2d_world *world, dem2d_part
     if (world == NULL) return DEM2D_NULL_ARGUMENT;
     int slot = dem2di_slot(world, id);
     if (slot < 0) return dem2di_stale(world, "particle", id.index);
-    dem2d_result result = dem2di_check_motion(&world->env, motion, velocity, angular_velocity);
+    dem2d_particle_desc driven = dem2di_particle_plain();
+    driven.motion = motion;
+    driven.velocity = velocity;
+    driven.angular_velocity = angular_velocity;
+    dem2d_result result = dem2di_check_motion(&world->env, &driven);
     if (result != DEM2D_OK) return result;
     if (!dem2di_redirect(world, slot, velocity, angular_velocity))
         return dem2di_out_of_memory(world, "velocities");
@@ -11781,6 +11913,20 @@ DEM2D_API dem2d_result dem2d_world_drive_particle(dem2d_world *world, dem2d_part
     return DEM2D_OK;
 }
 
+static const dem2di_field dem2di_wall_fields[] = {
+    DEM2DI_ROW(dem2d_wall_desc, length, DEM2DI_FROM_0, "m none; of a servo > 0 or spans"),
+    DEM2DI_ROW(dem2d_wall_desc, mode, DEM2DI_CHOICE(DEM2D_WALL_SERVO + 1), "- STILL"),
+    DEM2DI_ROW(dem2d_wall_desc, material, DEM2DI_HANDLE, "- none; a material of this world"),
+    DEM2DI_ROW(dem2d_wall_desc, point, DEM2DI_VECTOR, "m 0"),
+    DEM2DI_ROW(dem2d_wall_desc, normal, DEM2DI_VECTOR, "- none; not zero; normalised"),
+    DEM2DI_ROW(dem2d_wall_desc, segment, DEM2DI_SWITCH, "- false"),
+    DEM2DI_ROW(dem2d_wall_desc, end, DEM2DI_VECTOR, "m 0; of segments not point"),
+    DEM2DI_ROW(dem2d_wall_desc, velocity, DEM2DI_VECTOR, "m/s 0; MOVING only"),
+    DEM2DI_ROW(dem2d_wall_desc, stress, DEM2DI_FINITE, "Pa 0; SERVO only"),
+    DEM2DI_ROW(dem2d_wall_desc, max_speed, DEM2DI_FROM_0, "m/s none; > 0 for SERVO"),
+    DEM2DI_ROW(dem2d_wall_desc, spans, DEM2DI_HANDLE, "- none; two walls, or both zero"),
+};
+
 static dem2d_result dem2di_check_spans(const dem2d_world *world, const dem2d_wall_desc *desc) {
     int given = 0;
     for (int i = 0; i < 2; i++) {
@@ -11792,8 +11938,8 @@ static dem2d_result dem2di_check_spans(const dem2d_world *world, const dem2d_wal
     if (given == 1)
         return dem2di_fail(&world->env, DEM2D_OUT_OF_RANGE, -1, "spans: one wall of two given");
     if (desc->mode == DEM2D_WALL_SERVO && given == 0 && !desc->segment)
-        return dem2di_check_positive(&world->env, "length", desc->length);
-    return dem2di_check_not_negative(&world->env, "length", desc->length);
+        return dem2di_check_number(&world->env, "length", desc->length, DEM2DI_POSITIVE);
+    return DEM2D_OK;
 }
 
 static dem2d_result dem2di_check_segment(const dem2d_world *world, const dem2d_wall_desc *desc) {
@@ -11808,22 +11954,14 @@ static dem2d_result dem2di_check_wall(const dem2d_world *world, const dem2d_wall
     dem2d_vec unit;
     if (!dem2di_material_lives(world, desc->material))
         return dem2di_stale(world, "material", desc->material.index);
-    dem2d_result result = dem2di_check_vec(env, "point", desc->point);
-    if (result == DEM2D_OK) result = dem2di_check_vec(env, "normal", desc->normal);
-    if (result == DEM2D_OK) result = dem2di_check_vec(env, "end", desc->end);
-    if (result == DEM2D_OK) result = dem2di_check_vec(env, "velocity", desc->velocity);
-    if (result == DEM2D_OK) result = dem2di_check_finite(env, "stress", desc->stress);
-    if (result == DEM2D_OK) result = dem2di_check_not_negative(env, "max_speed", desc->max_speed);
+    dem2d_result result = dem2di_check_fields(env, DEM2DI_ALL(dem2di_wall_fields), desc);
     if (result == DEM2D_OK && desc->mode == DEM2D_WALL_SERVO)
-        result = dem2di_check_positive(env, "max_speed", desc->max_speed);
+        result = dem2di_check_number(env, "max_speed", desc->max_speed, DEM2DI_POSITIVE);
     if (result != DEM2D_OK) return result;
     if (desc->segment) result = dem2di_check_segment(world, desc);
     if (result != DEM2D_OK) return result;
     if (!desc->segment && !dem2di_unit(desc->normal, &unit))
         return dem2di_fail(env, DEM2D_OUT_OF_RANGE, -1, "normal is 0");
-    if (desc->mode != DEM2D_WALL_STILL && desc->mode != DEM2D_WALL_MOVING &&
-        desc->mode != DEM2D_WALL_SERVO)
-        return dem2di_fail(env, DEM2D_OUT_OF_RANGE, -1, "mode = %d", (int)desc->mode);
     return dem2di_check_spans(world, desc);
 }
 
@@ -11995,7 +12133,8 @@ DEM2D_API dem2d_result dem2d_world_get_wall(const dem2d_world *world, dem2d_wall
 
 DEM2D_API dem2d_result dem2d_world_set_gravity(dem2d_world *world, dem2d_vec gravity) {
     if (world == NULL) return DEM2D_NULL_ARGUMENT;
-    dem2d_result result = dem2di_check_vec(&world->env, "gravity", gravity);
+    dem2d_result result = dem2di_check_one(&world->env, dem2di_world_fields,
+                                           offsetof(dem2d_world_desc, gravity), &gravity);
     if (result != DEM2D_OK) return result;
     world->gravity = gravity;
     world->list_stale = true; /* with its bounds of the motion */
@@ -12004,7 +12143,11 @@ DEM2D_API dem2d_result dem2d_world_set_gravity(dem2d_world *world, dem2d_vec gra
 
 DEM2D_API dem2d_result dem2d_world_set_damping(dem2d_world *world, double local, double global) {
     if (world == NULL) return DEM2D_NULL_ARGUMENT;
-    dem2d_result result = dem2di_check_damping(&world->env, local, global);
+    dem2d_result result = dem2di_check_one(&world->env, dem2di_world_fields,
+                                           offsetof(dem2d_world_desc, local_damping), &local);
+    if (result == DEM2D_OK)
+        result = dem2di_check_one(&world->env, dem2di_world_fields,
+                                  offsetof(dem2d_world_desc, global_damping), &global);
     if (result != DEM2D_OK) return result;
     world->local_damping = local;
     world->global_damping = global;
@@ -12018,7 +12161,8 @@ static double dem2di_time(const dem2d_world *world) {
 
 DEM2D_API dem2d_result dem2d_world_set_time_step(dem2d_world *world, double time_step) {
     if (world == NULL) return DEM2D_NULL_ARGUMENT;
-    dem2d_result result = dem2di_check_positive(&world->env, "time_step", time_step);
+    dem2d_result result = dem2di_check_one(&world->env, dem2di_world_fields,
+                                           offsetof(dem2d_world_desc, time_step), &time_step);
     if (result != DEM2D_OK) return result;
     if (time_step != world->time_step) {
         world->timed = dem2di_time(world);
@@ -12925,8 +13069,8 @@ static double dem2di_ledger_turnover(const dem2di_ledger *ledger, const dem2di_l
 
 /* ============================================================================================
    >>step  Contacts, their sums, walls, motion; the stable time step
-   uses: config, math, memory, support, shapes, gjk, faces, contact, broad, law, motion, world,
-         list, ledger
+   uses: config, math, memory, fields, support, shapes, gjk, faces, contact, broad, law, motion,
+         world, list, ledger
    ============================================================================================ */
 
 /* Contacts of circles are taken in batches: what they need is fetched, all are computed by a loop
@@ -14408,18 +14552,17 @@ static dem2d_result dem2di_step(dem2d_world *world) {
 DEM2D_API dem2d_result dem2d_world_step(dem2d_world *world, int count, int *done) {
     if (done != NULL) *done = 0;
     if (world == NULL) return DEM2D_NULL_ARGUMENT;
-    if (count < 0) return dem2di_fail(&world->env, DEM2D_OUT_OF_RANGE, -1, "count = %d", count);
-    for (int i = 0; i < count; i++) {
-        dem2d_result result = dem2di_step(world);
-        if (result != DEM2D_OK) return result;
-        if (done != NULL) *done = i + 1;
+    dem2d_result result = dem2di_check_number(&world->env, "count", count, DEM2DI_COUNT);
+    for (int i = 0; i < count && result == DEM2D_OK; i++) {
+        result = dem2di_step(world);
+        if (done != NULL && result == DEM2D_OK) *done = i + 1;
     }
-    return DEM2D_OK;
+    return result;
 }
 
 /* ============================================================================================
    >>measures  Lists of what is there, energy, stress, fabric, packing, distance from rest
-   uses: config, math, memory, mass, shapes, broad, law, motion, world
+   uses: config, math, memory, fields, mass, shapes, broad, law, motion, world
    ============================================================================================ */
 
 /* A walk over the contacts of the last force pass in the order of their ids: those of particles, or
@@ -14612,7 +14755,7 @@ static dem2d_stress dem2di_stress_over(const dem2d_stress *sum, double area) {
 DEM2D_API dem2d_result dem2d_world_stress(const dem2d_world *world, double area,
                                           dem2d_stress *stress) {
     if (world == NULL || stress == NULL) return DEM2D_NULL_ARGUMENT;
-    dem2d_result result = dem2di_check_positive(&world->env, "area", area);
+    dem2d_result result = dem2di_check_number(&world->env, "area", area, DEM2DI_POSITIVE);
     if (result != DEM2D_OK) return result;
     dem2d_stress sum = {0, 0, 0, 0};
     for (int wall = 0; wall < 2; wall++) {
@@ -14970,9 +15113,11 @@ DEM2D_API dem2d_result dem2d_world_histogram(const dem2d_world *world, dem2d_his
                                              int bins, double *values) {
     if (world == NULL || values == NULL) return DEM2D_NULL_ARGUMENT;
     const dem2d_env *env = &world->env;
-    if (!((int)kind >= 0 && kind < DEM2D_HISTOGRAM_COUNT))
-        return dem2di_fail(env, DEM2D_OUT_OF_RANGE, -1, "kind = %d", (int)kind);
-    if (bins < 1) return dem2di_fail(env, DEM2D_OUT_OF_RANGE, -1, "bins = %d", bins);
+    dem2d_result result =
+        dem2di_check_number(env, "kind", (int)kind, DEM2DI_CHOICE(DEM2D_HISTOGRAM_COUNT));
+    if (result == DEM2D_OK)
+        result = dem2di_check_number(env, "bins", bins, DEM2DI_WHOLE(1, DBL_MAX));
+    if (result != DEM2D_OK) return result;
     size_t room = (size_t)bins, templates = (size_t)world->template_count + 1;
     int *counts = (int *)dem2di_allocate(env, room, sizeof *counts);
     dem2d_rot *axes = (dem2d_rot *)dem2di_allocate(env, templates, sizeof *axes);
@@ -15057,8 +15202,10 @@ DEM2D_API dem2d_result dem2d_world_equilibrium(const dem2d_world *world,
 DEM2D_API dem2d_result dem2d_world_inertial_number(const dem2d_world *world, double strain_rate,
                                                    double pressure, double *number) {
     if (world == NULL || number == NULL) return DEM2D_NULL_ARGUMENT;
-    dem2d_result result = dem2di_check_finite(&world->env, "strain_rate", strain_rate);
-    if (result == DEM2D_OK) result = dem2di_check_positive(&world->env, "pressure", pressure);
+    dem2d_result result =
+        dem2di_check_number(&world->env, "strain_rate", strain_rate, DEM2DI_FINITE);
+    if (result == DEM2D_OK)
+        result = dem2di_check_number(&world->env, "pressure", pressure, DEM2DI_POSITIVE);
     if (result != DEM2D_OK) return result;
     double diameters = 0, mass = 0, area = 0;
     int count = 0;
@@ -15133,7 +15280,7 @@ static dem2d_result dem2di_writer_close(const dem2d_env *env, const char *path,
 
 /* ============================================================================================
    >>snapshot  State hash, snapshots: one list of fields for hash, save and load
-   uses: config, memory, support, shapes, broad, law, motion, world, list, measures, output
+   uses: config, memory, fields, support, shapes, broad, law, motion, world, list, measures, output
    ============================================================================================ */
 
 /* A snapshot is a mark, a version, its size in bytes, what dem2di_archive_world lists, and a
@@ -15314,17 +15461,17 @@ static void dem2di_archive_bits(dem2di_archive *ar, double *value) {
 
 static void dem2di_archive_finite(dem2di_archive *ar, const char *name, double *value) {
     dem2di_archive_bits(ar, value);
-    dem2di_archive_check(ar, dem2di_check_finite(ar->env, name, *value));
+    dem2di_archive_check(ar, dem2di_check_number(ar->env, name, *value, DEM2DI_FINITE));
 }
 
 static void dem2di_archive_positive(dem2di_archive *ar, const char *name, double *value) {
     dem2di_archive_bits(ar, value);
-    dem2di_archive_check(ar, dem2di_check_positive(ar->env, name, *value));
+    dem2di_archive_check(ar, dem2di_check_number(ar->env, name, *value, DEM2DI_POSITIVE));
 }
 
 static void dem2di_archive_not_negative(dem2di_archive *ar, const char *name, double *value) {
     dem2di_archive_bits(ar, value);
-    dem2di_archive_check(ar, dem2di_check_not_negative(ar->env, name, *value));
+    dem2di_archive_check(ar, dem2di_check_number(ar->env, name, *value, DEM2DI_FROM_0));
 }
 
 static void dem2di_archive_vec(dem2di_archive *ar, const char *name, dem2d_vec *value) {
@@ -15756,8 +15903,8 @@ static void dem2di_archive_revive(dem2di_archive *ar, dem2d_world *w, int slot) 
     dem2di_archive_expect(ar, place->shape != NULL, "a particle without a shape");
     if (!dem2di_archive_good(ar)) return;
     double mass = dem2di_body_mass(w, body), inertia = dem2di_body_inertia(w, body);
-    dem2di_archive_check(ar, dem2di_check_positive(ar->env, "mass", mass));
-    dem2di_archive_check(ar, dem2di_check_positive(ar->env, "inertia", inertia));
+    dem2di_archive_check(ar, dem2di_check_number(ar->env, "mass", mass, DEM2DI_POSITIVE));
+    dem2di_archive_check(ar, dem2di_check_number(ar->env, "inertia", inertia, DEM2DI_POSITIVE));
     place->users++;
     w->inverse[slot] = dem2di_inverse_of(w, body);
     w->now[slot].radius = w->before[slot].radius = place->shape->circumscribed * body->scale;
@@ -16000,7 +16147,10 @@ static dem2d_result dem2di_save_aside(const dem2d_world *world, const char *path
 
 DEM2D_API dem2d_result dem2d_world_save(const dem2d_world *world, const dem2d_save_desc *desc,
                                         const char *path) {
-    if (world == NULL || desc == NULL) return DEM2D_NULL_ARGUMENT;
+    dem2d_save_desc plain;
+    if (world == NULL) return DEM2D_NULL_ARGUMENT;
+    memset(&plain, 0, sizeof plain);
+    if (desc == NULL) desc = &plain;
     const dem2d_env *env = &world->env;
     dem2di_archive ar;
     dem2di_archive_start(env, DEM2DI_SAVING, &ar);
@@ -16139,7 +16289,7 @@ DEM2D_API dem2d_result dem2d_world_load(const dem2d_load_desc *desc, const char 
 
 /* ============================================================================================
    >>writers  Pictures, files for ParaView, histories
-   uses: config, math, memory, mass, shapes, broad, law, world, measures, output
+   uses: config, math, memory, fields, mass, shapes, broad, law, world, measures, output
    ============================================================================================ */
 
 /* Write text without formatting, of any length. */
@@ -16180,12 +16330,6 @@ static void dem2di_print(dem2di_writer *writer, const char *format, ...) {
 /* Write a number with all digits: reading it gives the same bits. */
 static void dem2di_put_number(dem2di_writer *writer, double value) {
     dem2di_print(writer, "%.17g", value);
-}
-
-/* Check outline_points: at least 3, or 0 for the default. */
-static dem2d_result dem2di_check_outline_points(const dem2d_env *env, int points) {
-    if (points == 0 || points >= 3) return DEM2D_OK;
-    return dem2di_fail(env, DEM2D_OUT_OF_RANGE, -1, "outline_points = %d", points);
 }
 
 /* Number of points to draw a shape: the corners of a sharp polygon, else `points`, 0 for 64. */
@@ -16308,10 +16452,18 @@ static bool dem2di_box_given(const dem2d_box *box) {
     return box->lower.x != 0 || box->lower.y != 0 || box->upper.x != 0 || box->upper.y != 0;
 }
 
+static const dem2di_field dem2di_svg_fields[] = {
+    DEM2DI_ROW(dem2d_svg_desc, width, DEM2DI_FROM_0, "px 800"),
+    DEM2DI_ROW(dem2d_svg_desc, outline_points, DEM2DI_WHOLE_OR_0(3, DBL_MAX), "- 64"),
+    DEM2DI_ROW(dem2d_svg_desc, force_chains, DEM2DI_SWITCH, "- false"),
+    DEM2DI_ROW(dem2d_svg_desc, view.lower, DEM2DI_VECTOR, "m all"),
+    DEM2DI_ROW(dem2d_svg_desc, view.upper, DEM2DI_VECTOR, "m all; above lower, or all zero"),
+    DEM2DI_ROW(dem2d_svg_desc, write, DEM2DI_OPTIONAL, "- none; or a path, not both"),
+    DEM2DI_ROW(dem2d_svg_desc, user, DEM2DI_OPTIONAL, "- NULL"),
+};
+
 static dem2d_result dem2di_check_view(const dem2d_env *env, const dem2d_box *view) {
-    dem2d_result result = dem2di_check_vec(env, "view.lower", view->lower);
-    if (result == DEM2D_OK) result = dem2di_check_vec(env, "view.upper", view->upper);
-    if (result != DEM2D_OK || !dem2di_box_given(view)) return result;
+    if (!dem2di_box_given(view)) return DEM2D_OK;
     if (view->upper.x > view->lower.x && view->upper.y > view->lower.y) return DEM2D_OK;
     return dem2di_fail(env, DEM2D_OUT_OF_RANGE, -1,
                        "view from (%g, %g) to (%g, %g): upper must be above lower", view->lower.x,
@@ -16495,9 +16647,8 @@ DEM2D_API dem2d_result dem2d_world_write_svg(const dem2d_world *world, const dem
     if (desc == NULL) desc = &plain;
     const dem2d_env *env = &world->env;
     dem2di_writer writer;
-    dem2d_result result = dem2di_check_not_negative(env, "width", desc->width);
+    dem2d_result result = dem2di_check_fields(env, DEM2DI_ALL(dem2di_svg_fields), desc);
     if (result == DEM2D_OK) result = dem2di_check_view(env, &desc->view);
-    if (result == DEM2D_OK) result = dem2di_check_outline_points(env, desc->outline_points);
     if (result == DEM2D_OK)
         result = dem2di_writer_open(env, desc->write, desc->user, path, false, &writer);
     if (result != DEM2D_OK) return result;
@@ -16767,14 +16918,22 @@ static void dem2di_vtp(const dem2d_world *world, const dem2d_vtp_desc *desc,
     dem2di_put(writer, "</Piece>\n</PolyData>\n</VTKFile>\n");
 }
 
+static const dem2di_field dem2di_vtp_fields[] = {
+    DEM2DI_ROW(dem2d_vtp_desc, outline_points, DEM2DI_WHOLE_OR_0(3, DBL_MAX), "- 64"),
+    DEM2DI_ROW(dem2d_vtp_desc, part, DEM2DI_CHOICE(DEM2D_VTP_PART_COUNT), "- PARTICLES"),
+    DEM2DI_ROW(dem2d_vtp_desc, write, DEM2DI_OPTIONAL, "- none; or a path, not both"),
+    DEM2DI_ROW(dem2d_vtp_desc, user, DEM2DI_OPTIONAL, "- NULL"),
+};
+
 DEM2D_API dem2d_result dem2d_world_write_vtp(const dem2d_world *world, const dem2d_vtp_desc *desc,
                                              const char *path) {
-    if (world == NULL || desc == NULL) return DEM2D_NULL_ARGUMENT;
+    dem2d_vtp_desc plain;
+    if (world == NULL) return DEM2D_NULL_ARGUMENT;
+    memset(&plain, 0, sizeof plain);
+    if (desc == NULL) desc = &plain;
     const dem2d_env *env = &world->env;
     dem2di_writer writer;
-    if (!((int)desc->part >= 0 && desc->part < DEM2D_VTP_PART_COUNT))
-        return dem2di_fail(env, DEM2D_OUT_OF_RANGE, -1, "part = %d", (int)desc->part);
-    dem2d_result result = dem2di_check_outline_points(env, desc->outline_points);
+    dem2d_result result = dem2di_check_fields(env, DEM2DI_ALL(dem2di_vtp_fields), desc);
     if (result == DEM2D_OK)
         result = dem2di_writer_open(env, desc->write, desc->user, path, false, &writer);
     if (result != DEM2D_OK) return result;
@@ -16802,8 +16961,7 @@ static void dem2di_put_escaped(dem2di_writer *writer, const char *text) {
 static dem2d_result dem2di_check_named(const dem2d_env *env, const char *const *names,
                                        const char *what, const double *values, const char *of,
                                        int count, const char *unwanted) {
-    dem2d_result result = dem2di_check_count(env, "count", count);
-    if (result != DEM2D_OK || count == 0) return result;
+    if (count == 0) return DEM2D_OK;
     if (names == NULL) return dem2di_fail_null(env, what);
     if (values == NULL) return dem2di_fail_null(env, of);
     for (int i = 0; i < count; i++) {
@@ -16823,12 +16981,22 @@ static dem2d_result dem2di_check_named(const dem2d_env *env, const char *const *
     "\001\002\003\004\005\006\007\010\011\012\013\014\015\016\017\020" \
     "\021\022\023\024\025\026\027\030\031\032\033\034\035\036\037"
 
+static const dem2di_field dem2di_pvd_fields[] = {
+    DEM2DI_ROW(dem2d_pvd_desc, count, DEM2DI_WHOLE(0, 1 << 30), "- 0"),
+    DEM2DI_ROW(dem2d_pvd_desc, times, DEM2DI_OPTIONAL, "s none; count values, finite"),
+    DEM2DI_ROW(dem2d_pvd_desc, files, DEM2DI_OPTIONAL, "- none; count names, no control bytes"),
+    DEM2DI_ROW(dem2d_pvd_desc, write, DEM2DI_OPTIONAL, "- none; or a path, not both"),
+    DEM2DI_ROW(dem2d_pvd_desc, user, DEM2DI_OPTIONAL, "- NULL"),
+};
+
 DEM2D_API dem2d_result dem2d_pvd_write(const dem2d_env *env, const dem2d_pvd_desc *desc,
                                        const char *path) {
     dem2di_writer writer;
     if (desc == NULL) return dem2di_fail_null(env, "desc");
-    dem2d_result result = dem2di_check_named(env, desc->files, "files", desc->times, "times",
-                                             desc->count, DEM2DI_CONTROL);
+    dem2d_result result = dem2di_check_fields(env, DEM2DI_ALL(dem2di_pvd_fields), desc);
+    if (result == DEM2D_OK)
+        result = dem2di_check_named(env, desc->files, "files", desc->times, "times", desc->count,
+                                    DEM2DI_CONTROL);
     if (result == DEM2D_OK)
         result = dem2di_writer_open(env, desc->write, desc->user, path, false, &writer);
     if (result != DEM2D_OK) return result;
@@ -16926,13 +17094,27 @@ static void dem2di_csv_row(const dem2d_world *world, const dem2d_csv_desc *desc,
     dem2di_put(writer, "\n");
 }
 
+static const dem2di_field dem2di_csv_fields[] = {
+    DEM2DI_ROW(dem2d_csv_desc, count, DEM2DI_WHOLE(0, 1 << 30), "- 0"),
+    DEM2DI_ROW(dem2d_csv_desc, names, DEM2DI_OPTIONAL, "- none; count; no comma, quote, line end"),
+    DEM2DI_ROW(dem2d_csv_desc, values, DEM2DI_OPTIONAL, "- none; count values, finite"),
+    DEM2DI_ROW(dem2d_csv_desc, append, DEM2DI_SWITCH, "- false"),
+    DEM2DI_ROW(dem2d_csv_desc, write, DEM2DI_OPTIONAL, "- none; or a path, not both"),
+    DEM2DI_ROW(dem2d_csv_desc, user, DEM2DI_OPTIONAL, "- NULL"),
+};
+
 DEM2D_API dem2d_result dem2d_world_write_csv(const dem2d_world *world, const dem2d_csv_desc *desc,
                                              const char *path) {
-    if (world == NULL || desc == NULL) return DEM2D_NULL_ARGUMENT;
+    dem2d_csv_desc plain;
+    if (world == NULL) return DEM2D_NULL_ARGUMENT;
+    memset(&plain, 0, sizeof plain);
+    if (desc == NULL) desc = &plain;
     const dem2d_env *env = &world->env;
     dem2di_writer writer;
-    dem2d_result result = dem2di_check_named(env, desc->names, "names", desc->values, "values",
-                                             desc->count, ",\"\r\n");
+    dem2d_result result = dem2di_check_fields(env, DEM2DI_ALL(dem2di_csv_fields), desc);
+    if (result == DEM2D_OK)
+        result = dem2di_check_named(env, desc->names, "names", desc->values, "values", desc->count,
+                                    ",\"\r\n");
     if (result == DEM2D_OK)
         result = dem2di_writer_open(env, desc->write, desc->user, path, desc->append, &writer);
     if (result != DEM2D_OK) return result;
@@ -16993,7 +17175,7 @@ DEM2D_API dem2d_result dem2d_world_write_csv(const dem2d_world *world, const dem
             (DEM2D_CROSSING). The long axis of a template is exact for every model.
             Writers: an SVG picture has a view, half-planes beside the grains, marks of fixed and
             driven grains, and chains no wider than grains. Numbers have a decimal point in every
-            locale. desc may be NULL in dem2d_world_write_svg and dem2d_world_load.
+            locale. desc may be NULL where all of it may be zero.
             Names: dem2d_stats.looks -> collisions, gaps -> separations.
             Log and compilers: warnings have the result DEM2D_WARNING. The header refuses the parts
             of -ffast-math that the compiler tells it of. After the implementation clang is back at

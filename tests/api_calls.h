@@ -861,7 +861,7 @@ static const row rows_shape_create_polygon[] = {ENV, THREE_POINTS, ARG(x, "round
                                                 OUT};
 static const row rows_shape_create_bezier[] = {
     ENV, ARG(points, "control", POINTER),
-    ARG_INT(count, "arcs", INTEGER, 2, INT_MAX / 3, TOO_FEW_POINTS), POINTS(p, "control["), OUT};
+    ARG_INT(count, "arcs", INTEGER, 2, INT_MAX, TOO_FEW_POINTS), POINTS(p, "control["), OUT};
 static const row rows_shape_create_fourier[] = {ENV, SERIES, OUT};
 static const row rows_shape_create_custom[] = {ENV, THE_DESC, OUT};
 static const row rows_shape_get[] = {ARG(shape, "shape", POINTER), OUT};

@@ -5,6 +5,7 @@
 #include "testing.h"
 
 #include <float.h>
+#include <limits.h>
 
 #define KAPPA 0.5522847498 /* handle length of a quarter circle */
 
@@ -443,6 +444,7 @@ static void beziers_are_checked(void **state) {
     dem2d_vec c[24], twice[24];
     turn_four(circle_quarter, 3, c);
     check_bezier("one arc", c, 1, DEM2D_TOO_FEW_POINTS, -1, -1);
+    check_bezier("too many arcs", c, INT_MAX / 12 + 1, DEM2D_OUT_OF_RANGE, -1, -1);
     check_bezier("none", c, 0, DEM2D_TOO_FEW_POINTS, -1, -1);
     check_bezier("negative", c, -4, DEM2D_TOO_FEW_POINTS, -1, -1);
     for (int i = 0; i < 24; i++) twice[i] = c[i % 12];

@@ -1212,7 +1212,9 @@ static void test_arguments(void **state) {
     assert_ptr_equal(world, untouched);
     assert_ok(dem2d_world_load(&load, NULL, &world));
     assert_result(dem2d_world_save(NULL, &save, "x"), DEM2D_NULL_ARGUMENT);
-    assert_result(dem2d_world_save(world, NULL, "x"), DEM2D_NULL_ARGUMENT);
+    assert_result(dem2d_world_save(world, NULL, NULL), DEM2D_NULL_ARGUMENT);
+    assert_ok(dem2d_world_save(world, NULL, "build/plain.snapshot"));
+    assert_int_equal(remove("build/plain.snapshot"), 0);
     assert_result(dem2d_world_save(world, &save, NULL), DEM2D_NULL_ARGUMENT);
     assert_logged(&env, DEM2D_NULL_ARGUMENT, -1, "write");
     save.write = scene_write;

@@ -299,9 +299,11 @@ static void test_null_arguments(void **state) {
     assert_result(dem2d_world_write_svg(NULL, &svg, "x"), DEM2D_NULL_ARGUMENT);
     assert_result(dem2d_world_write_svg(s.world, NULL, NULL), DEM2D_NULL_ARGUMENT);
     assert_result(dem2d_world_write_vtp(NULL, &vtp, "x"), DEM2D_NULL_ARGUMENT);
-    assert_result(dem2d_world_write_vtp(s.world, NULL, "x"), DEM2D_NULL_ARGUMENT);
+    assert_result(dem2d_world_write_vtp(s.world, NULL, NULL), DEM2D_NULL_ARGUMENT);
     assert_result(dem2d_world_write_csv(NULL, &csv, "x"), DEM2D_NULL_ARGUMENT);
-    assert_result(dem2d_world_write_csv(s.world, NULL, "x"), DEM2D_NULL_ARGUMENT);
+    assert_result(dem2d_world_write_csv(s.world, NULL, NULL), DEM2D_NULL_ARGUMENT);
+    assert_ok(dem2d_world_write_vtp(s.world, NULL, "build/test_writers_plain.vtp")); /* all zero */
+    assert_ok(dem2d_world_write_csv(s.world, NULL, "build/test_writers_plain.csv"));
     assert_result(dem2d_pvd_write(&env.env, NULL, "x"), DEM2D_NULL_ARGUMENT);
     assert_logged(&env, DEM2D_NULL_ARGUMENT, -1, "desc");
     for (int points = -1; points <= 2; points++) {
