@@ -37,10 +37,10 @@ static void curve_arc(curve *c, spot start, spot leave, spot arrive) {
 }
 
 /* A straight arc: third parts, or handles anywhere on it, or in its ends. */
-static void curve_straight(curve *c, spot from, spot to, dice *d) {
+static void curve_straight(curve *c, spot from, spot to, uint64_t *d) {
     static const real firsts[] = {1 / 3.0L, 1 / 3.0L, 0, 0, 0.5L, 0.1L};
     static const real seconds[] = {2 / 3.0L, 2 / 3.0L, 1, 2 / 3.0L, 0.5L, 0.2L};
-    const int style = dice_below(d, 6);
+    const int style = random_below(d, 6);
     const spot side = spot_less(to, from);
     curve_arc(c, from, spot_sum(from, firsts[style], side), spot_sum(from, seconds[style], side));
 }
@@ -64,28 +64,29 @@ static void curve_stretch(curve *c, real fx, real fy) {
 /* --- kinds of curves ------------------------------------------------------------------------- */
 
 /* 2 to 8 equal arcs of a circle, often stretched. */
-static void draw_round(curve *c, dice *d) {
-    curve_circle(c, spot_make(0, 0), 1, 0, 2 * CASE_PI, 2 + dice_below(d, 7));
-    if (dice_below(d, 3)) curve_stretch(c, 1, dice_scale(d, 0.1, 1));
+static void draw_round(curve *c, uint64_t *d) {
+    curve_circle(c, spot_make(0, 0), 1, 0, 2 * CASE_PI, 2 + random_below(d, 7));
+    if (random_below(d, 3)) curve_stretch(c, 1, random_scale(d, 0.1, 1));
 }
 
 /* Two arcs, each turning by exactly pi: circles, eggs, lenses, eyes, slanted or not. */
-static void draw_two_arcs(curve *c, dice *d) {
-    const bool equal = dice_below(d, 2);
-    const real width = dice_scale(d, 0.2, 2), slant = dice_below(d, 2) ? dice_uniform(d, -1, 1) : 0;
+static void draw_two_arcs(curve *c, uint64_t *d) {
+    const bool equal = random_below(d, 2);
+    const real width = random_scale(d, 0.2, 2),
+               slant = random_below(d, 2) ? random_between(d, -1, 1) : 0;
     const spot p = spot_make(-width / 2, -slant / 2), q = spot_make(width / 2, slant / 2);
     real handles[4];
     for (int i = 0; i < 4; i++)
-        handles[i] = equal && i > 0 ? handles[0] : (real)dice_scale(d, 0.02, 2);
+        handles[i] = equal && i > 0 ? handles[0] : (real)random_scale(d, 0.02, 2);
     curve_arc(c, p, spot_make(p.x, p.y - handles[0]), spot_make(q.x, q.y - handles[1]));
     curve_arc(c, q, spot_make(q.x, q.y + handles[2]), spot_make(p.x, p.y + handles[3]));
 }
 
 /* Two straight sides and two caps, of one arc or more each. */
-static void draw_stadium(curve *c, dice *d) {
-    const real half = dice_scale(d, 0.01, 3),
-               radius = dice_below(d, 3) ? 1 : dice_scale(d, 0.05, 1);
-    const int parts = dice_below(d, 3) ? 1 : 2;
+static void draw_stadium(curve *c, uint64_t *d) {
+    const real half = random_scale(d, 0.01, 3),
+               radius = random_below(d, 3) ? 1 : random_scale(d, 0.05, 1);
+    const int parts = random_below(d, 3) ? 1 : 2;
     const spot low = spot_make(0, -radius), high = spot_make(0, radius), out = spot_make(half, 0);
     curve_straight(c, spot_sum(low, -1, out), spot_sum(low, 1, out), d);
     curve_circle(c, out, radius, -CASE_PI / 2, CASE_PI / 2, parts);
@@ -94,15 +95,16 @@ static void draw_stadium(curve *c, dice *d) {
 }
 
 /* A flat side, a cap that turns by pi, or in two parts, and two small corners. */
-static void draw_d_shape(curve *c, dice *d) {
-    const real corner = dice_scale(d, 1e-3, 0.5), reach = dice_uniform(d, 0, 1);
+static void draw_d_shape(curve *c, uint64_t *d) {
+    const real corner = random_scale(d, 1e-3, 0.5), reach = random_between(d, 0, 1);
     const spot below = spot_make(corner + reach, -1), above = spot_make(corner + reach, 1);
     curve_circle(c, spot_make(corner, -1 + corner), corner, CASE_PI, 3 * CASE_PI / 2, 1);
     curve_straight(c, spot_make(corner, -1), below, d);
-    if (dice_below(d, 2)) {
-        curve_circle(c, spot_make(below.x, 0), 1, -CASE_PI / 2, CASE_PI / 2, 1 + dice_below(d, 2));
+    if (random_below(d, 2)) {
+        curve_circle(c, spot_make(below.x, 0), 1, -CASE_PI / 2, CASE_PI / 2,
+                     1 + random_below(d, 2));
     } else {
-        const real handle = dice_scale(d, 0.1, 2);
+        const real handle = random_scale(d, 0.1, 2);
         curve_arc(c, below, spot_make(below.x + handle, -1), spot_make(above.x + handle, 1));
     }
     curve_straight(c, above, spot_make(corner, 1), d);
@@ -120,16 +122,16 @@ typedef struct cut_polygon {
 } cut_polygon;
 
 /* Corners on a stretched circle, or of a rectangle. */
-static void draw_cut_polygon(cut_polygon *p, dice *d) {
-    const bool box = dice_below(d, 3) == 0;
-    const real thin = dice_uniform(d, 0.3, 1);
-    p->count = box ? 4 : 3 + dice_below(d, 4);
+static void draw_cut_polygon(cut_polygon *p, uint64_t *d) {
+    const bool box = random_below(d, 3) == 0;
+    const real thin = random_between(d, 0.3, 1);
+    p->count = box ? 4 : 3 + random_below(d, 4);
     for (int i = 0; i < p->count; i++) {
-        const real shift = box ? 0.5L : (real)dice_uniform(d, 0, 0.6);
+        const real shift = box ? 0.5L : (real)random_between(d, 0, 0.6);
         const spot u = spot_turned(spot_make(1, 0), 2 * CASE_PI * (i + shift) / p->count);
         p->at[i] = spot_make(u.x, thin * u.y);
-        p->before[i] = p->after[i] = dice_uniform(d, 0.1, 0.5);
-        p->first[i] = p->second[i] = dice_below(d, 4) ? 0.5522847498L : 1;
+        p->before[i] = p->after[i] = random_between(d, 0.1, 0.5);
+        p->first[i] = p->second[i] = random_below(d, 4) ? 0.5522847498L : 1;
         p->bend[i] = 0;
     }
 }
@@ -138,7 +140,7 @@ static spot cut_side(const cut_polygon *p, int i) {
     return spot_less(p->at[(i + 1) % p->count], p->at[i]);
 }
 
-static void curve_cut(curve *c, const cut_polygon *p, dice *d) {
+static void curve_cut(curve *c, const cut_polygon *p, uint64_t *d) {
     for (int i = 0; i < p->count; i++) {
         const int before = (i + p->count - 1) % p->count, next = (i + 1) % p->count;
         const spot in = spot_sum(p->at[i], -p->before[i], cut_side(p, before));
@@ -163,54 +165,55 @@ static void curve_cut(curve *c, const cut_polygon *p, dice *d) {
 }
 
 /* Straight sides, rounded corners; where two cuts meet in the middle there is no side. */
-static void draw_cut(curve *c, dice *d) {
+static void draw_cut(curve *c, uint64_t *d) {
     cut_polygon p;
     draw_cut_polygon(&p, d);
     for (int i = 0; i < p.count; i++) {
-        if (dice_below(d, 3)) continue;
-        p.after[i] = dice_uniform(d, 0.1, 0.9);
+        if (random_below(d, 3)) continue;
+        p.after[i] = random_between(d, 0.1, 0.9);
         p.before[(i + 1) % p.count] = 1 - p.after[i];
     }
     curve_cut(c, &p, d);
 }
 
 /* Sides that bend by 1e-15 to 1e-3. */
-static void draw_nearly_straight(curve *c, dice *d) {
+static void draw_nearly_straight(curve *c, uint64_t *d) {
     cut_polygon p;
     draw_cut_polygon(&p, d);
-    const real bend = dice_scale(d, 1e-15, 1e-3);
+    const real bend = random_scale(d, 1e-15, 1e-3);
     for (int i = 0; i < p.count; i++) {
-        p.bend[i] = dice_below(d, 2) ? bend : (real)dice_scale(d, 1e-15, 1e-3);
-        p.before[i] = p.after[i] = dice_uniform(d, 0.1, 0.45);
+        p.bend[i] = random_below(d, 2) ? bend : (real)random_scale(d, 1e-15, 1e-3);
+        p.before[i] = p.after[i] = random_between(d, 0.1, 0.45);
     }
     curve_cut(c, &p, d);
 }
 
 /* Corners of 1e-14 to 1e-3 of the sides. */
-static void draw_tiny(curve *c, dice *d) {
+static void draw_tiny(curve *c, uint64_t *d) {
     cut_polygon p;
     draw_cut_polygon(&p, d);
-    const real size = dice_scale(d, 1e-14, 1e-3);
+    const real size = random_scale(d, 1e-14, 1e-3);
     for (int i = 0; i < p.count; i++)
-        if (dice_below(d, 3))
-            p.before[i] = p.after[i] = dice_below(d, 2) ? size : (real)dice_scale(d, 1e-14, 1e-3);
+        if (random_below(d, 3))
+            p.before[i] = p.after[i] =
+                random_below(d, 2) ? size : (real)random_scale(d, 1e-14, 1e-3);
     curve_cut(c, &p, d);
 }
 
 /* Joints on an ellipse-like chain with tangents between those of the chords. */
-static void draw_smooth(curve *c, dice *d) {
-    const int n = 3 + dice_below(d, 8);
+static void draw_smooth(curve *c, uint64_t *d) {
+    const int n = 3 + random_below(d, 8);
     spot joint[12], tangent[12];
-    const real thin = dice_uniform(d, 0.3, 1);
+    const real thin = random_between(d, 0.3, 1);
     for (int i = 0; i < n; i++) {
         const spot u =
-            spot_turned(spot_make(1, 0), 2 * CASE_PI * (i + dice_uniform(d, 0, 0.7)) / n);
+            spot_turned(spot_make(1, 0), 2 * CASE_PI * (i + random_between(d, 0, 0.7)) / n);
         joint[i] = spot_make(u.x, thin * u.y);
     }
     for (int i = 0; i < n; i++) {
         const spot in = spot_unit(spot_less(joint[i], joint[(i + n - 1) % n]));
         const spot out = spot_unit(spot_less(joint[(i + 1) % n], joint[i]));
-        const real w = dice_uniform(d, 0.1, 0.9);
+        const real w = random_between(d, 0.1, 0.9);
         tangent[i] = spot_unit(spot_make((1 - w) * in.x + w * out.x, (1 - w) * in.y + w * out.y));
     }
     for (int i = 0; i < n; i++) {
@@ -219,22 +222,23 @@ static void draw_smooth(curve *c, dice *d) {
         const real sine = spot_cross(s, t); /* arcs that turn by more than pi/2 may lack one */
         real a = hypotl(way.x, way.y), b = a;
         if (sine > 0.01L) a = spot_cross(way, t) / sine, b = spot_cross(s, way) / sine;
-        a *= dice_uniform(d, 0.2, 0.95), b *= dice_uniform(d, 0.2, 0.95);
+        a *= random_between(d, 0.2, 0.95), b *= random_between(d, 0.2, 0.95);
         curve_arc(c, joint[i], spot_sum(joint[i], a, s), spot_sum(joint[k], -b, t));
     }
 }
 
 /* Each arc of a curve cut in two, or not, by de Casteljau: nearly in the middle or at an end. */
-static void curve_split(curve *c, dice *d) {
+static void curve_split(curve *c, uint64_t *d) {
     const curve old = *c;
     c->count = 0;
     for (int i = 0; i < old.count; i += 3) {
         const spot *q = &old.q[i], end = old.q[(i + 3) % old.count];
-        if (dice_below(d, 3) == 0 || c->count + 6 + old.count - i > MODEL_POINTS) {
+        if (random_below(d, 3) == 0 || c->count + 6 + old.count - i > MODEL_POINTS) {
             curve_arc(c, q[0], q[1], q[2]);
             continue;
         }
-        const real t = dice_below(d, 3) ? dice_uniform(d, 0.05, 0.95) : dice_scale(d, 1e-10, 0.1);
+        const real t =
+            random_below(d, 3) ? random_between(d, 0.05, 0.95) : random_scale(d, 1e-10, 0.1);
         const spot a = spot_sum(q[0], t, spot_less(q[1], q[0]));
         const spot m = spot_sum(q[1], t, spot_less(q[2], q[1]));
         const spot b = spot_sum(q[2], t, spot_less(end, q[2]));
@@ -245,11 +249,11 @@ static void curve_split(curve *c, dice *d) {
 }
 
 /* Control points of straight and bent arcs drawn into the ends, or to where the handles meet. */
-static void draw_doubled(curve *c, dice *d) {
+static void draw_doubled(curve *c, uint64_t *d) {
     cut_polygon p;
     draw_cut_polygon(&p, d);
     for (int i = 0; i < p.count; i++) {
-        const int style = dice_below(d, 4);
+        const int style = random_below(d, 4);
         p.first[i] = style == 0 ? 0 : style == 1 ? 1 : (real)0.5522847498L;
         p.second[i] = style == 2 ? 0 : style == 1 ? 1 : (real)0.5522847498L;
         if (style == 0) p.second[i] = 1; /* the arc leaves along the line to that handle */
@@ -258,20 +262,20 @@ static void draw_doubled(curve *c, dice *d) {
     curve_cut(c, &p, d);
 }
 
-static void draw_simple(curve *c, dice *d) {
-    static void (*const draws[])(curve *, dice *) = {draw_round,   draw_two_arcs, draw_stadium,
-                                                     draw_d_shape, draw_cut,      draw_smooth};
-    draws[dice_below(d, 6)](c, d);
+static void draw_simple(curve *c, uint64_t *d) {
+    static void (*const draws[])(curve *, uint64_t *) = {draw_round,   draw_two_arcs, draw_stadium,
+                                                         draw_d_shape, draw_cut,      draw_smooth};
+    draws[random_below(d, 6)](c, d);
 }
 
-static void draw_split(curve *c, dice *d) {
+static void draw_split(curve *c, uint64_t *d) {
     draw_simple(c, d);
-    for (int i = dice_below(d, 3); i >= 0; i--) curve_split(c, d);
+    for (int i = random_below(d, 3); i >= 0; i--) curve_split(c, d);
 }
 
-static void draw_needle(curve *c, dice *d) {
+static void draw_needle(curve *c, uint64_t *d) {
     draw_simple(c, d);
-    curve_stretch(c, 1, dice_scale(d, 1e-6, 0.1));
+    curve_stretch(c, 1, random_scale(d, 1e-6, 0.1));
 }
 
 /* --- fits to outlines ------------------------------------------------------------------------ */
@@ -287,7 +291,7 @@ static outline outlines[OUTLINES];
 static int outline_count;
 
 /* A file of lines x,y after a line that says so; false if it is none. */
-CASE_HELPER bool outline_read(const char *path) {
+PART bool outline_read(const char *path) {
     char line[256];
     outline o = {NULL, 0};
     int room = 0;
@@ -314,18 +318,18 @@ CASE_HELPER bool outline_read(const char *path) {
     return true;
 }
 
-CASE_HELPER void outlines_free(void) {
+PART void outlines_free(void) {
     while (outline_count > 0) free(outlines[--outline_count].points);
 }
 
 /* A grain of random harmonics, seen in pixels of 1/40 of its size, or finely. */
-static int draw_outline(dem2d_vec *points, int count, dice *d) {
+static int draw_outline(dem2d_vec *points, int count, uint64_t *d) {
     double a[17], b[17];
     dem2d_virtual_desc desc = {0};
-    desc.radius = 1, desc.seed = dice_next(d), desc.elongation = dice_uniform(d, 0, 0.2);
-    desc.roundness = dice_uniform(d, 0, 0.1), desc.roughness = dice_uniform(d, 0, 0.02);
+    desc.radius = 1, desc.seed = random_bits(d), desc.elongation = random_between(d, 0, 0.2);
+    desc.roundness = random_between(d, 0, 0.1), desc.roughness = random_between(d, 0, 0.02);
     if (dem2d_fourier_virtual(&desc, 16, a, b) != DEM2D_OK) case_broken("no virtual grain");
-    const double pixel = dice_below(d, 2) ? 1 / 40.0 : 1e-6;
+    const double pixel = random_below(d, 2) ? 1 / 40.0 : 1e-6;
     for (int i = 0; i < count; i++) {
         const double t = 2 * (double)CASE_PI * i / count;
         double p = a[0] / 2, q = 0;
@@ -339,15 +343,15 @@ static int draw_outline(dem2d_vec *points, int count, dice *d) {
     return count;
 }
 
-static void draw_fitted(curve *c, dice *d) {
+static void draw_fitted(curve *c, uint64_t *d) {
     enum { DRAWN = 120, ARCS = 24 };
     dem2d_vec drawn[DRAWN], control[3 * ARCS];
     outline o = {drawn, 0};
-    if (outline_count > 0 && dice_below(d, 4))
-        o = outlines[dice_below(d, outline_count)];
+    if (outline_count > 0 && random_below(d, 4))
+        o = outlines[random_below(d, outline_count)];
     else
         o.count = draw_outline(drawn, DRAWN, d);
-    const int arcs = dice_below(d, 2) ? 10 : 4 + dice_below(d, ARCS - 3);
+    const int arcs = random_below(d, 2) ? 10 : 4 + random_below(d, ARCS - 3);
     if (dem2d_bezier_fit(NULL, o.points, o.count, arcs, control) != DEM2D_OK) return;
     double size = 0;
     for (int i = 1; i < 3 * arcs; i++)
@@ -374,14 +378,14 @@ enum {
     FITTED,
     CURVES
 };
-CASE_HELPER const char *const curve_names[CURVES] = {
+PART const char *const curve_names[CURVES] = {
     "round", "two arcs", "stadium", "D shape", "cut polygon", "nearly straight",
     "tiny",  "smooth",   "split",   "doubled", "needle",      "fitted"};
 
 /* How the control points are written down. */
 enum { AS_DOUBLE, AS_FLOAT, NINE_DIGITS, SEVEN_DIGITS, FIVE_DIGITS, WRITTEN };
-CASE_HELPER const char *const written_names[WRITTEN] = {"double", "float", "9 digits", "7 digits",
-                                                        "5 digits"};
+PART const char *const written_names[WRITTEN] = {"double", "float", "9 digits", "7 digits",
+                                                 "5 digits"};
 
 typedef struct grain {
     model m; /* m.shape is NULL if it was refused */
@@ -393,8 +397,8 @@ typedef struct grain {
     uint64_t seed;
 } grain;
 
-static void curve_draw(curve *c, int kind, dice *d) {
-    static void (*const draws[CURVES])(curve *, dice *) = {
+static void curve_draw(curve *c, int kind, uint64_t *d) {
+    static void (*const draws[CURVES])(curve *, uint64_t *) = {
         draw_round, draw_two_arcs, draw_stadium, draw_d_shape, draw_cut,    draw_nearly_straight,
         draw_tiny,  draw_smooth,   draw_split,   draw_doubled, draw_needle, draw_fitted};
     c->count = 0;
@@ -412,19 +416,19 @@ static double written(real value, int how) {
 
 /* Turned by quarters or anyhow, moved, mirrored (clockwise), begun at another arc. Sizes other
    than 1 only where every digit is kept: floats end at 1e38. */
-static void grain_write(grain *g, const curve *c, dice *d) {
+static void grain_write(grain *g, const curve *c, uint64_t *d) {
     static const double moves[] = {0, 0, 0, 1, 1000};
     model *m = &g->m;
-    const int quarters = dice_below(d, 4), first = 3 * dice_below(d, c->count / 3);
-    const real angle = dice_below(d, 2) ? quarters * CASE_PI / 2 : (real)dice_uniform(d, -4, 4);
-    const double move = g->curve == NEEDLE ? 0 : moves[dice_below(d, 5)];
-    const bool mirrored = dice_below(d, 4) == 0;
+    const int quarters = random_below(d, 4), first = 3 * random_below(d, c->count / 3);
+    const real angle = random_below(d, 2) ? quarters * CASE_PI / 2 : (real)random_between(d, -4, 4);
+    const double move = g->curve == NEEDLE ? 0 : moves[random_below(d, 5)];
+    const bool mirrored = random_below(d, 4) == 0;
     g->size = 1;
-    if (g->written == AS_DOUBLE && dice_below(d, 3) == 0) g->size = dice_scale(d, 1e-60, 1e60);
+    if (g->written == AS_DOUBLE && random_below(d, 3) == 0) g->size = random_scale(d, 1e-60, 1e60);
     const real f = g->size;
-    const spot turn = dice_below(d, 2) ? spot_turned(spot_make(1, 0), angle)
-                                       : (spot[4]){{1, 0}, {0, 1}, {-1, 0}, {0, -1}}[quarters];
-    const spot shift = spot_make(move * dice_uniform(d, -1, 1), move * dice_uniform(d, -1, 1));
+    const spot turn = random_below(d, 2) ? spot_turned(spot_make(1, 0), angle)
+                                         : (spot[4]){{1, 0}, {0, 1}, {-1, 0}, {0, -1}}[quarters];
+    const spot shift = spot_make(move * random_between(d, -1, 1), move * random_between(d, -1, 1));
     m->count = c->count;
     for (int i = 0; i < m->count; i++) {
         const spot q = c->q[(i + first) % m->count];
@@ -528,12 +532,12 @@ static real grain_reach(const model *m) {
 }
 
 /* The grain of a seed; deterministic, whatever the library does but for fits. */
-CASE_HELPER void grain_draw(grain *g, int kind, uint64_t seed) {
-    dice d = {seed};
+PART void grain_draw(grain *g, int kind, uint64_t seed) {
+    uint64_t d = seed;
     curve c;
     memset(g, 0, sizeof *g);
     g->curve = kind, g->seed = seed, g->m.kind = BEZIER, g->result = DEM2D_NOT_REACHED;
-    g->written = dice_below(&d, 2) ? AS_DOUBLE : dice_below(&d, WRITTEN);
+    g->written = random_below(&d, 2) ? AS_DOUBLE : random_below(&d, WRITTEN);
     curve_draw(&c, kind, &d);
     if (c.count == 0) return;
     grain_write(g, &c, &d);
@@ -554,46 +558,46 @@ CASE_HELPER void grain_draw(grain *g, int kind, uint64_t seed) {
 /* --- pairs of grains ------------------------------------------------------------------------- */
 
 /* Gaps, touches and overlaps of 1e-15 of the size to half of it. */
-static real draw_depth(const pair *p, dice *d) {
+static real draw_depth(const pair *p, uint64_t *d) {
     const double size =
         p->pose_a.scale * p->a->info.circumscribed + p->pose_b.scale * p->b->info.circumscribed;
-    const int style = dice_below(d, 8);
+    const int style = random_below(d, 8);
     if (style == 0) return 0;
-    if (style < 3) return -size * dice_scale(d, 1e-15, 1);
-    return size * (style < 5 ? dice_scale(d, 1e-15, 0.1) : dice_uniform(d, 0, 0.5));
+    if (style < 3) return -size * random_scale(d, 1e-15, 1);
+    return size * (style < 5 ? random_scale(d, 1e-15, 0.1) : random_between(d, 0, 0.5));
 }
 
 /* Two shapes placed by a normal and a depth, or face to face, anywhere, concentric, one in another;
    sizes are those of the templates. */
-CASE_HELPER pair pair_draw(const model *a, double size_a, const model *b, double size_b, dice *d) {
+PART pair pair_draw(const model *a, double size_a, const model *b, double size_b, uint64_t *d) {
     scene s;
     memset(&s, 0, sizeof s);
     pair *p = &s.p;
-    const int way = dice_below(d, 8);
+    const int way = random_below(d, 8);
     p->a = a, p->b = b;
     p->pose_a.rotation = draw_rotation(d), p->pose_b.rotation = draw_rotation(d);
-    p->pose_a.scale = (dice_below(d, 3) ? dice_uniform(d, 0.5, 2) : 1) / size_a;
-    p->pose_b.scale = (dice_below(d, 3) ? dice_uniform(d, 0.5, 2) : 1) / size_b;
-    if (way == 7) p->pose_b.scale *= dice_scale(d, 1e-6, 0.1);
-    if (dice_below(d, 2)) p->pose_a.position = (dem2d_vec){dice_uniform(d, -1, 1), 0.5};
+    p->pose_a.scale = (random_below(d, 3) ? random_between(d, 0.5, 2) : 1) / size_a;
+    p->pose_b.scale = (random_below(d, 3) ? random_between(d, 0.5, 2) : 1) / size_b;
+    if (way == 7) p->pose_b.scale *= random_scale(d, 1e-6, 0.1);
+    if (random_below(d, 2)) p->pose_a.position = (dem2d_vec){random_between(d, -1, 1), 0.5};
     p->pose_b.position = p->pose_a.position;
     const spot u = draw_normal(a, &p->pose_a, d), v = draw_normal(b, &p->pose_b, d);
     if (way < 3 || way == 7) scene_place(&s, u, draw_depth(p, d));
     if (way == 3) scene_place(&s, spot_make(-v.x, -v.y), draw_depth(p, d));
     if (way == 4) {
-        turn_against(p, u, v, dice_below(d, 2) ? dice_scale(d, 1e-15, 1e-3) : 0);
+        turn_against(p, u, v, random_below(d, 2) ? random_scale(d, 1e-15, 1e-3) : 0);
         scene_place(&s, u, draw_depth(p, d));
-        const double slide = dice_uniform(d, -1, 1) * (dice_below(d, 4) ? 1 : 1e-6);
+        const double slide = random_between(d, -1, 1) * (random_below(d, 4) ? 1 : 1e-6);
         p->pose_b.position.x -= slide * (double)u.y, p->pose_b.position.y += slide * (double)u.x;
     }
     if (way == 5) {
-        p->pose_b.position.x += dice_uniform(d, -2, 2);
-        p->pose_b.position.y += dice_uniform(d, -2, 2);
+        p->pose_b.position.x += random_between(d, -2, 2);
+        p->pose_b.position.y += random_between(d, -2, 2);
     }
     if (way == 6) {
-        const double off = dice_below(d, 2) ? dice_scale(d, 1e-16, 0.3) : 0;
+        const double off = random_below(d, 2) ? random_scale(d, 1e-16, 0.3) : 0;
         p->pose_b.position.x += off * (double)u.x, p->pose_b.position.y += off * (double)u.y;
-        if (dice_below(d, 3) == 0) p->pose_b.rotation = p->pose_a.rotation;
+        if (random_below(d, 3) == 0) p->pose_b.rotation = p->pose_a.rotation;
     }
     return s.p;
 }
@@ -616,13 +620,13 @@ static real place_rounding(const pair *p, dem2d_vec point) {
 }
 
 /* A grain that was refused or accepted, as what it says it takes has it. */
-CASE_HELPER const char *creation_flaw(const grain *g) {
+PART const char *creation_flaw(const grain *g) {
     if (g->m.count == 0 || g->m.shape != NULL) return NULL;
     return g->allowed ? "refused, though convex and smooth" : NULL;
 }
 
 /* Numbers of dem2d_shape_get: mass by quadrature, circles by samples and by a search. */
-CASE_HELPER const char *measures_flaw(const grain *g) {
+PART const char *measures_flaw(const grain *g) {
     const model *m = &g->m;
     const dem2d_shape_info *info = &m->info;
     const moments t = grain_moments(m);
@@ -714,19 +718,18 @@ static real outline_room(const pair *p, dem2d_vec point) {
 }
 
 /* The witness points lie on the outlines. */
-CASE_HELPER const char *outline_flaw(const pair *p, const dem2d_contact *c) {
+PART const char *outline_flaw(const pair *p, const dem2d_contact *c) {
     const spot u = spot_unit(spot_from(c->normal)), v = spot_make(-u.x, -u.y);
     if (!on_outline(p->a, &p->pose_a, c->point_a, u, outline_room(p, c->point_a)))
         return "a witness point is not on A's outline";
-    if (p->b != NULL &&
-        !on_outline(p->b, &p->pose_b, c->point_b, v, outline_room(p, c->point_b)))
+    if (p->b != NULL && !on_outline(p->b, &p->pose_b, c->point_b, v, outline_room(p, c->point_b)))
         return "a witness point is not on B's outline";
     return NULL;
 }
 
 /* They are a depth apart along the normal, to 1e-6 of the size and what the tolerance lets the
    normal turn: by e, where rho e^2 / 2 is the tolerance, so rho e = sqrt(2 rho tolerance). */
-CASE_HELPER const char *place_flaw(const pair *p, const dem2d_contact *c, real tolerance) {
+PART const char *place_flaw(const pair *p, const dem2d_contact *c, real tolerance) {
     const spot u = spot_unit(spot_from(c->normal));
     const real size = pair_size(p);
     const real x = (real)c->point_a.x - c->point_b.x - c->depth * u.x;
@@ -741,8 +744,8 @@ CASE_HELPER const char *place_flaw(const pair *p, const dem2d_contact *c, real t
 
 /* The depth of the truth is within the error. kink: of the grains, rad; the error may be so much of
    the size above what was asked for. */
-CASE_HELPER const char *bound_flaw(const pair *p, const dem2d_contact *c, const truth *t,
-                                   real tolerance, real kink) {
+PART const char *bound_flaw(const pair *p, const dem2d_contact *c, const truth *t, real tolerance,
+                            real kink) {
     const real size = pair_size(p), rounding = 16 * LDBL_EPSILON * size;
     if (!(c->error >= 0 && isfinite(c->depth))) return "a negative error, or a depth not finite";
     if (!(c->depth - c->error <= t->depth + rounding)) return "the depth is too large";
@@ -753,7 +756,7 @@ CASE_HELPER const char *bound_flaw(const pair *p, const dem2d_contact *c, const 
     return NULL;
 }
 
-CASE_HELPER const char *state_flaw(const pair *p, const dem2d_contact *c, const truth *t) {
+PART const char *state_flaw(const pair *p, const dem2d_contact *c, const truth *t) {
     const real slack = depth_slack(p);
     if (c->state == DEM2D_SEPARATED && !(t->lower <= slack))
         return "an overlap is said to be a gap";
@@ -767,8 +770,8 @@ CASE_HELPER const char *state_flaw(const pair *p, const dem2d_contact *c, const 
 
 /* A search may give up, at its cap of 128 iterations, only where one who knows the depth already
    needs a third of them to prove it. */
-CASE_HELPER const char *unresolved_flaw(const pair *p, const dem2d_contact *c, const truth *t,
-                                        double tolerance) {
+PART const char *unresolved_flaw(const pair *p, const dem2d_contact *c, const truth *t,
+                                 double tolerance) {
     if (c->state != DEM2D_UNRESOLVED) return NULL;
     return proof_halvings(p, t, tolerance * pair_size(p)) < 128 / 3 ? "given up too early" : NULL;
 }
@@ -777,7 +780,7 @@ CASE_HELPER const char *unresolved_flaw(const pair *p, const dem2d_contact *c, c
 
 /* A box holds the shape, to rounding and what the contact with a wall says that the shape may be
    off by, and touches it on all sides. */
-CASE_HELPER const char *box_flaw(const pair *p) {
+PART const char *box_flaw(const pair *p) {
     const model *m = p->a;
     dem2d_box box;
     dem2d_contact c;
@@ -805,13 +808,13 @@ typedef struct wall {
 } wall;
 
 /* Along an axis, a face or anything; at any depth, the point anywhere along it. */
-CASE_HELPER wall wall_draw(const pair *p, dice *d) {
+PART wall wall_draw(const pair *p, uint64_t *d) {
     const spot u = draw_normal(p->a, &p->pose_a, d);
     const spot far = posed_support(p->a, &p->pose_a, u);
     const double size = p->a->info.circumscribed * p->pose_a.scale;
     const real depth =
-        size * (dice_below(d, 2) ? 1 : -1) * (dice_below(d, 3) ? dice_scale(d, 1e-15, 1) : 0);
-    const real slide = size * dice_uniform(d, -2, 2);
+        size * (random_below(d, 2) ? 1 : -1) * (random_below(d, 3) ? random_scale(d, 1e-15, 1) : 0);
+    const real slide = size * random_between(d, -2, 2);
     wall w;
     w.point.x = (double)(p->pose_a.position.x + far.x - depth * u.x - slide * u.y);
     w.point.y = (double)(p->pose_a.position.y + far.y - depth * u.y + slide * u.x);
@@ -820,7 +823,7 @@ CASE_HELPER wall wall_draw(const pair *p, dice *d) {
 }
 
 /* The contact of a shape and a wall: depth by the support point, that point in its place. */
-CASE_HELPER const char *wall_flaw(const pair *p, const wall *w, const dem2d_contact *c) {
+PART const char *wall_flaw(const pair *p, const wall *w, const dem2d_contact *c) {
     const pair half = {p->a, NULL, p->pose_a, {w->point, {1, 0}, 1}};
     const spot u = spot_unit(spot_make(-(real)w->normal.x, -(real)w->normal.y));
     const real depth = pair_value(&half, u), rounding = place_rounding(&half, w->point);
@@ -890,7 +893,7 @@ static const char *listed_flaw(const pair *p, const dem2d_contact_info *c, real 
 }
 
 /* A segment that touches one of two shapes somewhere, and they one another, in a world. */
-CASE_HELPER const char *world_flaw(const pair *p, const wall *w, double length, real kink) {
+PART const char *world_flaw(const pair *p, const wall *w, double length, real kink) {
     const model line = {
         .kind = POLYGON, .count = 2, .points = {{0, 0}, {1, 0}}, .info = {.circumscribed = 1}};
     const dem2d_vec n = w->normal, start = w->point;
@@ -1025,9 +1028,9 @@ static void pool_grain(campaign *all, grain *g, int kind, uint64_t seed) {
 }
 
 static void pool_fill(campaign *all, uint64_t block) {
-    dice d = {all->series * 0x9e3779b97f4a7c15u ^ block * 0xbf58476d1ce4e5b9u};
+    uint64_t d = all->series * 0x9e3779b97f4a7c15u ^ block * 0xbf58476d1ce4e5b9u;
     for (int k = 0; k < CURVES; k++)
-        for (int i = 0; i < GRAINS; i++) pool_grain(all, &all->grains[k][i], k, dice_next(&d));
+        for (int i = 0; i < GRAINS; i++) pool_grain(all, &all->grains[k][i], k, random_bits(&d));
     for (int k = 0; k < PARTNER_KINDS; k++)
         for (int i = 0; i < PARTNERS && k != BEZIER; i++) model_draw(&all->partners[k][i], k, &d);
 }
@@ -1072,11 +1075,11 @@ static void report(campaign *all, const grain *g, int check, const pair *p, cons
 }
 
 /* How the pair is asked for: tolerance and first direction. */
-static dem2d_contact_desc draw_desc(dice *d) {
+static dem2d_contact_desc draw_desc(uint64_t *d) {
     static const double tolerances[] = {0, 0, 0, 1e-8, 1e-12, 1e-14};
     dem2d_contact_desc desc = {0};
-    desc.tolerance = tolerances[dice_below(d, 6)];
-    if (dice_below(d, 4) == 0) desc.start = spot_rounded(dice_direction(d));
+    desc.tolerance = tolerances[random_below(d, 6)];
+    if (random_below(d, 4) == 0) desc.start = spot_rounded(random_direction(d));
     return desc;
 }
 
@@ -1100,7 +1103,7 @@ static void check_contact(campaign *all, const grain *g, const pair *p, real kin
     report(all, g, PLACE, p, &c, place_flaw(p, &c, tolerance));
 }
 
-static void check_wall(campaign *all, const grain *g, const pair *p, real kink, dice *d) {
+static void check_wall(campaign *all, const grain *g, const pair *p, real kink, uint64_t *d) {
     const wall w = wall_draw(p, d);
     const pair half = {p->a, NULL, p->pose_a, {w.point, {1, 0}, 1}};
     dem2d_contact c;
@@ -1108,29 +1111,29 @@ static void check_wall(campaign *all, const grain *g, const pair *p, real kink, 
     if (dem2d_wall_contact(p->a->shape, p->pose_a, w.point, w.normal, &c) != DEM2D_OK)
         case_broken("a wall was refused");
     report(all, g, WALL, &half, &c, wall_flaw(p, &w, &c));
-    if (dice_below(d, WORLDS) == 0)
-        report(all, g, WORLD, p, NULL, world_flaw(p, &w, dice_scale(d, 0.1, 10), kink));
+    if (random_below(d, WORLDS) == 0)
+        report(all, g, WORLD, p, NULL, world_flaw(p, &w, random_scale(d, 0.1, 10), kink));
 }
 
 static void try_pair(campaign *all) {
-    dice d = {all->series * 0x9e3779b97f4a7c15u ^ all->number * 0xd1342543de82ef95u};
+    uint64_t d = all->series * 0x9e3779b97f4a7c15u ^ all->number * 0xd1342543de82ef95u;
     const int kind_a = (int)(all->number % CURVES),
               kind = (int)(all->number / CURVES % PARTNER_KINDS);
-    const grain *g = &all->grains[kind_a][dice_below(&d, GRAINS)];
-    const grain *other = &all->grains[dice_below(&d, CURVES)][dice_below(&d, GRAINS)];
-    const model *b = kind == BEZIER ? &other->m : &all->partners[kind][dice_below(&d, PARTNERS)];
+    const grain *g = &all->grains[kind_a][random_below(&d, GRAINS)];
+    const grain *other = &all->grains[random_below(&d, CURVES)][random_below(&d, GRAINS)];
+    const model *b = kind == BEZIER ? &other->m : &all->partners[kind][random_below(&d, PARTNERS)];
     const double size_b = kind == BEZIER ? other->size : 1;
     const dem2d_contact_desc desc = draw_desc(&d);
     if (g->m.shape == NULL || b->shape == NULL) return;
     pair p = pair_draw(&g->m, g->size, b, size_b, &d);
     const real kink = fmaxl(g->kink, kind == BEZIER ? other->kink : 0);
     check_wall(all, g, &p, kink, &d);
-    if (dice_below(&d, 2)) p = (pair){p.b, p.a, p.pose_b, p.pose_a};
+    if (random_below(&d, 2)) p = (pair){p.b, p.a, p.pose_b, p.pose_a};
     check_contact(all, g, &p, kink, &desc);
 }
 
 /* Tries `count` pairs from number `first` on. */
-CASE_HELPER void campaign_run(campaign *all, uint64_t first, uint64_t count) {
+PART void campaign_run(campaign *all, uint64_t first, uint64_t count) {
     uint64_t block = 0;
     for (uint64_t i = 0; i < count; i++) {
         all->number = first + i;

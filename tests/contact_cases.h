@@ -8,19 +8,11 @@
 #ifndef CONTACT_CASES_H
 #define CONTACT_CASES_H
 
+#include "parts.h"
+
 #include <float.h>
 #include <math.h>
 #include <stdbool.h>
-#include <stdint.h>
-#include <stdio.h>
-#include <stdlib.h>
-#include <string.h>
-
-#if defined(__GNUC__)
-#define CASE_HELPER static __attribute__((unused))
-#else
-#define CASE_HELPER static
-#endif
 
 /* What is promised of a support value of A minus B: 16 eps of R_A + R_B + |d|. */
 #define CASE_ROUNDING (16 * DBL_EPSILON)
@@ -51,7 +43,7 @@ static spot spot_unit(spot a) {
     return spot_make(a.x / length, a.y / length);
 }
 
-CASE_HELPER spot spot_turned(spot a, real angle) {
+PART spot spot_turned(spot a, real angle) {
     const real c = cosl(angle), s = sinl(angle);
     return spot_make(c * a.x - s * a.y, s * a.x + c * a.y);
 }
@@ -60,7 +52,7 @@ static spot spot_from(dem2d_vec v) {
     return spot_make(v.x, v.y);
 }
 
-CASE_HELPER dem2d_vec spot_rounded(spot a) {
+PART dem2d_vec spot_rounded(spot a) {
     return (dem2d_vec){(double)a.x, (double)a.y};
 }
 
@@ -72,34 +64,13 @@ static void case_broken(const char *what) {
 
 /* --- numbers that repeat --------------------------------------------------------------------- */
 
-typedef struct dice {
-    uint64_t state; /* any start will do */
-} dice;
-
-/* splitmix64 */
-static uint64_t dice_next(dice *d) {
-    uint64_t z = (d->state += 0x9e3779b97f4a7c15u);
-    z = (z ^ (z >> 30)) * 0xbf58476d1ce4e5b9u;
-    z = (z ^ (z >> 27)) * 0x94d049bb133111ebu;
-    return z ^ (z >> 31);
-}
-
-static double dice_uniform(dice *d, double lower, double upper) {
-    return lower + (upper - lower) * ((double)(dice_next(d) >> 11) * 0x1p-53);
-}
-
-/* 0 .. count - 1 */
-static int dice_below(dice *d, int count) {
-    return (int)(dice_next(d) % (uint64_t)count);
-}
-
 /* Every size from lower to upper as likely as any other. */
-static double dice_scale(dice *d, double lower, double upper) {
-    return exp(dice_uniform(d, log(lower), log(upper)));
+static double random_scale(uint64_t *d, double lower, double upper) {
+    return exp(random_between(d, log(lower), log(upper)));
 }
 
-static spot dice_direction(dice *d) {
-    const real angle = dice_uniform(d, -3.2, 3.2);
+static spot random_direction(uint64_t *d) {
+    const real angle = random_between(d, -3.2, 3.2);
     return spot_make(cosl(angle), sinl(angle));
 }
 
@@ -147,8 +118,8 @@ static lattice lattice_turned(lattice p, int turns) {
 enum { CIRCLE, ELLIPSE, POLYGON, ROUNDED, BEZIER, FOURIER, CUSTOM, BLIND, KINDS };
 enum { MODEL_POINTS = 192, MODEL_LATTICE = 14 };
 
-CASE_HELPER const char *const kind_names[KINDS] = {"circle", "ellipse", "polygon", "rounded",
-                                                   "bezier", "fourier", "custom",  "blind"};
+PART const char *const kind_names[KINDS] = {"circle", "ellipse", "polygon", "rounded",
+                                            "bezier", "fourier", "custom",  "blind"};
 
 /* Which numbers count: circle r; ellipse a, b; polygon points, r; polybezier points; Fourier
    points (a_n, b_n) up to count - 1; custom: the sum of ellipse, polygon and disc, where given. */
@@ -188,13 +159,13 @@ static dem2d_vec custom_support(void *user, dem2d_vec u, double *rho) {
 
 /* Convex polygons, about 1 in size: all corners on an ellipse, regular, rectangles to needles, thin
    triangles, cut corners, integers. */
-static void draw_corners(model *m, dice *d, int most) {
-    const int style = dice_below(d, 6), n = 3 + dice_below(d, most - 2);
-    const double thin = dice_below(d, 3) ? dice_scale(d, 0.2, 1) : dice_scale(d, 1e-4, 1);
+static void draw_corners(model *m, uint64_t *d, int most) {
+    const int style = random_below(d, 6), n = 3 + random_below(d, most - 2);
+    const double thin = random_below(d, 3) ? random_scale(d, 0.2, 1) : random_scale(d, 1e-4, 1);
     m->count = 0;
     if (style == 0 || style == 1) { /* gaps of at least a fifth of the mean between the corners */
         for (int i = 0; i < n; i++) {
-            const double shift = style == 0 ? dice_uniform(d, 0, 0.8) : 0;
+            const double shift = style == 0 ? random_between(d, 0, 0.8) : 0;
             const double t = 2 * (double)CASE_PI * (i + shift) / n;
             m->points[m->count++] = (dem2d_vec){cos(t), (style == 0 ? thin : 1) * sin(t)};
         }
@@ -203,12 +174,12 @@ static void draw_corners(model *m, dice *d, int most) {
         m->count = 4;
         memcpy(m->points, box, sizeof box);
     } else if (style == 3) {
-        const double tip = dice_uniform(d, -0.5, 1.5);
+        const double tip = random_between(d, -0.5, 1.5);
         const dem2d_vec three[3] = {{0, 0}, {1, 0}, {tip, thin}};
         m->count = 3;
         memcpy(m->points, three, sizeof three);
     } else if (style == 4) { /* a box with cut corners, edges down to 1e-6 of the others */
-        const double cut = dice_scale(d, 1e-6, 0.3);
+        const double cut = random_scale(d, 1e-6, 0.3);
         for (int i = 0; i < 4; i++)
             for (int k = 0; k < 2; k++) {
                 dem2d_vec p = {1 - (k ? cut : 0), 1 - (k ? 0 : cut)};
@@ -218,9 +189,9 @@ static void draw_corners(model *m, dice *d, int most) {
     }
     while (m->count == 0) {
         lattice points[7];
-        const int tried = 3 + dice_below(d, 5), span = 2 + dice_below(d, 5);
+        const int tried = 3 + random_below(d, 5), span = 2 + random_below(d, 5);
         for (int i = 0; i < tried; i++)
-            points[i].x = dice_below(d, span), points[i].y = dice_below(d, span);
+            points[i].x = random_below(d, span), points[i].y = random_below(d, span);
         m->count = m->corners = lattice_hull(points, tried, m->corner);
         for (int i = 0; i < m->count; i++)
             m->points[i] = (dem2d_vec){(double)m->corner[i].x, (double)m->corner[i].y};
@@ -229,7 +200,7 @@ static void draw_corners(model *m, dice *d, int most) {
 
 /* Cubic arcs round the corners of a polygon, and flat arcs between some of them: of third parts,
    or with two control points in one. */
-static void draw_arcs(model *m, dice *d) {
+static void draw_arcs(model *m, uint64_t *d) {
     model outline = *m;
     dem2d_vec *out = m->points;
     do draw_corners(&outline, d, 5);
@@ -237,14 +208,14 @@ static void draw_arcs(model *m, dice *d) {
     const int n = outline.count;
     double starts[8], stops[8]; /* on edge i the curve leaves the corner, and turns to the next */
     for (int i = 0; i < n; i++) {
-        starts[i] = dice_uniform(d, 0.1, 0.5);
-        stops[i] = dice_below(d, 3) ? starts[i] : dice_uniform(d, 0.6, 0.9);
+        starts[i] = random_between(d, 0.1, 0.5);
+        stops[i] = random_below(d, 3) ? starts[i] : random_between(d, 0.6, 0.9);
     }
     for (int i = 0; i < n; i++) {
         const int before = (i + n - 1) % n, after = (i + 1) % n;
         const dem2d_vec *c = outline.points;
-        const double f = dice_below(d, 4) ? dice_uniform(d, 0.3, 0.9) : 1;
-        const double g = dice_below(d, 4) ? dice_uniform(d, 0.3, 0.9) : 1;
+        const double f = random_below(d, 4) ? random_between(d, 0.3, 0.9) : 1;
+        const double g = random_below(d, 4) ? random_between(d, 0.3, 0.9) : 1;
         const dem2d_vec in = {c[before].x + stops[before] * (c[i].x - c[before].x),
                               c[before].y + stops[before] * (c[i].y - c[before].y)};
         const dem2d_vec end = {c[i].x + starts[i] * (c[after].x - c[i].x),
@@ -255,8 +226,8 @@ static void draw_arcs(model *m, dice *d) {
         if (stops[i] == starts[i]) continue;
         const double t = stops[i] - starts[i];
         const dem2d_vec side = {t * (c[after].x - c[i].x), t * (c[after].y - c[i].y)};
-        const double first = dice_below(d, 3) ? 1 / 3.0 : 0,
-                     second = dice_below(d, 3) ? 2 / 3.0 : 1;
+        const double first = random_below(d, 3) ? 1 / 3.0 : 0,
+                     second = random_below(d, 3) ? 2 / 3.0 : 1;
         *out++ = end;
         *out++ = (dem2d_vec){end.x + first * side.x, end.y + first * side.y};
         *out++ = (dem2d_vec){end.x + second * side.x, end.y + second * side.y};
@@ -266,19 +237,19 @@ static void draw_arcs(model *m, dice *d) {
 
 /* Harmonics that fall as 1/n^2, lowered together until the least radius of curvature is `least`
    of a0/2: samples of rho, less what it can dip between them. */
-static void draw_series(model *m, dice *d) {
+static void draw_series(model *m, uint64_t *d) {
     enum { SAMPLES = 512 };
     static const int orders[] = {0, 2, 3, 4, 8, 16};
     static const double leasts[] = {0.5, 0.1, 0.01, 1e-6};
-    const int order = orders[dice_below(d, 6)];
-    const double least = leasts[dice_below(d, 4)], step = 2 * (double)CASE_PI / SAMPLES;
+    const int order = orders[random_below(d, 6)];
+    const double least = leasts[random_below(d, 4)], step = 2 * (double)CASE_PI / SAMPLES;
     double dip = 0, lowest = 0;
     m->count = order + 1;
     m->points[0] = (dem2d_vec){2, 0};
     for (int n = 1; n <= order; n++) {
         const double reach = 0.3 / (n * n);
-        m->points[n].x = dice_uniform(d, -reach, reach);
-        m->points[n].y = dice_uniform(d, -reach, reach);
+        m->points[n].x = random_between(d, -reach, reach);
+        m->points[n].y = random_between(d, -reach, reach);
         if (n == 1) continue; /* moves the shape only */
         dip += hypot(m->points[n].x, m->points[n].y) * n * n * (n * n - 1) * step * step / 8;
     }
@@ -339,17 +310,18 @@ static dem2d_result model_make(model *m) {
     }
 }
 
-static void draw_numbers(model *m, dice *d) {
-    const double thin = dice_below(d, 3) ? dice_scale(d, 0.3, 1) : dice_scale(d, 1e-4, 1);
-    const bool ellipse = m->kind == ELLIPSE || (m->kind >= CUSTOM && dice_below(d, 3) > 0);
-    if (m->kind == CIRCLE || m->kind == ROUNDED || (m->kind >= CUSTOM && dice_below(d, 2)))
-        m->r = m->kind == ROUNDED ? dice_scale(d, 1e-3, 0.5) : dice_scale(d, 0.3, 1);
+static void draw_numbers(model *m, uint64_t *d) {
+    const double thin = random_below(d, 3) ? random_scale(d, 0.3, 1) : random_scale(d, 1e-4, 1);
+    const bool ellipse = m->kind == ELLIPSE || (m->kind >= CUSTOM && random_below(d, 3) > 0);
+    if (m->kind == CIRCLE || m->kind == ROUNDED || (m->kind >= CUSTOM && random_below(d, 2)))
+        m->r = m->kind == ROUNDED ? random_scale(d, 1e-3, 0.5) : random_scale(d, 0.3, 1);
     if (ellipse) {
-        m->a = 1, m->b = dice_below(d, 8) ? thin : 1;
-        if (dice_below(d, 2)) m->a = m->b, m->b = 1;
+        m->a = 1, m->b = random_below(d, 8) ? thin : 1;
+        if (random_below(d, 2)) m->a = m->b, m->b = 1;
     }
-    if (m->kind == POLYGON || m->kind == ROUNDED) draw_corners(m, d, dice_below(d, 4) ? 9 : 40);
-    if (m->kind >= CUSTOM && (!ellipse || dice_below(d, 2))) draw_corners(m, d, 6), m->corners = 0;
+    if (m->kind == POLYGON || m->kind == ROUNDED) draw_corners(m, d, random_below(d, 4) ? 9 : 40);
+    if (m->kind >= CUSTOM && (!ellipse || random_below(d, 2)))
+        draw_corners(m, d, 6), m->corners = 0;
     m->rho_min = m->r;
     if (ellipse) m->rho_min += fmin(m->a, m->b) * (fmin(m->a, m->b) / fmax(m->a, m->b));
     m->rho_min *= 1 - 1e-12; /* a bound in spite of rounding */
@@ -358,7 +330,7 @@ static void draw_numbers(model *m, dice *d) {
 }
 
 /* A shape of a kind. m must stay where it is: custom shapes refer to it. */
-CASE_HELPER void model_draw(model *m, int kind, dice *d) {
+PART void model_draw(model *m, int kind, uint64_t *d) {
     for (int i = 0; i < 100; i++) {
         memset(m, 0, sizeof *m);
         m->kind = kind;
@@ -506,7 +478,7 @@ static spot pair_support(const pair *p, spot u) {
     return spot_make(a.x - b.x - d.x, a.y - b.y - d.y);
 }
 
-CASE_HELPER real pair_value(const pair *p, spot u) {
+PART real pair_value(const pair *p, spot u) {
     return spot_dot(pair_support(p, u), u);
 }
 
@@ -606,7 +578,7 @@ static void scan_prove(scan *s, spot u0, spot w0, spot u1, spot w1, int halvings
 
 /* Directions all round, the lowest place of each dip that could be the least, and the proof that
    there is no other. */
-CASE_HELPER truth find_truth(const pair *p) {
+PART truth find_truth(const pair *p) {
     scan s = {p, {HUGE_VALL, HUGE_VALL, {1, 0}}, 1e-17L * pair_size(p), SCAN_EVALUATIONS};
     spot u[SCAN_DIRECTIONS + 1], w[SCAN_DIRECTIONS + 1];
     for (int i = 0; i < SCAN_DIRECTIONS; i++) {
@@ -624,7 +596,7 @@ CASE_HELPER truth find_truth(const pair *p) {
 
 /* Halvings of arcs that prove the least value to a tolerance, for one who knows it already: few
    where h bends, many where it hardly does or where many directions are as good. */
-CASE_HELPER int proof_halvings(const pair *p, const truth *t, double tolerance) {
+PART int proof_halvings(const pair *p, const truth *t, double tolerance) {
     enum { PARTS = 8 };
     scan s = {p, *t, tolerance, SCAN_EVALUATIONS};
     for (int i = 0; i < PARTS; i++) {
@@ -662,7 +634,7 @@ static bool above_beyond(const pair *p, const truth *t, real angle, real level) 
 
 /* Where all directions are whose value is within `excess` of the least: an angle on both sides of
    the least one; 4 when they are not close together. */
-CASE_HELPER real truth_spread(const pair *p, const truth *t, real excess) {
+PART real truth_spread(const pair *p, const truth *t, real excess) {
     const real level = t->depth + excess;
     for (real angle = 1e-9L; angle < 0.04L; angle *= 2) {
         if (pair_value(p, spot_turned(t->u, angle)) <= level ||
@@ -675,7 +647,7 @@ CASE_HELPER real truth_spread(const pair *p, const truth *t, real excess) {
 
 /* The least direction stands alone: whatever is more than an angle of 0.01 away is higher by 1e-7
    of the size, and h rises on both sides all the way there. */
-CASE_HELPER bool truth_unique(const pair *p, const truth *t) {
+PART bool truth_unique(const pair *p, const truth *t) {
     for (real angle = 1e-14L; angle < 0.01L; angle *= 1.5L)
         for (int side = -1; side <= 1; side += 2) {
             const spot u = spot_turned(t->u, side * angle);
@@ -745,9 +717,8 @@ enum {
     REMOTE,     /* near 1e8, on a grid that a double can move by that much */
     WAYS
 };
-CASE_HELPER const char *const way_names[WAYS] = {"chosen",  "touches",    "anywhere",
-                                                 "lattice", "concentric", "inside",
-                                                 "unequal", "parallel",   "remote"};
+PART const char *const way_names[WAYS] = {"chosen", "touches", "anywhere", "lattice", "concentric",
+                                          "inside", "unequal", "parallel", "remote"};
 
 typedef struct scene {
     pair p;
@@ -762,13 +733,13 @@ typedef struct scene {
 } scene;
 
 /* Depths below this are decided by a zero slope of h alone. */
-CASE_HELPER double pair_rho(const pair *p) {
+PART double pair_rho(const pair *p) {
     return p->pose_a.scale * p->a->rho_min + p->pose_b.scale * p->b->rho_min;
 }
 
 /* Puts B where h(u) = delta and h'(u) = 0. With r the least radius of curvature, A minus B eroded
    by r is convex and u its normal towards the origin: below r, delta is the least value. */
-CASE_HELPER void scene_place(scene *s, spot u, real delta) {
+PART void scene_place(scene *s, spot u, real delta) {
     pair *p = &s->p;
     const spot a = posed_support(p->a, &p->pose_a, u);
     const spot b = posed_support(p->b, &p->pose_b, spot_make(-u.x, -u.y));
@@ -781,25 +752,25 @@ CASE_HELPER void scene_place(scene *s, spot u, real delta) {
     s->places = DBL_EPSILON * (fabs(p->pose_b.position.x) + fabs(p->pose_b.position.y));
 }
 
-static dem2d_rot draw_rotation(dice *d) {
+static dem2d_rot draw_rotation(uint64_t *d) {
     static const dem2d_rot quarters[4] = {{1, 0}, {0, 1}, {-1, 0}, {0, -1}};
-    const int style = dice_below(d, 8);
-    if (style < 4) return quarters[dice_below(d, 4)];
-    return dem2d_rot_make(dice_uniform(d, -4, 4));
+    const int style = random_below(d, 8);
+    if (style < 4) return quarters[random_below(d, 4)];
+    return dem2d_rot_make(random_between(d, -4, 4));
 }
 
 /* A direction that matters: an edge of A faces it, an axis, or any. */
-static spot draw_normal(const model *m, const dem2d_pose *pose, dice *d) {
-    const int style = dice_below(d, 4);
+static spot draw_normal(const model *m, const dem2d_pose *pose, uint64_t *d) {
+    const int style = random_below(d, 4);
     if (style == 0 && m->count >= 3 && m->kind != FOURIER) {
-        const int i = dice_below(d, m->count), k = (i + 1) % m->count;
+        const int i = random_below(d, m->count), k = (i + 1) % m->count;
         const real ex = (real)m->points[k].x - m->points[i].x;
         const real ey = (real)m->points[k].y - m->points[i].y;
         const real c = pose->rotation.c, s = pose->rotation.s;
         if (ex != 0 || ey != 0) return spot_unit(spot_make(c * ey + s * ex, s * ey - c * ex));
     }
     if (style == 1) {
-        const int quarter = dice_below(d, 4);
+        const int quarter = random_below(d, 4);
         return spot_make(quarter == 0   ? 1
                          : quarter == 2 ? -1
                                         : 0,
@@ -807,39 +778,39 @@ static spot draw_normal(const model *m, const dem2d_pose *pose, dice *d) {
                          : quarter == 3 ? -1
                                         : 0);
     }
-    return dice_direction(d);
+    return random_direction(d);
 }
 
 /* Gaps and overlaps from 1e-12 of the size up; half of the overlaps are certified. */
-static real draw_delta(const pair *p, dice *d) {
+static real draw_delta(const pair *p, uint64_t *d) {
     const double size =
         p->pose_a.scale * p->a->info.circumscribed + p->pose_b.scale * p->b->info.circumscribed;
-    const int style = dice_below(d, 6);
-    if (style < 2) return -size * dice_scale(d, 1e-12, 3);
-    if (style == 2) return pair_rho(p) * dice_uniform(d, 0, 1);
-    if (style == 3) return pair_rho(p) * dice_scale(d, 1e-9, 1);
-    if (style == 4) return pair_rho(p) * (1 - dice_scale(d, 1e-15, 1e-2)); /* h hardly bends */
-    return size * dice_scale(d, 1e-12, 0.5);
+    const int style = random_below(d, 6);
+    if (style < 2) return -size * random_scale(d, 1e-12, 3);
+    if (style == 2) return pair_rho(p) * random_between(d, 0, 1);
+    if (style == 3) return pair_rho(p) * random_scale(d, 1e-9, 1);
+    if (style == 4) return pair_rho(p) * (1 - random_scale(d, 1e-15, 1e-2)); /* h hardly bends */
+    return size * random_scale(d, 1e-12, 0.5);
 }
 
-static void draw_touch(scene *s, dice *d) {
+static void draw_touch(scene *s, uint64_t *d) {
     static const double tiny[] = {0,     1e-16, 2e-16, 1e-15, 3e-15, 4e-15,
                                   1e-14, 1e-13, 1e-12, 1e-11, 1e-10, 1e-9};
     const pair *p = &s->p;
     const double size =
         p->pose_a.scale * p->a->info.circumscribed + p->pose_b.scale * p->b->info.circumscribed;
-    const double delta = size * tiny[dice_below(d, 12)];
-    scene_place(s, draw_normal(p->a, &p->pose_a, d), dice_below(d, 2) ? delta : -delta);
+    const double delta = size * tiny[random_below(d, 12)];
+    scene_place(s, draw_normal(p->a, &p->pose_a, d), random_below(d, 2) ? delta : -delta);
 }
 
 /* Integer polygons stand on their corners, others on their centres. */
-static void draw_on_lattice(scene *s, dice *d) {
+static void draw_on_lattice(scene *s, uint64_t *d) {
     static const dem2d_rot quarters[4] = {{1, 0}, {0, 1}, {-1, 0}, {0, -1}};
     const model *models[2] = {s->p.a, s->p.b};
     dem2d_pose *poses[2] = {&s->p.pose_a, &s->p.pose_b};
-    const double step = dice_below(d, 2) ? 1 : 0.5;
-    s->turns_a = dice_below(d, 4), s->turns_b = dice_below(d, 4);
-    s->shift.x = dice_below(d, 13) - 6, s->shift.y = dice_below(d, 13) - 6;
+    const double step = random_below(d, 2) ? 1 : 0.5;
+    s->turns_a = random_below(d, 4), s->turns_b = random_below(d, 4);
+    s->shift.x = random_below(d, 13) - 6, s->shift.y = random_below(d, 13) - 6;
     for (int i = 0; i < 2; i++) {
         const dem2d_rot q = quarters[i ? s->turns_b : s->turns_a];
         dem2d_vec at = models[i]->corners ? models[i]->info.offset : (dem2d_vec){0, 0};
@@ -859,47 +830,47 @@ static void draw_on_lattice(scene *s, dice *d) {
     s->known = true, s->places = 0;
 }
 
-static void draw_concentric(scene *s, dice *d) {
+static void draw_concentric(scene *s, uint64_t *d) {
     static const double offsets[] = {0, 1e-300, 1e-160, 1e-30, 1e-17, 1e-15, 1e-10, 1e-4};
-    const double offset = offsets[dice_below(d, 8)];
+    const double offset = offsets[random_below(d, 8)];
     const spot u = draw_normal(s->p.a, &s->p.pose_a, d);
     s->p.pose_b.position.x = s->p.pose_a.position.x + offset * (double)u.x;
     s->p.pose_b.position.y = s->p.pose_a.position.y + offset * (double)u.y;
-    if (dice_below(d, 2)) s->p.pose_b.rotation = s->p.pose_a.rotation;
-    if (dice_below(d, 2)) s->p.pose_b.scale = s->p.pose_a.scale;
+    if (random_below(d, 2)) s->p.pose_b.rotation = s->p.pose_a.rotation;
+    if (random_below(d, 2)) s->p.pose_b.scale = s->p.pose_a.scale;
 }
 
 /* Turns B until a direction v of it is to a hair from -u, in radians; 0 is as near as doubles. */
-CASE_HELPER void turn_against(pair *p, spot u, spot v, real hair) {
+PART void turn_against(pair *p, spot u, spot v, real hair) {
     const spot q = spot_turned(spot_make(-spot_dot(u, v), -spot_cross(v, u)), hair);
     const real bc = p->pose_b.rotation.c, bs = p->pose_b.rotation.s;
     const spot r = spot_unit(spot_make(q.x * bc - q.y * bs, q.x * bs + q.y * bc));
     p->pose_b.rotation = (dem2d_rot){(double)r.x, (double)r.y};
 }
 
-static void draw_parallel(scene *s, dice *d) {
+static void draw_parallel(scene *s, uint64_t *d) {
     pair *p = &s->p;
     const spot u = draw_normal(p->a, &p->pose_a, d), v = draw_normal(p->b, &p->pose_b, d);
-    const real hair = dice_scale(d, 1e-15, 1e-3) * (dice_below(d, 2) ? 1 : -1);
-    turn_against(p, u, v, dice_below(d, 5) ? hair : 0);
+    const real hair = random_scale(d, 1e-15, 1e-3) * (random_below(d, 2) ? 1 : -1);
+    turn_against(p, u, v, random_below(d, 5) ? hair : 0);
     scene_place(s, u, draw_delta(p, d));
     /* along the faces by any part of a size: u stays a bound where the faces still meet */
-    const double slide = dice_uniform(d, -1, 1) * p->pose_a.scale;
+    const double slide = random_between(d, -1, 1) * p->pose_a.scale;
     p->pose_b.position.x -= slide * (double)u.y, p->pose_b.position.y += slide * (double)u.x;
     s->bounded = s->known = false;
 }
 
 /* Positions are multiples of 2^-24, up to 2^27: doubles of 53 bits hold them. */
-static void draw_remote(scene *s, dice *d) {
+static void draw_remote(scene *s, uint64_t *d) {
     dem2d_vec *ends[2] = {&s->p.pose_a.position, &s->p.pose_b.position};
     for (int i = 0; i < 2; i++) {
-        ends[i]->x = 0x1p27 + floor(dice_uniform(d, -2, 2) * 0x1p24) * 0x1p-24;
-        ends[i]->y = -0x1p26 + floor(dice_uniform(d, -2, 2) * 0x1p24) * 0x1p-24;
+        ends[i]->x = 0x1p27 + floor(random_between(d, -2, 2) * 0x1p24) * 0x1p-24;
+        ends[i]->y = -0x1p26 + floor(random_between(d, -2, 2) * 0x1p24) * 0x1p-24;
     }
 }
 
 /* The same scene with all lengths times 2^power: no number but these changes. */
-CASE_HELPER scene scene_scaled(const scene *from, int power) {
+PART scene scene_scaled(const scene *from, int power) {
     scene s = *from;
     dem2d_pose *poses[2] = {&s.p.pose_a, &s.p.pose_b};
     for (int i = 0; i < 2; i++) {
@@ -911,26 +882,26 @@ CASE_HELPER scene scene_scaled(const scene *from, int power) {
     return s;
 }
 
-CASE_HELPER scene scene_draw(const model *a, const model *b, int way, dice *d) {
+PART scene scene_draw(const model *a, const model *b, int way, uint64_t *d) {
     scene s;
     memset(&s, 0, sizeof s);
     s.p.a = a, s.p.b = b, s.way = way;
     dem2d_pose *poses[2] = {&s.p.pose_a, &s.p.pose_b};
     for (int i = 0; i < 2; i++) {
         poses[i]->rotation = draw_rotation(d);
-        poses[i]->scale = dice_below(d, 3) ? dice_uniform(d, 0.5, 2) : 1;
-        if (i == 1 || dice_below(d, 2)) continue;
-        poses[i]->position.x = dice_uniform(d, -1, 1),
-        poses[i]->position.y = dice_uniform(d, -1, 1);
+        poses[i]->scale = random_below(d, 3) ? random_between(d, 0.5, 2) : 1;
+        if (i == 1 || random_below(d, 2)) continue;
+        poses[i]->position.x = random_between(d, -1, 1),
+        poses[i]->position.y = random_between(d, -1, 1);
     }
     if (way == UNEQUAL || way == INSIDE) {
-        const double ratio = dice_scale(d, way == INSIDE ? 1e-6 : 1e-3, 1e-2);
-        if (dice_below(d, 2))
+        const double ratio = random_scale(d, way == INSIDE ? 1e-6 : 1e-3, 1e-2);
+        if (random_below(d, 2))
             s.p.pose_b.scale *= ratio;
         else
             s.p.pose_a.scale *= ratio;
     }
-    if (way == UNEQUAL) s.p.pose_b.scale *= dice_scale(d, 1e-3, 1e3);
+    if (way == UNEQUAL) s.p.pose_b.scale *= random_scale(d, 1e-3, 1e3);
     if (way == CHOSEN || way == UNEQUAL) {
         const spot u = draw_normal(a, &s.p.pose_a, d);
         scene_place(&s, u, draw_delta(&s.p, d));
@@ -938,8 +909,8 @@ CASE_HELPER scene scene_draw(const model *a, const model *b, int way, dice *d) {
     if (way == TOUCHES) draw_touch(&s, d);
     if (way == ANYWHERE || way == INSIDE) {
         const double reach = way == INSIDE ? 0.3 * fmax(s.p.pose_a.scale, s.p.pose_b.scale) : 2;
-        s.p.pose_b.position.x = s.p.pose_a.position.x + dice_uniform(d, -reach, reach);
-        s.p.pose_b.position.y = s.p.pose_a.position.y + dice_uniform(d, -reach, reach);
+        s.p.pose_b.position.x = s.p.pose_a.position.x + random_between(d, -reach, reach);
+        s.p.pose_b.position.y = s.p.pose_a.position.y + random_between(d, -reach, reach);
     }
     if (way == ON_LATTICE) draw_on_lattice(&s, d);
     if (way == CONCENTRIC) draw_concentric(&s, d);
@@ -955,13 +926,13 @@ typedef struct pool {
     model models[KINDS][VARIANTS];
 } pool;
 
-CASE_HELPER void pool_draw(pool *all, uint64_t seed) {
-    dice d = {seed};
+PART void pool_draw(pool *all, uint64_t seed) {
+    uint64_t d = seed;
     for (int k = 0; k < KINDS; k++)
         for (int i = 0; i < VARIANTS; i++) model_draw(&all->models[k][i], k, &d);
 }
 
-CASE_HELPER void pool_destroy(pool *all) {
+PART void pool_destroy(pool *all) {
     for (int k = 0; k < KINDS; k++)
         for (int i = 0; i < VARIANTS; i++) dem2d_shape_destroy(all->models[k][i].shape);
 }
@@ -971,7 +942,7 @@ CASE_HELPER void pool_destroy(pool *all) {
 /* The functions below return what is wrong with an answer, or NULL. */
 
 /* A depth, and whatever is measured from the centres. */
-CASE_HELPER double depth_slack(const pair *p) {
+PART double depth_slack(const pair *p) {
     return CASE_ROUNDING * pair_size(p);
 }
 
@@ -1049,8 +1020,8 @@ static const char *points_flaw(const pair *p, const dem2d_contact *c) {
 }
 
 /* What can be seen without the shapes. tolerance: that of the query. */
-CASE_HELPER const char *answer_flaw(const pair *p, const dem2d_contact *c, double tolerance,
-                                    dem2d_solver solver) {
+PART const char *answer_flaw(const pair *p, const dem2d_contact *c, double tolerance,
+                             dem2d_solver solver) {
     const double slack = c->error + point_slack(p);
     const dem2d_vec a = c->point_a, b = c->point_b, n = c->normal;
     if (!vec_finite(n) || !vec_finite(a) || !vec_finite(b) || !vec_finite(c->point))
@@ -1079,7 +1050,7 @@ CASE_HELPER const char *answer_flaw(const pair *p, const dem2d_contact *c, doubl
 }
 
 /* Against a depth that is known to lie from lower to upper, both to within a slack. */
-CASE_HELPER const char *depth_flaw(const dem2d_contact *c, real lower, real upper, real slack) {
+PART const char *depth_flaw(const dem2d_contact *c, real lower, real upper, real slack) {
     if (!(c->depth - c->error - slack <= upper)) return "the depth is too large";
     if (!(c->depth + c->error + slack >= lower)) return "the depth is too small";
     if (c->state == DEM2D_SEPARATED && !(lower <= slack)) return "an overlap is said to be a gap";
@@ -1093,14 +1064,14 @@ CASE_HELPER const char *depth_flaw(const dem2d_contact *c, real lower, real uppe
 
 /* What Newton's last step may leave in h(normal): it is not looked at again, and a radius of
    curvature that jumps on the way (polybeziers) counts with the square of the step. */
-CASE_HELPER double step_slack(const pair *p, double tolerance) {
+PART double step_slack(const pair *p, double tolerance) {
     return 4 * tolerance * pair_size(p);
 }
 
 /* The support value along the normal, taken to within `slack`, is the depth. It is never below the
    true one, which is within the error. */
-CASE_HELPER const char *normal_flaw(const pair *p, const dem2d_contact *c, real value,
-                                    double tolerance, real slack) {
+PART const char *normal_flaw(const pair *p, const dem2d_contact *c, real value, double tolerance,
+                             real slack) {
     if (!(value >= c->depth - c->error - slack)) return "the depth is above all along the normal";
     if (!(value <= c->depth + c->error + step_slack(p, tolerance) + slack))
         return "the normal does not give the depth";
@@ -1141,7 +1112,7 @@ static bool is_deep(const pair *p, const dem2d_contact *c) {
    two, they are on the chords of both faces. No shape is farther outside its chord than the depth
    of the contact is above that of the point, and both were made deeper together by no more than the
    depth. */
-CASE_HELPER const char *surface_flaw(const pair *p, const dem2d_contact *c, double tolerance) {
+PART const char *surface_flaw(const pair *p, const dem2d_contact *c, double tolerance) {
     const real slack =
         c->error + point_slack(p) + step_slack(p, tolerance) + fabsl(witness_shear(c));
     const spot u = spot_from(c->normal), down = spot_make(-u.x, -u.y);
@@ -1166,19 +1137,19 @@ CASE_HELPER const char *surface_flaw(const pair *p, const dem2d_contact *c, doub
 
 /* Scenes whose line of centres gives a direction to start from: (1, 0), taken for lack of one,
    neither turns nor swaps. */
-CASE_HELPER bool has_line(const pair *p) {
+PART bool has_line(const pair *p) {
     const spot d = pair_line(p);
     return d.x != 0 || d.y != 0;
 }
 
 /* Centres so near that squares of their distance are lost, or would be when scaled by 2^-200. */
-CASE_HELPER bool too_near(const pair *p) {
+PART bool too_near(const pair *p) {
     const spot d = pair_line(p);
     return has_line(p) && hypotl(d.x, d.y) < 1e-60L;
 }
 
 /* Force and moment about a place that contact points of stiffness 1 give. */
-CASE_HELPER void sum_points(const dem2d_contact *c, dem2d_vec about, real *force, real *moment) {
+PART void sum_points(const dem2d_contact *c, dem2d_vec about, real *force, real *moment) {
     *force = *moment = 0;
     for (int i = 0; i < c->count; i++) {
         const dem2d_contact_point *q = &c->points[i];
@@ -1192,7 +1163,7 @@ CASE_HELPER void sum_points(const dem2d_contact *c, dem2d_vec about, real *force
 /* The answer r for the pair swapped, where one direction is the least: the same bits, and of the
    contact points the same force and moment, as there may be two in one place. Closed forms differ
    in the last bits: of two edges in line either may be taken. */
-CASE_HELPER const char *swap_flaw(const pair *p, const dem2d_contact *c, const dem2d_contact *r) {
+PART const char *swap_flaw(const pair *p, const dem2d_contact *c, const dem2d_contact *r) {
     const double size = pair_size(p), bits = c->proof == DEM2D_BY_FORM ? DBL_EPSILON : 0;
     const double place = 256 * DBL_EPSILON * size + point_slack(p);
     if (!(fabs(r->depth - c->depth) <= 4 * bits * size)) return "another depth when swapped";
@@ -1213,9 +1184,9 @@ CASE_HELPER const char *swap_flaw(const pair *p, const dem2d_contact *c, const d
 
 /* Directions that a broken cache could hold. The last is replaced by the opposite of the truth. */
 enum { GARBAGE = 9 };
-CASE_HELPER const dem2d_vec garbage_starts[GARBAGE] = {
-    {1, 0},       {0, -1},          {-0.6, 0.8},  {1e150, -1e150}, {-3e-300, 1e-300},
-    {0, -5e-324}, {5e-324, 5e-324}, {1e300, 1e8}, {0, 0}};
+PART const dem2d_vec garbage_starts[GARBAGE] = {{1, 0},           {0, -1},           {-0.6, 0.8},
+                                                {1e150, -1e150},  {-3e-300, 1e-300}, {0, -5e-324},
+                                                {5e-324, 5e-324}, {1e300, 1e8},      {0, 0}};
 
 /* --- to reproduce ----------------------------------------------------------------------------- */
 
@@ -1229,10 +1200,10 @@ static void print_model(const char *name, const model *m, const dem2d_pose *pose
             m->info.circumscribed, m->info.inscribed, m->info.rho_min);
 }
 
-CASE_HELPER const char *const proof_names[DEM2D_PROOF_COUNT] = {"nothing", "form", "radius", "arc",
-                                                                "polytope"};
+PART const char *const proof_names[DEM2D_PROOF_COUNT] = {"nothing", "form", "radius", "arc",
+                                                         "polytope"};
 
-CASE_HELPER void print_answer(const char *what, const dem2d_contact *c, const pair *p) {
+PART void print_answer(const char *what, const dem2d_contact *c, const pair *p) {
     const double size = pair_size(p);
     const spot n = spot_from(c->normal);
     const spot ab = spot_make((real)c->point_a.x - c->point_b.x, (real)c->point_a.y - c->point_b.y);
@@ -1254,7 +1225,7 @@ CASE_HELPER void print_answer(const char *what, const dem2d_contact *c, const pa
                 c->points[i].weight);
 }
 
-CASE_HELPER void print_scene(const scene *s) {
+PART void print_scene(const scene *s) {
     const truth t = find_truth(&s->p);
     print_model("A", s->p.a, &s->p.pose_a);
     print_model("B", s->p.b, &s->p.pose_b);

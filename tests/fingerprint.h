@@ -14,12 +14,12 @@ typedef struct fingerprint {
     int count, room;
 } fingerprint;
 
-TEST_HELPER void fingerprint_free(fingerprint *f) {
+PART void fingerprint_free(fingerprint *f) {
     free(f->at);
     memset(f, 0, sizeof *f);
 }
 
-TEST_HELPER void fingerprint_put(fingerprint *f, const char *what, int of, double value) {
+PART void fingerprint_put(fingerprint *f, const char *what, int of, double value) {
     if (f->count == f->room) {
         f->room = f->room > 0 ? 2 * f->room : 512;
         f->at = realloc(f->at, (size_t)f->room * sizeof *f->at);
@@ -28,7 +28,7 @@ TEST_HELPER void fingerprint_put(fingerprint *f, const char *what, int of, doubl
     f->at[f->count++] = (fingerprint_entry){value, what, of};
 }
 
-TEST_HELPER void fingerprint_put_vec(fingerprint *f, const char *what, int of, dem2d_vec v) {
+PART void fingerprint_put_vec(fingerprint *f, const char *what, int of, dem2d_vec v) {
     fingerprint_put(f, what, of, v.x);
     fingerprint_put(f, what, of, v.y);
 }
@@ -39,7 +39,7 @@ TEST_HELPER void fingerprint_put_vec(fingerprint *f, const char *what, int of, d
         fingerprint_put((f), what, (of), (id).generation); \
     } while (0)
 
-TEST_HELPER void fingerprint_particles(fingerprint *f, const dem2d_world *world) {
+PART void fingerprint_particles(fingerprint *f, const dem2d_world *world) {
     int count = -1, again = -1;
     assert_ok(dem2d_world_particles(world, NULL, 0, &count));
     dem2d_particle_id *ids = calloc((size_t)count + 1, sizeof *ids);
@@ -69,7 +69,7 @@ TEST_HELPER void fingerprint_particles(fingerprint *f, const dem2d_world *world)
     free(ids);
 }
 
-TEST_HELPER void fingerprint_contacts(fingerprint *f, const dem2d_world *world) {
+PART void fingerprint_contacts(fingerprint *f, const dem2d_world *world) {
     int count = -1, again = -1;
     assert_ok(dem2d_world_contacts(world, NULL, 0, &count));
     dem2d_contact_info *list = calloc((size_t)count + 1, sizeof *list);
@@ -93,7 +93,7 @@ TEST_HELPER void fingerprint_contacts(fingerprint *f, const dem2d_world *world) 
     free(list);
 }
 
-TEST_HELPER void fingerprint_wall(fingerprint *f, const dem2d_world *world, dem2d_wall_id id,
+PART void fingerprint_wall(fingerprint *f, const dem2d_world *world, dem2d_wall_id id,
                                   int i) {
     dem2d_wall_info w;
     assert_ok(dem2d_world_get_wall(world, id, &w));
@@ -110,7 +110,7 @@ TEST_HELPER void fingerprint_wall(fingerprint *f, const dem2d_world *world, dem2
     fingerprint_put(f, "target of wall", i, w.target);
 }
 
-TEST_HELPER void fingerprint_measures(fingerprint *f, const dem2d_world *world) {
+PART void fingerprint_measures(fingerprint *f, const dem2d_world *world) {
     dem2d_energy e;
     dem2d_stress s;
     dem2d_packing p;
@@ -144,7 +144,7 @@ TEST_HELPER void fingerprint_measures(fingerprint *f, const dem2d_world *world) 
 }
 
 /* Of a world that keeps one. */
-TEST_HELPER void fingerprint_ledger(fingerprint *f, const dem2d_world *world) {
+PART void fingerprint_ledger(fingerprint *f, const dem2d_world *world) {
     dem2d_ledger l;
     if (dem2d_world_ledger(world, &l) != DEM2D_OK) return;
     const double numbers[] = {l.kinetic,  l.normal,  l.tangential, l.gravity, l.walls,  l.driven,
@@ -153,7 +153,7 @@ TEST_HELPER void fingerprint_ledger(fingerprint *f, const dem2d_world *world) {
 }
 
 /* All counters but the bytes in use: arrays may have grown for what then failed. */
-TEST_HELPER void fingerprint_stats(fingerprint *f, const dem2d_world *world) {
+PART void fingerprint_stats(fingerprint *f, const dem2d_world *world) {
     dem2d_stats s;
     assert_ok(dem2d_world_stats(world, &s));
     const double numbers[] = {(double)s.steps,
@@ -176,14 +176,14 @@ TEST_HELPER void fingerprint_stats(fingerprint *f, const dem2d_world *world) {
 }
 
 /* FNV-1a */
-TEST_HELPER bool fingerprint_hash(void *user, const char *bytes, size_t count) {
+PART bool fingerprint_hash(void *user, const char *bytes, size_t count) {
     uint64_t *hash = user;
     for (size_t i = 0; i < count; i++) *hash = (*hash ^ (unsigned char)bytes[i]) * 0x100000001b3u;
     return true;
 }
 
 /* The picture shows the outlines of the templates. */
-TEST_HELPER void fingerprint_picture(fingerprint *f, const dem2d_world *world) {
+PART void fingerprint_picture(fingerprint *f, const dem2d_world *world) {
     uint64_t hash = 0xcbf29ce484222325u;
     dem2d_svg_desc svg = {0};
     svg.write = fingerprint_hash, svg.user = &hash;
@@ -194,7 +194,7 @@ TEST_HELPER void fingerprint_picture(fingerprint *f, const dem2d_world *world) {
 }
 
 /* Of a world and those of its walls that are named. Free it when it is done with. */
-TEST_HELPER fingerprint fingerprint_take(const dem2d_world *world, const dem2d_wall_id *walls,
+PART fingerprint fingerprint_take(const dem2d_world *world, const dem2d_wall_id *walls,
                                          int count) {
     fingerprint f = {NULL, 0, 0};
     fingerprint_particles(&f, world);
@@ -211,7 +211,7 @@ TEST_HELPER fingerprint fingerprint_take(const dem2d_world *world, const dem2d_w
 }
 
 /* The same bits; says what differs first. */
-TEST_HELPER bool fingerprint_same(const fingerprint *a, const fingerprint *b) {
+PART bool fingerprint_same(const fingerprint *a, const fingerprint *b) {
     const int count = a->count < b->count ? a->count : b->count;
     for (int i = 0; i < count; i++) {
         const fingerprint_entry *x = &a->at[i], *y = &b->at[i];

@@ -176,27 +176,27 @@ static void check_fully(const scene *s, const dem2d_contact *c, row *r) {
 
 /* --- one pair -------------------------------------------------------------------------------- */
 
-static scene draw_scene(int *kind_a, int *kind_b, dice *d) {
+static scene draw_scene(int *kind_a, int *kind_b, uint64_t *d) {
     *kind_a = (int)(number % KINDS), *kind_b = (int)(number / KINDS % KINDS);
-    const model *a = &all.models[*kind_a][dice_below(d, VARIANTS)];
-    const model *b = &all.models[*kind_b][dice_below(d, VARIANTS)];
-    scene s = scene_draw(a, b, dice_below(d, WAYS), d);
-    if (dice_below(d, 4) == 0) s = scene_scaled(&s, dice_below(d, 401) - 200);
+    const model *a = &all.models[*kind_a][random_below(d, VARIANTS)];
+    const model *b = &all.models[*kind_b][random_below(d, VARIANTS)];
+    scene s = scene_draw(a, b, random_below(d, WAYS), d);
+    if (random_below(d, 4) == 0) s = scene_scaled(&s, random_below(d, 401) - 200);
     return s;
 }
 
 /* Turned by a rounding, a step or a lot. */
-static dem2d_vec stale(dem2d_vec n, dice *d) {
+static dem2d_vec stale(dem2d_vec n, uint64_t *d) {
     static const double angles[] = {0, 1e-6, -1e-4, 1e-3, -1e-2};
-    const double t = angles[dice_below(d, 5)];
+    const double t = angles[random_below(d, 5)];
     return (dem2d_vec){n.x - t * n.y, n.y + t * n.x};
 }
 
 static void try_pair(void) {
-    dice d = {series * 0x9e3779b97f4a7c15u ^ number * 0xd1342543de82ef95u};
+    uint64_t d = series * 0x9e3779b97f4a7c15u ^ number * 0xd1342543de82ef95u;
     int kind_a, kind_b;
     const scene s = draw_scene(&kind_a, &kind_b, &d);
-    const dem2d_vec none = {0, 0}, u = spot_rounded(dice_direction(&d));
+    const dem2d_vec none = {0, 0}, u = spot_rounded(random_direction(&d));
     const dem2d_contact cold = ask(&s.p, DEM2D_CERTIFIED, none);
     const dem2d_contact warm = ask(&s.p, DEM2D_CERTIFIED, stale(cold.normal, &d));
     row *r = &rows[kind_a][kind_b];
@@ -206,12 +206,12 @@ static void try_pair(void) {
     check_quickly(&s, "cold", DEM2D_CERTIFIED, &cold, u);
     check_quickly(&s, "warm", DEM2D_CERTIFIED, &warm, u);
     check_agreement(&s, "warm", &cold, &warm);
-    if (dice_below(&d, 8) == 0) {
-        const dem2d_contact c = ask(&s.p, DEM2D_CERTIFIED, garbage_starts[dice_below(&d, GARBAGE)]);
+    if (random_below(&d, 8) == 0) {
+        const dem2d_contact c = ask(&s.p, DEM2D_CERTIFIED, garbage_starts[random_below(&d, GARBAGE)]);
         check_quickly(&s, "garbage start", DEM2D_CERTIFIED, &c, u);
         check_agreement(&s, "garbage start", &cold, &c);
     }
-    if (dice_below(&d, 8) == 0) {
+    if (random_below(&d, 8) == 0) {
         const dem2d_contact c = ask(&s.p, DEM2D_GJK_EPA, none);
         check_quickly(&s, "GJK and EPA", DEM2D_GJK_EPA, &c, u);
         check_agreement(&s, "GJK and EPA", &cold, &c);

@@ -143,15 +143,8 @@ static void make_samples(sample samples[SAMPLES]) {
     }
 }
 
-static uint64_t next_random(uint64_t *random) {
-    uint64_t z = (*random += 0x9e3779b97f4a7c15u); /* splitmix64 */
-    z = (z ^ (z >> 30)) * 0xbf58476d1ce4e5b9u;
-    z = (z ^ (z >> 27)) * 0x94d049bb133111ebu;
-    return z ^ (z >> 31);
-}
-
 static size_t below(uint64_t *random, size_t count) {
-    return (size_t)(next_random(random) % count);
+    return (size_t)(random_bits(random) % count);
 }
 
 /* One random change of what is between head and tail. */
@@ -166,7 +159,7 @@ static size_t change(uint8_t *bytes, size_t size, const sample *samples, uint64_
         bytes[at] ^= (uint8_t)(1 << below(random, 8));
         break;
     case 1:
-        bytes[at] = (uint8_t)next_random(random);
+        bytes[at] = (uint8_t)random_bits(random);
         break;
     case 2: {
         uint64_t word;

@@ -25,6 +25,8 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "parts.h"
+
 enum {
     MOST_MATERIALS = 3,
     MOST_SHAPES = 4,
@@ -94,35 +96,9 @@ static const char *const world_features[WITH_COUNT] = {
 /* --- scripts -----------------------------------------------------------------------------------
  */
 
-typedef struct world_random {
-    uint64_t state;
-} world_random;
-
-/* splitmix64 */
-static uint64_t world_next(world_random *r) {
-    uint64_t z = (r->state += 0x9e3779b97f4a7c15u);
-    z = (z ^ (z >> 30)) * 0xbf58476d1ce4e5b9u;
-    z = (z ^ (z >> 27)) * 0x94d049bb133111ebu;
-    return z ^ (z >> 31);
-}
-
-static double world_uniform(world_random *r, double low, double high) {
-    return low + (high - low) * ((double)(world_next(r) >> 11) * 0x1p-53);
-}
-
-static int world_below(world_random *r, int count) {
-    return (int)(world_next(r) % (uint64_t)count);
-}
-
 /* True once in so many times. */
-static bool world_once_in(world_random *r, int count) {
-    return world_below(r, count) == 0;
-}
-
-static dem2d_vec world_vec(double x, double y) {
-    dem2d_vec v;
-    v.x = x, v.y = y;
-    return v;
+static bool world_once_in(uint64_t *r, int count) {
+    return random_below(r, count) == 0;
 }
 
 /* A shape by its numbers. */
@@ -163,7 +139,7 @@ typedef struct world_event {
 typedef struct world_script {
     dem2d_world_desc desc; /* without callbacks */
     bool law;
-    double exact;     /* how near results are to those of a mirror image or in another order */
+    double exact; /* how near results are to those of a mirror image or in another order */
     dem2d_material_desc materials[MOST_MATERIALS];
     world_shape shapes[MOST_SHAPES];
     dem2d_wall_desc walls[MOST_WALLS];
@@ -174,80 +150,80 @@ typedef struct world_script {
     uint64_t seed; /* of what the runs choose */
 } world_script;
 
-static world_shape world_make_polygon(world_random *r) {
+static world_shape world_make_polygon(uint64_t *r) {
     world_shape s = {.type = DEM2D_POLYGON};
-    const double flat = world_uniform(r, 0.5, 1), phase = world_uniform(r, 0, 6);
-    s.count = 3 + world_below(r, 5);
-    if (world_once_in(r, 2)) s.rounding = world_uniform(r, 0.05, 0.3);
+    const double flat = random_between(r, 0.5, 1), phase = random_between(r, 0, 6);
+    s.count = 3 + random_below(r, 5);
+    if (world_once_in(r, 2)) s.rounding = random_between(r, 0.05, 0.3);
     for (int i = 0; i < s.count; i++) {
         const double angle =
-            phase + 6.283185307179586 * (i + world_uniform(r, -0.2, 0.2)) / s.count;
-        s.points[i] = world_vec(cos(angle), flat * sin(angle));
+            phase + 6.283185307179586 * (i + random_between(r, -0.2, 0.2)) / s.count;
+        s.points[i] = vec(cos(angle), flat * sin(angle));
     }
     if (!world_once_in(r, 3)) return s;
     s.count = 4; /* a box, by exact numbers */
     for (int i = 0; i < 4; i++)
-        s.points[i] = world_vec(i == 1 || i == 2 ? 0.75 : -0.75, i < 2 ? -0.5 : 0.5);
+        s.points[i] = vec(i == 1 || i == 2 ? 0.75 : -0.75, i < 2 ? -0.5 : 0.5);
     return s;
 }
 
 /* A box of straight arcs with round corners, or an oval of four arcs. */
-static world_shape world_make_bezier(world_random *r) {
+static world_shape world_make_bezier(uint64_t *r) {
     static const signed char box[MOST_POINTS][2] = {
         {-3, -5}, {-1, -5}, {1, -5}, {3, -5}, {4, -5},  {5, -4},  {5, -3},  {5, -1},
         {5, 1},   {5, 3},   {5, 4},  {4, 5},  {3, 5},   {1, 5},   {-1, 5},  {-3, 5},
         {-4, 5},  {-5, 4},  {-5, 3}, {-5, 1}, {-5, -1}, {-5, -3}, {-5, -4}, {-4, -5}};
     static const signed char axis[5][2] = {{1, 0}, {0, 1}, {-1, 0}, {0, -1}, {1, 0}};
-    const double x = world_uniform(r, 0.1, 0.2), y = world_uniform(r, 0.1, 0.2);
+    const double x = random_between(r, 0.1, 0.2), y = random_between(r, 0.1, 0.2);
     world_shape s = {.type = DEM2D_BEZIER};
     double reach[5];
     s.count = world_once_in(r, 2) ? 8 : 4;
-    for (int i = 0; i < 4; i++) reach[i] = world_uniform(r, 0.6, 1.1);
+    for (int i = 0; i < 4; i++) reach[i] = random_between(r, 0.6, 1.1);
     reach[4] = reach[0];
     for (int i = 0; i < MOST_POINTS && s.count == 8; i++)
-        s.points[i] = world_vec(x * box[i][0], y * box[i][1]);
+        s.points[i] = vec(x * box[i][0], y * box[i][1]);
     for (int i = 0; i < 4 && s.count == 4; i++) {
         const signed char *p = axis[i], *q = axis[i + 1];
         const double a = reach[i], b = reach[i + 1], h = 0.55;
-        s.points[3 * i] = world_vec(a * p[0], a * p[1]);
-        s.points[3 * i + 1] = world_vec(a * p[0] + h * b * q[0], a * p[1] + h * b * q[1]);
-        s.points[3 * i + 2] = world_vec(b * q[0] + h * a * p[0], b * q[1] + h * a * p[1]);
+        s.points[3 * i] = vec(a * p[0], a * p[1]);
+        s.points[3 * i + 1] = vec(a * p[0] + h * b * q[0], a * p[1] + h * b * q[1]);
+        s.points[3 * i + 2] = vec(b * q[0] + h * a * p[0], b * q[1] + h * a * p[1]);
     }
     return s;
 }
 
-static world_shape world_make_shape(world_random *r, int type) {
+static world_shape world_make_shape(uint64_t *r, int type) {
     world_shape s = {.type = type};
     if (type == DEM2D_POLYGON) return world_make_polygon(r);
     if (type == DEM2D_BEZIER) return world_make_bezier(r);
-    s.size[0] = world_uniform(r, 0.5, 1);
-    s.size[1] = type == DEM2D_CUSTOM ? 0.5 : world_uniform(r, 0.5, 1);
+    s.size[0] = random_between(r, 0.5, 1);
+    s.size[1] = type == DEM2D_CUSTOM ? 0.5 : random_between(r, 0.5, 1);
     if (type == DEM2D_CUSTOM) s.size[0] = 0.5;
     s.count = 4;
     s.a[0] = 1.6;
     for (int n = 2; n <= s.count && type == DEM2D_FOURIER; n++) {
         const double most = 0.4 / (s.count * (n * n - 1));
-        s.a[n] = world_uniform(r, -most, most);
-        s.b[n] = world_uniform(r, -most, most);
+        s.a[n] = random_between(r, -most, most);
+        s.b[n] = random_between(r, -most, most);
     }
     return s;
 }
 
-static dem2d_pair_desc world_make_pair(world_random *r) {
+static dem2d_pair_desc world_make_pair(uint64_t *r) {
     dem2d_pair_desc pair;
     memset(&pair, 0, sizeof pair);
-    pair.normal_stiffness = world_uniform(r, 1e4, 4e4);
-    if (!world_once_in(r, 4)) pair.tangential_stiffness = world_uniform(r, 5e3, 2e4);
-    if (!world_once_in(r, 4)) pair.friction = world_uniform(r, 0.1, 1);
-    if (world_once_in(r, 3)) pair.damping_ratio = world_uniform(r, 0.05, 0.5);
-    if (world_once_in(r, 3)) pair.rolling_friction = world_uniform(r, 0.05, 0.3);
+    pair.normal_stiffness = random_between(r, 1e4, 4e4);
+    if (!world_once_in(r, 4)) pair.tangential_stiffness = random_between(r, 5e3, 2e4);
+    if (!world_once_in(r, 4)) pair.friction = random_between(r, 0.1, 1);
+    if (world_once_in(r, 3)) pair.damping_ratio = random_between(r, 0.05, 0.5);
+    if (world_once_in(r, 3)) pair.rolling_friction = random_between(r, 0.05, 0.3);
     return pair;
 }
 
-static dem2d_material_desc world_make_material(world_random *r) {
+static dem2d_material_desc world_make_material(uint64_t *r) {
     const dem2d_pair_desc pair = world_make_pair(r);
     dem2d_material_desc m;
-    m.density = world_uniform(r, 0.8, 1.2);
+    m.density = random_between(r, 0.8, 1.2);
     m.normal_stiffness = pair.normal_stiffness;
     m.tangential_stiffness = pair.tangential_stiffness;
     m.friction = pair.friction;
@@ -256,51 +232,51 @@ static dem2d_material_desc world_make_material(world_random *r) {
     return m;
 }
 
-static dem2d_material_id world_material(world_random *r, const world_script *s) {
+static dem2d_material_id world_material(uint64_t *r, const world_script *s) {
     dem2d_material_id id;
-    id.index = (uint32_t)world_below(r, s->material_count);
+    id.index = (uint32_t)random_below(r, s->material_count);
     id.generation = 1;
     return id;
 }
 
 /* Grains on a lattice, most of them touching their neighbours; some upright, some deep in others or
    behind the floor. */
-static dem2d_particle_desc world_make_grain(world_random *r, const world_script *s, int place) {
+static dem2d_particle_desc world_make_grain(uint64_t *r, const world_script *s, int place) {
     dem2d_particle_desc g;
     memset(&g, 0, sizeof g);
-    g.scale = world_once_in(r, 3) ? 1 : world_uniform(r, 0.8, 1.2);
-    g.shape.index = (uint32_t)world_below(r, s->shape_count);
+    g.scale = world_once_in(r, 3) ? 1 : random_between(r, 0.8, 1.2);
+    g.shape.index = (uint32_t)random_below(r, s->shape_count);
     g.material = world_material(r, s);
     g.motion = world_once_in(r, 6) ? DEM2D_FIXED : world_once_in(r, 6) ? DEM2D_DRIVEN : DEM2D_FREE;
-    g.position.x = 1.5 * (place % 3) + world_uniform(r, -0.15, 0.15);
-    g.position.y = 0.7 + 1.45 * (double)(place / 3) + world_uniform(r, -0.15, 0.15);
+    g.position.x = 1.5 * (place % 3) + random_between(r, -0.15, 0.15);
+    g.position.y = 0.7 + 1.45 * (double)(place / 3) + random_between(r, -0.15, 0.15);
     const bool deep = world_once_in(r, 8), upright = world_once_in(r, 4);
-    if (deep) g.position.y -= world_uniform(r, 0.5, 6);
-    g.angle = world_uniform(r, -4, 4);
+    if (deep) g.position.y -= random_between(r, 0.5, 6);
+    g.angle = random_between(r, -4, 4);
     if (upright) g.angle = 0;
     if (g.motion == DEM2D_FIXED) return g;
-    g.velocity = world_vec(world_uniform(r, -2, 2), world_uniform(r, -2, 2));
-    g.angular_velocity = world_once_in(r, 3) ? 0 : world_uniform(r, -2, 2);
+    g.velocity = vec(random_between(r, -2, 2), random_between(r, -2, 2));
+    g.angular_velocity = world_once_in(r, 3) ? 0 : random_between(r, -2, 2);
     return g;
 }
 
-static dem2d_wall_desc world_make_wall(world_random *r, const world_script *s, double x, double y,
+static dem2d_wall_desc world_make_wall(uint64_t *r, const world_script *s, double x, double y,
                                        double nx, double ny) {
     dem2d_wall_desc w;
     memset(&w, 0, sizeof w);
     w.material = world_material(r, s);
-    w.point = world_vec(x, y);
-    w.normal = world_vec(nx, ny);
+    w.point = vec(x, y);
+    w.normal = vec(nx, ny);
     w.length = 3;
-    w.stress = world_uniform(r, 100, 1000);
-    w.max_speed = world_uniform(r, 0.1, 2);
+    w.stress = random_between(r, 100, 1000);
+    w.max_speed = random_between(r, 0.1, 2);
     if (!world_once_in(r, 4)) return w;
     w.mode = world_once_in(r, 2) ? DEM2D_WALL_MOVING : DEM2D_WALL_SERVO;
-    w.velocity = world_vec(world_uniform(r, -1, 1), world_uniform(r, -1, 1));
+    w.velocity = vec(random_between(r, -1, 1), random_between(r, -1, 1));
     return w;
 }
 
-static dem2d_wall_desc world_make_segment(world_random *r, const world_script *s, dem2d_vec from,
+static dem2d_wall_desc world_make_segment(uint64_t *r, const world_script *s, dem2d_vec from,
                                           dem2d_vec to) {
     dem2d_wall_desc w = world_make_wall(r, s, from.x, from.y, 0, 0);
     w.segment = true;
@@ -311,23 +287,22 @@ static dem2d_wall_desc world_make_segment(world_random *r, const world_script *s
 
 /* A floor, of segments or a half-plane; sides, of which one may be a segment; a lid, whose length
    may be the distance of the sides. */
-static void world_make_walls(world_random *r, world_script *s) {
-    const double tilt = world_once_in(r, 3) ? 0 : world_uniform(r, -0.2, 0.2);
+static void world_make_walls(uint64_t *r, world_script *s) {
+    const double tilt = world_once_in(r, 3) ? 0 : random_between(r, -0.2, 0.2);
     if (world_once_in(r, 2)) {
         s->walls[s->wall_count++] = world_make_wall(r, s, 0, 0, -tilt, 1);
     } else {
-        const int links = 1 + world_below(r, 3);
-        dem2d_vec from = world_vec(-1.5, world_uniform(r, -0.2, 0.2));
+        const int links = 1 + random_below(r, 3);
+        dem2d_vec from = vec(-1.5, random_between(r, -0.2, 0.2));
         for (int i = 0; i < links; i++) {
-            const dem2d_vec to =
-                world_vec(-1.5 + 6.0 * (i + 1) / links,
-                          world_once_in(r, 3) ? from.y : world_uniform(r, -0.3, 0.3));
+            const dem2d_vec to = vec(-1.5 + 6.0 * (i + 1) / links,
+                                     world_once_in(r, 3) ? from.y : random_between(r, -0.3, 0.3));
             s->walls[s->wall_count++] = world_make_segment(r, s, from, to);
             from = to;
         }
     }
     const int left = s->wall_count;
-    s->walls[s->wall_count++] = world_make_wall(r, s, -0.7, 0, 1, world_uniform(r, -0.1, 0.1));
+    s->walls[s->wall_count++] = world_make_wall(r, s, -0.7, 0, 1, random_between(r, -0.1, 0.1));
     s->walls[s->wall_count++] = world_make_wall(r, s, 3.7, 0, -1, 0);
     s->walls[s->wall_count] = world_make_wall(r, s, 0, 4.2, 0, -1);
     const bool spans = world_once_in(r, 2);
@@ -339,50 +314,50 @@ static void world_make_walls(world_random *r, world_script *s) {
     s->walls_at_first = s->wall_count;
     if (s->wall_count == MOST_WALLS) return;
     s->walls[s->wall_count++] = /* comes later, if it is called for */
-        world_make_segment(r, s, world_vec(world_uniform(r, 0, 1), world_uniform(r, 1, 2)),
-                           world_vec(world_uniform(r, 2, 3), world_uniform(r, 1, 2)));
+        world_make_segment(r, s, vec(random_between(r, 0, 1), random_between(r, 1, 2)),
+                           vec(random_between(r, 2, 3), random_between(r, 1, 2)));
 }
 
 /* A wall as it is described, or a little elsewhere, turned, or of another kind. */
-static dem2d_wall_desc world_change_wall(world_random *r, const world_script *s, int which) {
+static dem2d_wall_desc world_change_wall(uint64_t *r, const world_script *s, int which) {
     dem2d_wall_desc w = s->walls[which];
     const double way = world_once_in(r, 2) ? 1e-3 : 0.05;
-    const dem2d_vec move = world_vec(world_uniform(r, -way, way), world_uniform(r, -way, way));
+    const dem2d_vec move = vec(random_between(r, -way, way), random_between(r, -way, way));
     w.point.x += move.x, w.point.y += move.y;
     w.end.x += move.x, w.end.y += move.y;
-    if (world_once_in(r, 3)) w.end.y += world_uniform(r, -0.01, 0.01);
-    if (world_once_in(r, 3)) w.normal.x += world_uniform(r, -0.01, 0.01);
+    if (world_once_in(r, 3)) w.end.y += random_between(r, -0.01, 0.01);
+    if (world_once_in(r, 3)) w.normal.x += random_between(r, -0.01, 0.01);
     if (world_once_in(r, 3)) w.material = world_material(r, s);
-    if (world_once_in(r, 3)) w.mode = (dem2d_wall_mode)world_below(r, 3);
+    if (world_once_in(r, 3)) w.mode = (dem2d_wall_mode)random_below(r, 3);
     return w;
 }
 
-static void world_make_event(world_random *r, const world_script *s, world_event *e) {
+static void world_make_event(uint64_t *r, const world_script *s, world_event *e) {
     memset(e, 0, sizeof *e);
-    e->kind = world_below(r, EVENT_KINDS);
-    e->step = world_below(r, s->steps);
-    e->which = world_below(r, s->grain_count);
-    e->other = world_below(r, s->material_count);
-    e->at = world_vec(world_uniform(r, -2, 2), world_uniform(r, -2, 2));
-    e->angle = world_uniform(r, -3, 3);
-    e->number = world_uniform(r, 0, 0.5);
-    e->more = world_uniform(r, 0, 2);
-    e->motion = (dem2d_motion)world_below(r, 3);
+    e->kind = random_below(r, EVENT_KINDS);
+    e->step = random_below(r, s->steps);
+    e->which = random_below(r, s->grain_count);
+    e->other = random_below(r, s->material_count);
+    e->at = vec(random_between(r, -2, 2), random_between(r, -2, 2));
+    e->angle = random_between(r, -3, 3);
+    e->number = random_between(r, 0, 0.5);
+    e->more = random_between(r, 0, 2);
+    e->motion = (dem2d_motion)random_below(r, 3);
     e->pair = world_make_pair(r);
     if (e->kind == EVENT_ADD && world_once_in(r, 2)) e->which = s->grain_count - 1;
-    if (e->kind == EVENT_MOVE) e->at = world_vec(e->at.x + 1.5, e->at.y + 2);
-    if (e->kind == EVENT_GRAVITY) e->at = world_vec(5 * e->at.x, -10 + e->at.y);
+    if (e->kind == EVENT_MOVE) e->at = vec(e->at.x + 1.5, e->at.y + 2);
+    if (e->kind == EVENT_GRAVITY) e->at = vec(5 * e->at.x, -10 + e->at.y);
     if (e->kind == EVENT_PAIR || e->kind == EVENT_REFUSED)
-        e->which = world_below(r, s->material_count);
+        e->which = random_below(r, s->material_count);
     if (e->kind >= EVENT_ADD_WALL && e->kind <= EVENT_REMOVE_WALL) {
-        e->which = world_below(r, s->wall_count);
+        e->which = random_below(r, s->wall_count);
         e->wall = world_change_wall(r, s, e->which);
     }
-    if (e->kind == EVENT_TIME_STEP) e->number = world_uniform(r, 0.5, 1.5) * s->desc.time_step;
+    if (e->kind == EVENT_TIME_STEP) e->number = random_between(r, 0.5, 1.5) * s->desc.time_step;
 }
 
-static void world_make_events(world_random *r, world_script *s) {
-    s->event_count = world_once_in(r, 3) ? 0 : 1 + world_below(r, MOST_EVENTS);
+static void world_make_events(uint64_t *r, world_script *s) {
+    s->event_count = world_once_in(r, 3) ? 0 : 1 + random_below(r, MOST_EVENTS);
     for (int i = 0; i < s->event_count; i++) {
         world_event e;
         int k = i;
@@ -394,30 +369,30 @@ static void world_make_events(world_random *r, world_script *s) {
 
 /* The script of a seed and an index. */
 static void world_make_script(uint64_t seed, int64_t index, world_script *s) {
-    world_random random = {seed * 0xd1342543de82ef95u + (uint64_t)index}, *r = &random;
+    uint64_t random = seed * 0xd1342543de82ef95u + (uint64_t)index, *r = &random;
     const bool round = world_once_in(r, 6), sharp = world_once_in(r, 3);
     memset(s, 0, sizeof *s);
-    s->seed = world_next(r);
-    s->steps = 6 + world_below(r, MOST_STEPS - 5);
-    s->desc.time_step = world_uniform(r, 2e-4, 1.5e-3);
+    s->seed = random_bits(r);
+    s->steps = 6 + random_below(r, MOST_STEPS - 5);
+    s->desc.time_step = random_between(r, 2e-4, 1.5e-3);
     s->desc.gravity.y = world_once_in(r, 4) ? 0 : -9.81;
-    if (world_once_in(r, 3)) s->desc.local_damping = world_uniform(r, 0, 0.7);
-    if (world_once_in(r, 4)) s->desc.global_damping = world_uniform(r, 0, 2);
-    if (world_once_in(r, 4)) s->desc.skin = world_uniform(r, 0.001, 0.3);
+    if (world_once_in(r, 3)) s->desc.local_damping = random_between(r, 0, 0.7);
+    if (world_once_in(r, 4)) s->desc.global_damping = random_between(r, 0, 2);
+    if (world_once_in(r, 4)) s->desc.skin = random_between(r, 0.001, 0.3);
     if (world_once_in(r, 8)) s->desc.solver = DEM2D_GJK_EPA;
     if (world_once_in(r, 8)) s->desc.faces = DEM2D_ONE_POINT;
     s->desc.skip_time_step_check = world_once_in(r, 4);
     s->desc.ledger = world_once_in(r, 2);
     s->desc.contact_tolerance = WORLD_TOLERANCE;
     s->law = world_once_in(r, 8);
-    s->material_count = 1 + world_below(r, MOST_MATERIALS);
-    s->shape_count = 1 + world_below(r, MOST_SHAPES);
-    s->grain_count = 2 + world_below(r, MOST_GRAINS - 1);
+    s->material_count = 1 + random_below(r, MOST_MATERIALS);
+    s->shape_count = 1 + random_below(r, MOST_SHAPES);
+    s->grain_count = 2 + random_below(r, MOST_GRAINS - 1);
     s->exact = WORLD_PUSH;
     if (s->desc.solver == DEM2D_GJK_EPA) s->exact = WORLD_SEARCHED;
     for (int i = 0; i < s->material_count; i++) s->materials[i] = world_make_material(r);
     for (int i = 0; i < s->shape_count; i++) {
-        int type = world_below(r, DEM2D_SHAPE_TYPE_COUNT);
+        int type = random_below(r, DEM2D_SHAPE_TYPE_COUNT);
         if (sharp) type = world_once_in(r, 4) ? DEM2D_CIRCLE : DEM2D_POLYGON;
         if (round) type = DEM2D_CIRCLE;
         s->shapes[i] = world_make_shape(r, type);
@@ -425,7 +400,7 @@ static void world_make_script(uint64_t seed, int64_t index, world_script *s) {
             s->exact = fmax(s->exact, WORLD_SEARCHED);
     }
     for (int i = 0; i < s->grain_count; i++) s->grains[i] = world_make_grain(r, s, i);
-    s->grains_at_first = s->grain_count - world_below(r, 3) / 2;
+    s->grains_at_first = s->grain_count - random_below(r, 3) / 2;
     world_make_walls(r, s);
     world_make_events(r, s);
 }
@@ -466,13 +441,13 @@ typedef struct world_run {
     const world_script *script;
     world_view view;
     dem2d_world *world;
-    world_random random; /* of what this run chooses */
+    uint64_t random; /* of what this run chooses */
     dem2d_material_id materials[MOST_MATERIALS];
     dem2d_shape_id shapes[MOST_SHAPES];
     dem2d_particle_id grains[MOST_GRAINS]; /* generation 0: not there */
     dem2d_wall_id walls[MOST_WALLS];
     double time_step, local_damping,
-        global_damping; /* as they are set now, in the script's units */
+        global_damping;  /* as they are set now, in the script's units */
     double longest_step; /* that was made */
     dem2d_vec gravity;
     world_stadium stadium;
@@ -524,13 +499,13 @@ static void world_parallel(void *user, dem2d_phase phase, int count, dem2d_task_
     int begin[64], end[64], ranges = 0;
     (void)phase;
     for (int at = 0; at < count; ranges++) {
-        int length = 1 + world_below(&run->random, 3);
+        int length = 1 + random_below(&run->random, 3);
         if (ranges == 63 || length > count - at) length = count - at;
         begin[ranges] = at;
         end[ranges] = at += length;
     }
     for (; ranges > 0; ranges--) {
-        const int k = world_below(&run->random, ranges);
+        const int k = random_below(&run->random, ranges);
         task(context, begin[k], end[k]);
         begin[k] = begin[ranges - 1];
         end[k] = end[ranges - 1];
@@ -539,7 +514,7 @@ static void world_parallel(void *user, dem2d_phase phase, int count, dem2d_task_
 
 static dem2d_vec world_stadium_support(void *user, dem2d_vec u, double *rho) {
     const world_stadium *s = (const world_stadium *)user;
-    dem2d_vec p = world_vec(s->radius * u.x, s->radius * u.y);
+    dem2d_vec p = vec(s->radius * u.x, s->radius * u.y);
     if (s->upright)
         p.y += u.y >= 0 ? s->half : -s->half;
     else
@@ -578,14 +553,14 @@ static double world_power(int exponent) {
 /* A direction or a place, in other units. */
 static dem2d_vec world_map(const world_view *v, dem2d_vec p, double unit) {
     if (v->mirrored) p.x = -p.x;
-    if (v->turned) p = world_vec(-p.y, p.x);
-    return world_vec(p.x * unit, p.y * unit);
+    if (v->turned) p = vec(-p.y, p.x);
+    return vec(p.x * unit, p.y * unit);
 }
 
 /* And back. */
 static dem2d_vec world_unmap(const world_view *v, dem2d_vec p, double unit) {
-    p = world_vec(p.x / unit, p.y / unit);
-    if (v->turned) p = world_vec(p.y, -p.x);
+    p = vec(p.x / unit, p.y / unit);
+    if (v->turned) p = vec(p.y, -p.x);
     if (v->mirrored) p.x = -p.x;
     return p;
 }
@@ -701,7 +676,7 @@ static void world_add_shapes(world_run *run) {
 
 /* A number pushed, as a run does it. */
 static double world_push(world_run *run, double value) {
-    return value + run->view.push * world_uniform(&run->random, -1, 1);
+    return value + run->view.push * random_between(&run->random, -1, 1);
 }
 
 /* Velocities too: where nothing turns but by rounding, local damping goes by the sign of that. */
@@ -916,7 +891,7 @@ static void world_event_apply(world_run *run, const world_event *e) {
         world_met(run, WITH_MOVED);
     } else {
         const double go = e->motion == DEM2D_FIXED ? 0 : 1;
-        const dem2d_vec to = world_map(v, world_vec(go * e->at.x, go * e->at.y), world_speed(v));
+        const dem2d_vec to = world_map(v, vec(go * e->at.x, go * e->at.y), world_speed(v));
         world_must(
             run,
             dem2d_world_drive_particle(run->world, *id, e->motion, to,
@@ -1055,8 +1030,8 @@ static void world_sum_contact(world_run *run, const dem2d_contact_info *c,
                               const dem2d_vec at[MOST_GRAINS], world_sums *sums) {
     const dem2d_vec n = c->normal, p = c->point;
     const double fn = c->normal_force, ft = c->tangential_force;
-    const dem2d_vec on_b = world_vec(fn * n.x - ft * n.y, fn * n.y + ft * n.x);
-    const dem2d_vec on_a = world_vec(-on_b.x, -on_b.y);
+    const dem2d_vec on_b = vec(fn * n.x - ft * n.y, fn * n.y + ft * n.x);
+    const dem2d_vec on_a = vec(-on_b.x, -on_b.y);
     const int a = world_grain_of(run, c->a), b = world_grain_of(run, c->b);
     const int wall = b < 0 ? world_wall_of(run, c->wall) : -1;
     if (a < 0 || (b < 0 && wall < 0)) {
@@ -1064,9 +1039,9 @@ static void world_sum_contact(world_run *run, const dem2d_contact_info *c,
         return;
     }
     if (c->points == 2) world_met(run, WITH_TWO_POINTS);
-    world_add_force(sums, a, world_vec(p.x - at[a].x, p.y - at[a].y), on_a, -c->moment);
+    world_add_force(sums, a, vec(p.x - at[a].x, p.y - at[a].y), on_a, -c->moment);
     if (b >= 0) {
-        world_add_force(sums, b, world_vec(p.x - at[b].x, p.y - at[b].y), on_b, c->moment);
+        world_add_force(sums, b, vec(p.x - at[b].x, p.y - at[b].y), on_b, c->moment);
         return;
     }
     sums->wall[wall].x += on_b.x, sums->wall[wall].y += on_b.y;
@@ -1357,7 +1332,7 @@ static void world_disturb(world_run *run) {
 static dem2d_result world_step(world_run *run) {
     if (run->view.disturbed && world_once_in(&run->random, 4)) {
         const uint64_t hash = dem2d_world_hash(run->world);
-        run->fail_at = 1 + world_below(&run->random, 4);
+        run->fail_at = 1 + random_below(&run->random, 4);
         const dem2d_result result = dem2d_world_step(run->world, 1, NULL);
         run->fail_at = 0;
         if (result != DEM2D_OUT_OF_MEMORY) return result;
@@ -1469,7 +1444,7 @@ static int world_show(const world_script *s, const world_view *view, world_sight
     memset(&run, 0, sizeof run);
     run.script = s;
     run.view = *view;
-    run.random.state = s->seed;
+    run.random = s->seed;
     run.fault = fault;
     run.features = features;
     return world_perform(&run, sights);

@@ -3,16 +3,7 @@
 #ifndef SNAPSHOT_SCENES_H
 #define SNAPSHOT_SCENES_H
 
-#include <stdio.h>
-#include <stdlib.h>
-#include <string.h>
-
-/* Not every user of this file calls all of it. */
-#if defined(__GNUC__)
-#define SCENE_HELPER static __attribute__((unused))
-#else
-#define SCENE_HELPER static
-#endif
+#include "world_scene.h"
 
 enum {
     SCENE_CIRCLES,  /* no friction: nothing turns */
@@ -51,9 +42,7 @@ typedef struct snapshot_scene {
 } snapshot_scene;
 
 static void scene_check(dem2d_result result) {
-    if (result == DEM2D_OK) return;
-    fprintf(stderr, "scene: %s\n", dem2d_result_text(result));
-    exit(1);
+    expect_ok(result, "scene");
 }
 
 /* In [low, high): steps of 2^-30. Products here and in scene_stadium are exact, so that it does not
@@ -220,7 +209,7 @@ static dem2d_particle_id scene_add_grain(snapshot_scene *s, int shape, double x,
     return id;
 }
 
-SCENE_HELPER dem2d_world_desc scene_desc(int kind) {
+PART dem2d_world_desc scene_desc(int kind) {
     dem2d_world_desc desc;
     memset(&desc, 0, sizeof desc);
     desc.time_step = 1e-4;
@@ -240,7 +229,7 @@ SCENE_HELPER dem2d_world_desc scene_desc(int kind) {
 }
 
 /* A falling heap of `count` grains; env, skin and threads as in desc. */
-SCENE_HELPER void scene_make(snapshot_scene *s, int kind, int count, const dem2d_world_desc *desc) {
+PART void scene_make(snapshot_scene *s, int kind, int count, const dem2d_world_desc *desc) {
     dem2d_material_desc stone = {2700, 1e6, 1e6, 0.5, 0, 0}, rubber = {1000, 2e5, 1e5, 0.8, 0, 0};
     int columns = 3;
     memset(s, 0, sizeof *s);
@@ -269,51 +258,10 @@ SCENE_HELPER void scene_make(snapshot_scene *s, int kind, int count, const dem2d
     }
 }
 
-/* --- bytes -------------------------------------------------------------------------------------
- */
-
-typedef struct scene_bytes {
-    char *bytes;
-    size_t size, room;
-    size_t next;  /* for reading */
-    size_t limit; /* of writing or reading, from which on it fails; 0: none */
-} scene_bytes;
-
-static bool scene_write(void *user, const char *bytes, size_t count) {
-    scene_bytes *to = (scene_bytes *)user;
-    if (to->limit > 0 && to->size + count >= to->limit) return false;
-    if (to->size + count > to->room) {
-        to->room = 2 * (to->size + count);
-        to->bytes = (char *)realloc(to->bytes, to->room);
-        if (to->bytes == NULL) abort();
-    }
-    memcpy(to->bytes + to->size, bytes, count);
-    to->size += count;
-    return true;
-}
-
-static bool scene_read(void *user, char *bytes, size_t count) {
-    scene_bytes *from = (scene_bytes *)user;
-    if (count > from->size - from->next) return false;
-    if (from->limit > 0 && from->next + count >= from->limit) return false;
-    memcpy(bytes, from->bytes + from->next, count);
-    from->next += count;
-    return true;
-}
-
-SCENE_HELPER scene_bytes scene_save(const dem2d_world *world) {
-    scene_bytes bytes;
-    dem2d_save_desc desc;
-    memset(&bytes, 0, sizeof bytes);
-    memset(&desc, 0, sizeof desc);
-    desc.write = scene_write;
-    desc.user = &bytes;
-    scene_check(dem2d_world_save(world, &desc, NULL));
-    return bytes;
-}
+/* --- snapshots in memory ---------------------------------------------------------------------- */
 
 /* custom gets room for the answer of scene_custom. */
-SCENE_HELPER dem2d_load_desc scene_load_desc(scene_bytes *bytes, dem2d_custom_desc *custom) {
+PART dem2d_load_desc scene_load_desc(scene_bytes *bytes, dem2d_custom_desc *custom) {
     dem2d_load_desc desc;
     memset(&desc, 0, sizeof desc);
     bytes->next = 0;

@@ -71,7 +71,7 @@ static void test_oracle_lens(void **state) {
 /* Four straight arcs are a square: the same depths as of polygons, in all turns and places. */
 static void test_oracle_square(void **state) {
     (void)state;
-    dice d = {7};
+    uint64_t d = 7;
     for (int i = 0; i < 200; i++) {
         curve c = {0};
         model sharp = {.kind = POLYGON, .count = 4, .info = {.circumscribed = 2}};
@@ -82,7 +82,7 @@ static void test_oracle_square(void **state) {
             sharp.points[k] = spot_rounded(corner);
         }
         model square = bare(&c, 1);
-        pair p = bare_pair(&square, &square, dice_uniform(&d, -3, 3), dice_uniform(&d, -3, 3));
+        pair p = bare_pair(&square, &square, random_between(&d, -3, 3), random_between(&d, -3, 3));
         p.pose_b.rotation = draw_rotation(&d);
         pair q = p;
         q.a = q.b = &sharp;
@@ -96,10 +96,10 @@ static void test_oracle_brute_force(void **state) {
     (void)state;
     const int directions = 100000, pairs = test_long() ? 120 : 12;
     static grain a, b;
-    dice d = {11};
+    uint64_t d = 11;
     for (int i = 0; i < pairs; i++) {
-        grain_draw(&a, i % CURVES, dice_next(&d));
-        grain_draw(&b, dice_below(&d, CURVES), dice_next(&d));
+        grain_draw(&a, i % CURVES, random_bits(&d));
+        grain_draw(&b, random_below(&d, CURVES), random_bits(&d));
         if (a.m.shape != NULL && b.m.shape != NULL) {
             const pair p = pair_draw(&a.m, a.size, &b.m, b.size, &d);
             const truth t = find_truth(&p);

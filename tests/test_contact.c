@@ -285,18 +285,18 @@ static dem2d_contact check_pair(const pair *p, const dem2d_contact_desc *desc, r
 }
 
 /* Numbers are drawn one by one: C leaves the order of arguments to the compiler. */
-static dem2d_vec random_vec(test_random *random, double reach) {
-    const double x = test_uniform(random, -reach, reach);
-    return vec(x, test_uniform(random, -reach, reach));
+static dem2d_vec random_vec(uint64_t *random, double reach) {
+    const double x = random_between(random, -reach, reach);
+    return vec(x, random_between(random, -reach, reach));
 }
 
-static dem2d_pose random_pose(test_random *random, double reach) {
+static dem2d_pose random_pose(uint64_t *random, double reach) {
     const dem2d_vec at = random_vec(random, reach);
-    const double angle = test_uniform(random, -4, 4);
-    return dem2d_pose_make(at.x, at.y, angle, test_uniform(random, 0.5, 2));
+    const double angle = random_between(random, -4, 4);
+    return dem2d_pose_make(at.x, at.y, angle, random_between(random, 0.5, 2));
 }
 
-static pair random_pair(test_random *random, int a, int b) {
+static pair random_pair(uint64_t *random, int a, int b) {
     const dem2d_pose pose_a = random_pose(random, 1);
     return (pair){a, b, pose_a, random_pose(random, 1)};
 }
@@ -331,12 +331,12 @@ static void test_chosen_depths(void **state) {
     (void)state;
     static const double gaps[] = {-3, -0.3, -1e-3, -1e-6, -1e-9};  /* of the size */
     static const double overlaps[] = {1e-9, 1e-6, 1e-3, 0.3, 0.9}; /* of the certified depth */
-    test_random random = {1};
+    uint64_t random = 1;
     for (int i = 0; i < KINDS * KINDS * 8; i++) {
         const int a = i % KINDS, b = i / KINDS % KINDS;
         for (int k = 0; k < 2 * COUNT_OF(gaps); k++) {
             pair p = random_pair(&random, a, b);
-            const dem2d_vec u = direction(test_uniform(&random, -3.2, 3.2));
+            const dem2d_vec u = direction(random_between(&random, -3.2, 3.2));
             const double r = certified(&p), size = p.pose_a.scale + p.pose_b.scale;
             const double delta =
                 k < COUNT_OF(gaps) ? gaps[k] * size : overlaps[k - COUNT_OF(gaps)] * r;
@@ -353,10 +353,10 @@ static void test_touch(void **state) {
     (void)state;
     static const double sweep[] = {-1e-12,      -1e-13, -1e-14, -1e-15, -DBL_EPSILON, 0,
                                    DBL_EPSILON, 1e-15,  1e-14,  1e-13,  1e-12};
-    test_random random = {2};
+    uint64_t random = 2;
     for (int i = 0; i < KINDS * KINDS * 4; i++) {
         pair p = random_pair(&random, i % KINDS, i / KINDS % KINDS);
-        const dem2d_vec u = direction(test_uniform(&random, -3.2, 3.2));
+        const dem2d_vec u = direction(random_between(&random, -3.2, 3.2));
         for (int k = 0; k < COUNT_OF(sweep); k++) {
             const double delta = sweep[k] * (p.pose_a.scale + p.pose_b.scale);
             /* two sharp polygons: a positive depth may be larger than the certified least */
@@ -369,7 +369,7 @@ static void test_touch(void **state) {
 
 static void test_scanned_depths(void **state) {
     (void)state;
-    test_random random = {3};
+    uint64_t random = 3;
     for (int i = 0; i < KINDS * KINDS * 3; i++) {
         pair p = random_pair(&random, i % KINDS, i / KINDS % KINDS);
         check_pair(&p, NULL, scan(&p));
@@ -380,7 +380,7 @@ static void test_scanned_depths(void **state) {
 
 static void test_two_circles(void **state) {
     (void)state;
-    test_random random = {4};
+    uint64_t random = 4;
     for (int i = 0; i < 500; i++) {
         pair p = random_pair(&random, CIRCLE, CIRCLE);
         if (i % 5 == 0) p.pose_b.position = p.pose_a.position;
@@ -415,7 +415,7 @@ static real point_distance(const real (*points)[2], int count, real x, real y) {
 
 static void test_circle_and_polygon(void **state) {
     (void)state;
-    test_random random = {5};
+    uint64_t random = 5;
     for (int i = 0; i < 500; i++) {
         pair p = random_pair(&random, CIRCLE, POLYGON);
         real points[5][2];
@@ -486,14 +486,14 @@ static void test_homothetic_ellipses(void **state) {
 static void test_constant_width(void **state) {
     (void)state;
     const double a[6] = {2, 0, 0, 0.06, 0, 0.01}, b[6] = {0, 0, 0, 0.03, 0, -0.01};
-    test_random random = {6};
+    uint64_t random = 6;
     dem2d_shape *shape;
     assert_ok(dem2d_shape_create_fourier(NULL, a, b, 5, &shape));
     for (int i = 0; i < 200; i++) {
         dem2d_pose pose_a = random_pose(&random, 0), pose_b;
         dem2d_contact c;
         pose_a.scale = 1, pose_b = pose_a;
-        const double distance = i ? test_uniform(&random, 0, 3) : 0;
+        const double distance = i ? random_between(&random, 0, 3) : 0;
         const dem2d_vec u = direction(i);
         pose_b.position = vec(distance * u.x, distance * u.y);
         assert_ok(dem2d_pair_contact(shape, pose_a, shape, pose_b, NULL, &c));
@@ -597,7 +597,7 @@ static void test_concentric(void **state) {
 static void test_unequal_sizes(void **state) {
     (void)state;
     static const double ratios[] = {1e-3, 1e-6, 1e3, 1e6};
-    test_random random = {7};
+    uint64_t random = 7;
     for (int i = 0; i < KINDS * KINDS * COUNT_OF(ratios); i++) {
         pair p = random_pair(&random, i % KINDS, i / KINDS % KINDS);
         p.pose_b.scale = ratios[i / (KINDS * KINDS)];
@@ -605,7 +605,7 @@ static void test_unequal_sizes(void **state) {
         p.pose_a.position = vec(0, 0);
         p.pose_b.position = random_vec(&random, reach);
         if (i % 4 == 0) check_pair(&p, NULL, scan(&p)); /* the scan is slow */
-        const dem2d_vec u = direction(test_uniform(&random, -3.2, 3.2));
+        const dem2d_vec u = direction(random_between(&random, -3.2, 3.2));
         place(&p, u, -0.01 * p.pose_a.scale);
         check_pair(&p, NULL, -0.01 * p.pose_a.scale);
         if (certified(&p) <= 0) continue;
@@ -638,7 +638,7 @@ static void test_nearly_parallel(void **state) {
 /* A pair far from the origin, moved by what a double can hold: not one bit changes. */
 static void test_far_from_origin(void **state) {
     (void)state;
-    test_random random = {8};
+    uint64_t random = 8;
     for (int i = 0; i < KINDS * KINDS * 4; i++) {
         pair p = random_pair(&random, i % KINDS, i / KINDS % KINDS);
         dem2d_vec *ends[2] = {&p.pose_a.position, &p.pose_b.position};
@@ -741,12 +741,12 @@ static real lattice_depth(const lattice *hull, int count) {
     return -point_distance((const real(*)[2])points, count, 0, 0);
 }
 
-static int random_lattice(test_random *random, lattice *hull) {
+static int random_lattice(uint64_t *random, lattice *hull) {
     lattice points[7];
-    const int count = 3 + test_below(random, 5);
-    const int span = 2 + test_below(random, 5);
+    const int count = 3 + random_below(random, 5);
+    const int span = 2 + random_below(random, 5);
     for (int i = 0; i < count; i++)
-        points[i].x = test_below(random, span), points[i].y = test_below(random, span);
+        points[i].x = random_below(random, span), points[i].y = random_below(random, span);
     return lattice_hull(points, count, hull);
 }
 
@@ -764,14 +764,14 @@ static dem2d_shape *lattice_shape(const lattice *hull, int count, dem2d_pose *po
 
 static void test_lattice(void **state) {
     (void)state;
-    test_random random = {9};
+    uint64_t random = 9;
     int touching = 0;
     for (int round = 0; round < 20000; round++) {
         lattice a[14], b[14], differences[49], hull[98];
         const int na = random_lattice(&random, a), nb = random_lattice(&random, b);
         if (!na || !nb) continue;
         lattice shift;
-        shift.x = test_below(&random, 9) - 4, shift.y = test_below(&random, 9) - 4;
+        shift.x = random_below(&random, 9) - 4, shift.y = random_below(&random, 9) - 4;
         for (int i = 0; i < na * nb; i++) {
             differences[i].x = a[i / nb].x - b[i % nb].x - shift.x;
             differences[i].y = a[i / nb].y - b[i % nb].y - shift.y;
@@ -801,7 +801,7 @@ static void test_lattice(void **state) {
 
 static void test_swapped(void **state) {
     (void)state;
-    test_random random = {10};
+    uint64_t random = 10;
     for (int i = 0; i < KINDS * KINDS * 20; i++) {
         const pair p = random_pair(&random, i % KINDS, i / KINDS % KINDS);
         const pair q = {p.b, p.a, p.pose_b, p.pose_a};
@@ -815,7 +815,7 @@ static void test_swapped(void **state) {
 static void test_scaled_and_turned(void **state) {
     (void)state;
     static const int powers[] = {-200, -40, 1, 40, 200};
-    test_random random = {11};
+    uint64_t random = 11;
     for (int i = 0; i < KINDS * KINDS * 10; i++) {
         const pair p = random_pair(&random, i % KINDS, i / KINDS % KINDS);
         const dem2d_contact c = ask(&p, NULL);
@@ -845,7 +845,7 @@ static void test_scaled_and_turned(void **state) {
  */
 static void test_moved(void **state) {
     (void)state;
-    test_random random = {12};
+    uint64_t random = 12;
     for (int i = 0; i < KINDS * KINDS * 10; i++) {
         const pair p = random_pair(&random, i % KINDS, i / KINDS % KINDS);
         const dem2d_contact c = ask(&p, NULL);
@@ -854,7 +854,7 @@ static void test_moved(void **state) {
         q.pose_b.position.x += c.depth * c.normal.x, q.pose_b.position.y += c.depth * c.normal.y;
         const dem2d_contact touch = ask(&q, NULL);
         assert_within(touch.depth, 0, touch.error + c.error + slack);
-        const double step = pow(10, test_uniform(&random, -8, 0));
+        const double step = pow(10, random_between(&random, -8, 0));
         const dem2d_vec u = direction(i);
         q = p, q.pose_b.position.x += step * u.x, q.pose_b.position.y += step * u.y;
         const dem2d_contact moved = ask(&q, NULL);
@@ -874,7 +874,7 @@ static void test_representations(void **state) {
     assert_ok(dem2d_shape_create_ellipse(NULL, radius, radius, &discs[1]));
     assert_ok(dem2d_shape_create_fourier(NULL, a, b, 0, &discs[2]));
     assert_ok(dem2d_shape_create_custom(NULL, &custom, &discs[3]));
-    test_random random = {13};
+    uint64_t random = 13;
     for (int i = 0; i < KINDS * 20; i++) {
         const pair p = random_pair(&random, CIRCLE, i % KINDS);
         dem2d_contact first = {0}, c;
@@ -894,7 +894,7 @@ static void test_start(void **state) {
     static const dem2d_vec starts[] = {
         {1, 0},       {0, -1},      {1e150, -1e150}, {-3e-300, 1e-300},
         {0, -5e-324}, {1e300, 1e8}, {-1, -1e-16}};
-    test_random random = {14};
+    uint64_t random = 14;
     for (int i = 0; i < KINDS * KINDS * 5; i++) {
         const pair p = random_pair(&random, i % KINDS, i / KINDS % KINDS);
         const dem2d_contact cold = ask(&p, NULL);
@@ -915,7 +915,7 @@ static void test_start(void **state) {
 /* Stopped after one round: the bounds still hold, and an answer given is right. */
 static void test_iteration_cap(void **state) {
     (void)state;
-    test_random random = {15};
+    uint64_t random = 15;
     dem2d_contact_desc desc = {0};
     int unresolved = 0;
     desc.max_iterations = 1;
@@ -923,7 +923,7 @@ static void test_iteration_cap(void **state) {
     for (int i = 0; i < KINDS * KINDS * 10; i++) {
         pair p = random_pair(&random, i % KINDS, i / KINDS % KINDS);
         const double delta = certified(&p) > 0 ? 0.5 * certified(&p) : -0.1;
-        place(&p, direction(test_uniform(&random, -3.2, 3.2)), delta);
+        place(&p, direction(random_between(&random, -3.2, 3.2)), delta);
         const dem2d_contact c = ask(&p, &desc);
         check_bounds(&p, &c, delta);
         assert_true(isfinite(c.depth) && isfinite(c.error));
@@ -939,12 +939,12 @@ static void test_iteration_cap(void **state) {
 
 static void test_walls(void **state) {
     (void)state;
-    test_random random = {16};
+    uint64_t random = 16;
     for (int i = 0; i < KINDS * 200; i++) {
         const int kind = i % KINDS;
         const dem2d_pose pose = random_pose(&random, 2);
-        const dem2d_vec u = direction(test_uniform(&random, -3.2, 3.2));
-        const double length = pow(10, test_uniform(&random, -3, 3));
+        const dem2d_vec u = direction(random_between(&random, -3.2, 3.2));
+        const double length = pow(10, random_between(&random, -3, 3));
         const dem2d_vec on = random_vec(&random, 2);
         dem2d_contact c;
         assert_ok(
@@ -986,16 +986,16 @@ static void test_wall_along_face(void **state) {
 /* --- many pairs ------------------------------------------------------------------------------ */
 
 /* Aligned, concentric, equal, far apart, tiny: by chance, often together. */
-static pair degenerate_pair(test_random *random) {
+static pair degenerate_pair(uint64_t *random) {
     static const double scales[] = {1, 1, 0.5, 1e-6, 1e6};
-    const int a = test_below(random, KINDS);
-    pair p = random_pair(random, a, test_below(random, KINDS));
-    if (test_below(random, 3) == 0) p.pose_b.rotation = p.pose_a.rotation;
-    if (test_below(random, 3) == 0) p.pose_b.scale = scales[test_below(random, 5)];
-    if (test_below(random, 4) == 0) p.pose_a.rotation = (dem2d_rot){1, 0};
-    if (test_below(random, 4) == 0) p.pose_b.position.x = p.pose_a.position.x;
-    if (test_below(random, 4) == 0) p.pose_b.position.y = p.pose_a.position.y;
-    if (test_below(random, 10) == 0) p.pose_b = p.pose_a;
+    const int a = random_below(random, KINDS);
+    pair p = random_pair(random, a, random_below(random, KINDS));
+    if (random_below(random, 3) == 0) p.pose_b.rotation = p.pose_a.rotation;
+    if (random_below(random, 3) == 0) p.pose_b.scale = scales[random_below(random, 5)];
+    if (random_below(random, 4) == 0) p.pose_a.rotation = (dem2d_rot){1, 0};
+    if (random_below(random, 4) == 0) p.pose_b.position.x = p.pose_a.position.x;
+    if (random_below(random, 4) == 0) p.pose_b.position.y = p.pose_a.position.y;
+    if (random_below(random, 10) == 0) p.pose_b = p.pose_a;
     return p;
 }
 
@@ -1010,7 +1010,7 @@ static double support_value(const pair *p, dem2d_vec u) {
 
 static void test_many_pairs(void **state) {
     (void)state;
-    test_random random = {17};
+    uint64_t random = 17;
     for (int i = 0; i < 100000; i++) {
         const pair p = degenerate_pair(&random);
         const dem2d_contact c = ask(&p, NULL);
@@ -1024,7 +1024,7 @@ static void test_many_pairs(void **state) {
                           (c.point_a.y - c.point_b.y) * c.normal.y,
                       c.depth, slack + c.error);
         for (int k = 0; k < 3; k++) {
-            const dem2d_vec u = direction(test_uniform(&random, -3.2, 3.2));
+            const dem2d_vec u = direction(random_between(&random, -3.2, 3.2));
             assert_between(support_value(&p, u), c.depth - slack, HUGE_VALL);
         }
     }

@@ -653,16 +653,16 @@ static void check_image(const dem2d_vec *points, int count, double rounding, dou
 /* From a touch to many sizes behind the surface. */
 static void test_points_of_images(void **state) {
     (void)state;
-    test_random random = {11};
+    uint64_t random = 11;
     for (int i = 0; i < 4000; i++) {
-        const int count = 3 + test_below(&random, 5);
-        const double rounding = i % 3 == 0 ? test_uniform(&random, 0, 0.3) : 0;
-        const double depth = pow(10, test_uniform(&random, -4, 1.2));
-        const double flat = test_uniform(&random, 0.2, 1), tilt = test_uniform(&random, 0, 6);
+        const int count = 3 + random_below(&random, 5);
+        const double rounding = i % 3 == 0 ? random_between(&random, 0, 0.3) : 0;
+        const double depth = pow(10, random_between(&random, -4, 1.2));
+        const double flat = random_between(&random, 0.2, 1), tilt = random_between(&random, 0, 6);
         dem2d_vec points[8];
         for (int k = 0; k < count; k++) {
             const dem2d_vec u =
-                direction(2 * (double)TEST_PI * (k + test_uniform(&random, -0.2, 0.2)) / count);
+                direction(2 * (double)TEST_PI * (k + random_between(&random, -0.2, 0.2)) / count);
             points[k] = vec(u.x, flat * u.y);
         }
         check_image(points, count, rounding, depth, tilt, mirror);
@@ -736,18 +736,18 @@ static void test_points_conserve(void **state) {
     (void)state;
     static const int kinds[] = {BOX, SMALL, HEXAGON, GON64, ROUNDED, ROUNDED_SMALL, TRIANGLE, QUAD};
     enum { PAIRS = 8000 };
-    test_random random = {71};
+    uint64_t random = 71;
     int looked = 0, twos = 0, off = 0;
     while (looked < PAIRS) {
-        const int kind_a = kinds[test_below(&random, COUNT_OF(kinds))];
-        const int kind_b = kinds[test_below(&random, COUNT_OF(kinds))];
+        const int kind_a = kinds[random_below(&random, COUNT_OF(kinds))];
+        const int kind_b = kinds[random_below(&random, COUNT_OF(kinds))];
         const dem2d_shape *a = shapes[kind_a], *b = shapes[kind_b];
-        const double depth = pow(10, test_uniform(&random, -4, -1.3));
+        const double depth = pow(10, random_between(&random, -4, -1.3));
         const double face = fmin(shortest(kind_a), shortest(kind_b)), step = 1e-5 * depth;
         double q[WAYS], energy, force[WAYS], unused[WAYS], worst = 0, ways[2];
         q[TURN_A] = kind_a == TRIANGLE ? (double)TEST_PI : 0;
-        q[TURN_B] = test_uniform(&random, -1, 1) * fmin(2 * depth / face, 0.3);
-        q[X] = test_uniform(&random, -1, 1);
+        q[TURN_B] = random_between(&random, -1, 1) * fmin(2 * depth / face, 0.3);
+        q[X] = random_between(&random, -1, 1);
         const dem2d_vec up = vec(0, 1), down = vec(0, -1);
         q[Y] = reach(a, dem2d_pose_make(0, 0, q[TURN_A], 1), up) - depth +
                reach(b, dem2d_pose_make(0, 0, q[TURN_B], 1), down);
@@ -971,15 +971,15 @@ enum { STACK = 10 };
 /* Ten boxes, put on one another with a little disorder, settled with damping. */
 static scene make_stack(dem2d_solver solver, dem2d_particle_id *ids) {
     dem2d_world_desc desc = basic_desc(5e-4);
-    test_random random = {5};
+    uint64_t random = 5;
     desc.solver = solver, desc.local_damping = 0.5;
     const scene s = floor_scene(&desc, KN, 0.5);
     const double weight = DENSITY * G;
     double y = 0.5;
     for (int i = 0; i < STACK; i++) {
         y -= weight * (STACK - i) / (2 * KN);
-        ids[i] = add(&s, shapes[BOX], DEM2D_FREE, test_uniform(&random, -1e-5, 1e-5), y,
-                     test_uniform(&random, -1e-5, 1e-5));
+        ids[i] = add(&s, shapes[BOX], DEM2D_FREE, random_between(&random, -1e-5, 1e-5), y,
+                     random_between(&random, -1e-5, 1e-5));
         y += 1;
     }
     step(&s, 40000);
@@ -1166,13 +1166,13 @@ static probe force_pass(dem2d_face_rule rule, const dem2d_shape *a, const dem2d_
 }
 
 /* B beside A in some direction at some angle, pushed in along the normal by a depth. */
-static void place_pair(test_random *random, int i, int j, double depth, dem2d_pose *pa,
+static void place_pair(uint64_t *random, int i, int j, double depth, dem2d_pose *pa,
                        dem2d_pose *pb) {
     dem2d_contact c;
     const double away = 2 * (facts(shapes[i]).circumscribed + facts(shapes[j]).circumscribed);
-    const dem2d_vec at = direction(test_uniform(random, -3, 3));
-    *pa = dem2d_pose_make(0.1, -0.2, test_uniform(random, -3, 3), 1);
-    *pb = dem2d_pose_make(away * at.x, away * at.y, test_uniform(random, -3, 3), 1);
+    const dem2d_vec at = direction(random_between(random, -3, 3));
+    *pa = dem2d_pose_make(0.1, -0.2, random_between(random, -3, 3), 1);
+    *pb = dem2d_pose_make(away * at.x, away * at.y, random_between(random, -3, 3), 1);
     assert_ok(dem2d_pair_distance(shapes[i], *pa, shapes[j], *pb, NULL, &c));
     pb->position.x += (c.depth - depth) * c.normal.x;
     pb->position.y += (c.depth - depth) * c.normal.y;
@@ -1324,24 +1324,24 @@ static void test_shear_of_a_roller(void **state) {
 /* Two driven shapes turn and slide on each other; the world knows them in this order or the other. */
 static scene driven_pair(uint64_t seed, const int kinds[2], bool swapped) {
     dem2d_world_desc desc = basic_desc(1e-3);
-    test_random random = {seed};
+    uint64_t random = seed;
     dem2d_particle_id id[2];
     dem2d_vec at[2];
     double angle[2], spin[2];
     desc.skip_time_step_check = true;
     const scene s = make_scene(&desc, KN, 0.5);
     for (int k = 0; k < 2; k++) {
-        angle[k] = test_uniform(&random, -3, 3), spin[k] = test_uniform(&random, -2, 2);
+        angle[k] = random_between(&random, -3, 3), spin[k] = random_between(&random, -2, 2);
         at[k] = vec(0, 0);
     }
     const dem2d_pose pose[2] = {dem2d_pose_make(0, 0, angle[0], 1),
                                 dem2d_pose_make(0, 0, angle[1], 1)};
-    const dem2d_vec up = direction(test_uniform(&random, 0, 6)), down = vec(-up.x, -up.y);
+    const dem2d_vec up = direction(random_between(&random, 0, 6)), down = vec(-up.x, -up.y);
     const double far = reach(shapes[kinds[0]], pose[0], up) +
-                       reach(shapes[kinds[1]], pose[1], down) - test_uniform(&random, 0.01, 0.1);
-    const double aside = test_uniform(&random, -0.2, 0.2);
+                       reach(shapes[kinds[1]], pose[1], down) - random_between(&random, 0.01, 0.1);
+    const double aside = random_between(&random, -0.2, 0.2);
     at[1] = vec(far * up.x - aside * up.y, far * up.y + aside * up.x);
-    const dem2d_vec v = vec(test_uniform(&random, -1, 1), test_uniform(&random, -1, 1));
+    const dem2d_vec v = vec(random_between(&random, -1, 1), random_between(&random, -1, 1));
     for (int k = 0; k < 2; k++) {
         const int i = swapped ? 1 - k : k;
         id[i] = add(&s, shapes[kinds[i]], DEM2D_DRIVEN, at[i].x, at[i].y, angle[i]);
@@ -1391,11 +1391,11 @@ static void test_shear_by_order(void **state) {
 /* Deep behind a wall the second point may carry nothing: it is there in a mirror image as well. */
 static void test_deep_images(void **state) {
     (void)state;
-    test_random random = {5};
+    uint64_t random = 5;
     int twos = 0;
     for (int i = 0; i < 400; i++) {
-        const dem2d_vec left[3] = {{-1, 0}, {1, test_uniform(&random, -0.5, 0.5)}, {0.3, 1.5}};
-        const double angle = test_uniform(&random, -3, 3), y = test_uniform(&random, -4, 0);
+        const dem2d_vec left[3] = {{-1, 0}, {1, random_between(&random, -0.5, 0.5)}, {0.3, 1.5}};
+        const double angle = random_between(&random, -3, 3), y = random_between(&random, -4, 0);
         dem2d_contact_info c[2];
         dem2d_particle_info info[2];
         for (int k = 0; k < 2; k++) {
@@ -1456,20 +1456,20 @@ static void check_report(const dem2d_contact_info *c, const dem2d_contact *expec
 /* The world's answer to one pass is that of the stateless layer. */
 static void test_reports(void **state) {
     (void)state;
-    test_random random = {21};
+    uint64_t random = 21;
     dem2d_contact_desc exact = {0};
     int twos = 0;
     exact.tolerance = 1e-12;
     for (int i = 0; i < 300; i++) {
-        const int a = test_below(&random, SHAPES), b = test_below(&random, SHAPES);
-        const double depth = test_uniform(&random, 1e-3, 0.02);
+        const int a = random_below(&random, SHAPES), b = random_below(&random, SHAPES);
+        const double depth = random_between(&random, 1e-3, 0.02);
         dem2d_contact c;
         dem2d_pose pa, pb;
         place_pair(&random, a, b, depth, &pa, &pb);
         if (i % 2 && a <= STADIUM && b <= STADIUM) { /* face to face */
-            const double tilt = test_uniform(&random, -5e-3, 5e-3);
+            const double tilt = random_between(&random, -5e-3, 5e-3);
             const double top = reach(shapes[a], still(), vec(0, 1));
-            pa = still(), pb = dem2d_pose_make(test_uniform(&random, -0.3, 0.3), 0, tilt, 1);
+            pa = still(), pb = dem2d_pose_make(random_between(&random, -0.3, 0.3), 0, tilt, 1);
             pb.position.y = top + reach(shapes[b], pb, vec(0, -1)) - depth;
         }
         probe p = force_pass(DEM2D_TWO_POINTS, shapes[a], &pa, shapes[b], &pb);
@@ -1479,7 +1479,7 @@ static void test_reports(void **state) {
         twos += p.count && p.c.points == 2;
         assert_within(length(p.force[1]), p.c.normal_force, 1e-9 * KN);
 
-        pa = dem2d_pose_make(0.2, 0, i % 2 ? depth * 0.3 : test_uniform(&random, -3, 3), 1);
+        pa = dem2d_pose_make(0.2, 0, i % 2 ? depth * 0.3 : random_between(&random, -3, 3), 1);
         pa.position.y = reach(shapes[a], pa, vec(0, -1)) - depth;
         p = force_pass(DEM2D_TWO_POINTS, shapes[a], &pa, NULL, NULL);
         assert_ok(dem2d_wall_contact(shapes[a], pa, vec(0, 0), vec(0, 1), &c));
@@ -1493,12 +1493,12 @@ static void test_reports(void **state) {
 /* The papers' rule: one point, the middle of the witness points, with all the stiffness. */
 static void test_one_point_reports(void **state) {
     (void)state;
-    test_random random = {22};
+    uint64_t random = 22;
     for (int i = 0; i < 100; i++) {
-        const int a = test_below(&random, SHAPES), b = test_below(&random, SHAPES);
+        const int a = random_below(&random, SHAPES), b = random_below(&random, SHAPES);
         dem2d_pose pa, pb;
         dem2d_contact c;
-        place_pair(&random, a, b, test_uniform(&random, 1e-3, 0.02), &pa, &pb);
+        place_pair(&random, a, b, random_between(&random, 1e-3, 0.02), &pa, &pb);
         const probe p = force_pass(DEM2D_ONE_POINT, shapes[a], &pa, shapes[b], &pb);
         assert_ok(dem2d_pair_contact(shapes[a], pa, shapes[b], pb, NULL, &c));
         assert_int_equal(p.count, 1);
@@ -1520,7 +1520,7 @@ typedef struct gas {
 /* Grains of all types fly about in a box of 2.4 m. */
 static gas make_gas(dem2d_solver solver, dem2d_face_rule faces) {
     dem2d_world_desc desc = basic_desc(2e-4);
-    test_random random = {31};
+    uint64_t random = 31;
     gas g;
     desc.solver = solver, desc.faces = faces, desc.gravity.y = 0;
     g.s = make_scene(&desc, 0, 0);
@@ -1534,10 +1534,10 @@ static gas make_gas(dem2d_solver solver, dem2d_face_rule faces) {
         assert_ok(dem2d_world_add_shape(g.s.world, g.shape[i], &grain.shape));
         grain.scale = 0.25, grain.material = g.s.material;
         grain.position = vec(0.2 + 0.4 * (i % 6), 0.2 + 0.4 * (i / 6));
-        grain.angle = test_uniform(&random, -3, 3);
-        grain.velocity = direction(test_uniform(&random, -3, 3));
+        grain.angle = random_between(&random, -3, 3);
+        grain.velocity = direction(random_between(&random, -3, 3));
         grain.velocity.x *= 2, grain.velocity.y *= 2;
-        grain.angular_velocity = test_uniform(&random, -10, 10);
+        grain.angular_velocity = random_between(&random, -10, 10);
         assert_ok(dem2d_world_add_particle(g.s.world, &grain, &g.ids[i]));
     }
     return g;
@@ -1612,20 +1612,20 @@ static void test_no_contact_is_late(void **state) {
                 {DEM2D_CERTIFIED, DEM2D_ONE_POINT, 500}};
     for (int row = 0; row < COUNT_OF(rows); row++) {
         const gas g = make_gas(rows[row].solver, rows[row].faces);
-        test_random random = {41};
+        uint64_t random = 41;
         int met = 0;
         for (int i = 0; i < rows[row].steps; i++) {
-            const dem2d_particle_id id = g.ids[test_below(&random, GRAINS)];
-            const dem2d_vec way = direction(test_uniform(&random, -3, 3));
+            const dem2d_particle_id id = g.ids[random_below(&random, GRAINS)];
+            const dem2d_vec way = direction(random_between(&random, -3, 3));
             const dem2d_vec at = particle(&g.s, id).pose.position;
             if (i % 10 == 0)
                 assert_ok(dem2d_world_drive_particle(g.s.world, id, DEM2D_FREE,
                                                      vec(2 * way.x, 2 * way.y),
-                                                     test_uniform(&random, -20, 20)));
+                                                     random_between(&random, -20, 20)));
             if (i % 10 == 5)
                 assert_ok(dem2d_world_move_particle(
                     g.s.world, id, vec(at.x + 1e-3 * way.x, at.y + 1e-3 * way.y),
-                    angle_of(&g.s, id) + test_uniform(&random, -0.02, 0.02)));
+                    angle_of(&g.s, id) + random_between(&random, -0.02, 0.02)));
             met += step_and_compare(&g);
         }
         assert_true(met > rows[row].steps / 2); /* it is lively */

@@ -55,7 +55,7 @@ static int make_outlines(void **state) {
     static const dem2d_vec five[] = {{-1, -1}, {1.5, -1.2}, {1.9, 0.4}, {0.3, 1.6}, {-1.3, 0.8}};
     static const dem2d_vec three[] = {{-1, -1}, {2, -0.7}, {0.2, 1.4}};
     dem2d_vec star[10];
-    test_random random = {71};
+    uint64_t random = 71;
     (void)state;
     corners(BOX, "box", box, 4);
     corners(PENTAGON, "pentagon", five, 5);
@@ -77,7 +77,7 @@ static int make_outlines(void **state) {
     for (int i = 0; i < 240; i++) { /* dents, lobes and noise, as traced from a picture */
         const double t = 0.0261799387799149437 * i;
         const double r =
-            1 + 0.12 * cos(3 * t + 1) + 0.04 * cos(7 * t) + test_uniform(&random, -0.01, 0.01);
+            1 + 0.12 * cos(3 * t + 1) + 0.04 * cos(7 * t) + random_between(&random, -0.01, 0.01);
         rough->p[i] = vec(1.5 * r * cos(t), r * sin(t));
     }
     for (int i = 0; i < 160; i++) /* whole pixels, some of them twice as long as others */
@@ -673,7 +673,7 @@ static oval moment_oval(const outline *o) {
 static void no_ellipse_is_better(void **state) {
     (void)state;
     const dem2d_fit_desc desc = {.model = DEM2D_ELLIPSE};
-    test_random random = {73};
+    uint64_t random = 73;
     for (int i = 0; i < OUTLINES; i++) {
         const outline *o = &given[i];
         dem2d_fit_report r;
@@ -691,11 +691,11 @@ static void no_ellipse_is_better(void **state) {
         for (int run = 0; run < 60; run++) {
             const double reach = size * pow(10, -1 - run % 3);
             oval e = found;
-            e.x += test_uniform(&random, -reach, reach),
-                e.y += test_uniform(&random, -reach, reach);
-            e.a += test_uniform(&random, -reach, reach),
-                e.b += test_uniform(&random, -reach, reach);
-            e.angle += test_uniform(&random, -reach, reach) / size;
+            e.x += random_between(&random, -reach, reach),
+                e.y += random_between(&random, -reach, reach);
+            e.a += random_between(&random, -reach, reach),
+                e.b += random_between(&random, -reach, reach);
+            e.angle += random_between(&random, -reach, reach) / size;
             assert_true(oval_covers(o, e) <= covered + 2e-4); /* twice the oracle's error */
         }
         dem2d_shape_destroy(shape);
@@ -726,7 +726,7 @@ static int extreme_points(const outline *o, int n, dem2d_vec *p) {
 static void no_polygon_is_better(void **state) {
     (void)state;
     static const int counts[] = {3, 4, 6, 9};
-    test_random random = {79};
+    uint64_t random = 79;
     for (int run = 0; run < OUTLINES * COUNT_OF(counts); run++) {
         const outline *o = &given[run % OUTLINES];
         const dem2d_fit_desc desc = {.model = DEM2D_POLYGON, .count = counts[run / OUTLINES]};
@@ -745,8 +745,8 @@ static void no_polygon_is_better(void **state) {
             for (int i = 0; i < n; i++) {
                 const bool moves = k % 2 == 0 || i == k / 2 % n; /* all of them, or one */
                 const double far = moves ? reach : 0;
-                other[i] = vec(p[i].x + test_uniform(&random, -far, far),
-                               p[i].y + test_uniform(&random, -far, far));
+                other[i] = vec(p[i].x + random_between(&random, -far, far),
+                               p[i].y + random_between(&random, -far, far));
             }
             if (is_convex(other, n))
                 assert_true(coverage(o->p, o->count, other, n) <= covered + 5e-4);

@@ -98,13 +98,13 @@ static void check_hull(const dem2d_vec *points, int n, long double rounding) {
 
 static void hulls(void **state) {
     (void)state;
-    test_random random = {41};
+    uint64_t random = 41;
     for (int run = 0; run < 400; run++) {
         dem2d_vec p[500];
-        const int n = 3 + test_below(&random, run % 2 ? 60 : 9), size = 2 + run % 7;
+        const int n = 3 + random_below(&random, run % 2 ? 60 : 9), size = 2 + run % 7;
         bool flat = true;
         for (int i = 0; i < n; i++) {
-            p[i] = vec(test_below(&random, size) - 3, test_below(&random, size));
+            p[i] = vec(random_below(&random, size) - 3, random_below(&random, size));
             for (int k = 0; k < i; k++) flat = flat && cross3(p[0], p[k], p[i]) == 0;
         }
         dem2d_vec hull[500];
@@ -117,8 +117,8 @@ static void hulls(void **state) {
     for (int run = 0; run < 30; run++) {
         dem2d_vec p[500];
         for (int i = 0; i < 500; i++) {
-            p[i] = direction(test_uniform(&random, 0, 6.3));
-            if (run % 2) p[i].x *= test_uniform(&random, 0, 1e-3);
+            p[i] = direction(random_between(&random, 0, 6.3));
+            if (run % 2) p[i].x *= random_between(&random, 0, 1e-3);
         }
         check_hull(p, 500, 1e-15L);
     }
@@ -213,17 +213,17 @@ static void scan_rho(const double *a, const double *b, int order, long double *l
 }
 
 /* A series with a0/2 = 1 and |rho - 1| about `swing`. */
-static void random_series(test_random *random, int order, double swing, double *a, double *b) {
+static void random_series(uint64_t *random, int order, double swing, double *a, double *b) {
     for (int n = 0; n <= order; n++) {
         const double size = n > 1 ? swing / (n * n - 1) / sqrt(order) : 0.3;
-        a[n] = size * test_uniform(random, -1, 1), b[n] = size * test_uniform(random, -1, 1);
+        a[n] = size * random_between(random, -1, 1), b[n] = size * random_between(random, -1, 1);
     }
     a[0] = 2, b[0] = 0;
 }
 
 static void convexity_brackets_the_scan(void **state) {
     (void)state;
-    test_random random = {43};
+    uint64_t random = 43;
     int convex = 0, loose = 0;
     for (int run = 0; run < 60; run++) {
         static const int orders[] = {0, 1, 2, 3, 5, 8, 13, 20, 32, 64};
@@ -263,7 +263,7 @@ static void convexity_brackets_the_scan(void **state) {
 
 static void reduction_makes_it_convex(void **state) {
     (void)state;
-    test_random random = {47};
+    uint64_t random = 47;
     for (int run = 0; run < 40; run++) {
         const int order = 2 + run % 16;
         double a[18], b[18];
@@ -299,7 +299,7 @@ static void reduction_makes_it_convex(void **state) {
 static void reduction_options(void **state) {
     (void)state;
     double a[9], b[9], c[9], d[9];
-    test_random random = {53};
+    uint64_t random = 53;
     random_series(&random, 8, 6, a, b);
     memcpy(c, a, sizeof a), memcpy(d, b, sizeof b);
     const dem2d_reduction_desc none = {DEM2D_NO_TEST, 0, 0}, zero = {DEM2D_SUFFICIENT, 0, 0};
@@ -336,7 +336,7 @@ static void reduction_options(void **state) {
     assert_ok(dem2d_fourier_reduce(c, d, 8, &same, &count));
     assert_memory_equal(a, c, sizeof a); /* 0 means the defaults of the manual */
     assert_memory_equal(b, d, sizeof b);
-    random.state = 53;
+    random = 53;
     random_series(&random, 8, 6, a, b);
     assert_ok(dem2d_fourier_reduce(a, b, 8, &steep, &other));
     assert_between(other, 1, count - 1);
@@ -400,7 +400,7 @@ static void bezier_fit_of_round_outlines(void **state) {
    covers is bounded only by common sense. */
 static void bezier_fit_of_polygons(void **state) {
     (void)state;
-    test_random random = {59};
+    uint64_t random = 59;
     double worst = 1;
     int failed = 0;
     for (int run = 0; run < 120; run++) {
@@ -409,12 +409,12 @@ static void bezier_fit_of_polygons(void **state) {
         for (int i = 0; i < n; i++) { /* regular: many edges are normal to a direction */
             p[i] = direction(6.283185307179586 * i / n);
             if (run >= 40 && run < 80) { /* irregular, 3 to 12 corners */
-                p[i] = direction(6.283185307179586 * (i + test_uniform(&random, 0, 0.7)) / n);
+                p[i] = direction(6.283185307179586 * (i + random_between(&random, 0, 0.7)) / n);
                 p[i].x *= 1 + run % 3;
             }
         }
         if (run >= 80) { /* rectangles, axis-aligned, up to 10:1 */
-            const double w = 1 + test_below(&random, 10), h = 1;
+            const double w = 1 + random_below(&random, 10), h = 1;
             const dem2d_vec box[4] = {{0, 0}, {w, 0}, {w, h}, {0, h}};
             memcpy(p, box, sizeof box), n = 4;
         }
@@ -436,15 +436,15 @@ static void bezier_fit_of_polygons(void **state) {
 static void bezier_fit_of_rough_outlines(void **state) {
     (void)state;
     static const int some[] = {3, 4, 5, 8, 10, 12, 16}; /* multiples of 4 meet the axes */
-    test_random random = {61};
+    uint64_t random = 61;
     int failed = 0;
     for (int run = 0; run < 60; run++) {
         dem2d_vec p[170];
         const double noise = 0.02 * (run % 6), wave = 0.1 * (run % 4);
-        const int n = 12 + test_below(&random, 150), lobes = 2 + run % 5;
+        const int n = 12 + random_below(&random, 150), lobes = 2 + run % 5;
         for (int i = 0; i < n; i++) {
             const double t = 6.283185307179586 * i / n;
-            const double r = 1 + wave * cos(lobes * t) + test_uniform(&random, -noise, noise);
+            const double r = 1 + wave * cos(lobes * t) + random_between(&random, -noise, noise);
             p[i] = vec(50 + 30 * r * cos(t), 40 + 20 * r * sin(t));
             if (run % 3 == 0) p[i] = vec(round(p[i].x), round(p[i].y));
         }

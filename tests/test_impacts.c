@@ -3,63 +3,25 @@
    steps of a hundredth of the contact time, unless a row takes a finer step. */
 #include "dem2d.h"
 #include "testing.h"
+#include "world_scene.h"
 
 #include <float.h>
 
 #define G 9.81
 #define KN 1e7
 
-typedef struct scene {
-    dem2d_world *world;
-    dem2d_material_id material;
-} scene;
-
 static scene make_scene(double kt, double friction, double time_step) {
-    const dem2d_material_desc material = {2700, KN, kt, friction, 0, 0};
+    const dem2d_material_desc material = stone_desc(kt, friction);
     dem2d_world_desc desc = {0};
-    scene s;
     desc.time_step = time_step;
     desc.contact_tolerance = 1e-13;
-    assert_ok(dem2d_world_create(&desc, &s.world));
-    assert_ok(dem2d_world_add_material(s.world, &material, &s.material));
-    return s;
+    return open_scene(&desc, &material);
 }
 
 /* Takes the shape. */
-static dem2d_particle_id add(const scene *s, dem2d_shape *shape, dem2d_motion motion, dem2d_vec at,
-                             dem2d_vec velocity, double spin) {
-    dem2d_particle_desc desc = {0};
-    dem2d_particle_id id;
-    assert_ok(dem2d_world_add_shape(s->world, shape, &desc.shape));
-    dem2d_shape_destroy(shape);
-    desc.scale = 1, desc.material = s->material, desc.motion = motion;
-    desc.position = at, desc.velocity = velocity, desc.angular_velocity = spin;
-    assert_ok(dem2d_world_add_particle(s->world, &desc, &id));
-    return id;
-}
-
-static dem2d_wall_id add_floor(const scene *s) {
-    dem2d_wall_desc desc = {0};
-    dem2d_wall_id id;
-    desc.material = s->material, desc.normal.y = 1;
-    assert_ok(dem2d_world_add_wall(s->world, &desc, &id));
-    return id;
-}
-
-static dem2d_particle_info look(const scene *s, dem2d_particle_id id) {
-    dem2d_particle_info info;
-    assert_ok(dem2d_world_get_particle(s->world, id, &info));
-    return info;
-}
-
-static void step(const scene *s, int count) {
-    assert_ok(dem2d_world_step(s->world, count, NULL));
-}
-
-static int contacts(const scene *s, dem2d_contact_info *first) {
-    int count;
-    assert_ok(dem2d_world_contacts(s->world, first, 1, &count));
-    return count;
+static dem2d_particle_id add_one(const scene *s, dem2d_shape *shape, dem2d_motion motion,
+                                 dem2d_vec at, dem2d_vec velocity, double spin) {
+    return add_shape(s, shape, motion, at, 0, velocity, spin);
 }
 
 /* Mass and inertia of a disc of the material. */
@@ -91,17 +53,17 @@ static head_on make_head_on(int kind, double steps_per_contact) {
     if (wall)
         add_floor(&h.s);
     else
-        h.target = add(&h.s, is_disc ? test_disc(radius) : test_ellipse(a, b),
-                       kind == DISC_FIXED ? DEM2D_FIXED : DEM2D_FREE, vec(0, 0), vec(0, 0), 0);
-    h.mover = add(&h.s, is_disc ? test_disc(radius) : test_ellipse(a, b), DEM2D_FREE,
-                  vec(0, h.touch + 1.003e-4), vec(0, -1), 0);
+        h.target = add_one(&h.s, is_disc ? make_disc(radius) : make_ellipse(a, b),
+                           kind == DISC_FIXED ? DEM2D_FIXED : DEM2D_FREE, vec(0, 0), vec(0, 0), 0);
+    h.mover = add_one(&h.s, is_disc ? make_disc(radius) : make_ellipse(a, b), DEM2D_FREE,
+                      vec(0, h.touch + 1.003e-4), vec(0, -1), 0);
     return h;
 }
 
 /* Gap between the two, from positions alone. */
 static double gap_of(const head_on *h) {
-    const double y = look(&h->s, h->mover).pose.position.y;
-    return y - h->touch - (h->target.generation ? look(&h->s, h->target).pose.position.y : 0);
+    const double y = grain_of(&h->s, h->mover).pose.position.y;
+    return y - h->touch - (h->target.generation ? grain_of(&h->s, h->target).pose.position.y : 0);
 }
 
 /* Between contacts the motion is uniform, so that crossings are found by a straight line. */
@@ -112,7 +74,7 @@ static double measure_impact(const head_on *h, double dt, double *depth, double 
         dem2d_contact_info c;
         step(&h->s, 1);
         const double now = gap_of(h);
-        if (contacts(&h->s, &c)) {
+        if (contacts_of(&h->s, &c, 1)) {
             *depth = fmax(*depth, c.depth);
             *force = fmax(*force, c.normal_force);
         }
@@ -134,8 +96,8 @@ static void test_elastic_impact(void **state) {
         assert_near(depth, 1 / w, 1e-3);
         assert_near(force, sqrt(h.mass * KN), 1e-3);
         assert_near(time, contact_time, 1e-3);
-        const double target = h.target.generation ? look(&h.s, h.target).velocity.y : 0;
-        assert_near(look(&h.s, h.mover).velocity.y - target, 1, 1e-3);
+        const double target = h.target.generation ? grain_of(&h.s, h.target).velocity.y : 0;
+        assert_near(grain_of(&h.s, h.mover).velocity.y - target, 1, 1e-3);
         dem2d_world_destroy(h.s.world);
     }
 }
@@ -161,13 +123,13 @@ static dem2d_particle_info bounce(double kt, double mu, double vt, double vn, do
     const scene s = make_scene(kt, mu, contact_time / steps);
     add_floor(&s);
     const dem2d_particle_id id =
-        add(&s, test_disc(radius), DEM2D_FREE, vec(0, radius + 1e-6), vec(vt, -vn), 0);
-    dem2d_particle_info info = look(&s, id);
-    for (int i = 0; i < 1000000 && info.velocity.y <= 0; i++) step(&s, 1), info = look(&s, id);
+        add_one(&s, make_disc(radius), DEM2D_FREE, vec(0, radius + 1e-6), vec(vt, -vn), 0);
+    dem2d_particle_info info = grain_of(&s, id);
+    for (int i = 0; i < 1000000 && info.velocity.y <= 0; i++) step(&s, 1), info = grain_of(&s, id);
     step(&s, (int)(2 * steps)); /* until it has left */
     dem2d_contact_info c;
-    assert_int_equal(contacts(&s, &c), 0);
-    info = look(&s, id);
+    assert_int_equal(contacts_of(&s, &c, 1), 0);
+    info = grain_of(&s, id);
     dem2d_world_destroy(s.world);
     return info;
 }
@@ -216,12 +178,12 @@ static void test_slide_to_roll(void **state) {
         assert_ok(dem2d_world_set_gravity(s.world, vec(0, -G)));
         add_floor(&s);
         const dem2d_particle_id id =
-            add(&s, test_disc(radius), DEM2D_FREE, vec(0, radius - rest), vec(v0, 0), 0);
+            add_one(&s, make_disc(radius), DEM2D_FREE, vec(0, radius - rest), vec(v0, 0), 0);
         double slip = v0, last = v0, v = v0, v_last = v0;
         int n = 0;
         for (; n < 1000000 && slip > 0; n++) {
             step(&s, 1);
-            const dem2d_particle_info info = look(&s, id);
+            const dem2d_particle_info info = grain_of(&s, id);
             last = slip, v_last = v;
             v = info.velocity.x, slip = v + info.angular_velocity * (radius - rest / 2);
         }
@@ -246,9 +208,9 @@ static void test_disc_on_incline(void **state) {
         add_floor(&s);
         const double rest = disc_mass(radius) * G * cos(b) / KN;
         const dem2d_particle_id id =
-            add(&s, test_disc(radius), DEM2D_FREE, vec(0, radius - rest), vec(0, 0), 0);
+            add_one(&s, make_disc(radius), DEM2D_FREE, vec(0, radius - rest), vec(0, 0), 0);
         step(&s, 20000);
-        const dem2d_particle_info info = look(&s, id);
+        const dem2d_particle_info info = grain_of(&s, id);
         const bool rolls = mu >= tan(b) / 3;
         const double a = rolls ? 2 * G * sin(b) / 3 : G * (sin(b) - mu * cos(b));
         const double spin = rolls ? -a / radius : -2 * mu * G * cos(b) / radius;
@@ -273,10 +235,10 @@ static void test_block_on_incline(void **state) {
         assert_ok(dem2d_world_set_damping(s.world, 0.3, 0));
         add_floor(&s);
         const double rest = 2700 * width * height * G * cos(b) / KN;
-        const dem2d_particle_id id =
-            add(&s, test_box(width, height), DEM2D_FREE, vec(0, height / 2 - rest), vec(0, 0), 0);
+        const dem2d_particle_id id = add_one(&s, make_box(width, height), DEM2D_FREE,
+                                             vec(0, height / 2 - rest), vec(0, 0), 0);
         step(&s, (int)(time / dt));
-        const double x = look(&s, id).pose.position.x;
+        const double x = grain_of(&s, id).pose.position.x;
         const double slide = 0.5 * G * (sin(b) - mu * cos(b)) * time * time;
         if (off < 0)
             assert_between(x, -1e-4, 1e-3);
@@ -294,11 +256,12 @@ static void test_opposite_spin(void **state) {
     const double radius = 0.05, spin = 10;
     const double dt = (double)TEST_PI * sqrt(disc_mass(radius) / 2 / KN) / 100;
     const scene s = make_scene(KN, 0.5, dt);
-    const dem2d_particle_id a = add(&s, test_disc(radius), DEM2D_FREE, vec(0, 0), vec(1, 0), spin);
+    const dem2d_particle_id a =
+        add_one(&s, make_disc(radius), DEM2D_FREE, vec(0, 0), vec(1, 0), spin);
     const dem2d_particle_id b =
-        add(&s, test_disc(radius), DEM2D_FREE, vec(0.1001, 0), vec(-1, 0), -spin);
+        add_one(&s, make_disc(radius), DEM2D_FREE, vec(0.1001, 0), vec(-1, 0), -spin);
     step(&s, 400);
-    const dem2d_particle_info ia = look(&s, a), ib = look(&s, b);
+    const dem2d_particle_info ia = grain_of(&s, a), ib = grain_of(&s, b);
     assert_near(ia.velocity.x, -1, 1e-3); /* they did meet */
     assert_near(ia.angular_velocity, spin, 1e-12);
     assert_near(ib.angular_velocity, -spin, 1e-12);
@@ -318,33 +281,33 @@ static void test_cradle(void **state) {
         const scene s = make_scene(0, 0, contact_time / 1000);
         dem2d_particle_id ids[5];
         for (int i = 0; i < n; i++)
-            ids[i] = add(&s, test_disc(radius), DEM2D_FREE, vec(i, 0), vec(i ? 0 : v0, 0), 0);
+            ids[i] = add_one(&s, make_disc(radius), DEM2D_FREE, vec(i, 0), vec(i ? 0 : v0, 0), 0);
         step(&s, 1000 * 3 * n);
         for (int i = 0; i < n; i++)
-            assert_within(look(&s, ids[i]).velocity.x / v0, expected[row][i], 1e-3);
+            assert_within(grain_of(&s, ids[i]).velocity.x / v0, expected[row][i], 1e-3);
         dem2d_contact_info c;
-        assert_int_equal(contacts(&s, &c), 0);
+        assert_int_equal(contacts_of(&s, &c, 1), 0);
         dem2d_world_destroy(s.world);
     }
 }
 
-static dem2d_shape *random_shape(test_random *random) {
+static dem2d_shape *random_shape(uint64_t *random) {
     const double a[4] = {0.1, 0, 0.004, 0.001}, b[4] = {0, 0, -0.003, 0.001};
     const dem2d_vec corners[5] = {{0, 0}, {0.06, -0.01}, {0.09, 0.03}, {0.05, 0.07}, {-0.01, 0.04}};
     dem2d_shape *shape;
     double length;
-    switch (test_below(random, 4)) {
+    switch (random_below(random, 4)) {
     case 0:
-        return test_disc(test_uniform(random, 0.03, 0.06));
+        return make_disc(random_between(random, 0.03, 0.06));
     case 1:
-        length = test_uniform(random, 0.03, 0.06);
-        return test_ellipse(length, test_uniform(random, 0.02, 0.06));
+        length = random_between(random, 0.03, 0.06);
+        return make_ellipse(length, random_between(random, 0.02, 0.06));
     case 2:
         assert_ok(dem2d_shape_create_fourier(NULL, a, b, 3, &shape));
         return shape;
     default:
         assert_ok(
-            dem2d_shape_create_polygon(NULL, corners, 5, test_below(random, 2) * 0.005, &shape));
+            dem2d_shape_create_polygon(NULL, corners, 5, random_below(random, 2) * 0.005, &shape));
         return shape;
     }
 }
@@ -352,7 +315,7 @@ static dem2d_shape *random_shape(test_random *random) {
 /* Sum, and the size of its terms: what rounding is measured by. */
 static void add_momentum(const scene *s, dem2d_particle_id id, long double sum[3],
                          long double size[3]) {
-    const dem2d_particle_info p = look(s, id);
+    const dem2d_particle_info p = grain_of(s, id);
     const long double m = p.mass, x = p.pose.position.x, y = p.pose.position.y;
     const long double terms[4] = {m * p.velocity.x, m * p.velocity.y,
                                   m * (x * p.velocity.y - y * p.velocity.x),
@@ -365,24 +328,25 @@ static void add_momentum(const scene *s, dem2d_particle_id id, long double sum[3
    step before the position: x cross v is that of free flight, before and after. */
 static void test_conservation(void **state) {
     (void)state;
-    test_random random = {77};
+    uint64_t random = 77;
     int met = 0;
     for (int i = 0; i < 200; i++) {
         const scene s = make_scene(KN, 0.5, 2e-5);
         dem2d_particle_id ids[2];
         for (int k = 0; k < 2; k++) {
-            const dem2d_vec at = vec(0.16 * k, test_uniform(&random, -0.03, 0.03));
-            const dem2d_vec v = vec(k ? -1 : 1, test_uniform(&random, -0.5, 0.5));
+            const dem2d_vec at = vec(0.16 * k, random_between(&random, -0.03, 0.03));
+            const dem2d_vec v = vec(k ? -1 : 1, random_between(&random, -0.5, 0.5));
             dem2d_shape *shape = random_shape(&random);
-            ids[k] = add(&s, shape, DEM2D_FREE, at, v, test_uniform(&random, -20, 20));
-            assert_ok(dem2d_world_move_particle(s.world, ids[k], at, test_uniform(&random, -3, 3)));
+            ids[k] = add_one(&s, shape, DEM2D_FREE, at, v, random_between(&random, -20, 20));
+            assert_ok(
+                dem2d_world_move_particle(s.world, ids[k], at, random_between(&random, -3, 3)));
         }
         long double before[3] = {0}, after[3] = {0}, size[3] = {0};
         for (int k = 0; k < 2; k++) add_momentum(&s, ids[k], before, size);
-        const double spin = look(&s, ids[0]).angular_velocity;
+        const double spin = grain_of(&s, ids[0]).angular_velocity;
         step(&s, 6000);
         for (int k = 0; k < 2; k++) add_momentum(&s, ids[k], after, size);
-        met += look(&s, ids[0]).angular_velocity != spin;
+        met += grain_of(&s, ids[0]).angular_velocity != spin;
         for (int k = 0; k < 2; k++) assert_within(after[k], before[k], 1e-14 * size[k] * 10);
         assert_within(after[2], before[2], 1e-13 * size[2] * 10);
         dem2d_world_destroy(s.world);
@@ -419,7 +383,7 @@ static dem2d_shape *rocker(int kind) {
     }
     switch (kind) {
     case ROCK_ELLIPSE:
-        return test_ellipse(0.03, 0.015);
+        return make_ellipse(0.03, 0.015);
     case ROCK_FOURIER:
         assert_ok(dem2d_shape_create_fourier(NULL, a, b, 4, &shape));
         break;
@@ -453,8 +417,8 @@ static double rocking_period(int kind, double kt, double mu, double *expected) {
     assert_ok(dem2d_shape_support(shape, tilted, vec(0, -1), &low));
     assert_ok(dem2d_world_set_gravity(s.world, vec(0, -G)));
     add_floor(&s);
-    const dem2d_particle_id id = add(&s, shape, DEM2D_FREE, vec(0, low.value), vec(0, 0), 0);
-    const dem2d_particle_info info = look(&s, id);
+    const dem2d_particle_id id = add_one(&s, shape, DEM2D_FREE, vec(0, low.value), vec(0, 0), 0);
+    const dem2d_particle_info info = grain_of(&s, id);
     const double about = info.inertia / info.mass + (mu > 0 ? h * h : 0);
     *expected = (double)(2 * TEST_PI) / sqrt(G * (rho - h) / about);
     const double rest = info.mass * G / KN;
@@ -463,7 +427,7 @@ static double rocking_period(int kind, double kt, double mu, double *expected) {
     int crossings = 0;
     for (int i = 1; i <= 1000000 && crossings < 5; i++) {
         step(&s, 1);
-        const double angle = dem2d_rot_angle(look(&s, id).pose.rotation);
+        const double angle = dem2d_rot_angle(grain_of(&s, id).pose.rotation);
         if (last > 0 && angle <= 0) {
             latest = i - angle / (angle - last);
             if (crossings++ == 0) first = latest;

@@ -2,62 +2,21 @@
    the ledger of energies, which has to close. */
 #include "dem2d.h"
 #include "testing.h"
+#include "world_scene.h"
 
 #include <float.h>
 
 #define KN 1e7
 
-typedef struct scene {
-    dem2d_world *world;
-    dem2d_material_id material;
-} scene;
-
 static scene make_scene(dem2d_world_desc desc, dem2d_material_desc material) {
-    scene s;
     if (!(desc.contact_tolerance > 0)) desc.contact_tolerance = 1e-13;
-    assert_ok(dem2d_world_create(&desc, &s.world));
-    assert_ok(dem2d_world_add_material(s.world, &material, &s.material));
-    return s;
-}
-
-static dem2d_material_desc stone(double kt, double friction) {
-    dem2d_material_desc material = {0};
-    material.density = 2700, material.normal_stiffness = KN;
-    material.tangential_stiffness = kt, material.friction = friction;
-    return material;
+    return open_scene(&desc, &material);
 }
 
 /* Takes the shape. */
-static dem2d_particle_id add(const scene *s, dem2d_shape *shape, dem2d_vec at, double angle,
-                             dem2d_vec velocity, double spin) {
-    dem2d_particle_desc desc = {0};
-    dem2d_particle_id id;
-    assert_ok(dem2d_world_add_shape(s->world, shape, &desc.shape));
-    dem2d_shape_destroy(shape);
-    desc.scale = 1, desc.material = s->material, desc.angle = angle;
-    desc.position = at, desc.velocity = velocity, desc.angular_velocity = spin;
-    assert_ok(dem2d_world_add_particle(s->world, &desc, &id));
-    return id;
-}
-
-static dem2d_wall_id add_wall(const scene *s, double x, double y, double nx, double ny) {
-    dem2d_wall_desc desc = {0};
-    dem2d_wall_id id;
-    desc.material = s->material, desc.point = vec(x, y), desc.normal = vec(nx, ny);
-    assert_ok(dem2d_world_add_wall(s->world, &desc, &id));
-    return id;
-}
-
-static dem2d_particle_info look(const scene *s, dem2d_particle_id id) {
-    dem2d_particle_info info;
-    assert_ok(dem2d_world_get_particle(s->world, id, &info));
-    return info;
-}
-
-static dem2d_ledger book(const scene *s) {
-    dem2d_ledger ledger;
-    assert_ok(dem2d_world_ledger(s->world, &ledger));
-    return ledger;
+static dem2d_particle_id add_free(const scene *s, dem2d_shape *shape, dem2d_vec at, double angle,
+                                  dem2d_vec velocity, double spin) {
+    return add_shape(s, shape, DEM2D_FREE, at, angle, velocity, spin);
 }
 
 /* --- dashpot --------------------------------------------------------------------------------- */
@@ -103,7 +62,7 @@ enum { DISCS, DISC_WALL, BOX_WALL, OVALS, IMPACTS };
 /* Head on, at 1 m/s; the speed of parting over that of meeting. */
 static double bounce(int kind, double restitution, double steps) {
     dem2d_world_desc desc = {0};
-    dem2d_material_desc material = stone(KN, 0.3);
+    dem2d_material_desc material = stone_desc(KN, 0.3);
     const double half = 0.05;
     const bool wall = kind == DISC_WALL || kind == BOX_WALL;
     const double area = kind == BOX_WALL ? 4 * half * half : (double)TEST_PI * half * half;
@@ -116,19 +75,19 @@ static double bounce(int kind, double restitution, double steps) {
     scene s = make_scene(desc, material);
     dem2d_particle_id b = {0, 0}, a;
     if (wall)
-        add_wall(&s, 0, 0, 0, 1);
+        add_plane(&s, 0, 0, 0, 1);
     else
-        b = add(&s, kind == DISCS ? test_disc(half) : test_ellipse(0.08, half), vec(0, -half), 0,
-                vec(0, 0), 0);
+        b = add_free(&s, kind == DISCS ? make_disc(half) : make_ellipse(0.08, half), vec(0, -half),
+                     0, vec(0, 0), 0);
     if (kind == OVALS)
-        a = add(&s, test_ellipse(0.08, half), vec(0, half + 1e-4), 0, vec(0, -1), 0);
+        a = add_free(&s, make_ellipse(0.08, half), vec(0, half + 1e-4), 0, vec(0, -1), 0);
     else
-        a = add(&s, kind == BOX_WALL ? test_box(2 * half, 2 * half) : test_disc(half),
-                vec(0, half + 1e-4), 0, vec(0, -1), 0);
+        a = add_free(&s, kind == BOX_WALL ? make_box(2 * half, 2 * half) : make_disc(half),
+                     vec(0, half + 1e-4), 0, vec(0, -1), 0);
     assert_ok(dem2d_world_step(s.world, (int)(4 * steps), NULL));
-    double parting = look(&s, a).velocity.y;
-    if (!wall) parting -= look(&s, b).velocity.y;
-    if (kind == OVALS) assert_within(look(&s, a).angular_velocity, 0, 1e-9);
+    double parting = grain_of(&s, a).velocity.y;
+    if (!wall) parting -= grain_of(&s, b).velocity.y;
+    if (kind == OVALS) assert_within(grain_of(&s, a).angular_velocity, 0, 1e-9);
     dem2d_world_destroy(s.world);
     return parting;
 }
@@ -152,20 +111,20 @@ static void test_rolling(void **state) {
     const double radius = 0.05, mu_r = 0.1, slopes[] = {0.05, 0.3};
     for (int i = 0; i < 2; i++) {
         dem2d_world_desc desc = {0};
-        dem2d_material_desc material = stone(KN, 0.8);
+        dem2d_material_desc material = stone_desc(KN, 0.8);
         material.rolling_friction = mu_r;
         desc.time_step = 2e-5;
         desc.gravity = vec(9.81 * sin(slopes[i]), -9.81 * cos(slopes[i]));
         desc.ledger = true;
         scene s = make_scene(desc, material);
         const double mass = 2700 * (double)TEST_PI * radius * radius;
-        add_wall(&s, 0, 0, 0, 1);
+        add_plane(&s, 0, 0, 0, 1);
         dem2d_particle_id id =
-            add(&s, test_disc(radius), vec(0, radius - mass * 9.81 * cos(slopes[i]) / KN), 0,
-                vec(0, 0), 0);
+            add_free(&s, make_disc(radius), vec(0, radius - mass * 9.81 * cos(slopes[i]) / KN), 0,
+                     vec(0, 0), 0);
         const double time = 1.5; /* long against the swing of the tangential spring */
         assert_ok(dem2d_world_step(s.world, (int)(time / desc.time_step), NULL));
-        const double way = look(&s, id).pose.position.x;
+        const double way = grain_of(&s, id).pose.position.x;
         if (i == 0)
             assert_within(way, 0, 1e-4 * radius);
         else
@@ -184,7 +143,7 @@ static void test_rolling(void **state) {
         assert_near(rest.kinetic_ratio,
                     (e.translational + e.rotational) / (e.normal + e.tangential + e.rolling),
                     1e-14);
-        dem2d_ledger ledger = book(&s);
+        dem2d_ledger ledger = ledger_of(&s);
         assert_within(ledger.closure, 0, 1e-3 * fmax(ledger.gravity, ledger.tangential));
         if (i == 1) assert_true(ledger.friction > 0.2 * ledger.gravity);
         dem2d_world_destroy(s.world);
@@ -221,22 +180,22 @@ static void same_law(void *user, const dem2d_law_input *in, dem2d_law_output *ou
 
 /* Grains of three kinds in a box; the last of them are the last added. */
 static void fill(const scene *s, int count, double speed) {
-    test_random random = {11};
+    uint64_t random = 11;
     for (int i = 0; i < count; i++) {
         const dem2d_vec at = vec(0.06 + 0.12 * (i % 4), 0.06 + 0.12 * (i / 4));
         const dem2d_vec v =
-            vec(test_uniform(&random, -speed, speed), test_uniform(&random, -speed, speed));
-        dem2d_shape *shape = i % 3 == 0   ? test_disc(0.04)
-                             : i % 3 == 1 ? test_ellipse(0.055, 0.03)
+            vec(random_between(&random, -speed, speed), random_between(&random, -speed, speed));
+        dem2d_shape *shape = i % 3 == 0   ? make_disc(0.04)
+                             : i % 3 == 1 ? make_ellipse(0.055, 0.03)
                                           : NULL;
         if (shape == NULL) {
             const double a[4] = {0.09, 0, 0, 0.003}, b[4] = {0, 0, 0, 0};
             assert_ok(dem2d_shape_create_fourier(NULL, a, b, 3, &shape));
         }
-        add(s, shape, at, i, v, test_uniform(&random, -speed, speed) / 0.05);
+        add_free(s, shape, at, i, v, random_between(&random, -speed, speed) / 0.05);
     }
-    add_wall(s, 0, 0, 0, 1), add_wall(s, 0, 0, 1, 0);
-    add_wall(s, 0.48, 0, -1, 0), add_wall(s, 0, 0.48, 0, -1);
+    add_plane(s, 0, 0, 0, 1), add_plane(s, 0, 0, 1, 0);
+    add_plane(s, 0.48, 0, -1, 0), add_plane(s, 0, 0.48, 0, -1);
 }
 
 /* The same grains by the built-in law and by the caller's copy of it. */
@@ -249,7 +208,7 @@ static void test_callers_law(void **state) {
         desc.time_step = 2e-5, desc.gravity.y = -9.81, desc.ledger = true;
         desc.faces = DEM2D_ONE_POINT;
         if (k == 1) desc.law = same_law, desc.law_user = &seen;
-        s[k] = make_scene(desc, stone(KN / 2, 0.3));
+        s[k] = make_scene(desc, stone_desc(KN / 2, 0.3));
         fill(&s[k], 16, 1);
         assert_ok(dem2d_world_step(s[k].world, 2000, NULL));
     }
@@ -258,11 +217,11 @@ static void test_callers_law(void **state) {
     int count;
     assert_ok(dem2d_world_particles(s[0].world, ids, 16, &count));
     for (int i = 0; i < count; i++) {
-        const dem2d_particle_info a = look(&s[0], ids[i]), b = look(&s[1], ids[i]);
+        const dem2d_particle_info a = grain_of(&s[0], ids[i]), b = grain_of(&s[1], ids[i]);
         assert_within(a.pose.position.x, b.pose.position.x, 1e-9);
         assert_within(a.pose.position.y, b.pose.position.y, 1e-9);
     }
-    const dem2d_ledger a = book(&s[0]), b = book(&s[1]);
+    const dem2d_ledger a = ledger_of(&s[0]), b = ledger_of(&s[1]);
     assert_near(b.friction, a.friction, 1e-6);
     assert_within(b.closure, 0, 1e-3 * b.given);
     for (int k = 0; k < 2; k++) dem2d_world_destroy(s[k].world);
@@ -277,12 +236,12 @@ static void test_tension(void **state) {
     seen.dashpot = 2 * zeta * w0;
     dem2d_world_desc desc = {0};
     desc.time_step = (double)TEST_PI / w0 / 1000, desc.law = same_law, desc.law_user = &seen;
-    scene s = make_scene(desc, stone(0, 0));
-    add_wall(&s, 0, 0, 0, 1);
-    dem2d_particle_id id = add(&s, test_disc(half), vec(0, half + 1e-4), 0, vec(0, -1), 0);
+    scene s = make_scene(desc, stone_desc(0, 0));
+    add_plane(&s, 0, 0, 0, 1);
+    dem2d_particle_id id = add_free(&s, make_disc(half), vec(0, half + 1e-4), 0, vec(0, -1), 0);
     assert_ok(dem2d_world_step(s.world, 3000, NULL));
     const double expected = exp(-(double)TEST_PI * zeta / sqrt(1 - zeta * zeta));
-    assert_within(look(&s, id).velocity.y, expected, 1e-3);
+    assert_within(grain_of(&s, id).velocity.y, expected, 1e-3);
     dem2d_world_destroy(s.world);
 }
 
@@ -293,12 +252,12 @@ static double gas_error(double steps) {
     dem2d_world_desc desc = {0};
     const double mass = 2700 * (double)TEST_PI * 0.04 * 0.04 / 2;
     desc.time_step = (double)TEST_PI * sqrt(mass / KN) / steps, desc.ledger = true;
-    scene s = make_scene(desc, stone(0, 0));
+    scene s = make_scene(desc, stone_desc(0, 0));
     fill(&s, 16, 1);
     double worst = 0;
     for (int i = 0; i < 200; i++) {
         assert_ok(dem2d_world_step(s.world, (int)steps / 2, NULL));
-        const dem2d_ledger ledger = book(&s);
+        const dem2d_ledger ledger = ledger_of(&s);
         worst = fmax(worst, fabs(ledger.closure) / ledger.given);
         assert_true(ledger.friction == 0 && ledger.dashpot == 0);
         assert_within(ledger.damping, 0, 1e-10 * ledger.given); /* rounding of forces */
@@ -333,7 +292,7 @@ static void test_ledger_closes(void **state) {
     for (int i = 0; i < COUNT_OF(accounts); i++) {
         const account *a = &accounts[i];
         dem2d_world_desc desc = {0};
-        dem2d_material_desc material = stone(KN / 2, a->friction);
+        dem2d_material_desc material = stone_desc(KN / 2, a->friction);
         material.damping_ratio = a->ratio, material.rolling_friction = a->rolling;
         desc.time_step = 5e-6, desc.ledger = true;
         desc.gravity.y = -9.81;
@@ -346,7 +305,7 @@ static void test_ledger_closes(void **state) {
         const dem2d_wall_id top = {3, 1};
         assert_ok(dem2d_world_set_wall(s.world, top, &moving));
         assert_ok(dem2d_world_step(s.world, (int)(0.2 / desc.time_step), NULL));
-        const dem2d_ledger l = book(&s);
+        const dem2d_ledger l = ledger_of(&s);
         const double put = fabs(l.given) + fabs(l.gravity) + fabs(l.walls);
         print_message("%-9s closure %.2g of %.3g; friction %.3g dashpot %.3g damping %.3g "
                       "walls %.3g\n",
@@ -365,34 +324,34 @@ static void test_ledger_edits(void **state) {
     (void)state;
     dem2d_world_desc desc = {0};
     desc.time_step = 1e-5, desc.ledger = true;
-    scene s = make_scene(desc, stone(0, 0));
-    dem2d_particle_id id = add(&s, test_disc(0.05), vec(0, 0), 0, vec(1, 0), 0);
+    scene s = make_scene(desc, stone_desc(0, 0));
+    dem2d_particle_id id = add_free(&s, make_disc(0.05), vec(0, 0), 0, vec(1, 0), 0);
     assert_ok(dem2d_world_step(s.world, 10, NULL));
-    const double mass = look(&s, id).mass;
-    assert_near(book(&s).given, mass / 2, 1e-12);
+    const double mass = grain_of(&s, id).mass;
+    assert_near(ledger_of(&s).given, mass / 2, 1e-12);
     assert_ok(dem2d_world_drive_particle(s.world, id, DEM2D_FREE, vec(3, 0), 0));
     assert_ok(dem2d_world_step(s.world, 2, NULL));
-    assert_near(book(&s).given, 9 * mass / 2, 1e-12);
-    assert_within(book(&s).closure, 0, 1e-12 * mass);
-    dem2d_particle_id other = add(&s, test_disc(0.05), vec(5, 5), 0, vec(2, 0), 0);
+    assert_near(ledger_of(&s).given, 9 * mass / 2, 1e-12);
+    assert_within(ledger_of(&s).closure, 0, 1e-12 * mass);
+    dem2d_particle_id other = add_free(&s, make_disc(0.05), vec(5, 5), 0, vec(2, 0), 0);
     assert_ok(dem2d_world_step(s.world, 2, NULL));
-    assert_near(book(&s).given, (9 + 4) * mass / 2, 1e-12);
+    assert_near(ledger_of(&s).given, (9 + 4) * mass / 2, 1e-12);
     assert_ok(dem2d_world_remove_particle(s.world, other));
     assert_ok(dem2d_world_step(s.world, 2, NULL));
-    assert_near(book(&s).given, 9 * mass / 2, 1e-12);
+    assert_near(ledger_of(&s).given, 9 * mass / 2, 1e-12);
     /* a driven disc pushes another: what it does is work */
     assert_ok(dem2d_world_drive_particle(s.world, id, DEM2D_DRIVEN, vec(1, 0), 0));
-    const double x = look(&s, id).pose.position.x;
-    add(&s, test_disc(0.05), vec(x + 0.1001, 0), 0, vec(0, 0), 0);
+    const double x = grain_of(&s, id).pose.position.x;
+    add_free(&s, make_disc(0.05), vec(x + 0.1001, 0), 0, vec(0, 0), 0);
     assert_ok(dem2d_world_step(s.world, 2000, NULL));
-    dem2d_ledger l = book(&s);
+    dem2d_ledger l = ledger_of(&s);
     assert_near(l.kinetic, 4 * mass / 2, 1e-3); /* thrown off at twice the speed */
     assert_near(l.driven, 4 * mass / 2, 1e-3);
     assert_within(l.closure, 0, 1e-3 * l.driven);
     assert_result(dem2d_world_ledger(s.world, NULL), DEM2D_NULL_ARGUMENT);
     dem2d_world_destroy(s.world);
     desc.ledger = false;
-    s = make_scene(desc, stone(0, 0));
+    s = make_scene(desc, stone_desc(0, 0));
     l.closure = 7;
     assert_result(dem2d_world_ledger(s.world, &l), DEM2D_OUT_OF_RANGE);
     assert_true(l.closure == 7);
@@ -404,11 +363,11 @@ static void test_law_changes(void **state) {
     (void)state;
     dem2d_world_desc desc = {0};
     desc.time_step = 2e-5, desc.gravity = vec(1, -9.81), desc.local_damping = 0.5;
-    scene s = make_scene(desc, stone(KN / 2, 0.6));
-    add_wall(&s, 0, 0, 0, 1);
-    dem2d_particle_id low = add(&s, test_disc(0.05), vec(0, 0.05), 0, vec(0, 0), 0);
-    add(&s, test_disc(0.05), vec(0.1, 0.05), 0, vec(0, 0), 0);
-    add(&s, test_disc(0.05), vec(0.05, 0.05 + 0.0866), 0, vec(0, 0), 0);
+    scene s = make_scene(desc, stone_desc(KN / 2, 0.6));
+    add_plane(&s, 0, 0, 0, 1);
+    dem2d_particle_id low = add_free(&s, make_disc(0.05), vec(0, 0.05), 0, vec(0, 0), 0);
+    add_free(&s, make_disc(0.05), vec(0.1, 0.05), 0, vec(0, 0), 0);
+    add_free(&s, make_disc(0.05), vec(0.05, 0.05 + 0.0866), 0, vec(0, 0), 0);
     dem2d_wall_desc side = {0};
     side.material = s.material, side.point = vec(0.15, 0), side.normal = vec(-1, 0);
     dem2d_wall_id id;
@@ -416,14 +375,14 @@ static void test_law_changes(void **state) {
     assert_ok(dem2d_world_step(s.world, 40000, NULL));
     dem2d_pair_desc law = {0};
     law.normal_stiffness = KN, law.tangential_stiffness = KN / 2, law.friction = 0.6;
-    const dem2d_particle_info rest = look(&s, low);
+    const dem2d_particle_info rest = grain_of(&s, low);
     assert_true(fabs(rest.torque) < 1e-6 && fabs(rest.velocity.x) < 1e-9);
     for (int k = 0; k < 4; k++) {
         law.damping_ratio = k % 2 == 0 ? 0.1 : 0;
         assert_ok(dem2d_world_set_pair(s.world, s.material, s.material, &law));
         assert_ok(dem2d_world_step(s.world, 2000, NULL));
-        assert_within(look(&s, low).pose.position.x, rest.pose.position.x, 1e-9 * 0.05);
-        assert_within(look(&s, low).force.y, rest.force.y, 1e-6 * rest.mass);
+        assert_within(grain_of(&s, low).pose.position.x, rest.pose.position.x, 1e-9 * 0.05);
+        assert_within(grain_of(&s, low).force.y, rest.force.y, 1e-6 * rest.mass);
     }
     dem2d_world_destroy(s.world);
 }
@@ -432,17 +391,17 @@ static void test_law_changes(void **state) {
 static void test_damped_time_step(void **state) {
     (void)state;
     dem2d_world_desc desc = {0};
-    dem2d_material_desc material = stone(0, 0);
+    dem2d_material_desc material = stone_desc(0, 0);
     material.damping_ratio = 2;
     desc.time_step = 1e-6, desc.gravity.y = -9.81;
     for (int k = 0; k < 2; k++) {
         double safe, limit;
         scene s = make_scene(desc, material);
-        add_wall(&s, 0, 0, 0, 1);
-        dem2d_particle_id id = add(&s, test_disc(0.05), vec(0, 0.05 - 1e-6), 0, vec(0, 0), 0);
+        add_plane(&s, 0, 0, 0, 1);
+        dem2d_particle_id id = add_free(&s, make_disc(0.05), vec(0, 0.05 - 1e-6), 0, vec(0, 0), 0);
         assert_ok(dem2d_world_step(s.world, 1, NULL));
         assert_ok(dem2d_world_time_step_bounds(s.world, &safe, &limit, NULL));
-        const double w0 = sqrt(KN / look(&s, id).mass);
+        const double w0 = sqrt(KN / grain_of(&s, id).mass);
         assert_near(limit, 2 / w0, 1e-12);
         assert_near(safe, 2 / w0 * (sqrt(1 + 4) - 2), 1e-12);
         assert_ok(dem2d_world_set_time_step(s.world, (k == 0 ? 0.98 : 1.05) * safe));
@@ -450,7 +409,7 @@ static void test_damped_time_step(void **state) {
         double fastest = 0;
         for (int i = 0; i < 4000; i++) {
             assert_ok(dem2d_world_step(s.world, 1, NULL));
-            if (i > 3000) fastest = fmax(fastest, fabs(look(&s, id).velocity.y));
+            if (i > 3000) fastest = fmax(fastest, fabs(grain_of(&s, id).velocity.y));
         }
         assert_ok(dem2d_world_stats(s.world, &stats));
         assert_true((stats.slow_time_step > 0) == (k == 1));
@@ -471,24 +430,24 @@ enum { PILE = 60 };
 static scene pile_make(double far_dashpot, dem2d_particle_id ids[PILE]) {
     dem2d_world_desc desc = {0};
     desc.time_step = 1e-5, desc.gravity = vec(0.5, -9.81), desc.local_damping = 0.05;
-    scene s = make_scene(desc, stone(0.8 * KN, 0.4));
-    dem2d_material_desc other = stone(0.5 * KN, 0.9), far = stone(0, 0);
+    scene s = make_scene(desc, stone_desc(0.8 * KN, 0.4));
+    dem2d_material_desc other = stone_desc(0.5 * KN, 0.9), far = stone_desc(0, 0);
     dem2d_material_id materials[2];
     dem2d_particle_desc grain = {0};
     dem2d_particle_id id;
-    dem2d_shape *disc = test_disc(0.05);
+    dem2d_shape *disc = make_disc(0.05);
     other.normal_stiffness = KN / 3, far.damping_ratio = far_dashpot;
     materials[0] = s.material;
     assert_ok(dem2d_world_add_material(s.world, &other, &materials[1]));
     assert_ok(dem2d_world_add_shape(s.world, disc, &grain.shape));
     dem2d_shape_destroy(disc);
-    add_wall(&s, 0, 0, 0.1, 1), add_wall(&s, 0, 0, 1, 0), add_wall(&s, 1, 0, -1, 0);
-    test_random random = {7};
+    add_plane(&s, 0, 0, 0.1, 1), add_plane(&s, 0, 0, 1, 0), add_plane(&s, 1, 0, -1, 0);
+    uint64_t random = 7;
     for (int i = 0; i < PILE; i++) {
         grain.scale = i % 2 == 0 ? 1 : 0.7, grain.material = materials[i % 3 == 0];
         grain.position = vec(0.06 + 0.097 * (i % 10), 0.2 + 0.097 * (double)(i / 10));
-        grain.velocity = vec(test_uniform(&random, -1, 1), test_uniform(&random, -1, 1));
-        grain.angular_velocity = test_uniform(&random, -30, 30);
+        grain.velocity = vec(random_between(&random, -1, 1), random_between(&random, -1, 1));
+        grain.angular_velocity = random_between(&random, -30, 30);
         assert_ok(dem2d_world_add_particle(s.world, &grain, &ids[i]));
     }
     grain.position = vec(0, 50), grain.velocity = vec(0, 0), grain.angular_velocity = 0;
@@ -503,7 +462,7 @@ static bool same_vec(dem2d_vec a, dem2d_vec b) {
 }
 
 static bool same_particle(const scene *a, const scene *b, dem2d_particle_id id) {
-    const dem2d_particle_info one = look(a, id), other = look(b, id);
+    const dem2d_particle_info one = grain_of(a, id), other = grain_of(b, id);
     return same_vec(one.pose.position, other.pose.position) &&
            same_vec(one.velocity, other.velocity) && same_vec(one.force, other.force) &&
            one.angular_velocity == other.angular_velocity && one.torque == other.torque;

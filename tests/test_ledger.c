@@ -41,32 +41,11 @@ static void test_random_scenes(void **state) {
 /* --- scenes of a few ---------------------------------------------------------------------------
  */
 
-typedef struct scene {
-    dem2d_world *world;
-    dem2d_material_id material;
-} scene;
-
 static scene make_scene(double time_step, const dem2d_material_desc *material) {
-    scene s;
     dem2d_world_desc desc = {0};
     desc.time_step = time_step, desc.ledger = true, desc.contact_tolerance = 1e-13;
     desc.skip_time_step_check = true;
-    assert_ok(dem2d_world_create(&desc, &s.world));
-    assert_ok(dem2d_world_add_material(s.world, material, &s.material));
-    return s;
-}
-
-/* Takes the shape. */
-static dem2d_particle_id add(const scene *s, dem2d_shape *shape, dem2d_motion motion, dem2d_vec at,
-                             double angle, dem2d_vec velocity, double spin) {
-    dem2d_particle_desc desc = {0};
-    dem2d_particle_id id;
-    assert_ok(dem2d_world_add_shape(s->world, shape, &desc.shape));
-    dem2d_shape_destroy(shape);
-    desc.scale = 1, desc.material = s->material, desc.motion = motion, desc.angle = angle;
-    desc.position = at, desc.velocity = velocity, desc.angular_velocity = spin;
-    assert_ok(dem2d_world_add_particle(s->world, &desc, &id));
-    return id;
+    return open_scene(&desc, material);
 }
 
 static dem2d_wall_desc floor_of(const scene *s, dem2d_vec velocity) {
@@ -74,18 +53,6 @@ static dem2d_wall_desc floor_of(const scene *s, dem2d_vec velocity) {
     desc.material = s->material, desc.normal = vec(0, 1);
     desc.mode = DEM2D_WALL_MOVING, desc.velocity = velocity;
     return desc;
-}
-
-static dem2d_ledger book(const scene *s) {
-    dem2d_ledger ledger;
-    assert_ok(dem2d_world_ledger(s->world, &ledger));
-    return ledger;
-}
-
-static dem2d_particle_info look(const scene *s, dem2d_particle_id id) {
-    dem2d_particle_info info;
-    assert_ok(dem2d_world_get_particle(s->world, id, &info));
-    return info;
 }
 
 /* A square that is not quite level falls on a floor: its two corners are damped, each by its own
@@ -100,9 +67,9 @@ static double square_closure(double time_step, double damping_ratio) {
     dem2d_shape *square;
     assert_ok(dem2d_world_add_wall(s.world, &ground, &id));
     assert_ok(dem2d_shape_create_polygon(NULL, corners, 4, 0, &square));
-    add(&s, square, DEM2D_FREE, vec(0, 0.0501), 0.001, vec(0, -0.5), 0.5);
+    add_shape(&s, square, DEM2D_FREE, vec(0, 0.0501), 0.001, vec(0, -0.5), 0.5);
     assert_ok(dem2d_world_step(s.world, (int)(0.012 / time_step + 0.5), NULL));
-    const dem2d_ledger l = book(&s);
+    const dem2d_ledger l = ledger_of(&s);
     assert_true(damping_ratio > 0 ? l.dashpot > 0.5 * l.given : l.dashpot == 0);
     dem2d_world_destroy(s.world);
     return fabs(l.closure) / l.given;
@@ -126,7 +93,7 @@ typedef struct outcome {
 /* Eight pairs of discs that spin meet and part. Friction, and a dashpot that does nothing but bring
    them to the path of other shapes; rolling friction does something. */
 static outcome meet(double time_step, double friction, double rolling, bool full) {
-    test_random random = {77};
+    uint64_t random = 77;
     outcome mean = {0, 0};
     for (int k = 0; k < 8; k++) {
         dem2d_material_desc stone = {0};
@@ -137,15 +104,16 @@ static outcome meet(double time_step, double friction, double rolling, bool full
         dem2d_particle_id id = {0};
         for (int i = 0; i < 2; i++) {
             const double way = i == 0 ? 1 : -1;
-            const dem2d_vec at = vec(0.0502 * i + 1e-4 * test_uniform(&random, 0, 1), 0);
-            const dem2d_vec v = vec(way, -way * test_uniform(&random, 0.5, 1.5));
-            id = add(&s, test_disc(0.025), DEM2D_FREE, at, 0, v, test_uniform(&random, -20, 20));
+            const dem2d_vec at = vec(0.0502 * i + 1e-4 * random_between(&random, 0, 1), 0);
+            const dem2d_vec v = vec(way, -way * random_between(&random, 0.5, 1.5));
+            id = add_shape(&s, make_disc(0.025), DEM2D_FREE, at, 0, v,
+                           random_between(&random, -20, 20));
         }
         assert_ok(dem2d_world_step(s.world, (int)(6e-3 / time_step), NULL));
-        const dem2d_ledger l = book(&s);
+        const dem2d_ledger l = ledger_of(&s);
         assert_true(l.normal == 0 && l.tangential == 0 && l.friction > 0);
         mean.closure += fabs(l.closure) / l.given / 8;
-        mean.spin = look(&s, id).angular_velocity;
+        mean.spin = grain_of(&s, id).angular_velocity;
         dem2d_world_destroy(s.world);
     }
     return mean;
@@ -231,10 +199,10 @@ static driven make_driven(bool wall, bool full) {
         const dem2d_wall_desc belt = floor_of(&d.s, vec(0.1, 0));
         assert_ok(dem2d_world_add_wall(d.s.world, &belt, &d.wall));
     } else {
-        add(&d.s, test_disc(below), DEM2D_FIXED, vec(0, -below), 0, vec(0, 0), 0);
+        add_shape(&d.s, make_disc(below), DEM2D_FIXED, vec(0, -below), 0, vec(0, 0), 0);
     }
-    d.disc =
-        add(&d.s, test_disc(radius), DEM2D_DRIVEN, vec(0, radius - overlap), 0, vec(0.2, 0), 1);
+    d.disc = add_shape(&d.s, make_disc(radius), DEM2D_DRIVEN, vec(0, radius - overlap), 0,
+                       vec(0.2, 0), 1);
     return d;
 }
 
@@ -245,7 +213,7 @@ typedef struct place {
 } place;
 
 static place place_of(const driven *d) {
-    const dem2d_particle_info g = look(&d->s, d->disc);
+    const dem2d_particle_info g = grain_of(&d->s, d->disc);
     place p = {g.pose.position.x, g.pose.position.y, dem2d_rot_angle(g.pose.rotation), 0};
     if (d->wall.generation != 0) {
         dem2d_wall_info w;
@@ -274,15 +242,15 @@ static long double slide_between(const driven *d, place from, place to) {
     return slide;
 }
 
-static void change(driven *d, test_random *random) {
-    const dem2d_vec v = vec(test_uniform(random, -0.3, 0.3), test_uniform(random, -0.05, 0.05));
-    const int what = (int)test_uniform(random, 0, 8);
+static void change(driven *d, uint64_t *random) {
+    const dem2d_vec v = vec(random_between(random, -0.3, 0.3), random_between(random, -0.05, 0.05));
+    const int what = (int)random_between(random, 0, 8);
     if (what == 0)
-        assert_ok(dem2d_world_set_time_step(d->s.world, test_uniform(random, 1e-4, 2e-3)));
+        assert_ok(dem2d_world_set_time_step(d->s.world, random_between(random, 1e-4, 2e-3)));
     if (what == 1 || what == 2) /* twice: what was done is still the same */
         for (int k = 0; k < what; k++)
             assert_ok(dem2d_world_drive_particle(d->s.world, d->disc, DEM2D_DRIVEN, v,
-                                                 test_uniform(random, -2, 2)));
+                                                 random_between(random, -2, 2)));
     if (what == 3 && d->wall.generation != 0) {
         dem2d_wall_info w;
         assert_ok(dem2d_world_get_wall(d->s.world, d->wall, &w));
@@ -300,7 +268,7 @@ static void change(driven *d, test_random *random) {
 static void test_step_that_was_made(void **state) {
     (void)state;
     for (int kind = 0; kind < 4; kind++) {
-        test_random random = {(uint64_t)kind};
+        uint64_t random = (uint64_t)kind;
         driven d = make_driven(kind % 2 == 1, kind >= 2);
         place last = place_of(&d);
         dem2d_contact_info before, now;
@@ -310,7 +278,7 @@ static void test_step_that_was_made(void **state) {
         for (int i = 0; i < 400; i++) {
             const place at = place_of(&d);
             change(&d, &random);
-            if (test_uniform(&random, 0, 1) < 0.5) change(&d, &random);
+            if (random_between(&random, 0, 1) < 0.5) change(&d, &random);
             assert_ok(dem2d_world_step(d.s.world, 1, NULL));
             assert_ok(dem2d_world_contacts(d.s.world, &now, 1, &count));
             assert_int_equal(count, 1);

@@ -84,11 +84,11 @@ static void check_cloud(double ratio, double far, double speed, double skin) {
     dem2d_world_desc desc = quiet_desc();
     desc.skin = skin;
     const scene s = open_scene(&desc, 1e5, 0.3);
-    test_random random = {7};
+    uint64_t random = 7;
     for (int i = 0; i < 150; i++) {
-        const double scale = pow(ratio, -test_uniform(&random, 0, 1));
-        add(&s, i % 3, scale, far + test_uniform(&random, -8, 8), test_uniform(&random, -8, 8),
-            test_uniform(&random, -speed, speed));
+        const double scale = pow(ratio, -random_between(&random, 0, 1));
+        add(&s, i % 3, scale, far + random_between(&random, -8, 8), random_between(&random, -8, 8),
+            random_between(&random, -speed, speed));
     }
     for (int k = 0; k < 25; k++) {
         assert_ok(dem2d_world_step(s.world, k < 5 ? 1 : 20, NULL));

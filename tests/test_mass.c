@@ -127,10 +127,10 @@ static void circles_and_ellipses(void **state) {
 
 static void triangles_and_rectangles(void **state) {
     (void)state;
-    test_random random = {17};
+    uint64_t random = 17;
     for (int i = 0; i < 200; i++) {
-        const double w = test_uniform(&random, 0.1, 2), h = test_uniform(&random, 0.1, 2);
-        const double apex = test_uniform(&random, -1, 2), x = test_uniform(&random, -3, 3);
+        const double w = random_between(&random, 0.1, 2), h = random_between(&random, 0.1, 2);
+        const double apex = random_between(&random, -1, 2), x = random_between(&random, -3, 3);
         dem2d_vec p[4] = {{x, 5}, {x + w, 5}, {x + apex, 5 + h}};
         dem2d_shape *shape;
         assert_ok(dem2d_shape_create_polygon(NULL, p, 3, 0, &shape));
@@ -234,11 +234,11 @@ static void beziers(void **state) {
 }
 
 /* A random series of this order, convex by the sufficient test, about (cx, cy). */
-static void random_series(test_random *random, int order, double *a, double *b) {
+static void random_series(uint64_t *random, int order, double *a, double *b) {
     double sum = 0;
     for (int n = 1; n <= order; n++) {
         const double size = n == 1 ? 1 : 1.0 / (n * n * n);
-        a[n] = size * test_uniform(random, -1, 1), b[n] = size * test_uniform(random, -1, 1);
+        a[n] = size * random_between(random, -1, 1), b[n] = size * random_between(random, -1, 1);
         if (n > 1) sum += (n * n - 1) * hypot(a[n], b[n]);
     }
     a[0] = 2 * (1.1 * sum + 0.1), b[0] = 0;
@@ -247,7 +247,7 @@ static void random_series(test_random *random, int order, double *a, double *b) 
 static void series(void **state) {
     (void)state;
     static const int orders[] = {0, 1, 2, 3, 5, 8, 16, 64};
-    test_random random = {23};
+    uint64_t random = 23;
     for (int i = 0; i < 3 * COUNT_OF(orders); i++) {
         const int order = orders[i / 3];
         double a[65], b[65];
@@ -314,7 +314,7 @@ static void customs(void **state) {
 static void moving_the_input(void **state) {
     (void)state;
     static const double moves[][2] = {{0.3, -0.7}, {12.5, 40}, {-1e3, 1e3}};
-    test_random random = {29};
+    uint64_t random = 29;
     double a[9], b[9];
     random_series(&random, 8, a, b);
     const dem2d_vec corners[] = {{0, 0}, {4, -1}, {6, 2}, {3, 5}, {-1, 3}};

@@ -86,7 +86,7 @@ typedef struct heap {
 static void make_heap(heap *h, const dem2d_env *env) {
     const dem2d_vec rest = {0, 0};
     const double cell = 0.022, width = cell * (COLUMNS + 0.5), height = cell * ROWS;
-    test_random random = {7};
+    uint64_t random = 7;
     h->world = new_world(env);
     h->material = new_material(h->world, 0.4);
     const dem2d_shape_id disc = new_disc(h->world);
@@ -95,7 +95,7 @@ static void make_heap(heap *h, const dem2d_env *env) {
         const int row = i / COLUMNS;
         const dem2d_vec at =
             vec(cell * (i % COLUMNS + (row % 2 == 0 ? 0.5 : 1)), cell * (row + 0.5));
-        const double radius = test_uniform(&random, 0.35, 0.5) * cell;
+        const double radius = random_between(&random, 0.35, 0.5) * cell;
         h->ids[i] = add(h->world, disc, h->material, at, radius, 0, DEM2D_FREE);
     }
     h->walls[0] = add_wall(h->world, h->material, vec(0, 0), vec(1, 0), rest);
@@ -132,14 +132,14 @@ static void check_strain(double now, double before) {
 
 static void test_strain(void **state) {
     (void)state;
-    test_random random = {1};
+    uint64_t random = 1;
     if (LDBL_MANT_DIG <= DBL_MANT_DIG) skip(); /* no better logarithm to compare with */
     for (int i = 0; i < 20000; i++) {
-        const double before = ldexp(test_uniform(&random, 1, 2), test_below(&random, 1000) - 500);
-        check_strain(before * test_uniform(&random, 0.5, 2), before);
-        check_strain(before * (1 + ldexp(test_uniform(&random, -1, 1), -test_below(&random, 52))),
+        const double before = ldexp(random_between(&random, 1, 2), random_below(&random, 1000) - 500);
+        check_strain(before * random_between(&random, 0.5, 2), before);
+        check_strain(before * (1 + ldexp(random_between(&random, -1, 1), -random_below(&random, 52))),
                      before);
-        check_strain(ldexp(test_uniform(&random, 1, 2), test_below(&random, 1000) - 500), before);
+        check_strain(ldexp(random_between(&random, 1, 2), random_below(&random, 1000) - 500), before);
     }
     const double odd[] = {
         DBL_MAX,     DBL_MAX / 1.4,       DBL_MIN,           4.9e-324, 3e-310, 1, 1 - 0x1p-53,
@@ -165,12 +165,12 @@ static void test_strain_errors(void **state) {
 /* Principal values and their direction, turned into a tensor, come back. */
 static void test_principal(void **state) {
     (void)state;
-    test_random random = {3};
+    uint64_t random = 3;
     for (int i = 0; i < 5000; i++) {
-        const double size = ldexp(1, test_below(&random, 1800) - 900);
-        const double p = size * test_uniform(&random, -1, 1),
-                     q = size * test_uniform(&random, 0, 1);
-        const double angle = test_uniform(&random, -1.57, 1.57), odd = size * (i % 3);
+        const double size = ldexp(1, random_below(&random, 1800) - 900);
+        const double p = size * random_between(&random, -1, 1),
+                     q = size * random_between(&random, 0, 1);
+        const double angle = random_between(&random, -1.57, 1.57), odd = size * (i % 3);
         const dem2d_stress stress = {p + q * cos(2 * angle), q * sin(2 * angle) + odd,
                                      q * sin(2 * angle) - odd, p - q * cos(2 * angle)};
         dem2d_principal got;
@@ -252,12 +252,6 @@ static void test_sum_of_stresses(void **state) {
 }
 
 /* --- axes of shapes -------------------------------------------------------------------------- */
-
-static dem2d_shape *make_polygon(const dem2d_vec *points, int count, double rounding) {
-    dem2d_shape *shape;
-    assert_ok(dem2d_shape_create_polygon(NULL, points, count, rounding, &shape));
-    return shape;
-}
 
 static dem2d_shape *make_rectangle(double a, double b, double turn) {
     const dem2d_vec u = direction(turn);
@@ -457,13 +451,13 @@ static void test_axis_of_every_model(void **state) {
                 check_curve_axis(shape, rounded_point, &r, 10, k == 0);
             }
         }
-    test_random random = {17};
+    uint64_t random = 17;
     for (int run = 0; run < 20; run++) {
-        series f = {{2}, {0}, 2 + test_below(&random, 7)};
+        series f = {{2}, {0}, 2 + random_below(&random, 7)};
         for (int n = 2; n <= f.order; n++) {
             const double most = 0.6 / ((f.order - 1) * (n * n - 1));
-            f.a[n] = test_uniform(&random, -most, most),
-            f.b[n] = test_uniform(&random, -most, most);
+            f.a[n] = random_between(&random, -most, most),
+            f.b[n] = random_between(&random, -most, most);
         }
         assert_ok(dem2d_shape_create_fourier(NULL, f.a, f.b, f.order, &shape));
         check_curve_axis(shape, series_point, &f, 1, true);
@@ -580,14 +574,14 @@ static void check_region(int kind, double x, double angle, double scale, const d
 
 static void test_porosity(void **state) {
     (void)state;
-    test_random random = {11};
+    uint64_t random = 11;
     for (int i = 0; i < 12 * KINDS; i++) {
         dem2d_box box;
-        box.lower.x = ldexp(floor(test_uniform(&random, -1024, 512)), -10);
-        box.lower.y = ldexp(floor(test_uniform(&random, -1024, 512)), -10);
-        box.upper.x = box.lower.x + ldexp(floor(test_uniform(&random, 10, 2048)), -10);
-        box.upper.y = box.lower.y + ldexp(floor(test_uniform(&random, 10, 2048)), -10);
-        check_region(i % KINDS, i % 2 == 0 ? 0 : 4096, test_uniform(&random, -3, 3),
+        box.lower.x = ldexp(floor(random_between(&random, -1024, 512)), -10);
+        box.lower.y = ldexp(floor(random_between(&random, -1024, 512)), -10);
+        box.upper.x = box.lower.x + ldexp(floor(random_between(&random, 10, 2048)), -10);
+        box.upper.y = box.lower.y + ldexp(floor(random_between(&random, 10, 2048)), -10);
+        check_region(i % KINDS, i % 2 == 0 ? 0 : 4096, random_between(&random, -3, 3),
                      i % 3 == 0 ? 1 : 0.7, &box);
     }
 }

@@ -114,14 +114,14 @@ static int otsu(const uint8_t *pixels, int count) {
 
 static void thresholds(void **state) {
     (void)state;
-    test_random random = {7};
+    uint64_t random = 7;
     picture p;
     int threshold;
     for (int run = 0; run < 60; run++) {
-        const int levels = 2 + test_below(&random, 40);
+        const int levels = 2 + random_below(&random, 40);
         picture_init(&p, SIDE, SIDE, 0);
         for (int i = 0; i < SIDE * SIDE; i++)
-            p.pixels[i] = (uint8_t)(test_below(&random, levels) * 6 + (i % 3 ? 0 : 9));
+            p.pixels[i] = (uint8_t)(random_below(&random, levels) * 6 + (i % 3 ? 0 : 9));
         assert_ok(dem2d_image_threshold(&p.desc, &threshold));
         assert_int_equal(threshold, otsu(p.pixels, SIDE * SIDE));
     }
@@ -328,18 +328,18 @@ static void check_places(const picture *p, const dem2d_outline *outline) {
 
 static void random_pictures(void **state) {
     (void)state;
-    test_random random = {11};
+    uint64_t random = 11;
     for (int run = 0; run < 400; run++) {
         picture p, inverse;
-        const int w = 1 + test_below(&random, SIDE), h = 1 + test_below(&random, SIDE);
-        const int part = 1 + test_below(&random, 9), greys = run % 3 ? 2 : 256;
+        const int w = 1 + random_below(&random, SIDE), h = 1 + random_below(&random, SIDE);
+        const int part = 1 + random_below(&random, 9), greys = run % 3 ? 2 : 256;
         picture_init(&p, w, h, 0);
         p.desc.threshold = 128, p.desc.bright = run % 2, p.desc.keep_border = run % 4 < 2;
         p.desc.min_pixels = run % 5, p.desc.max_pixels = run % 3 ? 0 : 1 + run / 20;
-        p.desc.scale = test_uniform(&random, 0.1, 3);
+        p.desc.scale = random_between(&random, 0.1, 3);
         for (int i = 0; i < w * h; i++) {
-            const int grey = test_below(&random, greys) * (255 / (greys - 1));
-            p.pixels[i] = (uint8_t)(test_below(&random, 10) < part ? grey : 255);
+            const int grey = random_below(&random, greys) * (255 / (greys - 1));
+            p.pixels[i] = (uint8_t)(random_below(&random, 10) < part ? grey : 255);
         }
         dem2d_outline_set *set = outlines(&p.desc), *turned;
         check_against_labels(&p, set);
@@ -529,14 +529,14 @@ static void light_frame(void **state) {
 /* A region is a picture of its own, in the place it has in the whole. */
 static void crops(void **state) {
     (void)state;
-    test_random random = {5};
+    uint64_t random = 5;
     sheet s;
     sheet_init(&s, 200, 30);
-    for (int i = 0; i < WIDE * HIGH; i++) s.pixels[i] ^= (uint8_t)test_below(&random, 16);
+    for (int i = 0; i < WIDE * HIGH; i++) s.pixels[i] ^= (uint8_t)random_below(&random, 16);
     for (int run = 0; run < 100; run++) {
-        const int left = test_below(&random, WIDE), top = test_below(&random, HIGH);
-        const int width = 1 + test_below(&random, WIDE - left);
-        const int height = 1 + test_below(&random, HIGH - top);
+        const int left = random_below(&random, WIDE), top = random_below(&random, HIGH);
+        const int width = 1 + random_below(&random, WIDE - left);
+        const int height = 1 + random_below(&random, HIGH - top);
         dem2d_image_desc crop = s.desc, cut = s.desc;
         crop.min_pixels = cut.min_pixels = 1;
         crop.keep_border = cut.keep_border = run % 2;
@@ -657,14 +657,14 @@ static void label_masks(void **state) {
 /* Every connected piece of a label has the outline that it has alone in a binary picture. */
 static void random_labels(void **state) {
     (void)state;
-    test_random random = {23};
+    uint64_t random = 23;
     for (int run = 0; run < 100; run++) {
-        const int w = 1 + test_below(&random, SIDE), h = 1 + test_below(&random, SIDE);
-        const int kinds = 1 + test_below(&random, 4);
+        const int w = 1 + random_below(&random, SIDE), h = 1 + random_below(&random, SIDE);
+        const int kinds = 1 + random_below(&random, 4);
         picture p, alone;
         int found = 0;
         picture_init(&p, w, h, 0);
-        for (int i = 0; i < w * h; i++) p.pixels[i] = (uint8_t)test_below(&random, kinds + 1);
+        for (int i = 0; i < w * h; i++) p.pixels[i] = (uint8_t)random_below(&random, kinds + 1);
         p.desc.labels = p.desc.keep_border = true;
         dem2d_outline_set *set = outlines(&p.desc);
         picture rest = p;
@@ -783,10 +783,10 @@ static void picture_errors(void **state) {
 /* --- measures --------------------------------------------------------------------------------- */
 
 /* A star-shaped outline, concave as a rule. */
-static int star(test_random *random, int n, double depth, dem2d_vec centre, dem2d_vec *p) {
+static int star(uint64_t *random, int n, double depth, dem2d_vec centre, dem2d_vec *p) {
     for (int i = 0; i < n; i++) {
-        const double r = test_uniform(random, 1 - depth, 1);
-        const dem2d_vec u = direction(6.283185307179586 * (i + test_uniform(random, 0, 0.8)) / n);
+        const double r = random_between(random, 1 - depth, 1);
+        const dem2d_vec u = direction(6.283185307179586 * (i + random_between(random, 0, 0.8)) / n);
         p[i] = vec(centre.x + 2 * r * u.x, centre.y + r * u.y);
     }
     return n;
@@ -821,7 +821,7 @@ static double depth_at(dem2d_vec c, const dem2d_vec *p, int n) {
 
 static void measures_of_stars(void **state) {
     (void)state;
-    test_random random = {13};
+    uint64_t random = 13;
     for (int run = 0; run < 120; run++) {
         dem2d_vec p[60];
         dem2d_outline_info info;
@@ -915,7 +915,7 @@ static void measures_of_known_shapes(void **state) {
 /* All lengths times 2^k: the same bits. Sizes are what the manual promises. */
 static void measures_have_no_length(void **state) {
     (void)state;
-    test_random random = {17};
+    uint64_t random = 17;
     dem2d_vec p[90], q[90], s[90], t[90];
     const int n = star(&random, 90, 0.3, vec(3, 4), p), m = star(&random, 70, 0.3, vec(3, 4), q);
     dem2d_outline_info one, other;
@@ -996,16 +996,16 @@ static double farthest_corner(const dem2d_vec *p, int n, const dem2d_vec *q, int
 
 static void differences_of_stars(void **state) {
     (void)state;
-    test_random random = {19};
+    uint64_t random = 19;
     for (int run = 0; run < 300; run++) {
         dem2d_vec p[200], q[200];
         dem2d_difference d, back;
-        const int n = star(&random, 5 + test_below(&random, run % 3 ? 20 : 190), 0.6, vec(1, 1), p);
-        const dem2d_vec at = vec(test_uniform(&random, 0, run % 5), 1);
-        int m = star(&random, 5 + test_below(&random, 190), 0.1 * (run % 9), at, q);
+        const int n = star(&random, 5 + random_below(&random, run % 3 ? 20 : 190), 0.6, vec(1, 1), p);
+        const dem2d_vec at = vec(random_between(&random, 0, run % 5), 1);
+        int m = star(&random, 5 + random_below(&random, 190), 0.1 * (run % 9), at, q);
         if (run % 4 == 0) { /* many corners on corners, sides on sides */
             memcpy(q, p, sizeof q), m = n;
-            for (int i = 0; i < m; i += 3) q[i].x += test_uniform(&random, -0.1, 0.1);
+            for (int i = 0; i < m; i += 3) q[i].x += random_between(&random, -0.1, 0.1);
         }
         if (run % 6 == 0) /* level sides and crossings at corners */
             for (int i = 0; i < 200; i++) {
@@ -1239,17 +1239,17 @@ static bool check_crossing(const dem2d_vec *p, int n, bool good) {
    they do so but for rounding. */
 static void crossings_of_lattice_polygons(void **state) {
     (void)state;
-    test_random random = {41};
+    uint64_t random = 41;
     int good = 0, runs = test_long() ? 200000 : 4000;
     for (int run = 0; run < runs; run++) {
         dem2d_vec p[16], q[16];
-        const int n = 3 + test_below(&random, 8), side = 2 + test_below(&random, 5);
+        const int n = 3 + random_below(&random, 8), side = 2 + random_below(&random, 5);
         for (int i = 0; i < n; i++)
-            p[i] = vec(test_below(&random, side), test_below(&random, side));
+            p[i] = vec(random_below(&random, side), random_below(&random, side));
         const bool once = is_good(p, n);
         good += check_crossing(p, n, once);
-        const dem2d_vec u = direction(test_uniform(&random, 0, 7));
-        const double x = test_uniform(&random, -9, 9), size = exp(test_uniform(&random, -9, 9));
+        const dem2d_vec u = direction(random_between(&random, 0, 7));
+        const double x = random_between(&random, -9, 9), size = exp(random_between(&random, -9, 9));
         for (int i = 0; i < n; i++)
             q[i] = vec(size * (p[i].x * u.x - p[i].y * u.y + x),
                        size * (p[i].x * u.y + p[i].y * u.x - x));

@@ -19,8 +19,8 @@ static int destroy_pool(void **state) {
     return 0;
 }
 
-static const model *any(int kind, dice *d) {
-    return &all.models[kind][dice_below(d, VARIANTS)];
+static const model *any(int kind, uint64_t *d) {
+    return &all.models[kind][random_below(d, VARIANTS)];
 }
 
 /* --- asking, and failing so that it can be done again ---------------------------------------- */
@@ -140,7 +140,7 @@ static void check_scene(const scene *s, bool surfaces) {
 
 static void test_every_pair(void **state) {
     (void)state;
-    dice d = {101};
+    uint64_t d = 101;
     for (int i = 0; i < KINDS * KINDS * WAYS * 2; i++) {
         const model *a = any(i % KINDS, &d), *b = any(i / KINDS % KINDS, &d);
         const scene s = scene_draw(a, b, i / (KINDS * KINDS) % WAYS, &d);
@@ -151,7 +151,7 @@ static void test_every_pair(void **state) {
 /* The two other questions about the same pairs. */
 static void test_overlap_and_distance(void **state) {
     (void)state;
-    dice d = {102};
+    uint64_t d = 102;
     for (int i = 0; i < KINDS * KINDS * WAYS; i++) {
         const model *a = any(i % KINDS, &d), *b = any(i / KINDS % KINDS, &d);
         const scene s = scene_draw(a, b, i / (KINDS * KINDS), &d);
@@ -255,7 +255,7 @@ static void check_unchanged(const scene *s, dem2d_solver solver) {
 
 static void test_unchanged(void **state) {
     (void)state;
-    dice d = {103};
+    uint64_t d = 103;
     for (int i = 0; i < KINDS * KINDS * WAYS * 2; i++) {
         const model *a = any(i % KINDS, &d), *b = any(i / KINDS % KINDS, &d);
         const scene s = scene_draw(a, b, i / (KINDS * KINDS) % WAYS, &d);
@@ -266,7 +266,7 @@ static void test_unchanged(void **state) {
 /* Near 1e8, moved there by what doubles hold: not one bit of what is relative changes. */
 static void test_moved_far(void **state) {
     (void)state;
-    dice d = {104};
+    uint64_t d = 104;
     for (int i = 0; i < KINDS * KINDS * 8; i++) {
         const model *a = any(i % KINDS, &d), *b = any(i / KINDS % KINDS, &d);
         const scene far = scene_draw(a, b, REMOTE, &d);
@@ -289,7 +289,7 @@ static void test_sweep(void **state) {
     static const double gaps[] = {1e-9,  1e-10, 1e-11, 1e-12, 1e-13, 3e-14,
                                   1e-14, 6e-15, 3e-15, 1e-15, 2e-16};
     enum { STEPS = 2 * COUNT_OF(gaps) + 1 };
-    dice d = {105};
+    uint64_t d = 105;
     for (int i = 0; i < KINDS * KINDS * 3; i++) {
         const model *a = any(i % KINDS, &d), *b = any(i / KINDS % KINDS, &d);
         scene s = scene_draw(a, b, TOUCHES, &d);
@@ -320,7 +320,7 @@ static void test_sweep(void **state) {
 /* The position of B, moved by single steps of a double. */
 static void test_sweep_by_ulps(void **state) {
     (void)state;
-    dice d = {106};
+    uint64_t d = 106;
     for (int i = 0; i < KINDS * KINDS; i++) {
         scene s = scene_draw(any(i % KINDS, &d), any(i / KINDS, &d), TOUCHES, &d);
         scene_place(&s, s.u, 0);
@@ -342,7 +342,7 @@ static void test_sweep_by_ulps(void **state) {
 
 /* --- polygons, exactly ----------------------------------------------------------------------- */
 
-static const model *integer_polygon(dice *d) {
+static const model *integer_polygon(uint64_t *d) {
     for (int i = 0; i < 1000; i++) {
         const model *m = any(POLYGON, d);
         if (m->corners) return m;
@@ -364,7 +364,7 @@ static bool is_least_edge(const lattice *hull, int count, const bool *least, dem
 
 static void test_integer_polygons(void **state) {
     (void)state;
-    dice d = {107};
+    uint64_t d = 107;
     int touches = 0, overlaps = 0;
     for (int i = 0; i < 6000; i++) {
         const model *a = integer_polygon(&d), *b = integer_polygon(&d);
@@ -374,7 +374,7 @@ static void test_integer_polygons(void **state) {
         const int n = lattice_difference(a, s.turns_a, b, s.turns_b, s.shift, hull);
         /* the library adds up the size in its own way: not the same last bits */
         const real depth = lattice_depth(hull, n, least), slack = 1.001L * depth_slack(&s.p);
-        dem2d_contact_desc desc = with(DEM2D_CERTIFIED, dice_direction(&d));
+        dem2d_contact_desc desc = with(DEM2D_CERTIFIED, random_direction(&d));
         for (int warm = 0; warm < 2; warm++) {
             const dem2d_contact c = ask(&s.p, warm ? &desc : NULL);
             EXPECT_NONE(answer_flaw(&s.p, &c, CASE_TOLERANCE, DEM2D_CERTIFIED), &s, "integer", &c);
@@ -398,13 +398,13 @@ static void test_integer_polygons(void **state) {
 static void test_closed_forms(void **state) {
     (void)state;
     static const int kinds[3] = {CIRCLE, POLYGON, ROUNDED};
-    dice d = {108};
+    uint64_t d = 108;
     for (int i = 0; i < 9 * WAYS * 12; i++) {
         const model *a = any(kinds[i % 3], &d), *b = any(kinds[i / 3 % 3], &d);
         const scene s = scene_draw(a, b, i / 9 % WAYS, &d);
         const truth t = find_truth(&s.p);
         const real slack = 1.001L * depth_slack(&s.p);
-        const dem2d_contact_desc desc = with(DEM2D_CERTIFIED, dice_direction(&d));
+        const dem2d_contact_desc desc = with(DEM2D_CERTIFIED, random_direction(&d));
         for (int warm = 0; warm < 2; warm++) {
             const dem2d_contact c = ask(&s.p, warm ? &desc : NULL);
             check_answer(&s, &t, "closed form", DEM2D_CERTIFIED, &c);
@@ -625,15 +625,15 @@ static void test_needles(void **state) {
 /* Series whose radius of curvature touches 0, and of order 64 with coefficients from 1e-20 up. */
 static void test_series(void **state) {
     (void)state;
-    dice d = {109};
+    uint64_t d = 109;
     for (int i = 0; i < 40; i++) {
         double a[65] = {2}, b[65] = {0};
         model m = {0};
         const int order = i % 2 ? 64 : 2;
         if (order == 2) a[2] = 1 / 3.0;
         for (int n = 2; order == 64 && n <= 64; n++) {
-            const double size = dice_scale(&d, 1e-20, 0.5 / (n * n)) / (n * n);
-            a[n] = dice_uniform(&d, -size, size), b[n] = dice_uniform(&d, -size, size);
+            const double size = random_scale(&d, 1e-20, 0.5 / (n * n)) / (n * n);
+            a[n] = random_between(&d, -size, size), b[n] = random_between(&d, -size, size);
         }
         m.kind = FOURIER;
         m.count = order < MODEL_POINTS ? order + 1 : MODEL_POINTS; /* what is left out is < 1e-7 */
@@ -660,10 +660,10 @@ static void test_series(void **state) {
 /* Directions where one arc or corner hands over to the next, and an ulp beside. */
 static void test_joints(void **state) {
     (void)state;
-    dice d = {110};
+    uint64_t d = 110;
     for (int i = 0; i < 2 * VARIANTS; i++) {
         const model *a = &all.models[i % 2 ? BEZIER : POLYGON][i / 2];
-        const model *b = any(dice_below(&d, KINDS), &d);
+        const model *b = any(random_below(&d, KINDS), &d);
         for (int k = 0; k < a->count; k++) {
             const int next = (k + 1) % a->count;
             const dem2d_vec e =
@@ -732,10 +732,10 @@ static void test_representations(void **state) {
     assert_ok(dem2d_shape_create_polygon(NULL, core, 3, 0.8 - tiny, &discs[4]));
     assert_ok(dem2d_shape_create_polygon(NULL, ring, CORNERS, 0, &discs[5]));
     static const double off[DISCS] = {0, 0, 0, 0, 3 * 1e-9, 0.8 * 3.9e-5};
-    dice d = {111};
+    uint64_t d = 111;
     for (int i = 0; i < KINDS * 12; i++) {
         const model *m = any(i % KINDS, &d);
-        const dem2d_pose at = {{dice_uniform(&d, 0, 2), dice_uniform(&d, 0, 1)}, {0.6, 0.8}, 1};
+        const dem2d_pose at = {{random_between(&d, 0, 2), random_between(&d, 0, 1)}, {0.6, 0.8}, 1};
         dem2d_contact first = {0}, c;
         for (int k = 0; k < DISCS; k++) {
             assert_ok(dem2d_pair_contact(discs[k], still(), m->shape, at, NULL, &c));
@@ -752,7 +752,7 @@ static void test_representations(void **state) {
 static void test_cap_and_tolerance(void **state) {
     (void)state;
     static const double tolerances[] = {1e-3, 1e-6, 1e-14};
-    dice d = {112};
+    uint64_t d = 112;
     int unresolved = 0;
     for (int i = 0; i < KINDS * KINDS * 6; i++) {
         const model *a = any(i % KINDS, &d), *b = any(i / KINDS % KINDS, &d);
@@ -776,7 +776,7 @@ static void test_cap_and_tolerance(void **state) {
 /* Without contact points all else is the same. */
 static void test_skip_points(void **state) {
     (void)state;
-    dice d = {115};
+    uint64_t d = 115;
     for (int i = 0; i < KINDS * KINDS * 4; i++) {
         const model *a = any(i % KINDS, &d), *b = any(i / KINDS % KINDS, &d);
         const scene s = scene_draw(a, b, i % 2 ? CHOSEN : PARALLEL, &d);
@@ -854,18 +854,18 @@ static void check_wall(const model *m, const dem2d_pose *pose, dem2d_vec on, spo
 static void test_walls(void **state) {
     (void)state;
     static const double lengths[] = {1, 1e-3, 1e3, 1e150, 1e-160};
-    dice d = {113};
+    uint64_t d = 113;
     for (int i = 0; i < KINDS * 60; i++) {
         const model *m = any(i % KINDS, &d);
         const scene s = scene_draw(m, m, i % WAYS, &d);
-        const spot n = i % 4 ? draw_normal(m, &s.p.pose_b, &d) : dice_direction(&d);
+        const spot n = i % 4 ? draw_normal(m, &s.p.pose_b, &d) : random_direction(&d);
         const spot inward = spot_make(-n.x, -n.y);
         const spot a = posed_support(m, &s.p.pose_b, inward);
         /* at a depth from far off to wholly behind the wall, anywhere along it */
-        const double along = dice_uniform(&d, -9, 9), f = s.p.pose_b.scale;
-        const double depth = i % 3 == 0   ? f * dice_scale(&d, 1e-16, 1)
-                             : i % 3 == 1 ? -f * dice_scale(&d, 1e-16, 1)
-                                          : f * dice_uniform(&d, 0, 4);
+        const double along = random_between(&d, -9, 9), f = s.p.pose_b.scale;
+        const double depth = i % 3 == 0   ? f * random_scale(&d, 1e-16, 1)
+                             : i % 3 == 1 ? -f * random_scale(&d, 1e-16, 1)
+                                          : f * random_between(&d, 0, 4);
         const dem2d_vec at = s.p.pose_b.position;
         const dem2d_vec on = {(double)(at.x + a.x + depth * n.x - along * n.y),
                               (double)(at.y + a.y + depth * n.y + along * n.x)};
@@ -918,13 +918,13 @@ static void test_many_turns(void **state) {
 /* Against what the construction knows, the value along the normal, and other directions. */
 static void test_many_pairs(void **state) {
     (void)state;
-    dice d = {114};
+    uint64_t d = 114;
     int unresolved = 0;
     for (int i = 0; i < 100000; i++) {
-        const model *a = any(dice_below(&d, KINDS), &d), *b = any(dice_below(&d, KINDS), &d);
-        scene s = scene_draw(a, b, dice_below(&d, WAYS), &d);
-        if (i % 4 == 0) s = scene_scaled(&s, dice_below(&d, 401) - 200);
-        dem2d_contact_desc desc = with(DEM2D_CERTIFIED, dice_direction(&d));
+        const model *a = any(random_below(&d, KINDS), &d), *b = any(random_below(&d, KINDS), &d);
+        scene s = scene_draw(a, b, random_below(&d, WAYS), &d);
+        if (i % 4 == 0) s = scene_scaled(&s, random_below(&d, 401) - 200);
+        dem2d_contact_desc desc = with(DEM2D_CERTIFIED, random_direction(&d));
         const dem2d_contact c = ask(&s.p, i % 2 ? &desc : NULL);
         const real slack = depth_slack(&s.p) + s.places;
         EXPECT_NONE(answer_flaw(&s.p, &c, CASE_TOLERANCE, DEM2D_CERTIFIED), &s, "many", &c);
@@ -932,7 +932,7 @@ static void test_many_pairs(void **state) {
         if (s.known) EXPECT_NONE(depth_flaw(&c, s.chosen, s.chosen, slack), &s, "many", &c);
         if (s.bounded) EXPECT(c.depth - c.error - slack <= s.chosen, &s, "many", &c);
         for (int k = 0; k < 3; k++) {
-            const real h = pair_value(&s.p, dice_direction(&d));
+            const real h = pair_value(&s.p, random_direction(&d));
             EXPECT(h >= c.depth - c.error - slack, &s, "many", &c);
         }
         if (c.state != DEM2D_UNRESOLVED) continue;

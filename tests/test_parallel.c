@@ -58,7 +58,7 @@ typedef struct host {
     const runner *runner;
     calls *calls;
     crew crew;
-    test_random random;
+    uint64_t random;
     pthread_t caller; /* of dem2d_world_step: the only thread that runs callbacks of the library */
     bool elsewhere;   /* one was run by another */
     bool inside;      /* a call of the callback is going on */
@@ -85,15 +85,15 @@ static void host_log(void *user, dem2d_result result, int index, const char *tex
 }
 
 /* Cuts 0 .. count - 1 into ranges of random lengths and does them in random order. */
-static void run_at_random(test_random *random, int count, dem2d_task_fn *task, void *context) {
+static void run_at_random(uint64_t *random, int count, dem2d_task_fn *task, void *context) {
     int *ends = malloc((size_t)count * 2 * sizeof *ends), *order = ends + count, ranges = 0;
     assert_non_null(ends);
     for (int end = 0; end < count; ranges++) {
-        end += 1 + test_below(random, 1 + (count - end) / 2);
+        end += 1 + random_below(random, 1 + (count - end) / 2);
         ends[ranges] = end;
     }
     for (int i = 0; i < ranges; i++) { /* a shuffle that grows */
-        const int k = test_below(random, i + 1);
+        const int k = random_below(random, i + 1);
         order[i] = order[k], order[k] = i;
     }
     for (int i = 0; i < ranges; i++)
@@ -240,7 +240,7 @@ typedef struct run {
     dem2d_material_id material;
     dem2d_wall_id walls[WALLS + LINKS];
     int wall_count;
-    test_random random;
+    uint64_t random;
     dem2d_env env;
     host host;
 } run;
@@ -271,18 +271,18 @@ static dem2d_shape *make_shape(int kind) {
 static dem2d_particle_id add_grain(run *r, const scene *s, int place) {
     dem2d_particle_desc desc = {0};
     dem2d_particle_id id;
-    r->random.state = (uint64_t)place + 7; /* whenever it comes */
+    r->random = (uint64_t)place + 7; /* whenever it comes */
     desc.shape = r->shapes[s->discs ? 0 : place % 5], desc.material = r->material;
-    desc.scale = test_uniform(&r->random, 0.9, 1) * (s->discs ? 1 : 1.2); /* most touch */
+    desc.scale = random_between(&r->random, 0.9, 1) * (s->discs ? 1 : 1.2); /* most touch */
     desc.position.x = PITCH * (0.5 + place % COLUMNS);
     desc.position.y = PITCH * (0.5 + (double)(place / COLUMNS));
-    desc.angle = test_uniform(&r->random, -3, 3);
+    desc.angle = random_between(&r->random, -3, 3);
     if (s->drive && place % 7 == 0) desc.motion = DEM2D_FIXED;
     if (s->drive && place % 7 == 3) desc.motion = DEM2D_DRIVEN;
     if (desc.motion != DEM2D_FIXED) {
-        desc.velocity.x = test_uniform(&r->random, -1, 1);
-        desc.velocity.y = test_uniform(&r->random, -1, 1);
-        desc.angular_velocity = test_uniform(&r->random, -20, 20);
+        desc.velocity.x = random_between(&r->random, -1, 1);
+        desc.velocity.y = random_between(&r->random, -1, 1);
+        desc.angular_velocity = random_between(&r->random, -20, 20);
     }
     assert_ok(dem2d_world_add_particle(r->world, &desc, &id));
     return id;
@@ -293,9 +293,9 @@ static dem2d_particle_id add_grain(run *r, const scene *s, int place) {
 static void add_in_order(run *r, const scene *s, uint64_t seed) {
     dem2d_particle_id ids[GRAINS];
     int order[GRAINS];
-    test_random random = {seed};
+    uint64_t random = seed;
     for (int i = 0; i < GRAINS; i++) {
-        const int k = seed > 0 ? test_below(&random, i + 1) : i;
+        const int k = seed > 0 ? random_below(&random, i + 1) : i;
         ids[i] = add_grain(r, s, i);
         order[i] = order[k], order[k] = i;
     }

@@ -115,7 +115,7 @@ static dem2d_world *make_world(const scene *s, double size, dem2d_wall_id walls[
     dem2d_particle_desc grain = {0};
     dem2d_shape_id shapes[KINDS];
     dem2d_world *world;
-    test_random random = {42};
+    uint64_t random = 42;
     desc.time_step = 1e-4, desc.gravity.y = -9.81 * size, desc.local_damping = 0.5;
     desc.faces = s->faces, desc.ledger = true, desc.law = s->law ? own_law : NULL;
     if (s->full) stone.damping_ratio = 0.2, stone.rolling_friction = 0.1;
@@ -129,12 +129,12 @@ static dem2d_world *make_world(const scene *s, double size, dem2d_wall_id walls[
     }
     for (int i = 0; i < GRAINS; i++) {
         dem2d_particle_id id;
-        grain.scale = test_uniform(&random, 0.8, 1.1),
+        grain.scale = random_between(&random, 0.8, 1.1),
         grain.shape = shapes[s->discs ? 0 : i % KINDS];
-        grain.position.x = size * (0.05 + 0.075 * (i % 6) + test_uniform(&random, -0.004, 0.004));
+        grain.position.x = size * (0.05 + 0.075 * (i % 6) + random_between(&random, -0.004, 0.004));
         grain.position.y = size * (0.05 + 0.065 * (i / 6));
-        grain.angle = test_uniform(&random, -3, 3);
-        grain.velocity = vec(size * test_uniform(&random, -0.5, 0.5), -2 * size);
+        grain.angle = random_between(&random, -3, 3);
+        grain.velocity = vec(size * random_between(&random, -0.5, 0.5), -2 * size);
         assert_ok(dem2d_world_add_particle(world, &grain, &id));
     }
     return world;

@@ -81,19 +81,19 @@ static long double scan_depth(const dem2d_shape *shape, dem2d_pose pose, dem2d_v
 /* One particle near one segment, beside its side or its ends. */
 static void test_depth(void **state) {
     (void)state;
-    test_random random = {5};
+    uint64_t random = 5;
     int found = 0;
     for (int i = 0; i < 400; i++) {
         dem2d_material_id material;
         dem2d_world *world = make_world(0.3, vec(0, 0), false, &material);
-        const double angle = test_uniform(&random, 0, 6.28), length = i % 2 ? 0.03 : 0.4;
+        const double angle = random_between(&random, 0, 6.28), length = i % 2 ? 0.03 : 0.4;
         const dem2d_vec from = vec(1, 2);
         const dem2d_vec to = vec(from.x + length * cos(angle), from.y + length * sin(angle));
-        const double place = test_uniform(&random, -0.05, length + 0.05);
-        const double away = test_uniform(&random, 0.02, 0.06) * (i % 3 ? 1 : -1);
+        const double place = random_between(&random, -0.05, length + 0.05);
+        const double away = random_between(&random, 0.02, 0.06) * (i % 3 ? 1 : -1);
         const dem2d_vec at = vec(from.x + place * cos(angle) - away * sin(angle),
                                  from.y + place * sin(angle) + away * cos(angle));
-        const double turn = test_uniform(&random, 0, 6.28);
+        const double turn = random_between(&random, 0, 6.28);
         add_segment(world, material, from, to);
         dem2d_shape *shape = make_shape(i % SHAPES);
         const dem2d_pose pose = dem2d_pose_make(at.x, at.y, turn, 1);

@@ -62,66 +62,66 @@ static void scale_points(double scale, int count, const dem2d_vec *in, dem2d_vec
     for (int i = 0; i < count; i++) out[i] = vec(scale * in[i].x, scale * in[i].y);
 }
 
-static dem2d_result make_circle(const dem2d_env *env, double scale, dem2d_shape **shape) {
+static dem2d_result try_circle(const dem2d_env *env, double scale, dem2d_shape **shape) {
     return dem2d_shape_create_circle(env, 1.5 * scale, shape);
 }
 
-static dem2d_result make_ellipse(const dem2d_env *env, double scale, dem2d_shape **shape) {
+static dem2d_result try_ellipse(const dem2d_env *env, double scale, dem2d_shape **shape) {
     return dem2d_shape_create_ellipse(env, 3 * scale, 0.75 * scale, shape);
 }
 
-static dem2d_result make_polygon(const dem2d_env *env, double scale, dem2d_shape **shape) {
+static dem2d_result try_polygon(const dem2d_env *env, double scale, dem2d_shape **shape) {
     dem2d_vec points[5];
     scale_points(scale, 5, pentagon, points);
     return dem2d_shape_create_polygon(env, points, 5, 0, shape);
 }
 
-static dem2d_result make_rounded(const dem2d_env *env, double scale, dem2d_shape **shape) {
+static dem2d_result try_rounded(const dem2d_env *env, double scale, dem2d_shape **shape) {
     dem2d_vec points[5];
     scale_points(scale, 5, pentagon, points);
     return dem2d_shape_create_polygon(env, points, 5, 0.7 * scale, shape);
 }
 
-static dem2d_result make_arcs(const dem2d_env *env, double scale, const dem2d_vec *control,
+static dem2d_result try_arcs(const dem2d_env *env, double scale, const dem2d_vec *control,
                               int arcs, dem2d_shape **shape) {
     dem2d_vec scaled[3 * 16];
     scale_points(scale, 3 * arcs, control, scaled);
     return dem2d_shape_create_bezier(env, scaled, arcs, shape);
 }
 
-static dem2d_result make_cubic(const dem2d_env *env, double scale, dem2d_shape **shape) {
+static dem2d_result try_cubic(const dem2d_env *env, double scale, dem2d_shape **shape) {
     dem2d_vec control[15];
     cut_corners(pentagon, 5, 0.8, control);
-    return make_arcs(env, scale, control, 5, shape);
+    return try_arcs(env, scale, control, 5, shape);
 }
 
-static dem2d_result make_parabola(const dem2d_env *env, double scale, dem2d_shape **shape) {
+static dem2d_result try_parabola(const dem2d_env *env, double scale, dem2d_shape **shape) {
     dem2d_vec control[15];
     cut_corners(pentagon, 5, 2.0 / 3, control);
-    return make_arcs(env, scale, control, 5, shape);
+    return try_arcs(env, scale, control, 5, shape);
 }
 
-static dem2d_result make_flat(const dem2d_env *env, double scale, dem2d_shape **shape) {
+static dem2d_result try_flat(const dem2d_env *env, double scale, dem2d_shape **shape) {
     dem2d_vec control[24];
     turn_four(flat_quarter, 6, control);
-    return make_arcs(env, scale, control, 8, shape);
+    return try_arcs(env, scale, control, 8, shape);
 }
 
-static dem2d_result make_series(const dem2d_env *env, double scale, const double *a,
+static dem2d_result try_series(const dem2d_env *env, double scale, const double *a,
                                 const double *b, int order, dem2d_shape **shape) {
     double scaled_a[65], scaled_b[65];
     for (int n = 0; n <= order; n++) scaled_a[n] = scale * a[n], scaled_b[n] = scale * b[n];
     return dem2d_shape_create_fourier(env, scaled_a, scaled_b, order, shape);
 }
 
-static dem2d_result make_fs8(const dem2d_env *env, double scale, dem2d_shape **shape) {
-    return make_series(env, scale, fs8_a, fs8_b, 8, shape);
+static dem2d_result try_fs8(const dem2d_env *env, double scale, dem2d_shape **shape) {
+    return try_series(env, scale, fs8_a, fs8_b, 8, shape);
 }
 
-static dem2d_result make_fs64(const dem2d_env *env, double scale, dem2d_shape **shape) {
+static dem2d_result try_fs64(const dem2d_env *env, double scale, dem2d_shape **shape) {
     double a[65], b[65];
     fs64(a, b);
-    return make_series(env, scale, a, b, 64, shape);
+    return try_series(env, scale, a, b, 64, shape);
 }
 
 static dem2d_vec ellipse_callback(void *user, dem2d_vec u, double *rho) {
@@ -131,7 +131,7 @@ static dem2d_vec ellipse_callback(void *user, dem2d_vec u, double *rho) {
     return vec(a * a * u.x / h, b * b * u.y / h);
 }
 
-static dem2d_result make_custom(const dem2d_env *env, double scale, dem2d_shape **shape) {
+static dem2d_result try_custom(const dem2d_env *env, double scale, dem2d_shape **shape) {
     static double scales[16]; /* the shape keeps a pointer to its size */
     static int next;
     double *kept = &scales[next++ % 16];
@@ -262,16 +262,16 @@ typedef struct model {
 } model;
 
 static const model models[] = {
-    {"circle", make_circle, truth_circle, 1e-14L, DEM2D_CIRCLE, 0, 0},
-    {"ellipse", make_ellipse, truth_ellipse, 1e-14L, DEM2D_ELLIPSE, 0, 0},
-    {"polygon", make_polygon, truth_polygon, 1e-14L, DEM2D_POLYGON, 5, 0},
-    {"rounded", make_rounded, truth_rounded, 1e-14L, DEM2D_POLYGON, 5, 0.7},
-    {"cubic", make_cubic, truth_cubic, 1e-8L, DEM2D_BEZIER, 5, 0},
-    {"parabola", make_parabola, truth_parabola, 1e-8L, DEM2D_BEZIER, 5, 0},
-    {"flat", make_flat, truth_flat, 1e-8L, DEM2D_BEZIER, 8, 0},
-    {"fs8", make_fs8, truth_fs8, 1e-14L, DEM2D_FOURIER, 8, 0},
-    {"fs64", make_fs64, truth_fs64, 2e-14L, DEM2D_FOURIER, 64, 0},
-    {"custom", make_custom, truth_ellipse, 1e-14L, DEM2D_CUSTOM, 0, 0},
+    {"circle", try_circle, truth_circle, 1e-14L, DEM2D_CIRCLE, 0, 0},
+    {"ellipse", try_ellipse, truth_ellipse, 1e-14L, DEM2D_ELLIPSE, 0, 0},
+    {"polygon", try_polygon, truth_polygon, 1e-14L, DEM2D_POLYGON, 5, 0},
+    {"rounded", try_rounded, truth_rounded, 1e-14L, DEM2D_POLYGON, 5, 0.7},
+    {"cubic", try_cubic, truth_cubic, 1e-8L, DEM2D_BEZIER, 5, 0},
+    {"parabola", try_parabola, truth_parabola, 1e-8L, DEM2D_BEZIER, 5, 0},
+    {"flat", try_flat, truth_flat, 1e-8L, DEM2D_BEZIER, 8, 0},
+    {"fs8", try_fs8, truth_fs8, 1e-14L, DEM2D_FOURIER, 8, 0},
+    {"fs64", try_fs64, truth_fs64, 2e-14L, DEM2D_FOURIER, 64, 0},
+    {"custom", try_custom, truth_ellipse, 1e-14L, DEM2D_CUSTOM, 0, 0},
 };
 #define EACH_MODEL(m) (const model *m = models; m < models + COUNT_OF(models); m++)
 
@@ -676,10 +676,10 @@ static void support_is_the_farthest_point(void **state) {
             dem2d_vec hard[128];
             const int count = hard_directions(hard);
             for (int i = 0; i < count; i++) check_support(m, shape, &info, hard[i]);
-            test_random random = {7};
+            uint64_t random = 7;
             for (int i = 0; i < 300; i++)
                 check_support(m, shape, &info,
-                              vec(test_uniform(&random, -1, 1), test_uniform(&random, -1, 1)));
+                              vec(random_between(&random, -1, 1), random_between(&random, -1, 1)));
             dem2d_shape_destroy(shape);
         }
 }
@@ -692,10 +692,10 @@ static void rho_is_the_radius_of_curvature(void **state) {
         EACH_MODEL(m) {
             dem2d_shape_info info;
             dem2d_shape *shape = make(m, 1, &info);
-            test_random random = {11};
+            uint64_t random = 11;
             int compared = 0;
             for (int i = 0; i < 100; i++) {
-                const dem2d_vec d = direction(test_uniform(&random, 0, 6.3));
+                const dem2d_vec d = direction(random_between(&random, 0, 6.3));
                 const long double t = atan2l(d.y, d.x), step = 1e-4L;
                 long double h[5], rho[3];
                 for (int k = 0; k < 5; k++)
@@ -715,7 +715,7 @@ static void rho_is_the_radius_of_curvature(void **state) {
         }
     dem2d_shape_info info;
     dem2d_shape *shape = NULL;
-    assert_ok(make_flat(NULL, 1, &shape));
+    assert_ok(try_flat(NULL, 1, &shape));
     assert_ok(dem2d_shape_get(shape, &info));
     dem2d_support s;
     assert_ok(dem2d_shape_support(shape, still(), vec(0, 3), &s));
@@ -860,12 +860,12 @@ static void right_angles_are_exact(void **state) {
 static void polygons_of_many_vertices(void **state) {
     (void)state;
     static const int counts[] = {3, 4, 5, 8, 9, 16, 17, 33, 100, 1000};
-    test_random random = {3};
+    uint64_t random = 3;
     for (int i = 0; i < COUNT_OF(counts); i++) {
         const int n = counts[i];
         static dem2d_vec points[1000];
         for (int k = 0; k < n; k++) {
-            const dem2d_vec u = direction(6.283185 * (k + test_uniform(&random, 0, 0.8)) / n);
+            const dem2d_vec u = direction(6.283185 * (k + random_between(&random, 0, 0.8)) / n);
             points[k] = vec(3 * u.x + 10, u.y - 20);
         }
         dem2d_shape *shape;
@@ -878,7 +878,7 @@ static void polygons_of_many_vertices(void **state) {
             dem2d_vec d = {q.y - p.y, p.x - q.x};
             if (k % 4 == 1) d.x = nextafter(d.x, 9);
             if (k % 4 == 2) d.x = nextafter(d.x, -9);
-            if (k % 4 == 3) d = direction(test_uniform(&random, 0, 6.3));
+            if (k % 4 == 3) d = direction(random_between(&random, 0, 6.3));
             const long double length = hypotl(d.x, d.y), ux = d.x / length, uy = d.y / length;
             const long double h =
                 true_polygon(points, n, 0, ux, uy).h - (info.offset.x * ux + info.offset.y * uy);
@@ -1030,13 +1030,13 @@ static void containment(void **state) {
             dem2d_shape_info info;
             dem2d_shape *shape = make(m, 1, &info);
             rim_make(m, &info, &r);
-            test_random random = {5};
+            uint64_t random = 5;
             int in = 0, out = 0;
             bool inside;
             for (int i = 0; i < 300; i++) {
                 const double size = 1.2 * info.circumscribed;
-                const dem2d_vec p = {test_uniform(&random, -size, size),
-                                     test_uniform(&random, -size, size)};
+                const dem2d_vec p = {random_between(&random, -size, size),
+                                     random_between(&random, -size, size)};
                 const dem2d_vec q = {3 + 4 * (-0.28 * p.x - 0.96 * p.y),
                                      -2 + 4 * (0.96 * p.x - 0.28 * p.y)};
                 const long double depth = rim_depth(&r, p);
@@ -1064,10 +1064,10 @@ static void containment(void **state) {
 
 static void rotations_and_poses(void **state) {
     (void)state;
-    test_random random = {1};
+    uint64_t random = 1;
     for (int i = 0; i < 2000; i++) {
         const double sizes[] = {1e-300, 1e-8, 1, 4, 1e3, 1e6, 0x1p30};
-        double angle = sizes[i % 7] * test_uniform(&random, -1, 1);
+        double angle = sizes[i % 7] * random_between(&random, -1, 1);
         if (i < 40) angle = (i - 20) * 1.5707963267948966;
         const dem2d_rot rot = dem2d_rot_make(angle);
         assert_within(rot.c, cosl(angle), 4e-16L);

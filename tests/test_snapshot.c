@@ -33,7 +33,7 @@ static void assert_same_numbers(const double *a, const double *b, int count) {
 }
 
 /* Of a world that keeps one. */
-static int ledger_of(const dem2d_world *world, double *to) {
+static int ledger_numbers(const dem2d_world *world, double *to) {
     dem2d_ledger l;
     if (dem2d_world_ledger(world, &l) != DEM2D_OK) return 0;
     const double got[] = {l.kinetic,  l.normal,  l.tangential, l.gravity, l.walls,  l.driven,
@@ -52,7 +52,7 @@ static int numbers_of(const dem2d_world *world, double *to, int room) {
     to[used++] = energy.translational, to[used++] = energy.rotational;
     to[used++] = energy.normal, to[used++] = energy.tangential, to[used++] = energy.potential;
     to[used++] = energy.rolling;
-    used += ledger_of(world, to + used);
+    used += ledger_numbers(world, to + used);
     for (int j = 0; j < world->wall_count; j++) {
         const dem2d_wall_id id = {(uint32_t)j, world->walls[j].generation};
         dem2d_wall_info w;
@@ -146,8 +146,8 @@ static void check_resume(dem2d_world *world, bool shared, int steps) {
         assert_int_equal(done[0], done[1]);
         assert_int_equal(dem2d_world_hash(world), dem2d_world_hash(copy));
         double books[2][11];
-        const int count = ledger_of(world, books[0]);
-        assert_int_equal(count, ledger_of(copy, books[1]));
+        const int count = ledger_numbers(world, books[0]);
+        assert_int_equal(count, ledger_numbers(copy, books[1]));
         assert_same_numbers(books[0], books[1], count);
     }
     assert_same_world(world, copy);

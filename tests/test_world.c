@@ -288,17 +288,17 @@ static void make_pile(pile *p, test_env *env, const pile_desc *desc) {
         dem2d_shape_destroy(shape);
     }
     pile_walls(p, env, desc, size);
-    test_random random = {42};
+    uint64_t random = 42;
     for (int i = 0; i < desc->particles; i++) {
         const int kind = desc->kinds == DISCS    ? DEM2D_CIRCLE
                          : desc->kinds == SMOOTH ? smooth[i % COUNT_OF(smooth)]
                                                  : i % (DEM2D_SHAPE_TYPE_COUNT + 1);
         dem2d_particle_desc grain = grain_desc(&p->scene, p->shapes[kind], 0, 0);
         dem2d_particle_id id;
-        grain.position.x = size * (0.05 + 0.08 * (i % 6) + test_uniform(&random, -0.004, 0.004));
+        grain.position.x = size * (0.05 + 0.08 * (i % 6) + random_between(&random, -0.004, 0.004));
         grain.position.y = size * (0.04 + 0.07 * (i / 6));
-        grain.angle = test_uniform(&random, -3, 3);
-        grain.velocity.x = size * test_uniform(&random, -0.2, 0.2);
+        grain.angle = random_between(&random, -3, 3);
+        grain.velocity.x = size * random_between(&random, -0.2, 0.2);
         WITH_RETRY(env, dem2d_world_add_particle(p->scene.world, &grain, &id));
     }
 }

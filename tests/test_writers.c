@@ -588,7 +588,7 @@ static const char *svg_text(const dem2d_world *world, dem2d_svg_desc desc) {
 /* Discs of radius 1 in rows that overlap a little, one row on a floor. */
 static void make_rows(scene *s, int columns, int rows) {
     make_scene(s, NULL);
-    dem2d_shape *disc = test_disc(1);
+    dem2d_shape *disc = make_disc(1);
     dem2d_shape_id shape;
     assert_ok(dem2d_world_add_shape(s->world, disc, &shape));
     dem2d_shape_destroy(disc);

@@ -1,5 +1,5 @@
-/* testing.h - what the tests share: comparisons that print, numbers that repeat, an allocator that
-   counts and fails on demand, a log that is kept. Include it after dem2d.h. */
+/* testing.h - what the tests share: comparisons that print, an allocator that counts and fails on
+   demand, a log that is kept; and parts.h. Include it after dem2d.h. */
 #ifndef TESTING_H
 #define TESTING_H
 
@@ -15,20 +15,16 @@
 
 #include <cmocka.h>
 
-#if defined(__GNUC__)
-#define TEST_HELPER static __attribute__((unused))
-#else
-#define TEST_HELPER static
-#endif
+#define PARTS_FAIL(what, why) fail_msg("%s: %s", what, why)
+#include "parts.h"
 
 #define TEST_PI 3.14159265358979323846264338327950288L
-#define COUNT_OF(array) ((int)(sizeof(array) / sizeof((array)[0])))
 
 /* --- comparisons ---------------------------------------------------------------------------- */
 
 /* |actual - expected| <= tolerance; a NaN anywhere fails. */
-TEST_HELPER void test_within(long double actual, long double expected, long double tolerance,
-                             const char *what, const char *file, int line) {
+PART void test_within(long double actual, long double expected, long double tolerance,
+                      const char *what, const char *file, int line) {
     const long double error = fabsl(actual - expected);
     if (error <= tolerance || actual == expected) return;
     print_error("%s: %.21Lg, expected %.21Lg, off by %.3Lg, allowed %.3Lg\n", what, actual,
@@ -37,15 +33,15 @@ TEST_HELPER void test_within(long double actual, long double expected, long doub
 }
 
 /* lower <= actual <= upper. */
-TEST_HELPER void test_between(long double actual, long double lower, long double upper,
-                              const char *what, const char *file, int line) {
+PART void test_between(long double actual, long double lower, long double upper, const char *what,
+                       const char *file, int line) {
     if (actual >= lower && actual <= upper) return;
     print_error("%s: %.21Lg, expected from %.21Lg to %.21Lg\n", what, actual, lower, upper);
     _fail(file, line);
 }
 
-TEST_HELPER void test_result(dem2d_result actual, dem2d_result expected, const char *what,
-                             const char *file, int line) {
+PART void test_result(dem2d_result actual, dem2d_result expected, const char *what,
+                      const char *file, int line) {
     if (actual == expected) return;
     print_error("%s: \"%s\", expected \"%s\"\n", what, dem2d_result_text(actual),
                 dem2d_result_text(expected));
@@ -78,69 +74,20 @@ TEST_HELPER void test_result(dem2d_result actual, dem2d_result expected, const c
  */
 
 /* LONG=1 in the environment: all of the sweeps that are known to take long, else a part of them. */
-TEST_HELPER bool test_long(void) {
+PART bool test_long(void) {
     const char *value = getenv("LONG");
     return value != NULL && value[0] != 0;
 }
 
-/* --- numbers that repeat --------------------------------------------------------------------- */
-
-typedef struct test_random {
-    uint64_t state; /* any start will do */
-} test_random;
-
-/* splitmix64 */
-TEST_HELPER uint64_t test_next(test_random *random) {
-    uint64_t z = (random->state += 0x9e3779b97f4a7c15u);
-    z = (z ^ (z >> 30)) * 0xbf58476d1ce4e5b9u;
-    z = (z ^ (z >> 27)) * 0x94d049bb133111ebu;
-    return z ^ (z >> 31);
-}
-
-/* Uniform in [lower, upper). */
-TEST_HELPER double test_uniform(test_random *random, double lower, double upper) {
-    return lower + (upper - lower) * ((double)(test_next(random) >> 11) * 0x1p-53);
-}
-
-/* Uniform in 0 .. count - 1. */
-TEST_HELPER int test_below(test_random *random, int count) {
-    return (int)(test_next(random) % (uint64_t)count);
-}
-
 /* --- vectors and poses ----------------------------------------------------------------------- */
 
-TEST_HELPER dem2d_vec vec(double x, double y) {
-    return (dem2d_vec){x, y};
-}
-
-TEST_HELPER dem2d_vec direction(double angle) {
+PART dem2d_vec direction(double angle) {
     return (dem2d_vec){cos(angle), sin(angle)};
 }
 
 /* No move, no turn, size 1. */
-TEST_HELPER dem2d_pose still(void) {
+PART dem2d_pose still(void) {
     return (dem2d_pose){{0, 0}, {1, 0}, 1};
-}
-
-/* --- shapes ---------------------------------------------------------------------------------- */
-
-TEST_HELPER dem2d_shape *test_disc(double radius) {
-    dem2d_shape *shape;
-    assert_ok(dem2d_shape_create_circle(NULL, radius, &shape));
-    return shape;
-}
-
-TEST_HELPER dem2d_shape *test_ellipse(double a, double b) {
-    dem2d_shape *shape;
-    assert_ok(dem2d_shape_create_ellipse(NULL, a, b, &shape));
-    return shape;
-}
-
-TEST_HELPER dem2d_shape *test_box(double width, double height) {
-    const dem2d_vec points[4] = {{0, 0}, {width, 0}, {width, height}, {0, height}};
-    dem2d_shape *shape;
-    assert_ok(dem2d_shape_create_polygon(NULL, points, 4, 0, &shape));
-    return shape;
 }
 
 /* --- log ------------------------------------------------------------------------------------- */
@@ -177,7 +124,7 @@ typedef union test_block {
 
 #define TEST_MARK 0x6d656d2d64323464u
 
-TEST_HELPER void *test_allocate(void *user, size_t size) {
+PART void *test_allocate(void *user, size_t size) {
     test_env *env = user;
     if (++env->calls == env->fail_at) return NULL;
     test_block *block = malloc(sizeof *block + size);
@@ -189,7 +136,7 @@ TEST_HELPER void *test_allocate(void *user, size_t size) {
     return block + 1;
 }
 
-TEST_HELPER void test_release(void *user, void *memory, size_t size) {
+PART void test_release(void *user, void *memory, size_t size) {
     test_env *env = user;
     if (!memory) return;
     test_block *block = (test_block *)memory - 1;
@@ -202,18 +149,18 @@ TEST_HELPER void test_release(void *user, void *memory, size_t size) {
     free(block);
 }
 
-TEST_HELPER void test_keep_log(void *user, dem2d_result result, int index, const char *text) {
+PART void test_keep_log(void *user, dem2d_result result, int index, const char *text) {
     test_log *log = &((test_env *)user)->log;
     log->result = result, log->index = index, log->count++;
     snprintf(log->text, sizeof log->text, "%s", text ? text : "(NULL)");
 }
 
-TEST_HELPER void test_log_clear(test_env *env) {
+PART void test_log_clear(test_env *env) {
     memset(&env->log, 0, sizeof env->log);
     env->log.index = -2;
 }
 
-TEST_HELPER void test_env_init(test_env *env) {
+PART void test_env_init(test_env *env) {
     memset(env, 0, sizeof *env);
     env->env.user = env;
     env->env.allocate = test_allocate;
@@ -223,12 +170,12 @@ TEST_HELPER void test_env_init(test_env *env) {
 }
 
 /* From now on the call'th allocation fails (1 is the next one; 0: none). */
-TEST_HELPER void test_env_fail(test_env *env, int call) {
+PART void test_env_fail(test_env *env, int call) {
     env->calls = 0, env->fail_at = call;
 }
 
 /* Nothing is left, and every release named the size that was asked for. */
-TEST_HELPER void test_env_clean(const test_env *env, const char *file, int line) {
+PART void test_env_clean(const test_env *env, const char *file, int line) {
     if (env->bytes == 0 && env->blocks == 0 && env->bad_frees == 0) return;
     print_error("memory: %zu bytes in %d blocks left, %d bad releases\n", env->bytes, env->blocks,
                 env->bad_frees);
@@ -237,7 +184,7 @@ TEST_HELPER void test_env_clean(const test_env *env, const char *file, int line)
 #define assert_clean(env) test_env_clean((env), __FILE__, __LINE__)
 
 /* Whether a text holds a word as a whole: "radius" is not found in "radii", nor "a" in "area". */
-TEST_HELPER bool test_has_word(const char *text, const char *word) {
+PART bool test_has_word(const char *text, const char *word) {
     const char *const letters = "abcdefghijklmnopqrstuvwxyzABCDEFGHIJKLMNOPQRSTUVWXYZ0123456789_";
     const size_t length = strlen(word);
     for (const char *at = strstr(text, word); at; at = strstr(at + 1, word)) {
@@ -249,8 +196,8 @@ TEST_HELPER bool test_has_word(const char *text, const char *word) {
 
 /* The last message is about this result and index, and its text holds a word as a whole (or word
    is NULL). */
-TEST_HELPER void test_logged(const test_env *env, dem2d_result result, int index, const char *word,
-                             const char *file, int line) {
+PART void test_logged(const test_env *env, dem2d_result result, int index, const char *word,
+                      const char *file, int line) {
     const test_log *log = &env->log;
     if (log->count > 0 && log->result == result && log->index == index &&
         (!word || test_has_word(log->text, word)))
