@@ -2,8 +2,8 @@
    on how work is shared: the same state hash after some thousand steps. */
 #include "dem2d.h"
 #include "inside.h"
-#include "snapshot_scenes.h"
 #include "testing.h"
+#include "snapshot_scenes.h"
 
 enum { GRAINS = 24, EVERY = 100 /* steps between two edits, after which hashes are compared */ };
 
