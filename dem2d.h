@@ -1951,6 +1951,11 @@ static dem2d_vec dem2di_perp(dem2d_vec a) {
     return dem2di_vec(-a.y, a.x);
 }
 
+/* A quarter turn clockwise: from a tangent to the outward normal. */
+static dem2d_vec dem2di_right(dem2d_vec a) {
+    return dem2di_vec(a.y, -a.x);
+}
+
 static double dem2di_length(dem2d_vec a) {
     return sqrt(dem2di_dot(a, a));
 }
@@ -1994,6 +1999,13 @@ static dem2d_vec dem2di_turn(dem2d_rot q, dem2d_vec v) {
 
 static dem2d_vec dem2di_turn_back(dem2d_rot q, dem2d_vec v) {
     return dem2di_vec(q.c * v.x + q.s * v.y, q.c * v.y - q.s * v.x);
+}
+
+static dem2d_rot dem2di_rot(dem2d_vec v) {
+    dem2d_rot q;
+    q.c = v.x;
+    q.s = v.y;
+    return q;
 }
 
 /* Sine and cosine for |x| <= pi/4 by their Taylor series; the first omitted terms are
@@ -2047,6 +2059,17 @@ DEM2D_API double dem2d_rot_angle(dem2d_rot rotation) {
     return angle > -DEM2DI_PI ? angle : DEM2DI_PI;
 }
 
+/* Angle from a to b in (-pi, pi]. */
+static double dem2di_angle(dem2d_vec a, dem2d_vec b) {
+    return dem2d_rot_angle(dem2di_rot(dem2di_vec(dem2di_dot(a, b), dem2di_cross(a, b))));
+}
+
+/* Direction i of count uniform ones. */
+static dem2d_vec dem2di_direction(int i, int count) {
+    dem2d_rot z = dem2d_rot_make(2 * DEM2DI_PI * i / count);
+    return dem2di_vec(z.c, z.s);
+}
+
 /* ln(a/b) for a >= b > 0 = k ln 2 + 2 artanh z, z = (a - b)/(a + b). Exact halving and doubling
    bring b to between 0.7 a and 1.4 a, so that z^2 <= 1/34. Then a - b is exact, and the first
    omitted term, z^24/25, is 1e-38. */
@@ -2073,6 +2096,20 @@ DEM2D_API dem2d_pose dem2d_pose_make(double x, double y, double angle, double sc
     return pose;
 }
 
+/* Extend a box to a point. */
+static void dem2di_box_add(dem2d_box *box, dem2d_vec p) {
+    box->lower = dem2di_vec(dem2di_min(box->lower.x, p.x), dem2di_min(box->lower.y, p.y));
+    box->upper = dem2di_vec(dem2di_max(box->upper.x, p.x), dem2di_max(box->upper.y, p.y));
+}
+
+/* The bounding box of points; its upper corner relative to the lower one is *size. */
+static dem2d_box dem2di_box_of(const dem2d_vec *points, int count, dem2d_vec *size) {
+    dem2d_box box = {points[0], points[0]};
+    for (int i = 1; i < count; i++) dem2di_box_add(&box, points[i]);
+    *size = dem2di_sub(box.upper, box.lower);
+    return box;
+}
+
 /* A symmetric tensor in the plane. */
 typedef struct dem2di_tensor {
     double xx, xy, yy;
@@ -2088,14 +2125,11 @@ static void dem2di_tensor_add(dem2di_tensor *t, double f, dem2d_vec a, dem2d_vec
 /* Mohr's circle. */
 static dem2d_principal dem2di_tensor_principal(dem2di_tensor t) {
     dem2d_vec across = dem2di_vec(t.xx / 2 - t.yy / 2, t.xy), u = {0, 0};
-    dem2d_rot twice;
     (void)dem2di_unit(across, &u);
-    twice.c = u.x;
-    twice.s = u.y;
     dem2d_principal principal;
     principal.p = t.xx / 2 + t.yy / 2;
     principal.q = dem2di_dot(across, u);
-    principal.angle = dem2d_rot_angle(twice) / 2;
+    principal.angle = dem2d_rot_angle(dem2di_rot(u)) / 2;
     return principal;
 }
 
@@ -3039,14 +3073,10 @@ static dem2d_mass dem2di_rounded_polygon_mass(const dem2d_vec *corners, int coun
         dem2d_vec corner = dem2di_sub(corners[k], core.centroid);
         dem2d_vec edge = dem2di_sub(corners[(k + 1) % count], corners[k]);
         dem2d_vec last = dem2di_sub(corners[k], corners[(k + count - 1) % count]);
-        double length = dem2di_length(edge), turn;
-        dem2d_vec normal = dem2di_scale(dem2di_perp(edge), -1 / length);
+        double length = dem2di_length(edge), turn = dem2di_angle(last, edge);
+        dem2d_vec normal = dem2di_scale(dem2di_right(edge), 1 / length);
         dem2d_vec middle = dem2di_along(dem2di_along(corner, 0.5, edge), r / 2, normal);
         dem2di_add_piece(&m, length * r, middle, length * r * (length * length + r * r) / 12);
-        dem2d_rot rotation;
-        rotation.c = dem2di_dot(last, edge);
-        rotation.s = dem2di_cross(last, edge);
-        turn = dem2d_rot_angle(rotation);
         dem2d_rot half = dem2d_rot_make(-turn / 2); /* from the edge's normal to the bisector */
         double area = r * r * turn / 2, reach = -4 * r * half.s / (3 * turn);
         dem2d_vec centre = dem2di_along(corner, reach, dem2di_turn(half, normal));
@@ -3112,13 +3142,9 @@ DEM2D_API dem2d_result dem2d_shape_mass(const dem2d_shape *shape, dem2d_mass *ma
 static dem2d_vec dem2di_rounded_point(const dem2d_shape *shape, int k, int j, int each) {
     int n = shape->count;
     dem2d_vec in, out, u;
-    (void)dem2di_unit(dem2di_negate(dem2di_perp(shape->tangents[(k + n - 1) % n])), &in);
-    (void)dem2di_unit(dem2di_negate(dem2di_perp(shape->tangents[k])), &out);
-    dem2d_rot between;
-    between.c = dem2di_dot(in, out);
-    between.s = dem2di_cross(in, out);
-    double angle = dem2d_rot_angle(between) * j / (each - 1);
-    u = dem2di_turn(dem2d_rot_make(angle), in);
+    (void)dem2di_unit(dem2di_right(shape->tangents[(k + n - 1) % n]), &in);
+    (void)dem2di_unit(dem2di_right(shape->tangents[k]), &out);
+    u = dem2di_turn(dem2d_rot_make(dem2di_angle(in, out) * j / (each - 1)), in);
     return dem2di_along(shape->corners[k], shape->rounding, u);
 }
 
@@ -3140,8 +3166,7 @@ static dem2d_vec dem2di_outline_point(const dem2d_shape *shape, int i, int count
         }
         if (count >= 2 * n) return dem2di_rounded_point(shape, k, i - first, each);
     }
-    dem2d_rot z = dem2d_rot_make(2 * DEM2DI_PI * i / count);
-    return dem2di_support(shape, dem2di_vec(z.c, z.s), NULL);
+    return dem2di_support(shape, dem2di_direction(i, count), NULL);
 }
 
 /* [P] eq. 10-11 over outline points, without storing them. */
@@ -3509,8 +3534,8 @@ static void dem2di_least_rho_lower(dem2d_shape *shape, dem2d_vec from, dem2d_vec
     /* widened, so that no rounding error moves them over the border of a sector */
     from = dem2di_along(from, -1e-12, dem2di_perp(from));
     to = dem2di_along(to, 1e-12, dem2di_perp(to));
-    int k = dem2di_rho_sector(dem2di_negate(dem2di_perp(from)));
-    int last = dem2di_rho_sector(dem2di_negate(dem2di_perp(to)));
+    int k = dem2di_rho_sector(dem2di_right(from));
+    int last = dem2di_rho_sector(dem2di_right(to));
     for (;; k = (k + 1) & (DEM2DI_RHO_SECTORS - 1)) {
         shape->least_rho[k] = dem2di_min(shape->least_rho[k], rho);
         if (k == last) break;
@@ -4125,13 +4150,10 @@ static void dem2di_fourier_least_rho(dem2d_shape *shape, const double *a, const 
         dem2d_vec v = dem2di_sector_start(2 * k, 8 * DEM2DI_RHO_SECTORS);
         dem2d_vec w =
             dem2di_sector_start((2 * k + 2) % (8 * DEM2DI_RHO_SECTORS), 8 * DEM2DI_RHO_SECTORS);
-        dem2d_rot q;
-        q.c = u.x;
-        q.s = u.y;
         /* tangents of the half angles: upper bounds of the half angles */
         double half = dem2di_max(dem2di_cross(v, u) / dem2di_dot(v, u),
                                  dem2di_cross(u, w) / dem2di_dot(u, w));
-        double value = dem2di_series_value(&radius, dem2d_rot_angle(q), d);
+        double value = dem2di_series_value(&radius, dem2d_rot_angle(dem2di_rot(u)), d);
         double least = dem2di_taylor_bound(&radius, value, d, half) - rounding;
         double *sector = &shape->least_rho[k / 4];
         if (k % 4 == 0) *sector = HUGE_VAL;
@@ -4495,18 +4517,15 @@ static dem2di_tensor dem2di_second_rounded(const dem2d_shape *shape, dem2d_rot q
         dem2d_vec b = dem2di_turn_back(q, shape->corners[(k + 1) % n]);
         dem2d_vec last = dem2di_turn_back(q, shape->corners[(k + n - 1) % n]);
         dem2d_vec edge = dem2di_sub(b, a), before = dem2di_sub(a, last), normal, in;
-        (void)dem2di_unit(dem2di_negate(dem2di_perp(edge)), &normal);
-        (void)dem2di_unit(dem2di_negate(dem2di_perp(before)), &in);
+        (void)dem2di_unit(dem2di_right(edge), &normal);
+        (void)dem2di_unit(dem2di_right(before), &in);
         dem2d_vec middle = dem2di_along(dem2di_along(a, 0.5, edge), r / 2, normal);
         double area = dem2di_length(edge) * r;
         dem2di_second_triangle(&sum, a, b);
         dem2di_tensor_add(&sum, area, middle, middle);
         dem2di_tensor_add(&sum, area / 12, edge, edge);
         dem2di_tensor_add(&sum, area * r * r / 12, normal, normal);
-        dem2d_rot turn;
-        turn.c = dem2di_dot(before, edge);
-        turn.s = dem2di_cross(before, edge);
-        dem2di_second_sector(&sum, a, r, in, dem2d_rot_angle(turn));
+        dem2di_second_sector(&sum, a, r, in, dem2di_angle(before, edge));
     }
     return sum;
 }
@@ -4530,8 +4549,7 @@ static dem2di_tensor dem2di_second_fourier(const dem2d_shape *shape, dem2d_rot q
     dem2di_tensor sum = {0, 0, 0};
     int points = 4 * shape->count + 8;
     for (int i = 0; i < points; i++) {
-        dem2d_rot z = dem2d_rot_make(2 * DEM2DI_PI * i / points);
-        dem2d_vec u = dem2di_vec(z.c, z.s);
+        dem2d_vec u = dem2di_direction(i, points);
         double rho, weight = 2 * DEM2DI_PI / points / 4;
         dem2d_vec s = dem2di_support(shape, u, &rho), turned = dem2di_turn_back(q, s);
         dem2di_tensor_add(&sum, weight * dem2di_dot(s, u) * rho, turned, turned);
@@ -5092,13 +5110,9 @@ static bool dem2di_scan_picture(dem2d_outline_set *set, dem2di_picture *p, dem2d
 
 /* Does an outline fill its box and much of the region, as the background in a frame does? */
 static bool dem2di_is_like_background(const dem2di_picture *p, const dem2d_outline *grain) {
-    dem2d_vec low = grain->points[0], high = low;
-    for (int i = 1; i < grain->count; i++) {
-        dem2d_vec q = grain->points[i];
-        low = dem2di_vec(dem2di_min(low.x, q.x), dem2di_min(low.y, q.y));
-        high = dem2di_vec(dem2di_max(high.x, q.x), dem2di_max(high.y, q.y));
-    }
-    double box = (high.x - low.x) / p->desc.scale * ((high.y - low.y) / p->desc.scale);
+    dem2d_vec size;
+    (void)dem2di_box_of(grain->points, grain->count, &size);
+    double box = size.x / p->desc.scale * (size.y / p->desc.scale);
     double region = (double)p->desc.width * p->desc.height;
     return !p->desc.labels && grain->pixels > region / 4 && grain->pixels > 0.9 * box;
 }
@@ -5463,17 +5477,13 @@ static int dem2di_compare_sweep_points(const void *a, const void *b) {
 /* Take the points that differ from the one before, relative to origin and size; the last differs
    from the first. */
 static void dem2di_sweep_points(dem2di_sweep *s, const dem2d_vec *points, int count) {
-    dem2d_vec low = points[0], high = points[0];
-    for (int i = 1; i < count; i++) {
-        low = dem2di_vec(dem2di_min(low.x, points[i].x), dem2di_min(low.y, points[i].y));
-        high = dem2di_vec(dem2di_max(high.x, points[i].x), dem2di_max(high.y, points[i].y));
-    }
-    s->origin = low;
-    s->size = dem2di_max(high.x - low.x, high.y - low.y);
+    dem2d_vec extent;
+    s->origin = dem2di_box_of(points, count, &extent).lower;
+    s->size = dem2di_max(extent.x, extent.y);
     if (!(s->size > 0)) return; /* all in one place */
     s->rounding = DEM2DI_SWEEP_ROUNDING * (dem2di_coordinate_size(points, count) / s->size);
     for (int i = 0; i < count; i++) {
-        dem2d_vec p = dem2di_sub(points[i], low);
+        dem2d_vec p = dem2di_sub(points[i], s->origin);
         p = dem2di_vec(p.x / s->size, p.y / s->size);
         if (s->count > 0 && dem2di_sweep_same(s, p, s->points[s->count - 1].at)) continue;
         s->edges[s->count].name = i;
@@ -5821,21 +5831,21 @@ static void dem2di_inscribe_cell(dem2di_inscribe *in, dem2d_vec centre, double h
 static bool dem2di_inscribed(const dem2d_env *env, const dem2di_side *sides, int count,
                              dem2d_outline_info *info) {
     dem2di_inscribe in;
-    dem2d_vec low = sides[0].a, high = sides[0].a;
+    dem2d_box box = {sides[0].a, sides[0].a};
     in.near = (dem2di_near_side *)dem2di_allocate(env, (size_t)count, sizeof *in.near);
     if (in.near == NULL) return false;
     for (int i = 0; i < count; i++) {
         in.near[i].side = i;
-        low = dem2di_vec(dem2di_min(low.x, sides[i].a.x), dem2di_min(low.y, sides[i].a.y));
-        high = dem2di_vec(dem2di_max(high.x, sides[i].a.x), dem2di_max(high.y, sides[i].a.y));
+        dem2di_box_add(&box, sides[i].a);
     }
+    dem2d_vec size = dem2di_sub(box.upper, box.lower);
     in.sides = sides;
     in.count = count;
     in.best = 0;
     in.at = dem2di_vec(0, 0);
     in.tolerance = 1e-6 * info->feret_max;
-    double half = dem2di_max(high.x - low.x, high.y - low.y) / 2;
-    dem2di_inscribe_cell(&in, dem2di_along(low, 0.5, dem2di_sub(high, low)), half, count, 22);
+    double half = dem2di_max(size.x, size.y) / 2;
+    dem2di_inscribe_cell(&in, dem2di_along(box.lower, 0.5, size), half, count, 22);
     dem2di_release(env, in.near, (size_t)count, sizeof *in.near);
     info->inscribed = in.best;
     info->inscribed_at = dem2di_add(info->mass.centroid, in.at);
@@ -5914,14 +5924,11 @@ static double dem2di_roundness(const dem2di_side *sides, int count, double perim
     for (int i = 0; i < n; i++) {
         dem2d_vec before = samples[i > 0 ? i - 1 : n - 1], after = samples[i + 1 < n ? i + 1 : 0];
         dem2d_vec in = dem2di_sub(samples[i], before), out = dem2di_sub(after, samples[i]), normal;
-        dem2d_rot rotation;
-        rotation.c = dem2di_dot(in, out);
-        rotation.s = dem2di_cross(in, out);
-        if (!(rotation.s > 0)) continue; /* concave or straight */
+        if (!(dem2di_cross(in, out) > 0)) continue; /* concave or straight */
         if (!dem2di_unit(dem2di_perp(dem2di_sub(after, before)), &normal)) continue;
         double radius = dem2di_touching_radius(samples, n, i, normal);
         if (!(radius < inscribed)) continue;
-        double turn = dem2d_rot_angle(rotation);
+        double turn = dem2di_angle(in, out);
         sum += turn * radius;
         all += turn;
     }
@@ -6520,13 +6527,10 @@ typedef struct dem2di_straight {
     int arcs;    /* curved arcs that divide this angle */
 } dem2di_straight;
 
-static dem2d_rot dem2di_edge_normal(const dem2di_outline *outline, int from) {
+static dem2d_vec dem2di_edge_normal(const dem2di_outline *outline, int from) {
     dem2d_vec unit = dem2di_vec(0, 0);
-    dem2d_rot z;
     (void)dem2di_unit(dem2di_hull_edge(outline, from), &unit);
-    z.c = unit.y;
-    z.s = -unit.x;
-    return z;
+    return dem2di_right(unit);
 }
 
 /* Distribute curved arcs over the turns between straight edges, which are sorted along the hull:
@@ -6535,11 +6539,9 @@ static dem2d_rot dem2di_edge_normal(const dem2di_outline *outline, int from) {
 static bool dem2di_distribute_arcs(const dem2di_outline *outline, dem2di_straight *sides, int count,
                                    int arcs) {
     for (int j = 0; j < count; j++) {
-        dem2d_rot from = dem2di_edge_normal(outline, sides[j].edge), turn;
-        dem2d_rot to = dem2di_edge_normal(outline, sides[(j + 1) % count].edge);
-        turn.c = from.c * to.c + from.s * to.s;
-        turn.s = from.c * to.s - from.s * to.c;
-        sides[j].turn = count > 1 ? dem2d_rot_angle(turn) : 2 * DEM2DI_PI;
+        dem2d_vec from = dem2di_edge_normal(outline, sides[j].edge);
+        dem2d_vec to = dem2di_edge_normal(outline, sides[(j + 1) % count].edge);
+        sides[j].turn = count > 1 ? dem2di_angle(from, to) : 2 * DEM2DI_PI;
         if (sides[j].turn < 0) sides[j].turn += 2 * DEM2DI_PI;
         sides[j].arcs = 1;
     }
@@ -6563,14 +6565,11 @@ static double dem2di_corner_reach(const dem2di_outline *outline) {
 static void dem2di_joints_make(const dem2di_outline *outline, int arcs,
                                const dem2di_straight *sides, int count, dem2di_joint *joints) {
     int k = dem2di_hull_start(outline);
-    for (int i = 0; i < arcs && count == 0; i++) {
-        dem2d_rot z = dem2d_rot_make(2 * DEM2DI_PI * i / arcs);
-        k = dem2di_joint_make(outline, k, dem2di_vec(z.c, z.s), &joints[i]);
-    }
+    for (int i = 0; i < arcs && count == 0; i++)
+        k = dem2di_joint_make(outline, k, dem2di_direction(i, arcs), &joints[i]);
     for (int j = 0; j < count; j++) {
         const dem2di_straight *side = &sides[j];
-        dem2d_rot z = dem2di_edge_normal(outline, side->edge);
-        dem2d_vec normal = dem2di_vec(z.c, z.s);
+        dem2d_vec normal = dem2di_edge_normal(outline, side->edge);
         double cut = dem2di_min(0.25, dem2di_corner_reach(outline) / side->length);
         for (int end = 0; end < 2; end++, joints++) {
             joints->normal = normal;
@@ -6842,29 +6841,38 @@ static double dem2di_section_penalty(const dem2di_section *section, const dem2di
     return weight * sum;
 }
 
+/* Number of points of a section: those of the outline between its joints, then the second joint. */
+static int dem2di_section_count(const dem2di_section *section) {
+    int count = section->outline->count;
+    return (section->to->place - section->from->place + count) % count + 2;
+}
+
+/* Point i of count, relative to the first joint. */
+static dem2d_vec dem2di_section_point(const dem2di_section *section, int i, int count) {
+    const dem2di_outline *outline = section->outline;
+    int place = (section->from->place + i) % outline->count;
+    dem2d_vec p = i + 1 < count ? outline->points[place] : section->to->point;
+    return dem2di_sub(p, section->from->point);
+}
+
 /* Area between arc and outline: their crossings divide both into loops, and the area of each loop
    is the difference of two sweeps. Exact if arc and outline pass the crossings in the same
    order. */
 static double dem2di_section_area(const dem2di_section *section, const double f[2],
                                   double slope[2]) {
-    const dem2di_outline *outline = section->outline;
     dem2di_arc arc = dem2di_section_arc(section, f[0], f[1]);
-    dem2d_vec origin = section->from->point, p = dem2di_vec(0, 0);
+    dem2d_vec chord = dem2di_vec(0, 0), p = dem2di_vec(0, 0);
     double area = 0, loop = 0, last = 0, t[2];
-    int place = section->from->place;
-    int inner = (section->to->place - place + outline->count) % outline->count + 1;
-    dem2d_vec chord = dem2di_vec(0, 0);
+    int count = dem2di_section_count(section);
     dem2di_foot before = {false, 0, 0};
     slope[0] = slope[1] = 0;
     /* dem2di_arc_foot needs an arc within 60 degrees of its chord; a zero chord switches it off */
-    (void)dem2di_unit(dem2di_sub(section->to->point, origin), &chord);
+    (void)dem2di_unit(dem2di_sub(section->to->point, section->from->point), &chord);
     if (dem2di_dot(chord, section->from->tangent) < 0.5 ||
         dem2di_dot(chord, section->to->tangent) < 0.5)
         chord = dem2di_vec(0, 0);
-    for (int i = 0; i <= inner; i++) { /* the outline's points, then the second joint */
-        dem2d_vec q =
-            i < inner ? outline->points[(place + i) % outline->count] : section->to->point;
-        q = dem2di_sub(q, origin);
+    for (int i = 0; i < count; i++) {
+        dem2d_vec q = dem2di_section_point(section, i, count);
         dem2di_foot here = dem2di_arc_foot(&arc, chord, q, before.t);
         bool cross = dem2di_may_cross(&arc, &before, &here);
         int found = cross ? dem2di_arc_crossings(&arc, p, dem2di_sub(q, p), t) : 0;
@@ -7065,33 +7073,27 @@ static void dem2di_swarm_search(const dem2di_section *section, const dem2di_rast
 static dem2d_result dem2di_swarm_section(const dem2d_env *env, const dem2di_section *section,
                                          const dem2di_swarm *swarm, uint64_t *random,
                                          dem2di_arc *arc, int *iterations) {
-    const dem2di_outline *outline = section->outline;
-    int place = section->from->place;
-    int inner = (section->to->place - place + outline->count) % outline->count + 1;
-    dem2d_vec origin = section->from->point;
+    int inner = dem2di_section_count(section);
     dem2d_vec corner = dem2di_scale(section->from->tangent, section->l1);
-    dem2d_vec lower = dem2di_vec(dem2di_min(0, corner.x), dem2di_min(0, corner.y));
-    dem2d_vec upper = dem2di_vec(dem2di_max(0, corner.x), dem2di_max(0, corner.y));
-    size_t count = (size_t)inner + 2;
+    dem2d_box box = {{0, 0}, {0, 0}};
+    dem2di_box_add(&box, corner);
+    size_t count = (size_t)inner + 1;
     dem2d_vec *points = (dem2d_vec *)dem2di_allocate(env, count, sizeof *points);
     if (points == NULL)
         return dem2di_fail(env, DEM2D_OUT_OF_MEMORY, -1, "no memory for a picture of a section");
     points[0] = dem2di_vec(0, 0);
-    for (int i = 0; i <= inner; i++) {
-        dem2d_vec q =
-            i < inner ? outline->points[(place + i) % outline->count] : section->to->point;
-        points[i + 1] = q = dem2di_sub(q, origin);
-        lower = dem2di_vec(dem2di_min(lower.x, q.x), dem2di_min(lower.y, q.y));
-        upper = dem2di_vec(dem2di_max(upper.x, q.x), dem2di_max(upper.y, q.y));
+    for (int i = 0; i < inner; i++) {
+        points[i + 1] = dem2di_section_point(section, i, inner);
+        dem2di_box_add(&box, points[i + 1]);
     }
+    dem2d_vec size = dem2di_sub(box.upper, box.lower);
     dem2di_raster raster;
-    raster.lower = lower;
-    raster.pixel = 2 * outline->radius / swarm->pixels;
+    raster.lower = box.lower;
+    raster.pixel = 2 * section->outline->radius / swarm->pixels;
     /* a needle may be much longer than the circle of its area: limit the number of pixels */
-    raster.pixel = dem2di_max(raster.pixel, dem2di_max(upper.x - lower.x, upper.y - lower.y) /
-                                                (8.0 * swarm->pixels));
-    raster.width = (int)ceil((upper.x - lower.x) / raster.pixel) + 1;
-    raster.height = (int)ceil((upper.y - lower.y) / raster.pixel) + 1;
+    raster.pixel = dem2di_max(raster.pixel, dem2di_max(size.x, size.y) / (8.0 * swarm->pixels));
+    raster.width = (int)ceil(size.x / raster.pixel) + 1;
+    raster.height = (int)ceil(size.y / raster.pixel) + 1;
     size_t width = (size_t)raster.width, pixels = width * (size_t)raster.height + width + 1;
     raster.mask = (unsigned char *)dem2di_allocate(env, pixels, 1);
     if (raster.mask != NULL) {
@@ -7318,17 +7320,14 @@ static void dem2di_hull_series(const dem2di_outline *outline, int order, double 
     for (int k = 0; k <= order; k++) a[k] = b[k] = 0;
     dem2d_vec last, unit;
     (void)dem2di_unit(dem2di_sub(outline->hull[0], outline->hull[n - 1]), &last);
-    last = dem2di_negate(dem2di_perp(last));
+    last = dem2di_right(last);
     for (int i = 0; i < n; i++) {
         dem2d_vec corner = outline->hull[i], edge = dem2di_sub(outline->hull[(i + 1) % n], corner);
         double length = dem2di_length(edge);
         (void)dem2di_unit(edge, &unit);
-        dem2d_rot z, turn;
-        z.c = unit.y;
-        z.s = -unit.x; /* the edge's outward normal */
-        turn.c = last.x * z.c + last.y * z.s;
-        turn.s = last.x * z.s - last.y * z.c;
-        double angle = dem2d_rot_angle(turn);
+        dem2d_vec normal = dem2di_right(unit);
+        dem2d_rot z = dem2di_rot(normal);
+        double angle = dem2di_angle(last, normal);
         double sine = z.c * z.s - last.x * last.y; /* half the difference of sin(2 angle) */
         double cosine = last.x * last.x - last.y * last.y - z.c * z.c + z.s * z.s;
         dem2d_vec power = dem2di_vec(1, 0);
@@ -7343,7 +7342,7 @@ static void dem2di_hull_series(const dem2di_outline *outline, int order, double 
             a[1] += (corner.x * (angle + sine) + corner.y * cosine / 2) / (2 * DEM2DI_PI);
             b[1] += (corner.x * cosine / 2 + corner.y * (angle - sine)) / (2 * DEM2DI_PI);
         }
-        last = dem2di_vec(z.c, z.s);
+        last = normal;
     }
 }
 
@@ -7701,12 +7700,10 @@ static dem2d_result dem2di_fit_ellipse(dem2di_fit *fit) {
         yy += sweep * (p.y * p.y + p.y * q.y + q.y * q.y);
         xy += sweep * (p.x * p.y + q.x * q.y + (p.x * q.y + q.x * p.y) / 2);
     }
-    dem2d_rot twice;
-    twice.c = xx - yy;
-    twice.s = 2 * xy;
-    double root = dem2di_length(dem2di_vec(twice.c, twice.s));
+    dem2d_vec twice = dem2di_vec(xx - yy, 2 * xy);
+    double root = dem2di_length(twice);
     double ratio = sqrt(sqrt((xx + yy + root) / (xx + yy - root)));
-    double x[5] = {0, 0, size * ratio, size / ratio, dem2d_rot_angle(twice) / 2};
+    double x[5] = {0, 0, size * ratio, size / ratio, dem2d_rot_angle(dem2di_rot(twice)) / 2};
     double steps[5] = {0.1 * size, 0.1 * size, 0.1 * size, 0.1 * size, 0.2};
     fit->report.iterations += dem2di_compass(dem2di_ellipse_objective, fit, x, steps, 5, 1e-3);
     if (fit->compare_result != DEM2D_OK) return fit->compare_result;
@@ -7923,8 +7920,7 @@ DEM2D_API dem2d_result dem2d_radial_compare(const dem2d_env *env, const dem2d_ve
     if (fitted == NULL) return dem2di_fail_memory(env, rays, "rays");
     double *r = (double *)(void *)(fitted + rays), *sum = r + rays;
     for (int i = 0; i < rays; i++) {
-        dem2d_rot z = dem2d_rot_make(2 * DEM2DI_PI * i / rays);
-        r[i] = dem2di_ray_reach(points, count, mass.centroid, dem2di_vec(z.c, z.s));
+        r[i] = dem2di_ray_reach(points, count, mass.centroid, dem2di_direction(i, rays));
         sum[i] = 0;
     }
     for (int n = 0; n <= order; n++) {
@@ -7935,10 +7931,8 @@ DEM2D_API dem2d_result dem2d_radial_compare(const dem2d_env *env, const dem2d_ve
         z = dem2di_vec(1, 0);
         for (int i = 0; i < rays; i++, z = dem2di_turn(step, z)) sum[i] += dem2di_dot(c, z);
     }
-    for (int i = 0; i < rays; i++) {
-        dem2d_rot z = dem2d_rot_make(2 * DEM2DI_PI * i / rays);
-        fitted[i] = dem2di_along(mass.centroid, dem2di_max(0, sum[i]), dem2di_vec(z.c, z.s));
-    }
+    for (int i = 0; i < rays; i++)
+        fitted[i] = dem2di_along(mass.centroid, dem2di_max(0, sum[i]), dem2di_direction(i, rays));
     result = dem2d_outline_compare(env, points, count, fitted, rays, difference);
     dem2di_release(env, fitted, 2 * (size_t)rays, sizeof *fitted);
     return result;
@@ -8559,10 +8553,6 @@ static inline void dem2di_walk_on(const dem2di_pair *pair, const dem2di_core cor
     walk->w.y = (walk->p[0].y + walk->p[1].y) - pair->d.y;
 }
 
-static dem2d_vec dem2di_right(dem2d_vec tangent) {
-    return dem2di_vec(tangent.y, -tangent.x);
-}
-
 /* The result for the shapes, from an overlap of the cores along a normal, at their points p and
    q. */
 static void dem2di_core_report(const dem2di_core core[2], dem2d_vec p, dem2d_vec q,
@@ -9030,7 +9020,7 @@ static bool dem2di_bracket_cut(const dem2di_pair *pair, const dem2di_eval *eval,
                                dem2di_bracket *bracket) {
     dem2d_vec u = eval->u;
     if (!bracket->known && !dem2di_cone(pair, eval->h, bracket->end)) {
-        bracket->end[0] = dem2di_negate(dem2di_perp(u));
+        bracket->end[0] = dem2di_right(u);
         bracket->end[1] = dem2di_perp(u);
     }
     bracket->known = true;
@@ -9291,9 +9281,7 @@ static bool dem2di_side_excludes(const dem2di_pair *pair, const dem2di_eval *eva
     double along = dem2di_dot(eval->u, v), ahead = turn * dem2di_cross(eval->u, v), rho[2];
     const double c = DEM2DI_MARCH_COS, s = DEM2DI_MARCH_SIN;
     dem2d_vec u = eval->u;
-    dem2d_rot step;
-    step.c = c;
-    step.s = turn * s;
+    dem2d_rot step = dem2di_rot(dem2di_vec(c, turn * s));
     /* the remaining slope lowers h by slope^2/(2 (r - h)) */
     if (!(eval->edge ? slope >= 0 : slope * slope <= 2 * tolerance * (r - h))) return false;
     for (int i = 0; i < 20; i++) { /* 20 steps are 36 degrees: a support point farther is rare */
