@@ -359,49 +359,45 @@ leaves it open)
         corrected: eq. 9 caps one sign; here -mu F_n <= F_t <= mu F_n. Chosen: the step's sliding
         velocity, see Sliding. Beyond: dashpots, rolling friction (eq. 10: none), your own law.
 
-OPTIONS (zero means: physical zero for physical fields; "library default" where one is given)
+OPTIONS (zero means: physical zero for physical fields; "library default" where one is given; fields
+that are not listed are 0, false or NULL by default and may have any value)
     struct                  field                 unit   default    range
     dem2d_env               user                  -      NULL       handed to the callbacks
     dem2d_env               allocate              -      malloc     with release, else not used
     dem2d_env               release               -      free       with allocate, else not used
     dem2d_env               log                   -      silent
     dem2d_custom_desc       support               -      none       required
-    dem2d_custom_desc       user                  -      NULL
     dem2d_custom_desc       rho_min               m      0          >= 0
     dem2d_custom_desc       inscribed             m      0          >= 0
-    dem2d_custom_desc       mass                  m2,m4  computed   area 0: from outline_points
+    dem2d_custom_desc       mass.area             m2     computed   >= 0, 0: from outline_points
+    dem2d_custom_desc       mass.centroid         m      computed   finite
+    dem2d_custom_desc       mass.polar_moment     m4     computed   >= 0, > 0 with an area
     dem2d_custom_desc       outline_points        -      1000       0 or >= 3
-    dem2d_custom_desc       tag                   -      0
     dem2d_reduction_desc    test                  -      SUFFICIENT
-    dem2d_reduction_desc    factor                -      0.9        0 or inside (0, 1)
+    dem2d_reduction_desc    factor                -      0.9        0 or in (0, 1)
     dem2d_reduction_desc    tolerance             -      1e-6       >= 0, relative to a0
     dem2d_image_desc        pixels                -      none       required, or pixels16
     dem2d_image_desc        pixels16              -      none       not with pixels
-    dem2d_image_desc        width                 px     none       1 to 2^15
-    dem2d_image_desc        height                px     none       1 to 2^15
-    dem2d_image_desc        stride                -      width      0 or >= width
-    dem2d_image_desc        crop_left             px     0          0 to width - 1
-    dem2d_image_desc        crop_top              px     0          0 to height - 1
-    dem2d_image_desc        crop_width            px     the rest   0 to width - crop_left
-    dem2d_image_desc        crop_height           px     the rest   0 to height - crop_top
+    dem2d_image_desc        width                 px     none       1 to 32768
+    dem2d_image_desc        height                px     none       1 to 32768
+    dem2d_image_desc        stride                -      width      >= 0, not below the width
+    dem2d_image_desc        crop_left             px     0          >= 0, below the width
+    dem2d_image_desc        crop_top              px     0          >= 0, below the height
+    dem2d_image_desc        crop_width            px     the rest   >= 0, within the width
+    dem2d_image_desc        crop_height           px     the rest   >= 0, within the height
     dem2d_image_desc        labels                -      false      without the next three
-    dem2d_image_desc        threshold             -      Otsu       0 to 255 (pixels16: 65535)
+    dem2d_image_desc        threshold             -      Otsu       0 to 65535, to 255 for pixels
     dem2d_image_desc        ignore_frame          -      false      without a threshold
-    dem2d_image_desc        bright                -      false
     dem2d_image_desc        min_pixels            -      16         >= 0
     dem2d_image_desc        max_pixels            -      no limit   >= 0
-    dem2d_image_desc        keep_border           -      false
     dem2d_image_desc        scale                 m/px   none       > 0
-    dem2d_fit_desc          count                 -      coverage   0 to 1024; 3 for polygon, bezier
-    dem2d_fit_desc          coverage              -      none       inside (0, 1) when count is 0
+    dem2d_fit_desc          count                 -      coverage   0 to 1024, 3 for polygon, bezier
+    dem2d_fit_desc          coverage              -      none       >= 0, in (0, 1) if count is 0
     dem2d_fit_desc          model                 -      CIRCLE     not CUSTOM
-    dem2d_fit_desc          method                -      DEFAULT    one of the model's
+    dem2d_fit_desc          method                -      DEFAULT    of the model
     dem2d_fit_desc          scale                 -      HULL
-    dem2d_fit_desc          min_radius            -      0.1        [0, 1), of a0/2
-    dem2d_fit_desc          corners               -      false
+    dem2d_fit_desc          min_radius            -      0.1        in [0, 1), of a0/2
     dem2d_fit_desc          max_radius            -      20         0 or >= 1, of the size
-    dem2d_fit_desc          unbounded             -      false
-    dem2d_fit_desc          seed                  -      0
     dem2d_fit_desc          birds                 -      30         0 or 2 to 256
     dem2d_fit_desc          moves                 -      60         0 to 100000
     dem2d_fit_desc          pixels                px     256        0 or 8 to 4096
@@ -410,33 +406,26 @@ OPTIONS (zero means: physical zero for physical fields; "library default" where 
     dem2d_virtual_desc      roundness             -      0          >= 0
     dem2d_virtual_desc      roughness             -      0          >= 0
     dem2d_virtual_desc      spectrum              -      NULL       order + 1 values >= 0
-    dem2d_virtual_desc      min_radius            -      0.1        [0, 1), of a0/2
-    dem2d_virtual_desc      seed                  -      0
+    dem2d_virtual_desc      min_radius            -      0.1        in [0, 1), of a0/2
     dem2d_contact_desc      tolerance             -      1e-10      >= 0, of R_A + R_B + |d|
     dem2d_contact_desc      max_iterations        -      128        >= 0
-    dem2d_contact_desc      start                 -      centres    any direction
+    dem2d_contact_desc      start                 -      centres    finite, any direction
     dem2d_contact_desc      solver                -      CERTIFIED
-    dem2d_contact_desc      skip_points           -      false
     dem2d_world_desc        time_step             s      none       > 0
     dem2d_world_desc        gravity               m/s2   0          finite
-    dem2d_world_desc        local_damping         -      0          [0, 1)
+    dem2d_world_desc        local_damping         -      0          in [0, 1)
     dem2d_world_desc        global_damping        1/s    0          >= 0
     dem2d_world_desc        skin                  -      by itself  >= 0, of the particle radius
     dem2d_world_desc        contact_tolerance     -      1e-8       >= 0, of R_A + R_B + |d|
-    dem2d_world_desc        max_iterations        -      128        >= 0
+    dem2d_world_desc        max_iterations        -      128        0 to 1073741824
     dem2d_world_desc        solver                -      CERTIFIED
     dem2d_world_desc        faces                 -      TWO_POINTS
-    dem2d_world_desc        particle_capacity     -      grows      >= 0
-    dem2d_world_desc        pair_capacity         -      grows      >= 0
-    dem2d_world_desc        skip_time_step_check  -      false
-    dem2d_world_desc        ledger                -      false
+    dem2d_world_desc        particle_capacity     -      grows      0 to 1073741824
+    dem2d_world_desc        pair_capacity         -      grows      0 to 1073741824
     dem2d_world_desc        law                   -      NULL       springs and friction
-    dem2d_world_desc        law_user              -      NULL
-    dem2d_world_desc        law_tag               -      0
-    dem2d_world_desc        parallel_for          -      NULL       the caller's thread does all
-    dem2d_world_desc        parallel_user         -      NULL
+    dem2d_world_desc        parallel_for          -      NULL       one thread does all
     dem2d_world_desc        env                   -      NULL       copied
-    dem2d_material_desc     density               kg/m2  none       > 0 (walls ignore it)
+    dem2d_material_desc     density               kg/m2  none       > 0, walls ignore it
     dem2d_material_desc     normal_stiffness      N/m    none       > 0
     dem2d_material_desc     tangential_stiffness  N/m    0          >= 0
     dem2d_material_desc     friction              -      0          >= 0
@@ -452,53 +441,42 @@ OPTIONS (zero means: physical zero for physical fields; "library default" where 
     dem2d_particle_desc     material              -      none       a material of this world
     dem2d_particle_desc     motion                -      FREE
     dem2d_particle_desc     position              m      0          finite
-    dem2d_particle_desc     angle                 rad    0          at most 2^30
-    dem2d_particle_desc     velocity              m/s    0          finite; 0 when FIXED
-    dem2d_particle_desc     angular_velocity      rad/s  0          finite; 0 when FIXED
-    dem2d_wall_desc         length                m      none       > 0 for a servo with no spans
+    dem2d_particle_desc     angle                 rad    0          -1073741824 to 1073741824
+    dem2d_particle_desc     velocity              m/s    0          finite, 0 when FIXED
+    dem2d_particle_desc     angular_velocity      rad/s  0          finite, 0 when FIXED
+    dem2d_wall_desc         length                m      none       >= 0, of a servo > 0 or spans
     dem2d_wall_desc         mode                  -      STILL
     dem2d_wall_desc         material              -      none       a material of this world
     dem2d_wall_desc         point                 m      0          finite
-    dem2d_wall_desc         normal                -      none       not zero; normalised
-    dem2d_wall_desc         segment               -      false
+    dem2d_wall_desc         normal                -      none       finite, not zero; normalised
     dem2d_wall_desc         end                   m      0          finite, of segments not point
-    dem2d_wall_desc         velocity              m/s    0          finite; MOVING only
-    dem2d_wall_desc         stress                Pa     0          finite; SERVO only
-    dem2d_wall_desc         max_speed             m/s    none       > 0 for SERVO
+    dem2d_wall_desc         velocity              m/s    0          finite, MOVING only
+    dem2d_wall_desc         stress                Pa     0          finite, SERVO only
+    dem2d_wall_desc         max_speed             m/s    none       >= 0, > 0 for SERVO
     dem2d_wall_desc         spans                 -      none       two walls, or both zero
     dem2d_save_desc         write                 -      none       or a path, not both
-    dem2d_save_desc         user                  -      NULL
     dem2d_load_desc         read                  -      none       or a path, not both
-    dem2d_load_desc         user                  -      NULL
-    dem2d_load_desc         parallel_for          -      NULL       the caller's thread does all
-    dem2d_load_desc         parallel_user         -      NULL
+    dem2d_load_desc         parallel_for          -      NULL       one thread does all
     dem2d_load_desc         custom                -      NULL       required for custom shapes
     dem2d_load_desc         law                   -      NULL       required for its worlds
-    dem2d_load_desc         law_user              -      NULL
     dem2d_load_desc         law_tag               -      0          as it was saved
-    dem2d_load_desc         custom_user           -      NULL
     dem2d_load_desc         env                   -      NULL       copied
     dem2d_svg_desc          width                 px     800        >= 0
     dem2d_svg_desc          outline_points        -      64         0 or >= 3
-    dem2d_svg_desc          force_chains          -      false
-    dem2d_svg_desc          view                  m      all        upper above lower, or all zero
+    dem2d_svg_desc          view.lower            m      all        finite
+    dem2d_svg_desc          view.upper            m      all        finite, above lower, or all zero
     dem2d_svg_desc          write                 -      none       or a path, not both
-    dem2d_svg_desc          user                  -      NULL
     dem2d_vtp_desc          outline_points        -      64         0 or >= 3
     dem2d_vtp_desc          part                  -      PARTICLES
     dem2d_vtp_desc          write                 -      none       or a path, not both
-    dem2d_vtp_desc          user                  -      NULL
-    dem2d_pvd_desc          count                 -      0          >= 0
+    dem2d_pvd_desc          count                 -      0          0 to 1073741824
     dem2d_pvd_desc          times                 s      none       count values, finite
     dem2d_pvd_desc          files                 -      none       count names, no control bytes
     dem2d_pvd_desc          write                 -      none       or a path, not both
-    dem2d_pvd_desc          user                  -      NULL
-    dem2d_csv_desc          count                 -      0          >= 0
+    dem2d_csv_desc          count                 -      0          0 to 1073741824
     dem2d_csv_desc          names                 -      none       count; no comma, quote, line end
     dem2d_csv_desc          values                -      none       count values, finite
-    dem2d_csv_desc          append                -      false
     dem2d_csv_desc          write                 -      none       or a path, not both
-    dem2d_csv_desc          user                  -      NULL
 
 ERRORS
     Functions that can fail return a dem2d_result; dem2d_result_text gives its text. Outputs are
@@ -4640,7 +4618,7 @@ static const dem2di_field dem2di_picture_fields[] = {
     DEM2DI_ROW(dem2d_image_desc, pixels16, DEM2DI_OPTIONAL, "- none; not with pixels"),
     DEM2DI_ROW(dem2d_image_desc, width, DEM2DI_WHOLE(1, DEM2DI_PICTURE_SIDE), "px none"),
     DEM2DI_ROW(dem2d_image_desc, height, DEM2DI_WHOLE(1, DEM2DI_PICTURE_SIDE), "px none"),
-    DEM2DI_ROW(dem2d_image_desc, stride, DEM2DI_COUNT, "- width; 0 or at least the width"),
+    DEM2DI_ROW(dem2d_image_desc, stride, DEM2DI_COUNT, "- width; not below the width"),
     DEM2DI_ROW(dem2d_image_desc, crop_left, DEM2DI_COUNT, "px 0; below the width"),
     DEM2DI_ROW(dem2d_image_desc, crop_top, DEM2DI_COUNT, "px 0; below the height"),
     DEM2DI_ROW(dem2d_image_desc, crop_width, DEM2DI_COUNT, "px the rest; within the width"),

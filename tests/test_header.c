@@ -12,6 +12,9 @@
 
 #include <cmocka.h>
 
+#include "dem2d.h"
+#include "fields.h"
+
 #ifndef HEADER_PATH
 #define HEADER_PATH "../dem2d.h" // the environment's DEM2D_HEADER goes first
 #endif
@@ -272,38 +275,92 @@ static void fields_read(const doc *d, list *fields) {
     }
 }
 
-// "struct field" of each row of the manual's table of options.
-static void options_read(const doc *d, list *options) {
-    options->count = 0;
-    int first = line_starting(d, 0, "OPTIONS");
-    for (int i = first + 1; first >= 0 && i < d->count; i++) {
-        char type[NAME / 2], field[NAME / 2];
-        if (d->line[i][0] && d->line[i][0] != ' ') break;
-        if (sscanf(d->line[i], " %46s %47s", type, field) != 2) continue;
-        if (!starts(type, "dem2d_")) continue;
-        strcat(type, " ");
-        list_add(options, type, field, i);
+// The tables of fields: those of dem2d.h, or the sample's.
+typedef struct table {
+    field_row row[MAX_NAMES];
+    int count;
+} table;
+
+static table real_fields, *known = &real_fields;
+
+// The part of a text up to a separator or its end; the text goes on behind it.
+static void part_of(const char **text, const char *separator, char part[NAME]) {
+    const char *end = strstr(*text, separator);
+    int length = end ? (int)(end - *text) : (int)strlen(*text);
+    snprintf(part, NAME, "%.*s", length, *text);
+    *text = end ? end + strlen(separator) : "";
+}
+
+// The line of a field in the manual's OPTIONS; false where there is nothing to say: any value is
+// right, and none is 0.
+static bool option_line(const field_row *row, char line[256]) {
+    char unit[NAME], value[NAME];
+    const char *note = row->text;
+    part_of(&note, " ", unit);
+    part_of(&note, "; ", value);
+    bool plain =
+        strcmp(value, "0") == 0 || strcmp(value, "false") == 0 || strcmp(value, "NULL") == 0;
+    if (plain && strcmp(unit, "-") == 0 && !row->range[0] && !*note) return false;
+    snprintf(line, 256, "    %-23s %-21s %-6s %-10s %s%s%s", row->of, row->name, unit, value,
+             row->range, row->range[0] && *note ? ", " : "", note);
+    for (size_t length = strlen(line); line[length - 1] == ' ';) line[--length] = '\0';
+    return true;
+}
+
+// "struct field" of each row of the tables: "dem2d_svg_desc view" for its parts.
+static void rows_read(list *rows) {
+    rows->count = 0;
+    for (int i = 0; i < known->count; i++) {
+        char type[NAME], field[NAME];
+        const char *rest = known->row[i].name;
+        part_of(&rest, ".", field);
+        snprintf(type, sizeof type, "%s ", known->row[i].of);
+        list_add(rows, type, field, i);
+        int last = rows->count - 1; // the parts of a field follow each other
+        if (last > 0 && strcmp(rows->name[last], rows->name[last - 1]) == 0) rows->count--;
     }
 }
 
-// Fields of the descs and rows of the table are the same.
-static int check_options(const doc *d, const doc *hello) {
+// Fields of the descs and rows of the tables are the same.
+static int check_fields(const doc *d, const doc *hello) {
     (void)hello;
-    list fields, options;
+    list fields, rows;
     fields_read(d, &fields);
-    options_read(d, &options);
-    if (fields.count == 0 || options.count == 0) return fault(d, -1, "no fields or no table", "");
+    rows_read(&rows);
+    if (fields.count == 0 || rows.count == 0) return fault(d, -1, "no fields or no table", "");
     int errors = 0;
     for (int i = 0; i < fields.count; i++)
-        if (list_find(&options, 0, fields.name[i]) < 0)
-            errors += fault(d, fields.line[i], "not in the table of options: ", fields.name[i]);
-    for (int i = 0; i < options.count; i++) {
-        if (list_find(&fields, 0, options.name[i]) < 0)
-            errors += fault(d, options.line[i], "no such field: ", options.name[i]);
-        if (list_find(&options, i + 1, options.name[i]) >= 0)
-            errors += fault(d, options.line[i], "twice in the table: ", options.name[i]);
-    }
+        if (list_find(&rows, 0, fields.name[i]) < 0)
+            errors += fault(d, fields.line[i], "not in the tables of fields: ", fields.name[i]);
+    for (int i = 0; i < rows.count; i++)
+        if (list_find(&fields, 0, rows.name[i]) < 0)
+            errors += fault(d, -1, "no such field: ", rows.name[i]);
     return errors;
+}
+
+// The manual's OPTIONS are the lines that follow from the tables, in the order of the tables.
+static int check_options(const doc *d, const doc *hello) {
+    (void)hello;
+    static char lines[MAX_NAMES][256];
+    int count = 0, errors = 0, first = line_starting(d, 0, "OPTIONS");
+    for (int i = 0; i < known->count; i++) count += option_line(&known->row[i], lines[count]);
+    if (first < 0 || count == 0) return fault(d, -1, "no OPTIONS or no table", "");
+    while (first < d->count && !starts(d->line[first], "    dem2d_")) first++;
+    int latest = first - 1, last = first;
+    while (last < d->count && starts(d->line[last], "    dem2d_")) last++;
+    for (int i = 0; i < count; i++) {
+        int at = first;
+        while (at < last && strcmp(d->line[at], lines[i]) != 0) at++;
+        if (at == last) errors += fault(d, -1, "OPTIONS needs the line:\n", lines[i]);
+        if (at < last && at < latest) errors += fault(d, at, "out of order", "");
+        if (at < last) latest = at;
+    }
+    for (int at = first; at < last; at++) {
+        int i = 0;
+        while (i < count && strcmp(d->line[at], lines[i]) != 0) i++;
+        if (i == count) errors += fault(d, at, "not what the tables of fields say", "");
+    }
+    return last - first == count ? errors : errors + fault(d, first, "too many or too few", "");
 }
 
 // The manual's quick start, less its indent of four, is hello.c.
@@ -652,6 +709,16 @@ static int check_named(const doc *d, const doc *hello) {
 
 static const char sample_hello[] = "int main(void) {\n\n    return 0;\n}\n";
 
+#define SAMPLE_LOG "    dem2d_env               log                   -      silent\n"
+
+static table sample_fields = {
+    {{.of = "dem2d_env", .name = "user", .text = "- NULL"},
+     {.of = "dem2d_env", .name = "log", .text = "- silent"},
+     {.of = "dem2d_some_desc", .name = "width", .text = "m none; of the grain", .range = "> 0"},
+     {.of = "dem2d_some_desc", .name = "spans.lower", .text = "- all", .range = "finite"},
+     {.of = "dem2d_some_desc", .name = "spans.upper", .text = "- false"}},
+    5};
+
 static const char sample[] =
     "/* dem2d.h - a sample, version 1.2.3\n"
     "\n"
@@ -674,10 +741,9 @@ static const char sample[] =
     "    }\n"
     "\n"
     "OPTIONS\n"
-    "    struct           field   unit\n"
-    "    dem2d_env        user    -\n"
-    "    dem2d_env        log     -\n"
-    "    dem2d_some_desc  spans   m\n"
+    "    struct                  field                 unit   default    range\n" SAMPLE_LOG
+    "    dem2d_some_desc         width                 m      none       > 0, of the grain\n"
+    "    dem2d_some_desc         spans.lower           -      all        finite\n"
     "\n"
     "ERRORS\n"
     "=============\n"
@@ -700,6 +766,7 @@ static const char sample[] =
     "} dem2d_env;\n"
     "/// Some.\n"
     "typedef struct dem2d_some_desc {\n"
+    "    double width;    ///< m\n"
     "    double spans[2]; ///< m\n"
     "} dem2d_some_desc;\n"
     "/// An enum.\n"
@@ -746,7 +813,8 @@ static rule rules[] = {
     {"anchors: once, as in the contents", check_anchors},
     {"functions have a comment", check_functions},
     {"types have a comment", check_types},
-    {"options are the fields of the descs", check_options},
+    {"tables of fields hold the fields of the descs", check_fields},
+    {"options are those of the tables", check_options},
     {"quick start is hello.c", check_quick_start},
     {"versions agree", check_versions},
     {"allocation only in its section", check_memory},
@@ -782,17 +850,24 @@ static mutation mutations[] = {
     {"rejects: no functions", check_functions, ">>api-types  Version", "Version"},
     {"rejects: struct without comment", check_types, "/// Some.\n", "// Some.\n"},
     {"rejects: enum without comment", check_types, "/// An enum.\n", ""},
-    {"rejects: field without option", check_options, "    double spans[2];",
-     "    double width;\n    double spans[2];"},
-    {"rejects: callback without option", check_options, "(*log)", "(*message)"},
-    {"rejects: array without option", check_options, "spans[2];", "lengths[2];"},
-    {"rejects: two fields in a line", check_options, "double spans[2]", "double width, spans[2]"},
-    {"rejects: option without field", check_options, "    dem2d_env        log     -\n",
-     "    dem2d_env        log     -\n    dem2d_env        free    -\n"},
-    {"rejects: option of another struct", check_options, "dem2d_some_desc  spans",
-     "dem2d_env        spans"},
-    {"rejects: option twice", check_options, "    dem2d_env        log     -\n",
-     "    dem2d_env        log     -\n    dem2d_env        log     -\n"},
+    {"rejects: field without row", check_fields, "    double spans[2];",
+     "    double height;\n    double spans[2];"},
+    {"rejects: callback without row", check_fields, "(*log)", "(*message)"},
+    {"rejects: array without row", check_fields, "spans[2];", "lengths[2];"},
+    {"rejects: two fields in a line", check_fields, "double spans[2]", "double width, spans[2]"},
+    {"rejects: row without field", check_fields, "    double width;    ///< m\n", ""},
+    {"rejects: no option", check_options, SAMPLE_LOG, ""},
+    {"rejects: option without row", check_options, SAMPLE_LOG,
+     SAMPLE_LOG "    dem2d_env               free                  -      free\n"},
+    {"rejects: option of another struct", check_options, "dem2d_some_desc         width",
+     "dem2d_env               width"},
+    {"rejects: option twice", check_options, SAMPLE_LOG, SAMPLE_LOG SAMPLE_LOG},
+    {"rejects: options out of order", check_options, "    dem2d_some_desc         spans.lower",
+     SAMPLE_LOG "    dem2d_some_desc         spans.lower"},
+    {"rejects: unit", check_options, "m      none", "px     none"},
+    {"rejects: default", check_options, "silent", "print"},
+    {"rejects: range", check_options, "> 0", ">= 0"},
+    {"rejects: note", check_options, "of the grain", "of the sample"},
     {"rejects: no table of options", check_options, "OPTIONS", "CHOICES"},
     {"rejects: quick start differs", check_quick_start, "        return 0;", "        return 1;"},
     {"rejects: quick start is longer", check_quick_start, "    }\n\nOPT", "    }\n    ;\n\nOPT"},
@@ -849,6 +924,9 @@ enum { RULES = sizeof rules / sizeof *rules, MUTATIONS = sizeof mutations / size
 
 static void test_rule(void **state) {
     const rule *r = *state;
+    known = &real_fields;
+    for (real_fields.count = 0; fields_get(real_fields.count, &real_fields.row[real_fields.count]);)
+        real_fields.count++;
     doc header = doc_read("DEM2D_HEADER", HEADER_PATH), hello = doc_read("DEM2D_HELLO", HELLO_PATH);
     int errors = r->check(&header, &hello);
     doc_free(&header);
@@ -871,6 +949,7 @@ static doc doc_replaced(const char *text, const char *from, const char *to) {
 
 static void test_sample(void **state) {
     (void)state;
+    known = &sample_fields;
     doc header = doc_replaced(sample, "", ""), hello = doc_replaced(sample_hello, "", "");
     int errors = 0;
     for (int i = 0; i < RULES; i++) errors += rules[i].check(&header, &hello);
@@ -881,6 +960,7 @@ static void test_sample(void **state) {
 
 static void test_mutation(void **state) {
     const mutation *m = *state;
+    known = &sample_fields;
     doc header = doc_replaced(sample, m->from, m->to), hello = doc_replaced(sample_hello, "", "");
     quiet = true;
     int errors = m->check(&header, &hello);
