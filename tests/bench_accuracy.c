@@ -72,14 +72,14 @@ enum { IMPACT_TIME = 4 }; /* contact times */
 
 static void strike(double steps, int start, double zeta, double vt, double friction, outcome *o) {
     const dem2d_world_desc desc = world_desc(contact_time() / steps);
-    dem2d_material_desc material = stone(KN / 2, friction);
+    dem2d_material_desc material = stone_desc(KN / 2, friction);
     material.damping_ratio = zeta;
     const scene s = open_scene(&desc, &material);
     add_floor(&s);
     const dem2d_particle_id id =
-        add(&s, disc(RADIUS), DEM2D_FREE, vec(0, RADIUS + gap(start)), vec(vt, -SPEED), 0);
+        add(&s, make_disc(RADIUS), DEM2D_FREE, vec(0, RADIUS + gap(start)), vec(vt, -SPEED), 0);
     timed_step(&s, (int)(IMPACT_TIME * steps + 0.5), 1, o);
-    const dem2d_particle_info p = look(&s, id);
+    const dem2d_particle_info p = grain_of(&s, id);
     o->count = 1;
     o->place[0] = vt != 0 ? p.velocity.x + p.angular_velocity * RADIUS : p.pose.position.y - RADIUS;
     close_scene(&s);
@@ -126,10 +126,10 @@ static void run_stick(double steps, int start, outcome *o) {
    that one step shows. Tangential springs then start from nothing to second order. */
 static void start_at_rest(const scene *s, const dem2d_particle_id *ids, int count) {
     dem2d_pose at[32];
-    for (int i = 0; i < count; i++) at[i] = look(s, ids[i]).pose;
+    for (int i = 0; i < count; i++) at[i] = grain_of(s, ids[i]).pose;
     step(s, 1);
     for (int i = 0; i < count; i++) {
-        const dem2d_particle_info p = look(s, ids[i]); /* velocities are a dt */
+        const dem2d_particle_info p = grain_of(s, ids[i]); /* velocities are a dt */
         must(dem2d_world_move_particle(s->world, ids[i], at[i].position,
                                        dem2d_rot_angle(at[i].rotation)),
              "move");
@@ -145,15 +145,15 @@ static void let_go(double steps, bool slips, outcome *o) {
     const double a = 0.03, b = 0.015, mass = DENSITY * (double)PI * a * b, tilt = 0.5;
     const double dt = (double)PI * sqrt(mass / KN) / steps;
     dem2d_world_desc desc = world_desc(dt);
-    const dem2d_material_desc material = stone(slips ? 0 : KN, slips ? 0 : 1e9);
+    const dem2d_material_desc material = stone_desc(slips ? 0 : KN, slips ? 0 : 1e9);
     dem2d_support low;
-    dem2d_shape *shape = ellipse(a, b);
+    dem2d_shape *shape = make_ellipse(a, b);
     desc.gravity.y = -G;
     const scene s = open_scene(&desc, &material);
     must(dem2d_shape_support(shape, dem2d_pose_make(0, 0, tilt, 1), vec(0, -1), &low), "support");
     add_floor(&s);
     const dem2d_particle_id id =
-        add_shape(&s, shape, DEM2D_FREE, vec(0, low.value - mass * G / KN), tilt, vec(0, 0), 0);
+        add_copy(&s, shape, DEM2D_FREE, vec(0, low.value - mass * G / KN), tilt, vec(0, 0), 0);
     dem2d_shape_destroy(shape);
     start_at_rest(&s, &id, 1);
     timed_step(&s, (int)(150 * steps + 0.5), 1, o); /* contact times: about 0.3 s */
@@ -179,7 +179,7 @@ static void run_lattice(double steps, int start, outcome *o) {
     const double spacing = 2 * RADIUS * (1 - OVERLAP / 2), wall = RADIUS * (1 - OVERLAP);
     const double time = contact_time(), off = SHAKING * RADIUS;
     const dem2d_world_desc desc = world_desc(time / steps);
-    const dem2d_material_desc material = stone(KN / 2, 1e9);
+    const dem2d_material_desc material = stone_desc(KN / 2, 1e9);
     const scene s = open_scene(&desc, &material);
     dem2d_particle_id ids[SIDE * SIDE];
     const double side = (SIDE - 1) * spacing + 2 * wall;
@@ -187,18 +187,18 @@ static void run_lattice(double steps, int start, outcome *o) {
     random_state = 3;
     add_plane(&s, 0, 0, 1, 0), add_plane(&s, side, 0, -1, 0);
     add_plane(&s, 0, 0, 0, 1), add_plane(&s, 0, side, 0, -1);
-    dem2d_shape *shape = disc(RADIUS);
+    dem2d_shape *shape = make_disc(RADIUS);
     for (int i = 0; i < SIDE * SIDE; i++)
-        ids[i] = add_shape(&s, shape, DEM2D_FREE,
-                           vec(wall + spacing * (i % SIDE) + uniform(-off, off),
-                               wall + spacing * (i / SIDE) + uniform(-off, off)),
-                           0, vec(0, 0), 0);
+        ids[i] = add_copy(&s, shape, DEM2D_FREE,
+                          vec(wall + spacing * (i % SIDE) + uniform(-off, off),
+                              wall + spacing * (i / SIDE) + uniform(-off, off)),
+                          0, vec(0, 0), 0);
     dem2d_shape_destroy(shape);
     start_at_rest(&s, ids, SIDE * SIDE);
     timed_step(&s, (int)(20 * steps + 0.5), SIDE * SIDE, o);
     o->count = 2 * SIDE * SIDE;
     for (int i = 0; i < SIDE * SIDE; i++) {
-        const dem2d_vec at = look(&s, ids[i]).pose.position;
+        const dem2d_vec at = grain_of(&s, ids[i]).pose.position;
         o->place[2 * i] = at.x, o->place[2 * i + 1] = at.y;
     }
     close_scene(&s);
@@ -212,7 +212,7 @@ static void run_grains(double steps, int start, outcome *o) {
     enum { GRAINS = 20, ROW = 5 };
     const double size = 1, time = (double)PI * sqrt(disc_mass(size) / KN), speed = 2;
     dem2d_world_desc desc = world_desc(time / steps);
-    const dem2d_material_desc material = stone(0, 0);
+    const dem2d_material_desc material = stone_desc(0, 0);
     dem2d_particle_id ids[GRAINS];
     desc.gravity.y = -G;
     const scene s = open_scene(&desc, &material);
@@ -225,14 +225,14 @@ static void run_grains(double steps, int start, outcome *o) {
         const double shift = speed * time * (start + 0.3) / (FIRST * STARTS);
         /* half a step before the place */
         const double v = (i < ROW ? -speed : -1.5 * speed) + G * desc.time_step / 2;
-        ids[i] = add_shape(&s, shape, DEM2D_FREE, vec(x, y + shift), uniform(-3, 3),
-                           vec(uniform(-0.2, 0.2), v), uniform(-0.3, 0.3));
+        ids[i] = add_copy(&s, shape, DEM2D_FREE, vec(x, y + shift), uniform(-3, 3),
+                          vec(uniform(-0.2, 0.2), v), uniform(-0.3, 0.3));
         dem2d_shape_destroy(shape);
     }
     timed_step(&s, (int)(6 * steps + 0.5), GRAINS, o);
     o->count = 2 * GRAINS;
     for (int i = 0; i < GRAINS; i++) {
-        const dem2d_vec at = look(&s, ids[i]).pose.position;
+        const dem2d_vec at = grain_of(&s, ids[i]).pose.position;
         o->place[2 * i] = at.x, o->place[2 * i + 1] = at.y;
     }
     close_scene(&s);

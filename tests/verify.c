@@ -52,17 +52,17 @@ static head_on open_head_on(int kind, const dem2d_material_desc *material, doubl
     if (wall)
         add_floor(&h.s);
     else
-        h.target = add(&h.s, is_disc ? disc(radius) : ellipse(a, b),
+        h.target = add(&h.s, is_disc ? make_disc(radius) : make_ellipse(a, b),
                        kind == DISC_FIXED ? DEM2D_FIXED : DEM2D_FREE, vec(0, 0), vec(0, 0), 0);
     const double above = 5.3 * speed * h.time_step;
-    h.mover = add(&h.s, is_disc ? disc(radius) : ellipse(a, b), DEM2D_FREE, vec(0, h.touch + above),
-                  vec(0, -speed), 0);
+    h.mover = add(&h.s, is_disc ? make_disc(radius) : make_ellipse(a, b), DEM2D_FREE,
+                  vec(0, h.touch + above), vec(0, -speed), 0);
     return h;
 }
 
 static double gap_of(const head_on *h) {
-    const double y = look(&h->s, h->mover).pose.position.y;
-    return y - h->touch - (h->target.generation ? look(&h->s, h->target).pose.position.y : 0);
+    const double y = grain_of(&h->s, h->mover).pose.position.y;
+    return y - h->touch - (h->target.generation ? grain_of(&h->s, h->target).pose.position.y : 0);
 }
 
 typedef struct impact {
@@ -79,7 +79,7 @@ static impact run_head_on(int kind, const dem2d_material_desc *material, double 
         dem2d_contact_info c;
         step(&h.s, 1);
         const double now = gap_of(&h);
-        if (contacts(&h.s, &c, 1)) {
+        if (contacts_of(&h.s, &c, 1)) {
             result.depth = fmax(result.depth, c.depth);
             result.force = fmax(result.force, c.normal_force);
         }
@@ -90,21 +90,21 @@ static impact run_head_on(int kind, const dem2d_material_desc *material, double 
         before = now;
     }
     step(&h.s, 10);
-    const double target = h.target.generation ? look(&h.s, h.target).velocity.y : 0;
-    result.restitution = (look(&h.s, h.mover).velocity.y - target) / speed;
+    const double target = h.target.generation ? grain_of(&h.s, h.target).velocity.y : 0;
+    result.restitution = (grain_of(&h.s, h.mover).velocity.y - target) / speed;
     close_scene(&h.s);
     return result;
 }
 
 static double frequency_of(int kind) {
-    const dem2d_material_desc material = stone(0, 0);
+    const dem2d_material_desc material = stone_desc(0, 0);
     const head_on h = open_head_on(kind, &material, 1, 100);
     close_scene(&h.s);
     return h.frequency;
 }
 
 static void elastic_impacts(void) {
-    const dem2d_material_desc material = stone(KN, 0.5);
+    const dem2d_material_desc material = stone_desc(KN, 0.5);
     table_group("Elastic impact at t_c/100");
     basis = "formula";
     for (int kind = 0; kind < HEAD_ONS; kind++) {
@@ -162,7 +162,7 @@ static void pulling_rows(void) {
         const double *steps = damped_steps[i % 2];
         const double speed = speeds[i / 2 % COUNT_OF(speeds)];
         double zeta = zetas[i / 2 / COUNT_OF(speeds)];
-        const dem2d_material_desc material = stone(0, 0);
+        const dem2d_material_desc material = stone_desc(0, 0);
         const double w = frequency_of(DISC_WALL);
         pulling = &zeta;
         const impact hit = run_head_on(DISC_WALL, &material, speed, steps[0]);
@@ -184,7 +184,7 @@ static void damped_impacts(void) {
     for (int i = 0; i < COUNT_OF(zetas) * 2; i++) {
         const double *steps = damped_steps[i % 2], zeta = zetas[i / 2], speed = 0.3;
         const int kind = i / 2 % HEAD_ONS;
-        dem2d_material_desc material = stone(0, 0);
+        dem2d_material_desc material = stone_desc(0, 0);
         material.damping_ratio = zeta;
         const impact hit = run_head_on(kind, &material, speed, steps[0]);
         const char *name =
@@ -203,7 +203,7 @@ static void damped_impacts(void) {
                  1e-12);
         for (int k = 0; k < 2; k++) {
             const double *steps = damped_steps[k];
-            dem2d_material_desc material = stone(0, 0);
+            dem2d_material_desc material = stone_desc(0, 0);
             material.damping_ratio = zeta;
             row_within(label("e = %g asked for, t_c/%g", asked[i], steps[0]), asked[i],
                        run_head_on(DISC_DISC, &material, 0.3, steps[0]).restitution, steps[1]);
@@ -224,11 +224,11 @@ static dem2d_particle_info bounce(const dem2d_material_desc *material, double vt
     const scene s = open_scene(&desc, material);
     add_floor(&s);
     const dem2d_particle_id id =
-        add(&s, disc(radius), DEM2D_FREE, vec(0, radius + 1e-6), vec(vt, -vn), 0);
-    for (int i = 0; i < 1000000 && look(&s, id).velocity.y <= 0; i++) step(&s, 1);
+        add(&s, make_disc(radius), DEM2D_FREE, vec(0, radius + 1e-6), vec(vt, -vn), 0);
+    for (int i = 0; i < 1000000 && grain_of(&s, id).velocity.y <= 0; i++) step(&s, 1);
     step(&s, (int)(2 * steps)); /* until it has left */
-    if (contacts(&s, NULL, 0) != 0) fail(STATUS_FAILED, "the disc does not leave the wall");
-    const dem2d_particle_info info = look(&s, id);
+    if (contacts_of(&s, NULL, 0) != 0) fail(STATUS_FAILED, "the disc does not leave the wall");
+    const dem2d_particle_info info = grain_of(&s, id);
     close_scene(&s);
     return info;
 }
@@ -252,18 +252,18 @@ static void slip_rows(const dem2d_material_desc *damped, double e, double steps)
 static void oblique_impacts(void) {
     static const double ratios[] = {1.0 / 3, 0.5, 1};
     static const double steps[][2] = {{100, 0.03}, {1000, 0.003}};
-    const dem2d_material_desc elastic = stone(KN, 0);
+    const dem2d_material_desc elastic = stone_desc(KN, 0);
     table_group("Oblique impact");
     basis = "formula";
     slip_rows(&elastic, 1, 100);
     /* a dashpot's force starts with a jump, which the tangential spring follows at once only if it
        is stiff: the formula knows no spring */
-    dem2d_material_desc damped = stone(100 * KN, 0);
+    dem2d_material_desc damped = stone_desc(100 * KN, 0);
     damped.damping_ratio = zeta_of_clipped(0.5);
     slip_rows(&damped, 0.5, 1000);
     for (int i = 0; i < COUNT_OF(ratios) * 2; i++) {
         const double ratio = ratios[i / 2], radius = 0.05, vt = 0.02;
-        const dem2d_material_desc material = stone(ratio * KN, 1e9);
+        const dem2d_material_desc material = stone_desc(ratio * KN, 1e9);
         const dem2d_particle_info p = bounce(&material, vt, 0.02, steps[i % 2][0], radius);
         row_within(
             label("stick, kt/kn = %.3g, t_c/%g: cos(pi sqrt(3 kt/kn))", ratio, steps[i % 2][0]),
@@ -278,18 +278,18 @@ static void oblique_impacts(void) {
 static void slide_to_roll(double mu) {
     const double radius = 0.05, v0 = 1, dt = 2e-5;
     const dem2d_world_desc desc = world_desc(dt);
-    const dem2d_material_desc material = stone(KN, mu);
+    const dem2d_material_desc material = stone_desc(KN, mu);
     const scene s = open_scene(&desc, &material);
     const double rest = disc_mass(radius) * G / KN;
     set_gravity(&s, 0, -G);
     add_floor(&s);
     const dem2d_particle_id id =
-        add(&s, disc(radius), DEM2D_FREE, vec(0, radius - rest), vec(v0, 0), 0);
+        add(&s, make_disc(radius), DEM2D_FREE, vec(0, radius - rest), vec(v0, 0), 0);
     double slip = v0, last = v0, v = v0, v_last = v0;
     int n = 0;
     for (; n < 1000000 && slip > 0; n++) {
         step(&s, 1);
-        const dem2d_particle_info info = look(&s, id);
+        const dem2d_particle_info info = grain_of(&s, id);
         last = slip, v_last = v;
         v = info.velocity.x, slip = v + info.angular_velocity * (radius - rest / 2);
     }
@@ -305,15 +305,15 @@ static void slide_to_roll(double mu) {
 static void disc_on_incline(double degrees, double mu) {
     const double radius = 0.05, dt = 5e-5, b = degrees * DEGREE;
     const dem2d_world_desc desc = world_desc(dt);
-    const dem2d_material_desc material = stone(KN, mu);
+    const dem2d_material_desc material = stone_desc(KN, mu);
     const scene s = open_scene(&desc, &material);
     const double rest = disc_mass(radius) * G * cos(b) / KN;
     set_gravity(&s, G * sin(b), -G * cos(b));
     add_floor(&s);
     const dem2d_particle_id id =
-        add(&s, disc(radius), DEM2D_FREE, vec(0, radius - rest), vec(0, 0), 0);
+        add(&s, make_disc(radius), DEM2D_FREE, vec(0, radius - rest), vec(0, 0), 0);
     step(&s, 20000);
-    const dem2d_particle_info info = look(&s, id);
+    const dem2d_particle_info info = grain_of(&s, id);
     const bool rolls = mu >= tan(b) / 3;
     const double a = rolls ? 2 * G * sin(b) / 3 : G * (sin(b) - mu * cos(b));
     const double spin = rolls ? a / radius : 2 * mu * G * cos(b) / radius;
@@ -331,12 +331,12 @@ static void disc_on_incline(double degrees, double mu) {
    turns by a degree; raised by a tenth of a degree each 0.25 s. Damping stills it between. */
 static double critical_slope(double width, double height, double mu, double from) {
     const dem2d_world_desc desc = world_desc(1e-4);
-    const dem2d_material_desc material = stone(KN, mu);
+    const dem2d_material_desc material = stone_desc(KN, mu);
     const scene s = open_scene(&desc, &material);
     double slope = 0;
     add_floor(&s);
     const dem2d_particle_id id =
-        add(&s, box(width, height), DEM2D_FREE,
+        add(&s, make_box(width, height), DEM2D_FREE,
             vec(0, height / 2 - DENSITY * width * height * G / (2 * KN)), vec(0, 0), 0);
     set_damping(&s, 0.5);
     for (int i = 1; i <= 40; i++) {
@@ -345,11 +345,11 @@ static double critical_slope(double width, double height, double mu, double from
         step(&s, 250);
     }
     step(&s, 5000);
-    const double x = look(&s, id).pose.position.x;
+    const double x = grain_of(&s, id).pose.position.x;
     for (; slope < from + 10; slope += 0.1) {
         set_gravity(&s, G * sin(slope * DEGREE), -G * cos(slope * DEGREE));
         step(&s, 2500);
-        const double moved = fabs(look(&s, id).pose.position.x - x);
+        const double moved = fabs(grain_of(&s, id).pose.position.x - x);
         if (moved > 1e-3 * height || fabs(angle_of(&s, id)) > DEGREE) break;
     }
     close_scene(&s);
@@ -386,13 +386,13 @@ static void rolling(void) {
 static void opposite_spins(void) {
     const double radius = 0.05, spin = 10;
     const dem2d_world_desc desc = world_desc((double)PI * sqrt(disc_mass(radius) / 2 / KN) / 100);
-    const dem2d_material_desc material = stone(KN, 0.5);
+    const dem2d_material_desc material = stone_desc(KN, 0.5);
     const scene s = open_scene(&desc, &material);
-    const dem2d_particle_id a = add(&s, disc(radius), DEM2D_FREE, vec(0, 0), vec(1, 0), spin);
+    const dem2d_particle_id a = add(&s, make_disc(radius), DEM2D_FREE, vec(0, 0), vec(1, 0), spin);
     const dem2d_particle_id b =
-        add(&s, disc(radius), DEM2D_FREE, vec(0.1001, 0), vec(-1, 0), -spin);
+        add(&s, make_disc(radius), DEM2D_FREE, vec(0.1001, 0), vec(-1, 0), -spin);
     step(&s, 400);
-    const dem2d_particle_info p = look(&s, a), q = look(&s, b);
+    const dem2d_particle_info p = grain_of(&s, a), q = grain_of(&s, b);
     row_near("opposite spins: rebound", -1, p.velocity.x, 1e-3);
     row_small("opposite spins: change of spin, 1/s",
               fmax(fabs(p.angular_velocity - spin), fabs(q.angular_velocity + spin)), 1e-12);
@@ -418,17 +418,17 @@ static void cradle_by_hand(int n, double *v) {
 static void cradle(int n) {
     const double radius = 0.5, v0 = 1e-2;
     const dem2d_world_desc desc = world_desc((double)PI * sqrt(disc_mass(radius) / 2 / KN) / 1000);
-    const dem2d_material_desc material = stone(0, 0);
+    const dem2d_material_desc material = stone_desc(0, 0);
     const scene s = open_scene(&desc, &material);
     dem2d_particle_id ids[5];
     double v[5];
     cradle_by_hand(n, v);
     for (int i = 0; i < n; i++)
-        ids[i] = add(&s, disc(radius), DEM2D_FREE, vec(i, 0), vec(i ? 0 : v0, 0), 0);
+        ids[i] = add(&s, make_disc(radius), DEM2D_FREE, vec(i, 0), vec(i ? 0 : v0, 0), 0);
     step(&s, 1000 * 3 * n);
     for (int i = 0; i < n; i++)
         row_within(label("cradle of %d: disc %d, v/v0", n, i + 1), v[i],
-                   look(&s, ids[i]).velocity.x / v0, 1e-3);
+                   grain_of(&s, ids[i]).velocity.x / v0, 1e-3);
     close_scene(&s);
 }
 
@@ -436,18 +436,18 @@ static void cradle(int n) {
 static void local_damping(void) {
     const double a = 0.3, v0 = 1, dt = 1e-3;
     dem2d_world_desc desc = world_desc(dt);
-    const dem2d_material_desc material = stone(0, 0);
+    const dem2d_material_desc material = stone_desc(0, 0);
     desc.gravity.y = -G, desc.local_damping = a;
     const scene s = open_scene(&desc, &material);
-    const dem2d_particle_id id = add(&s, disc(0.05), DEM2D_FREE, vec(0, 0), vec(0, v0), 0);
+    const dem2d_particle_id id = add(&s, make_disc(0.05), DEM2D_FREE, vec(0, 0), vec(0, v0), 0);
     step(&s, 70);
     row_near("local damping 0.3: up, g (1 + a), m/s2", G * (1 + a),
-             (v0 - look(&s, id).velocity.y) / (70 * dt), 1e-12);
+             (v0 - grain_of(&s, id).velocity.y) / (70 * dt), 1e-12);
     step(&s, 30);
-    const double v = look(&s, id).velocity.y;
+    const double v = grain_of(&s, id).velocity.y;
     step(&s, 100);
     row_near("local damping 0.3: down, g (1 - a), m/s2", G * (1 - a),
-             (v - look(&s, id).velocity.y) / (100 * dt), 1e-12);
+             (v - grain_of(&s, id).velocity.y) / (100 * dt), 1e-12);
     close_scene(&s);
 }
 
@@ -456,7 +456,7 @@ static void local_damping(void) {
 /* Sum, and the size of its terms: what rounding is measured by. */
 static void add_momentum(const scene *s, dem2d_particle_id id, long double sum[3],
                          long double size[3]) {
-    const dem2d_particle_info p = look(s, id);
+    const dem2d_particle_info p = grain_of(s, id);
     const long double m = p.mass, x = p.pose.position.x, y = p.pose.position.y;
     const long double terms[4] = {m * p.velocity.x, m * p.velocity.y,
                                   m * (x * p.velocity.y - y * p.velocity.x),
@@ -471,22 +471,22 @@ static void add_momentum(const scene *s, dem2d_particle_id id, long double sum[3
 static bool collide(int a, int b, double *momentum, double *angular) {
     const int models[2] = {a, b};
     const dem2d_world_desc desc = world_desc(2e-4);
-    const dem2d_material_desc material = stone(KN, 0.5);
+    const dem2d_material_desc material = stone_desc(KN, 0.5);
     const scene s = open_scene(&desc, &material);
     long double before[3] = {0}, after[3] = {0}, size[3] = {0}, unused[3] = {0};
     dem2d_particle_id ids[2];
     int met = 0, free_steps = 0;
     for (int k = 0; k < 2; k++) {
         dem2d_shape *shape = random_model(models[k]);
-        ids[k] = add_shape(&s, shape, DEM2D_FREE, vec(2.7 * k, uniform(-0.5, 0.5)), uniform(-3, 3),
-                           vec(k ? -2 : 2, uniform(-1, 1)), uniform(-2, 2));
+        ids[k] = add_copy(&s, shape, DEM2D_FREE, vec(2.7 * k, uniform(-0.5, 0.5)), uniform(-3, 3),
+                          vec(k ? -2 : 2, uniform(-1, 1)), uniform(-2, 2));
         dem2d_shape_destroy(shape);
     }
     for (int i = 0; i < 6000 && free_steps < 10; i++) {
         long double now[3] = {0}, terms[3] = {0};
         for (int k = 0; k < 2; k++) add_momentum(&s, ids[k], now, terms);
         step(&s, 1);
-        const int open = contacts(&s, NULL, 0);
+        const int open = contacts_of(&s, NULL, 0);
         if (open && !met) memcpy(before, now, sizeof now), memcpy(size, terms, sizeof terms);
         met += open;
         free_steps = met && !open ? free_steps + 1 : 0;
@@ -532,24 +532,24 @@ static double lattice_growth(double part, double *safe) {
     const double radius = 0.05, spacing = 2 * radius * (1 - 0.5e-4);
     const double critical = 2 / sqrt(6 * KN / disc_mass(radius));
     dem2d_world_desc desc = world_desc(part * critical);
-    const dem2d_material_desc material = stone(0, 0);
+    const dem2d_material_desc material = stone_desc(0, 0);
     desc.skip_time_step_check = true;
     const scene s = open_scene(&desc, &material);
     const double speed = 1e-6 * 1e-4 * radius / critical;
     double first = 0, most = 0, limit;
-    dem2d_shape *shape = disc(radius);
+    dem2d_shape *shape = make_disc(radius);
     random_state = 5;
     for (int i = 0; i < SIDE * SIDE; i++) {
         const int row = i / SIDE, column = i % SIDE;
         const bool rim = row == 0 || row == SIDE - 1 || column == 0 || column == SIDE - 1;
         const dem2d_vec at = vec(spacing * (column + 0.5 * (row % 2)), spacing * sqrt(0.75) * row);
         const dem2d_vec v = vec(uniform(-speed, speed), uniform(-speed, speed));
-        add_shape(&s, shape, rim ? DEM2D_FIXED : DEM2D_FREE, at, 0, rim ? vec(0, 0) : v, 0);
+        add_copy(&s, shape, rim ? DEM2D_FIXED : DEM2D_FREE, at, 0, rim ? vec(0, 0) : v, 0);
     }
     dem2d_shape_destroy(shape);
     for (int i = 0; i < STEPS; i++) {
         step(&s, 1);
-        const dem2d_energy e = energies(&s);
+        const dem2d_energy e = energy_of(&s);
         if (i == 0)
             first = kinetic(&e),
             must(dem2d_world_time_step_bounds(s.world, safe, &limit, NULL), "bounds");
@@ -623,7 +623,7 @@ static dem2d_shape *rocker(int kind) {
     custom.support = slim_ellipse, custom.outline_points = 4000;
     switch (kind) {
     case ROCK_ELLIPSE:
-        return ellipse(0.03, 0.015);
+        return make_ellipse(0.03, 0.015);
     case ROCK_FOURIER:
         must(dem2d_shape_create_fourier(NULL, a, b, 4, &shape), "rocker");
         return shape;
@@ -643,7 +643,7 @@ static dem2d_shape *rocker(int kind) {
 static double rocking_period(int kind, bool friction, double *own) {
     const double dt = 1e-5, start = 1e-3; /* the polybezier has a kink of rho at angle 0 */
     const dem2d_world_desc desc = world_desc(dt);
-    const dem2d_material_desc material = stone(friction ? KN : 0, friction ? 1000 : 0);
+    const dem2d_material_desc material = stone_desc(friction ? KN : 0, friction ? 1000 : 0);
     const scene s = open_scene(&desc, &material);
     dem2d_shape *shape = rocker(kind);
     dem2d_support low;
@@ -653,7 +653,7 @@ static double rocking_period(int kind, bool friction, double *own) {
     set_gravity(&s, 0, -G);
     add_floor(&s);
     const dem2d_particle_id id = add(&s, shape, DEM2D_FREE, vec(0, low.value), vec(0, 0), 0);
-    const dem2d_particle_info info = look(&s, id);
+    const dem2d_particle_info info = grain_of(&s, id);
     const double about = info.inertia / info.mass + (friction ? h * h : 0);
     *own = (double)(2 * PI) / sqrt(G * (rho - h) / about);
     const double rest = info.mass * G / KN;
@@ -708,13 +708,14 @@ static void housner(double part) {
     const double b = 0.05, h = 0.2, dt = 1e-5;
     const double al = atan(b / h), p = sqrt(3 * G / (4 * hypot(b, h))), start = part * al;
     dem2d_world_desc desc = world_desc(dt);
-    dem2d_material_desc material = stone(1e9, 1000);
+    dem2d_material_desc material = stone_desc(1e9, 1000);
     material.normal_stiffness = 1e9;
     desc.gravity.y = -G;
     const scene s = open_scene(&desc, &material);
     add_floor(&s);
     const double rest = DENSITY * 4 * b * h * G / material.normal_stiffness;
-    const dem2d_particle_id id = add(&s, box(2 * b, 2 * h), DEM2D_FREE, vec(0, 1), vec(0, 0), 0);
+    const dem2d_particle_id id =
+        add(&s, make_box(2 * b, 2 * h), DEM2D_FREE, vec(0, 1), vec(0, 0), 0);
     must(dem2d_world_move_particle(s.world, id, vec(0, h * cos(start) + b * sin(start) - rest),
                                    start),
          "move");
@@ -740,28 +741,28 @@ static void housner(double part) {
 static void boxes_at_rest(int count) {
     const double dt = 2e-4, weight = DENSITY * G;
     dem2d_world_desc desc = world_desc(dt);
-    const dem2d_material_desc material = stone(KN, 0.5);
+    const dem2d_material_desc material = stone_desc(KN, 0.5);
     dem2d_particle_id ids[10];
     dem2d_vec at[10];
     double y = 0.5, tilt = 0, drift = 0;
     desc.gravity.y = -G, desc.local_damping = 0.5;
     const scene s = open_scene(&desc, &material);
     const dem2d_wall_id floor = add_floor(&s);
-    dem2d_shape *shape = box(1, 1);
+    dem2d_shape *shape = make_box(1, 1);
     random_state = 5;
     for (int i = 0; i < count; i++) {
         y -= weight * (count - i) / (2 * KN);
-        ids[i] = add_shape(&s, shape, DEM2D_FREE, vec(uniform(-1e-5, 1e-5), y),
-                           uniform(-1e-5, 1e-5), vec(0, 0), 0);
+        ids[i] = add_copy(&s, shape, DEM2D_FREE, vec(uniform(-1e-5, 1e-5), y), uniform(-1e-5, 1e-5),
+                          vec(0, 0), 0);
         y += 1;
     }
     dem2d_shape_destroy(shape);
     step(&s, 100000);
     set_damping(&s, 0);
-    for (int i = 0; i < count; i++) at[i] = look(&s, ids[i]).pose.position;
+    for (int i = 0; i < count; i++) at[i] = grain_of(&s, ids[i]).pose.position;
     step(&s, (int)(1 / dt));
     for (int i = 0; i < count; i++) {
-        const dem2d_vec now = look(&s, ids[i]).pose.position;
+        const dem2d_vec now = grain_of(&s, ids[i]).pose.position;
         drift = fmax(drift, hypot(now.x - at[i].x, now.y - at[i].y));
         tilt = fmax(tilt, fabs(angle_of(&s, ids[i])));
     }
@@ -769,7 +770,7 @@ static void boxes_at_rest(int count) {
     row_small(label("%s at rest: tilt, rad", name), tilt, 1e-4);
     row_small(label("%s at rest: drift, sizes/s", name), drift, 1e-6);
     row_near(label("%s at rest: floor force/weight", name), 1,
-             -look_wall(&s, floor).force.y / (count * weight), 1e-6);
+             -wall_of(&s, floor).force.y / (count * weight), 1e-6);
     close_scene(&s);
 }
 
@@ -794,17 +795,17 @@ enum {
    which gives or takes a part (w dt)^2 of the energy: chance, so that releases are averaged. */
 static double rocking_drift(double tilt) {
     dem2d_world_desc desc = world_desc(1e-4);
-    const dem2d_material_desc material = stone(0, 0);
+    const dem2d_material_desc material = stone_desc(0, 0);
     desc.gravity.y = -G;
     const scene s = open_scene(&desc, &material);
     add_floor(&s);
     const double y = (cos(tilt) + sin(tilt)) / 2, lifted = DENSITY * G * (y - 0.5);
-    const dem2d_particle_id id = add(&s, box(1, 1), DEM2D_FREE, vec(0, 1), vec(0, 0), 0);
+    const dem2d_particle_id id = add(&s, make_box(1, 1), DEM2D_FREE, vec(0, 1), vec(0, 0), 0);
     must(dem2d_world_move_particle(s.world, id, vec(0, y), tilt), "move");
     step(&s, 1);
-    const dem2d_energy first = energies(&s);
+    const dem2d_energy first = energy_of(&s);
     step(&s, 200000);
-    const dem2d_energy last = energies(&s);
+    const dem2d_energy last = energy_of(&s);
     close_scene(&s);
     return (total(&last) - total(&first)) / lifted;
 }
@@ -1037,7 +1038,7 @@ static void moments_of_models(int times) {
     for (int i = 0; i < times; i++) {
         outline_data o = {{uniform(0.2, 3), 1}, {0}, 0, 0, {{0, 0}}, 0};
         const curve round = {ellipse_at, &o, 8};
-        compare_moments(&round, ellipse(o.a[0], o.a[1]), &worst[0]);
+        compare_moments(&round, make_ellipse(o.a[0], o.a[1]), &worst[0]);
         const dem2d_vec at = vec(uniform(-1, 1), uniform(-1, 1));
         o.count = 3 + random_below(&random_state, 10);
         for (int k = 0; k < o.count; k++) {
@@ -1236,7 +1237,7 @@ static void geometry(const char *folder) {
 static void balance(void) {
     static const bool kinds[KINDS] = {true, true, true, true, true};
     dem2d_world_desc desc = world_desc(1e-4);
-    const dem2d_material_desc material = stone(KN, 0.4);
+    const dem2d_material_desc material = stone_desc(KN, 0.4);
     desc.gravity.y = -G, desc.local_damping = 0.5;
     packing p = open_packing(&desc, &material, 0.8, 1.2, TOP);
     random_state = 21;
@@ -1246,10 +1247,10 @@ static void balance(void) {
     int count;
     double weight = 0, lift = 0;
     dem2d_particle_id *ids = all_ids(&p.s, &count);
-    for (int i = 0; i < count; i++) weight += look(&p.s, ids[i]).mass * G;
+    for (int i = 0; i < count; i++) weight += grain_of(&p.s, ids[i]).mass * G;
     free(ids);
     basis = "formula";
-    for (int i = 0; i < TOP; i++) lift -= look_wall(&p.s, p.walls[i]).force.y;
+    for (int i = 0; i < TOP; i++) lift -= wall_of(&p.s, p.walls[i]).force.y;
     row_near("150 grains at rest: force of floor and walls/weight", 1, lift / weight, 1e-6);
     basis = "measured";
     set_gravity(&p.s, 0, 0), p.gravity = vec(0, 0);
@@ -1293,13 +1294,13 @@ static void lattice(bool triangular) {
     enum { SIDE = 12 };
     const double radius = 0.5, rise = triangular ? sqrt(3) : 2;
     const dem2d_world_desc desc = world_desc(1e-4);
-    const dem2d_material_desc material = stone(0, 0);
+    const dem2d_material_desc material = stone_desc(0, 0);
     const scene s = open_scene(&desc, &material);
-    dem2d_shape *shape = disc(radius);
+    dem2d_shape *shape = make_disc(radius);
     for (int i = 0; i < SIDE * SIDE; i++) {
         const int row = i / SIDE;
         const double x = 2 * radius * (i % SIDE + (triangular ? 0.5 * (row % 2) : 0));
-        add_shape(&s, shape, DEM2D_FIXED, vec(x, radius * rise * row), 0, vec(0, 0), 0);
+        add_copy(&s, shape, DEM2D_FIXED, vec(x, radius * rise * row), 0, vec(0, 0), 0);
     }
     dem2d_shape_destroy(shape);
     step(&s, 1);
@@ -1325,7 +1326,7 @@ static void random_packing(double friction) {
     static const bool kinds[KINDS] = {true, false, false, false, false};
     enum { DISCS = 600 };
     dem2d_world_desc desc = world_desc(1e-4);
-    const dem2d_material_desc material = stone(friction > 0 ? KN : 0, friction);
+    const dem2d_material_desc material = stone_desc(friction > 0 ? KN : 0, friction);
     desc.local_damping = 0.3;
     packing p = open_packing(&desc, &material, 1.6, 1.6, WALLS);
     smooth_walls(&p);
@@ -1393,7 +1394,7 @@ static void measure_packing(const packing *p, paper_run *r) {
     }
     for (int i = 0; i < count; i++) {
         double angle, ratio;
-        const dem2d_particle_info info = look(&p->s, ids[i]);
+        const dem2d_particle_info info = grain_of(&p->s, ids[i]);
         r->share[degree[ids[i].index] < 7 ? degree[ids[i].index] : 7] += 1.0 / count;
         must(dem2d_shape_axis(dem2d_world_shape(p->s.world, info.shape), &angle, &ratio), "axis");
         if (ratio < 1.05) continue;
@@ -1429,10 +1430,10 @@ static void compress(packing *p, paper_run *r) {
     control_wall(p, TOP, DEM2D_WALL_MOVING, 0, 0.1);
     for (int i = 0; i < 20000; i++) {
         step(&p->s, 1);
-        const dem2d_wall_info top = look_wall(&p->s, p->walls[TOP]);
-        const dem2d_wall_info bottom = look_wall(&p->s, p->walls[BOTTOM]);
-        const dem2d_wall_info left = look_wall(&p->s, p->walls[LEFT]);
-        const dem2d_wall_info right = look_wall(&p->s, p->walls[RIGHT]);
+        const dem2d_wall_info top = wall_of(&p->s, p->walls[TOP]);
+        const dem2d_wall_info bottom = wall_of(&p->s, p->walls[BOTTOM]);
+        const dem2d_wall_info left = wall_of(&p->s, p->walls[LEFT]);
+        const dem2d_wall_info right = wall_of(&p->s, p->walls[RIGHT]);
         const double axial = (top.stress + bottom.stress) / 2;
         const double lateral = (left.stress + right.stress) / 2;
         if (i == 0) height = left.length;
@@ -1449,7 +1450,7 @@ static void compress(packing *p, paper_run *r) {
     for (int i = 0; i < STRAIN_BLOCKS; i++)
         r->ratio_at[i] = counts[i] > 0 ? sums[i] / counts[i] : 0;
     r->foretold /= samples, r->own_ratio /= samples;
-    const double last = look_wall(&p->s, p->walls[LEFT]).length;
+    const double last = wall_of(&p->s, p->walls[LEFT]).length;
     must(dem2d_world_inertial_number(p->s.world, 0.1 / last, r->lateral, &r->inertial),
          "inertial number");
 }
@@ -1458,7 +1459,7 @@ static void compress(packing *p, paper_run *r) {
    without gravity, all walls smooth; compressed. kn = kt = 1e7, friction 0.2, local damping 0.7. */
 static packing pack_papers(const bool kinds[KINDS], uint64_t seed, paper_run *r) {
     dem2d_world_desc desc = world_desc(1e-4);
-    const dem2d_material_desc material = stone(KN, 0.2);
+    const dem2d_material_desc material = stone_desc(KN, 0.2);
     desc.gravity.y = -9.8, desc.local_damping = 0.7, desc.contact_tolerance = 0;
     packing p = open_packing(&desc, &material, 1, 3, TOP);
     random_state = seed;
@@ -1484,9 +1485,8 @@ static paper_run run_papers(const bool kinds[KINDS]) {
         if (i != BOTTOM) control_wall(&p, i, DEM2D_WALL_SERVO, 1e5, 0.1);
     control_wall(&p, BOTTOM, DEM2D_WALL_STILL, 0, 0);
     step(&p.s, 10000);
-    r.start[0] = look_wall(&p.s, p.walls[TOP]).stress;
-    r.start[1] =
-        (look_wall(&p.s, p.walls[LEFT]).stress + look_wall(&p.s, p.walls[RIGHT]).stress) / 2;
+    r.start[0] = wall_of(&p.s, p.walls[TOP]).stress;
+    r.start[1] = (wall_of(&p.s, p.walls[LEFT]).stress + wall_of(&p.s, p.walls[RIGHT]).stress) / 2;
     compress(&p, &r);
     close_scene(&p.s);
     return r;

@@ -4,18 +4,16 @@
 #define VERIFY_H
 
 #include "../examples/common.h"
+#include "world_scene.h"
 
 #include <float.h>
 
 #if defined(__GNUC__)
-#define HELPER static __attribute__((unused))
 #define LABEL_PRINTF __attribute__((format(printf, 1, 2)))
 #else
-#define HELPER static
 #define LABEL_PRINTF
 #endif
 
-#define COUNT_OF(array) ((int)(sizeof(array) / sizeof((array)[0])))
 #define PI 3.14159265358979323846264338327950288L
 #define G 9.81
 #define DENSITY 2700.0
@@ -29,8 +27,8 @@ static double table_started, group_started;
 static const char *basis; /* where expectations come from */
 
 /* A text that lives until sixteen more were made. */
-HELPER const char *label(const char *format, ...) LABEL_PRINTF;
-HELPER const char *label(const char *format, ...) {
+PART const char *label(const char *format, ...) LABEL_PRINTF;
+PART const char *label(const char *format, ...) {
     static char text[16][96];
     static int next;
     va_list list;
@@ -41,7 +39,7 @@ HELPER const char *label(const char *format, ...) {
     return place;
 }
 
-HELPER void table_group(const char *title) {
+PART void table_group(const char *title) {
     const double now = clock_seconds();
     if (table_rows == 0) table_started = now;
     if (table_rows > 0) printf("%*s%.1f s\n", 118, "", now - group_started);
@@ -51,8 +49,8 @@ HELPER void table_group(const char *title) {
     fflush(stdout);
 }
 
-HELPER void table_row(const char *name, const char *expected, double got, double error,
-                      const char *allowed, bool good) {
+PART void table_row(const char *name, const char *expected, double got, double error,
+                    const char *allowed, bool good) {
     table_rows++;
     if (!good) table_failures++;
     printf("%-60s %15s %15.9g %10.2g %10s %s %s\n", name, expected, got, error, allowed,
@@ -61,40 +59,40 @@ HELPER void table_row(const char *name, const char *expected, double got, double
 }
 
 /* Relative to the expected value. */
-HELPER void row_near(const char *name, double expected, double got, double relative) {
+PART void row_near(const char *name, double expected, double got, double relative) {
     const double error = fabs(got - expected) / fabs(expected);
     table_row(name, label("%.9g", expected), got, error, label("%.2g rel", relative),
               error <= relative);
 }
 
-HELPER void row_within(const char *name, double expected, double got, double tolerance) {
+PART void row_within(const char *name, double expected, double got, double tolerance) {
     const double error = fabs(got - expected);
     table_row(name, label("%.9g", expected), got, error, label("%.2g", tolerance),
               error <= tolerance);
 }
 
 /* What must be small: at most the bound in size. */
-HELPER void row_small(const char *name, double got, double bound) {
+PART void row_small(const char *name, double got, double bound) {
     table_row(name, "0", got, fabs(got), label("%.2g", bound), fabs(got) <= bound);
 }
 
 /* The error is how far outside the band it is. */
-HELPER void row_between(const char *name, double low, double high, double got) {
+PART void row_between(const char *name, double low, double high, double got) {
     const double error = got < low ? low - got : got > high ? got - high : 0;
     table_row(name, label("%.4g to %.4g", low, high), got, error, "in band",
               got >= low && got <= high);
 }
 
-HELPER void row_above(const char *name, double low, double got) {
+PART void row_above(const char *name, double low, double got) {
     table_row(name, label("> %.4g", low), got, got > low ? 0 : low - got, "-", got > low);
 }
 
-HELPER void row_below(const char *name, double high, double got) {
+PART void row_below(const char *name, double high, double got) {
     table_row(name, label("< %.4g", high), got, got < high ? 0 : got - high, "-", got < high);
 }
 
 /* Prints the sum; the exit status. */
-HELPER int table_end(void) {
+PART int table_end(void) {
     const double now = clock_seconds();
     printf("%*s%.1f s\n", 118, "", now - group_started);
     printf("\n%d rows, %d failed, %.0f s\n", table_rows, table_failures, now - table_started);
@@ -103,109 +101,24 @@ HELPER int table_end(void) {
 
 /* --- small scenes ---------------------------------------------------------------------------- */
 
-static uint64_t random_state = 1;
-
-HELPER double uniform(double low, double high) {
-    return random_between(&random_state, low, high);
-}
-
-HELPER dem2d_vec vec(double x, double y) {
-    const dem2d_vec v = {x, y};
-    return v;
-}
-
-HELPER double length(dem2d_vec v) {
+PART double length(dem2d_vec v) {
     return sqrt(v.x * v.x + v.y * v.y);
 }
 
-typedef struct scene {
-    dem2d_world *world;
-    dem2d_material_id material;
-} scene;
-
-HELPER dem2d_material_desc stone(double kt, double friction) {
-    dem2d_material_desc material = {0};
-    material.density = DENSITY, material.normal_stiffness = KN;
-    material.tangential_stiffness = kt, material.friction = friction;
-    return material;
-}
-
-HELPER dem2d_world_desc world_desc(double time_step) {
+PART dem2d_world_desc world_desc(double time_step) {
     dem2d_world_desc desc = {0};
     desc.time_step = time_step, desc.contact_tolerance = 1e-13, desc.env = example_env();
     return desc;
 }
 
-HELPER scene open_scene(const dem2d_world_desc *desc, const dem2d_material_desc *material) {
-    scene s;
-    must(dem2d_world_create(desc, &s.world), "world");
-    must(dem2d_world_add_material(s.world, material, &s.material), "material");
-    return s;
-}
-
-HELPER void close_scene(const scene *s) {
-    dem2d_world_destroy(s->world);
-}
-
-HELPER dem2d_particle_id add_shape(const scene *s, const dem2d_shape *shape, dem2d_motion motion,
-                                   dem2d_vec at, double angle, dem2d_vec velocity, double spin) {
-    dem2d_particle_desc desc = {0};
-    dem2d_particle_id id;
-    must(dem2d_world_add_shape(s->world, shape, &desc.shape), "shape");
-    desc.scale = 1, desc.material = s->material, desc.motion = motion;
-    desc.position = at, desc.angle = angle, desc.velocity = velocity, desc.angular_velocity = spin;
-    must(dem2d_world_add_particle(s->world, &desc, &id), "particle");
-    return id;
-}
-
 /* Takes the shape. */
-HELPER dem2d_particle_id add(const scene *s, dem2d_shape *shape, dem2d_motion motion, dem2d_vec at,
-                             dem2d_vec velocity, double spin) {
-    const dem2d_particle_id id = add_shape(s, shape, motion, at, 0, velocity, spin);
-    dem2d_shape_destroy(shape);
-    return id;
-}
-
-HELPER dem2d_wall_id add_plane(const scene *s, double x, double y, double nx, double ny) {
-    dem2d_wall_desc desc = {0};
-    dem2d_wall_id id;
-    desc.material = s->material, desc.point = vec(x, y), desc.normal = vec(nx, ny);
-    must(dem2d_world_add_wall(s->world, &desc, &id), "wall");
-    return id;
-}
-
-HELPER dem2d_wall_id add_floor(const scene *s) {
-    return add_plane(s, 0, 0, 0, 1);
-}
-
-HELPER void step(const scene *s, int count) {
-    must(dem2d_world_step(s->world, count, NULL), "step");
-}
-
-HELPER dem2d_particle_info look(const scene *s, dem2d_particle_id id) {
-    dem2d_particle_info info;
-    must(dem2d_world_get_particle(s->world, id, &info), "particle");
-    return info;
-}
-
-HELPER double angle_of(const scene *s, dem2d_particle_id id) {
-    return dem2d_rot_angle(look(s, id).pose.rotation);
-}
-
-HELPER dem2d_wall_info look_wall(const scene *s, dem2d_wall_id id) {
-    dem2d_wall_info info;
-    must(dem2d_world_get_wall(s->world, id, &info), "wall");
-    return info;
-}
-
-HELPER int contacts(const scene *s, dem2d_contact_info *list, int room) {
-    int count;
-    must(dem2d_world_contacts(s->world, list, room, &count), "contacts");
-    return count;
+PART dem2d_particle_id add(const scene *s, dem2d_shape *shape, dem2d_motion motion, dem2d_vec at,
+                           dem2d_vec velocity, double spin) {
+    return add_shape(s, shape, motion, at, 0, velocity, spin);
 }
 
 /* Ids of all; the caller frees them. */
-HELPER dem2d_particle_id *all_ids(const scene *s, int *count) {
+PART dem2d_particle_id *all_ids(const scene *s, int *count) {
     must(dem2d_world_particles(s->world, NULL, 0, count), "particles");
     dem2d_particle_id *ids = get_memory(NULL, (size_t)*count + 1, sizeof *ids);
     must(dem2d_world_particles(s->world, ids, *count, count), "particles");
@@ -213,66 +126,41 @@ HELPER dem2d_particle_id *all_ids(const scene *s, int *count) {
 }
 
 /* All contacts; the caller frees them. */
-HELPER dem2d_contact_info *all_contacts(const scene *s, int *count) {
-    *count = contacts(s, NULL, 0);
+PART dem2d_contact_info *all_contacts(const scene *s, int *count) {
+    *count = contacts_of(s, NULL, 0);
     dem2d_contact_info *list = get_memory(NULL, (size_t)*count + 1, sizeof *list);
-    contacts(s, list, *count);
+    contacts_of(s, list, *count);
     return list;
 }
 
-HELPER dem2d_energy energies(const scene *s) {
-    dem2d_energy e;
-    must(dem2d_world_energy(s->world, &e), "energy");
-    return e;
-}
-
-HELPER double kinetic(const dem2d_energy *e) {
+PART double kinetic(const dem2d_energy *e) {
     return e->translational + e->rotational;
 }
 
-HELPER double total(const dem2d_energy *e) {
+PART double total(const dem2d_energy *e) {
     return kinetic(e) + e->normal + e->tangential + e->potential;
 }
 
-HELPER void set_gravity(const scene *s, double x, double y) {
+PART void set_gravity(const scene *s, double x, double y) {
     must(dem2d_world_set_gravity(s->world, vec(x, y)), "gravity");
 }
 
-HELPER void set_damping(const scene *s, double local) {
+PART void set_damping(const scene *s, double local) {
     must(dem2d_world_set_damping(s->world, local, 0), "damping");
 }
 
-HELPER dem2d_shape *disc(double radius) {
-    dem2d_shape *shape;
-    must(dem2d_shape_create_circle(NULL, radius, &shape), "circle");
-    return shape;
-}
-
-HELPER dem2d_shape *ellipse(double a, double b) {
-    dem2d_shape *shape;
-    must(dem2d_shape_create_ellipse(NULL, a, b, &shape), "ellipse");
-    return shape;
-}
-
-HELPER dem2d_shape *box(double width, double height) {
-    const dem2d_vec points[4] = {{0, 0}, {width, 0}, {width, height}, {0, height}};
-    dem2d_shape *shape;
-    must(dem2d_shape_create_polygon(NULL, points, 4, 0, &shape), "box");
-    return shape;
-}
-
-HELPER double disc_mass(double radius) {
+PART double disc_mass(double radius) {
     return DENSITY * (double)PI * radius * radius;
 }
 
 /* Mean resultant on a particle, gravity too, over the mean contact force. */
-HELPER double unbalanced(const scene *s, dem2d_vec gravity) {
+PART double unbalanced(const scene *s, dem2d_vec gravity) {
     int count, touching;
     double resultant = 0, force = 0;
     dem2d_particle_id *ids = all_ids(s, &count);
     dem2d_contact_info *list = all_contacts(s, &touching);
     for (int i = 0; i < count; i++) {
-        const dem2d_particle_info p = look(s, ids[i]);
+        const dem2d_particle_info p = grain_of(s, ids[i]);
         resultant += hypot(p.force.x + p.mass * gravity.x, p.force.y + p.mass * gravity.y) / count;
     }
     for (int i = 0; i < touching; i++) force += list[i].normal_force / touching;
@@ -284,19 +172,19 @@ HELPER double unbalanced(const scene *s, dem2d_vec gravity) {
 
 enum { K_CIRCLE, K_ELLIPSE, K_POLYGON, K_ROUNDED, K_BEZIER, K_FOURIER, K_CUSTOM, MODELS };
 
-HELPER const char *const model_names[MODELS] = {"circles",          "ellipses",    "sharp polygons",
-                                                "rounded polygons", "polybeziers", "Fourier series",
-                                                "custom shapes"};
+PART const char *const model_names[MODELS] = {"circles",          "ellipses",    "sharp polygons",
+                                              "rounded polygons", "polybeziers", "Fourier series",
+                                              "custom shapes"};
 
 /* An ellipse of 0.8 and 0.5, grown by 0.3. */
-HELPER dem2d_vec grown_ellipse(void *user, dem2d_vec u, double *rho) {
+PART dem2d_vec grown_ellipse(void *user, dem2d_vec u, double *rho) {
     const double grow = *(const double *)user, a = 0.8, b = 0.5;
     const double h = sqrt(a * a * u.x * u.x + b * b * u.y * u.y);
     if (rho) *rho = a * a * b * b / (h * h * h) + grow;
     return vec((a * a / h + grow) * u.x, (b * b / h + grow) * u.y);
 }
 
-HELPER dem2d_shape *polygon(int sides, double rounding) {
+PART dem2d_shape *polygon(int sides, double rounding) {
     dem2d_vec points[7];
     dem2d_shape *shape;
     for (int k = 0; k < sides; k++) {
@@ -308,7 +196,7 @@ HELPER dem2d_shape *polygon(int sides, double rounding) {
 }
 
 /* Four arcs of a kind of egg: handles along the axes, so that joints are smooth. */
-HELPER dem2d_shape *egg(void) {
+PART dem2d_shape *egg(void) {
     static const double way[4][2] = {{1, 0}, {0, 1}, {-1, 0}, {0, -1}};
     double reach[4];
     dem2d_vec points[12];
@@ -328,7 +216,7 @@ HELPER dem2d_shape *egg(void) {
 }
 
 /* A shape of about unit radius, another one each time. */
-HELPER dem2d_shape *random_model(int model) {
+PART dem2d_shape *random_model(int model) {
     enum { ORDER = 8 };
     static double grow = 0.3;
     double a[ORDER + 1], b[ORDER + 1];
@@ -337,9 +225,9 @@ HELPER dem2d_shape *random_model(int model) {
     dem2d_shape *shape;
     switch (model) {
     case K_CIRCLE:
-        return disc(uniform(0.8, 1.2));
+        return make_disc(uniform(0.8, 1.2));
     case K_ELLIPSE:
-        return ellipse(uniform(1, 1.5), 1);
+        return make_ellipse(uniform(1, 1.5), 1);
     case K_POLYGON:
     case K_ROUNDED:
         return polygon(4 + random_below(&random_state, 4), model == K_ROUNDED ? 0.15 : 0);
@@ -364,12 +252,12 @@ enum { GAS = 64, GAS_SIDE = 8, GAS_TEMPLATES = 16, GAS_STEPS = 1000000 };
 
 /* 64 grains of equal area on a lattice that fills a box to 0.3, with velocities of one size: two
    that meet head on overlap by 0.1 % of the radius. */
-HELPER scene open_gas(int model, int run, double steps_per_contact, dem2d_face_rule faces) {
+PART scene open_gas(int model, int run, double steps_per_contact, dem2d_face_rule faces) {
     const double radius = 0.5, area = (double)PI * radius * radius, half_mass = DENSITY * area / 2;
     const double side = sqrt(GAS * area / 0.3), cell = side / GAS_SIDE;
     const double speed = 1e-3 * radius * sqrt(KN / half_mass) / 2;
     dem2d_world_desc desc = world_desc((double)PI * sqrt(half_mass / KN) / steps_per_contact);
-    const dem2d_material_desc material = stone(0, 0);
+    const dem2d_material_desc material = stone_desc(0, 0);
     dem2d_shape_id ids[GAS_TEMPLATES];
     double scale[GAS_TEMPLATES];
     desc.faces = faces, desc.contact_tolerance = 0;
@@ -401,8 +289,8 @@ HELPER scene open_gas(int model, int run, double steps_per_contact, dem2d_face_r
 
 /* Change of the energy after about so many steps of t_c/200, or as long in others; read when no
    contact is open. It is then kinetic, and that of two successive half steps is the same. */
-HELPER double gas_drift(int model, int run, double steps_per_contact, dem2d_face_rule faces,
-                        double *overlap) {
+PART double gas_drift(int model, int run, double steps_per_contact, dem2d_face_rule faces,
+                      double *overlap) {
     const scene s = open_gas(model, run, steps_per_contact, faces);
     const int64_t steps = (int64_t)(GAS_STEPS * (steps_per_contact / 200));
     double first = 0;
@@ -415,11 +303,11 @@ HELPER double gas_drift(int model, int run, double steps_per_contact, dem2d_face
             *overlap = fmax(*overlap, packing.max_overlap);
         }
         step(&s, 1);
-        for (int i = 0; contacts(&s, NULL, 0) > 0; i++) {
+        for (int i = 0; contacts_of(&s, NULL, 0) > 0; i++) {
             step(&s, 1);
             if (i > 1000000) fail(STATUS_FAILED, "a gas that is never without contacts");
         }
-        const dem2d_energy e = energies(&s);
+        const dem2d_energy e = energy_of(&s);
         if (pass == 0) first = kinetic(&e);
         if (pass == 1) first = kinetic(&e) / first - 1;
     }
@@ -428,8 +316,8 @@ HELPER double gas_drift(int model, int run, double steps_per_contact, dem2d_face
 }
 
 /* Root of the mean square over runs. */
-HELPER double gas_drifts(int model, int runs, double steps_per_contact, dem2d_face_rule faces,
-                         double *overlap) {
+PART double gas_drifts(int model, int runs, double steps_per_contact, dem2d_face_rule faces,
+                       double *overlap) {
     double sum = 0;
     for (int run = 0; run < runs; run++) {
         const double drift = gas_drift(model, run, steps_per_contact, faces, overlap);
@@ -439,7 +327,7 @@ HELPER double gas_drifts(int model, int runs, double steps_per_contact, dem2d_fa
 }
 
 /* The order is the slope of log drift over log dt, from a 100th to a 400th of the contact time. */
-HELPER void gas(int model, int runs) {
+PART void gas(int model, int runs) {
     static const double steps[3] = {100, 200, 400};
     double drift[3], overlap = 0;
     for (int i = 0; i < 3; i++)
@@ -470,19 +358,19 @@ typedef struct packing {
     double width, height; /* of the box when it was made */
 } packing;
 
-HELPER dem2d_wall_desc box_wall(const packing *p, int which) {
+PART dem2d_wall_desc box_wall(const packing *p, int which) {
     static const double normals[WALLS][2] = {{1, 0}, {-1, 0}, {0, 1}, {0, -1}};
     dem2d_wall_desc desc = {0};
     desc.material = p->wall_material;
     desc.normal = vec(normals[which][0], normals[which][1]);
     desc.point = vec(which == RIGHT ? p->width : 0, which == TOP ? p->height : 0);
-    if (p->walls[which].generation) desc.point = look_wall(&p->s, p->walls[which]).point;
+    if (p->walls[which].generation) desc.point = wall_of(&p->s, p->walls[which]).point;
     return desc;
 }
 
 /* Walls up to this one, in the order of their names. */
-HELPER packing open_packing(const dem2d_world_desc *desc, const dem2d_material_desc *material,
-                            double width, double height, int walls) {
+PART packing open_packing(const dem2d_world_desc *desc, const dem2d_material_desc *material,
+                          double width, double height, int walls) {
     packing p;
     memset(&p, 0, sizeof p);
     p.s = open_scene(desc, material);
@@ -495,14 +383,14 @@ HELPER packing open_packing(const dem2d_world_desc *desc, const dem2d_material_d
     return p;
 }
 
-HELPER void smooth_walls(const packing *p) {
+PART void smooth_walls(const packing *p) {
     dem2d_pair_desc smooth = {0};
     smooth.normal_stiffness = KN;
     must(dem2d_world_set_pair(p->s.world, p->s.material, p->wall_material, &smooth), "friction");
 }
 
 /* A wall that is as long as two others are apart, and from now on holds a stress, or moves. */
-HELPER void control_wall(packing *p, int which, dem2d_wall_mode mode, double value, double speed) {
+PART void control_wall(packing *p, int which, dem2d_wall_mode mode, double value, double speed) {
     dem2d_wall_desc desc = box_wall(p, which);
     const int span = which == LEFT || which == RIGHT ? BOTTOM : LEFT;
     desc.mode = mode;
@@ -514,12 +402,12 @@ HELPER void control_wall(packing *p, int which, dem2d_wall_mode mode, double val
 }
 
 /* The fourth wall, on the highest grain. */
-HELPER void put_lid(packing *p) {
+PART void put_lid(packing *p) {
     int count;
     p->height = 0;
     dem2d_particle_id *ids = all_ids(&p->s, &count);
     for (int i = 0; i < count; i++) {
-        const dem2d_particle_info info = look(&p->s, ids[i]);
+        const dem2d_particle_info info = grain_of(&p->s, ids[i]);
         dem2d_box b;
         must(dem2d_shape_aabb(dem2d_world_shape(p->s.world, info.shape), info.pose, &b), "box");
         p->height = fmax(p->height, b.upper.y);
@@ -529,19 +417,17 @@ HELPER void put_lid(packing *p) {
     must(dem2d_world_add_wall(p->s.world, &lid, &p->walls[TOP]), "wall");
 }
 
-HELPER dem2d_box inside(const packing *p) {
+PART dem2d_box inside(const packing *p) {
     dem2d_box b;
-    b.lower =
-        vec(look_wall(&p->s, p->walls[LEFT]).point.x, look_wall(&p->s, p->walls[BOTTOM]).point.y);
-    b.upper =
-        vec(look_wall(&p->s, p->walls[RIGHT]).point.x, look_wall(&p->s, p->walls[TOP]).point.y);
+    b.lower = vec(wall_of(&p->s, p->walls[LEFT]).point.x, wall_of(&p->s, p->walls[BOTTOM]).point.y);
+    b.upper = vec(wall_of(&p->s, p->walls[RIGHT]).point.x, wall_of(&p->s, p->walls[TOP]).point.y);
     return b;
 }
 
 /* Templates of these kinds at sizes whose circle of equal area has a diameter uniform in the range,
    placed at random without overlap in the box (which may grow). */
-HELPER void fill(packing *p, int count, const bool kinds[KINDS], const char *path, double smallest,
-                 double largest) {
+PART void fill(packing *p, int count, const bool kinds[KINDS], const char *path, double smallest,
+               double largest) {
     const dem2d_image_desc search = default_search();
     template_set set = load_templates(path, &search, 0, false);
     grain *grains = get_memory(NULL, (size_t)count, sizeof *grains);
@@ -568,7 +454,7 @@ HELPER void fill(packing *p, int count, const bool kinds[KINDS], const char *pat
 }
 
 /* Steps until what is unbalanced is below a bound, or this many were made. */
-HELPER void settle(const packing *p, double bound, int most) {
+PART void settle(const packing *p, double bound, int most) {
     for (int done = 0; done < most; done += 500) {
         step(&p->s, 500);
         if (unbalanced(&p->s, p->gravity) < bound) return;
@@ -581,7 +467,7 @@ typedef struct backbone {
     int particles, contacts, wall_contacts; /* that are left */
 } backbone;
 
-HELPER backbone find_backbone(const packing *p, int least) {
+PART backbone find_backbone(const packing *p, int least) {
     int count, touching;
     dem2d_particle_id *ids = all_ids(&p->s, &count);
     dem2d_contact_info *list = all_contacts(&p->s, &touching);
@@ -613,14 +499,14 @@ HELPER backbone find_backbone(const packing *p, int least) {
 }
 
 /* Area of a disc on one side of a vertical line, x from its centre: to the left of it. */
-HELPER double disc_left_of(double r, double x) {
+PART double disc_left_of(double r, double x) {
     if (x >= r) return (double)PI * r * r;
     if (x <= -r) return 0;
     return r * r * (asin(x / r) + (double)PI / 2) + x * sqrt(r * r - x * x);
 }
 
 /* Area of a disc in a box, by strips across: Simpson's rule on the height of the part. */
-HELPER double disc_in_box(dem2d_vec at, double r, const dem2d_box *b) {
+PART double disc_in_box(dem2d_vec at, double r, const dem2d_box *b) {
     enum { STRIPS = 512 };
     const bool away = at.x + r <= b->lower.x || at.x - r >= b->upper.x || at.y + r <= b->lower.y ||
                       at.y - r >= b->upper.y;
@@ -641,12 +527,12 @@ HELPER double disc_in_box(dem2d_vec at, double r, const dem2d_box *b) {
 }
 
 /* Part of a region that discs cover. */
-HELPER double disc_fraction(const scene *s, const dem2d_box *b) {
+PART double disc_fraction(const scene *s, const dem2d_box *b) {
     int count;
     double sum = 0;
     dem2d_particle_id *ids = all_ids(s, &count);
     for (int i = 0; i < count; i++) {
-        const dem2d_particle_info p = look(s, ids[i]);
+        const dem2d_particle_info p = grain_of(s, ids[i]);
         sum += disc_in_box(p.pose.position, p.radius, b);
     }
     free(ids);

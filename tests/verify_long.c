@@ -31,20 +31,11 @@ static double bin_step(double stiffness) {
 
 static scene open_bin(double stiffness, double friction) {
     dem2d_world_desc desc = world_desc(bin_step(stiffness));
-    dem2d_material_desc material = stone(stiffness, friction);
+    dem2d_material_desc material = stone_desc(stiffness, friction);
     desc.gravity.y = -G, desc.contact_tolerance = 0;
     material.normal_stiffness = stiffness;
     must(dem2d_damping_ratio(0.5, &material.damping_ratio), "restitution");
     return open_scene(&desc, &material);
-}
-
-static dem2d_wall_id add_segment(const scene *s, double x0, double y0, double x1, double y1) {
-    dem2d_wall_desc desc = {0};
-    dem2d_wall_id id;
-    desc.material = s->material, desc.segment = true;
-    desc.point = vec(x0, y0), desc.end = vec(x1, y1);
-    must(dem2d_world_add_wall(s->world, &desc, &id), "segment");
-    return id;
 }
 
 /* Of a disc and its part of the voids, when poured. */
@@ -72,7 +63,7 @@ static double pour(const scene *s, dem2d_shape_id shape, int count, double width
 
 static dem2d_shape_id unit_disc(const scene *s) {
     dem2d_shape_id id;
-    dem2d_shape *shape = disc(1);
+    dem2d_shape *shape = make_disc(1);
     must(dem2d_world_add_shape(s->world, shape, &id), "disc");
     dem2d_shape_destroy(shape);
     return id;
@@ -101,7 +92,7 @@ static double refill(silo *p) {
     double mass = 0;
     dem2d_particle_id *ids = all_ids(&p->s, &count);
     for (int i = 0; i < count; i++) {
-        const dem2d_particle_info info = look(&p->s, ids[i]);
+        const dem2d_particle_info info = grain_of(&p->s, ids[i]);
         if (info.pose.position.y > -3 * MEAN) continue;
         const int columns = (int)(p->width / (1.3 * MEAN));
         const double x = (p->column + 0.5) * p->width / columns;
@@ -123,13 +114,14 @@ static double silo_flow(double slot, double width, double height, double stiffne
     const double left = (p.width - slot) / 2, right = left + slot;
     random_state = seed;
     add_plane(&p.s, 0, 0, 1, 0), add_plane(&p.s, p.width, 0, -1, 0);
-    add_segment(&p.s, 0, 0, left, 0), add_segment(&p.s, right, 0, p.width, 0);
-    const dem2d_wall_id plug = add_segment(&p.s, left, 0, right, 0);
+    add_segment(&p.s, vec(0, 0), vec(left, 0));
+    add_segment(&p.s, vec(right, 0), vec(p.width, 0));
+    const dem2d_wall_id plug = add_segment(&p.s, vec(left, 0), vec(right, 0));
     pour(&p.s, unit_disc(&p.s), (int)(width * height / disc_area()), p.width, 0);
     run_for(&p.s, stiffness, 0.6 + 2 * sqrt(height / G));
     int count;
     dem2d_particle_id *ids = all_ids(&p.s, &count);
-    for (int i = 0; i < count; i++) p.top = fmax(p.top, look(&p.s, ids[i]).pose.position.y);
+    for (int i = 0; i < count; i++) p.top = fmax(p.top, grain_of(&p.s, ids[i]).pose.position.y);
     free(ids);
     p.top += 4 * MEAN + 0.2 * width; /* what the slot does not reach heaps up beside it */
     must(dem2d_world_remove_wall(p.s.world, plug), "plug");
@@ -235,16 +227,16 @@ static void fill_silo(uint64_t seed, filling *fillings) {
         double force = 0;
         pour(&s, shape, LAYER, width, highest);
         run_for(&s, stiffness, 0.5);
-        desc.point = look_wall(&s, floor).point;
+        desc.point = wall_of(&s, floor).point;
         desc.mode = DEM2D_WALL_MOVING, desc.velocity = vec(0, -speed);
         must(dem2d_world_set_wall(s.world, floor, &desc), "floor");
         run_for(&s, stiffness, 0.25 * way / speed);
         const int steps = (int)(0.75 * way / speed / bin_step(stiffness));
         for (int i = 0; i < steps; i++) {
             step(&s, 1);
-            force -= look_wall(&s, floor).force.y / steps;
+            force -= wall_of(&s, floor).force.y / steps;
         }
-        desc.point = look_wall(&s, floor).point;
+        desc.point = wall_of(&s, floor).point;
         desc.mode = DEM2D_WALL_STILL, desc.velocity = vec(0, 0);
         must(dem2d_world_set_wall(s.world, floor, &desc), "floor");
         int count;
@@ -252,7 +244,7 @@ static void fill_silo(uint64_t seed, filling *fillings) {
         dem2d_particle_id *ids = all_ids(&s, &count);
         highest = -HUGE_VAL;
         for (int i = 0; i < count; i++) {
-            const dem2d_particle_info info = look(&s, ids[i]);
+            const dem2d_particle_info info = grain_of(&s, ids[i]);
             highest = fmax(highest, info.pose.position.y + info.radius);
             weight += info.mass * G;
         }
@@ -307,12 +299,12 @@ static double jamming(uint64_t seed, double *ends) {
     enum { DISCS = 1200, STEPS = 4 };
     static const double pressures[STEPS] = {1e-3, 1e-4, 3e-5, 1e-5}; /* of kn */
     dem2d_world_desc desc = world_desc(1e-4);
-    const dem2d_material_desc material = stone(0, 0);
+    const dem2d_material_desc material = stone_desc(0, 0);
     desc.local_damping = 0.3, desc.contact_tolerance = 0;
     const double side = sqrt(DISCS * (double)PI / 4 * (0.05 * 0.05 + 0.07 * 0.07) / 2 / 0.6);
     packing p = open_packing(&desc, &material, side, side, WALLS);
     dem2d_shape_id shape;
-    dem2d_shape *circle = disc(0.025);
+    dem2d_shape *circle = make_disc(0.025);
     must(dem2d_world_add_shape(p.s.world, circle, &shape), "disc");
     dem2d_shape_destroy(circle);
     random_state = seed;
@@ -376,7 +368,7 @@ static double heap_end(const scene *s) {
     int count, end = 0;
     dem2d_particle_id *ids = all_ids(s, &count);
     for (int i = 0; i < count; i++) {
-        const dem2d_particle_info info = look(s, ids[i]);
+        const dem2d_particle_info info = grain_of(s, ids[i]);
         const double at = info.pose.position.x / piece;
         if (at >= 0 && at < PIECES) area[(int)at] += (double)PI * info.equivalent * info.equivalent;
     }
@@ -398,7 +390,7 @@ static double collapse(double aspect, double width, double stiffness, uint64_t s
     int count;
     double height = 0;
     dem2d_particle_id *ids = all_ids(&s, &count);
-    for (int i = 0; i < count; i++) height += 2 * look(&s, ids[i]).pose.position.y / count;
+    for (int i = 0; i < count; i++) height += 2 * grain_of(&s, ids[i]).pose.position.y / count;
     free(ids);
     must(dem2d_world_remove_wall(s.world, gate), "gate");
     run_for(&s, stiffness, 7 * sqrt(2 * height / G));

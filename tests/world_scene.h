@@ -37,10 +37,15 @@ PART void close_scene(const scene *s) {
     dem2d_world_destroy(s->world);
 }
 
-/* The world's copy of a template that is given away. */
-PART dem2d_shape_id give_shape(const scene *s, dem2d_shape *shape) {
+PART dem2d_shape_id copy_shape(const scene *s, const dem2d_shape *shape) {
     dem2d_shape_id id;
     expect_ok(dem2d_world_add_shape(s->world, shape, &id), "template");
+    return id;
+}
+
+/* The same of a template that is given away. */
+PART dem2d_shape_id give_shape(const scene *s, dem2d_shape *shape) {
+    const dem2d_shape_id id = copy_shape(s, shape);
     dem2d_shape_destroy(shape);
     return id;
 }
@@ -60,13 +65,21 @@ PART dem2d_particle_id add_grain(const scene *s, const dem2d_particle_desc *desc
     return id;
 }
 
-/* A grain with a template of its own, which is given away. */
-PART dem2d_particle_id add_shape(const scene *s, dem2d_shape *shape, dem2d_motion motion,
-                                 dem2d_vec at, double angle, dem2d_vec velocity, double spin) {
-    dem2d_particle_desc desc = grain_desc(s, give_shape(s, shape), 1, at);
+/* A grain with a template of its own. */
+PART dem2d_particle_id add_copy(const scene *s, const dem2d_shape *shape, dem2d_motion motion,
+                                dem2d_vec at, double angle, dem2d_vec velocity, double spin) {
+    dem2d_particle_desc desc = grain_desc(s, copy_shape(s, shape), 1, at);
     desc.motion = motion, desc.angle = angle;
     desc.velocity = velocity, desc.angular_velocity = spin;
     return add_grain(s, &desc);
+}
+
+/* The same of a template that is given away. */
+PART dem2d_particle_id add_shape(const scene *s, dem2d_shape *shape, dem2d_motion motion,
+                                 dem2d_vec at, double angle, dem2d_vec velocity, double spin) {
+    const dem2d_particle_id id = add_copy(s, shape, motion, at, angle, velocity, spin);
+    dem2d_shape_destroy(shape);
+    return id;
 }
 
 /* A half-plane that stands still. */
