@@ -529,9 +529,10 @@ SNAPSHOTS
     dem2d_world_save writes all that later steps and queries depend on, with the neighbour list and
     the order in memory; dem2d_world_load continues to the same bits, on any machine and with any
     number of threads. Not saved: capacities, the environment, parallel_for. The tags of custom
-    shapes identify their support functions. A file of another version is refused, not converted:
-    keep the header that wrote it. A checksum detects damage before the bytes are used, and every
-    number is checked for its range; this does not protect from forgery.
+    shapes identify their support functions. A snapshot names its arrays and their fields: later
+    headers read it, with 0 for what they have beside these. What is not known is refused by its
+    name, since a later header wrote it. A checksum detects damage before the bytes are used, and
+    every number is checked for its range; this does not protect from forgery.
 
 DETERMINISM
     Same input, same bits: on gcc and clang, C and C++, -O0 to -O3, with or without FMA hardware
@@ -1698,7 +1699,8 @@ typedef struct dem2d_load_desc {
 /// pairs, templates, particles, walls, contacts and their springs. It takes them in the order of
 /// ids and doubles by their bits (0 and -0 differ), so it is the same for any number of threads,
 /// storage order, skin, compiler and machine. Not included: counters, the neighbour list,
-/// callbacks, free ids. 0 for NULL.
+/// callbacks, free ids, numbers that are 0: what later versions add changes no hash until it is
+/// used. 0 for NULL.
 DEM2D_API uint64_t dem2d_world_hash(const dem2d_world *world);
 /// Write all of a world to desc->write, or to a file if path is not NULL (desc may then be NULL).
 /// The file is written as path + ".part", then renamed: an old file is replaced only by a complete
@@ -2222,10 +2224,12 @@ typedef enum dem2di_type {
     DEM2DI_POINTER, /* as a number 1, NULL 0 */
     DEM2DI_BOOL,
     DEM2DI_ID,
-    DEM2DI_UINT64
+    DEM2DI_UINT64,
+    DEM2DI_INT64 /* in snapshots only */
 } dem2di_type;
 
-enum { DEM2DI_ABOVE = 1, DEM2DI_BELOW = 2, DEM2DI_OR_0 = 4 }; /* not low; not high; 0 as well */
+/* Not low; not high; 0 as well; what is not finite, too: not checked. */
+enum { DEM2DI_ABOVE = 1, DEM2DI_BELOW = 2, DEM2DI_OR_0 = 4, DEM2DI_ANY = 8 };
 
 typedef struct dem2di_field {
     const char *name; /* in a struct inside: "view.lower" */
@@ -2263,6 +2267,9 @@ typedef struct dem2di_field {
 #define DEM2DI_SWITCH 0, 0, 0, DEM2DI_BOOL
 #define DEM2DI_HANDLE 0, 0, 0, DEM2DI_ID
 #define DEM2DI_SEED 0, 0, 0, DEM2DI_UINT64
+#define DEM2DI_COUNTER 0, 4611686018427387904.0, 0, DEM2DI_INT64 /* 2^62: a sum may be made */
+#define DEM2DI_ANY_NUMBER 0, 0, DEM2DI_ANY, DEM2DI_DOUBLE
+#define DEM2DI_MAY_OVERFLOW DEM2DI_NUMBER(0, HUGE_VAL, 0)
 
 /* A field's number, or a component of its vector. Where enums are short they take one byte. */
 static double dem2di_field_value(const dem2di_field *field, const void *of, int part) {
@@ -10712,7 +10719,7 @@ static bool dem2di_state_finite(const dem2di_state *state) {
 
 /* ============================================================================================
    >>world  Objects with ids
-   uses: config, math, memory, fields, shapes, gjk, broad, law, motion
+   uses: config, math, memory, fields, support, shapes, gjk, broad, law, motion
    ============================================================================================ */
 
 typedef struct dem2di_template {
@@ -10878,9 +10885,12 @@ typedef struct dem2di_ledger {
     dem2di_stored stored;
 } dem2di_ledger;
 
+#define DEM2DI_MATERIALS_MAX 256 /* as declared: so many squared are the pairs of laws */
+
 /* Columns of one length. Those before the keys grow one by one; the others are renewed with the
    list, and in large scenes are most of the memory. */
 typedef enum dem2di_group {
+    DEM2DI_WORLD, /* one row: the world itself */
     DEM2DI_TEMPLATES,
     DEM2DI_MATERIALS,
     DEM2DI_LAWS, /* laws_side squared */
@@ -10897,6 +10907,11 @@ typedef enum dem2di_group {
     DEM2DI_INCIDENT,
     DEM2DI_TALLIES,
     DEM2DI_SCRATCH, /* lines */
+    DEM2DI_SHAPE,   /* one row: a shape itself; its columns by its count, its parts, ... */
+    DEM2DI_SHAPE_COUNT,
+    DEM2DI_SHAPE_PARTS,
+    DEM2DI_SHAPE_BLOCKS,
+    DEM2DI_SHAPE_SECTORS,
     DEM2DI_GROUPS
 } dem2di_group;
 
@@ -10906,6 +10921,7 @@ struct dem2d_world {
     dem2d_law_fn *law;
     void *law_user;
     int law_tag;
+    bool has_law; /* law is not NULL: for snapshots, which can't have the function */
     dem2d_parallel_fn *parallel_for;
     void *parallel_user;
     double time_step, local_damping, global_damping, tolerance;
@@ -10986,63 +11002,375 @@ static void dem2di_world_log(void *user, dem2d_result result, int index, const c
     if (world->user_env.log != NULL) world->user_env.log(world->user_env.user, result, index, text);
 }
 
-/* --- columns ------------------------------------------------------------------------------------
-   Each array of the world is a column: one line of the table says what is done with it. */
-
-enum {
-    DEM2DI_MOVES = 1, /* with the particles, when these are sorted in memory */
-    DEM2DI_SWAPS = 2  /* with the column on the next line, which holds the next step's values */
+static const dem2di_field dem2di_material_fields[] = {
+    DEM2DI_ROW(dem2d_material_desc, density, DEM2DI_POSITIVE, "kg/m2 none; walls ignore it"),
+    DEM2DI_ROW(dem2d_material_desc, normal_stiffness, DEM2DI_POSITIVE, "N/m none"),
+    DEM2DI_ROW(dem2d_material_desc, tangential_stiffness, DEM2DI_FROM_0, "N/m 0"),
+    DEM2DI_ROW(dem2d_material_desc, friction, DEM2DI_FROM_0, "- 0"),
+    DEM2DI_ROW(dem2d_material_desc, damping_ratio, DEM2DI_FROM_0, "- 0"),
+    DEM2DI_ROW(dem2d_material_desc, rolling_friction, DEM2DI_FROM_0, "- 0"),
 };
 
+static const dem2di_field dem2di_pair_fields[] = {
+    DEM2DI_ROW(dem2d_pair_desc, normal_stiffness, DEM2DI_POSITIVE, "N/m none"),
+    DEM2DI_ROW(dem2d_pair_desc, tangential_stiffness, DEM2DI_FROM_0, "N/m 0"),
+    DEM2DI_ROW(dem2d_pair_desc, friction, DEM2DI_FROM_0, "- 0"),
+    DEM2DI_ROW(dem2d_pair_desc, damping_ratio, DEM2DI_FROM_0, "- 0"),
+    DEM2DI_ROW(dem2d_pair_desc, rolling_friction, DEM2DI_FROM_0, "- 0"),
+};
+
+static const dem2di_field dem2di_wall_fields[] = {
+    DEM2DI_ROW(dem2d_wall_desc, length, DEM2DI_FROM_0, "m none; of a servo > 0 or spans"),
+    DEM2DI_ROW(dem2d_wall_desc, mode, DEM2DI_CHOICE(DEM2D_WALL_SERVO + 1), "- STILL"),
+    DEM2DI_ROW(dem2d_wall_desc, material, DEM2DI_HANDLE, "- none; a material of this world"),
+    DEM2DI_ROW(dem2d_wall_desc, point, DEM2DI_VECTOR, "m 0"),
+    DEM2DI_ROW(dem2d_wall_desc, normal, DEM2DI_VECTOR, "- none; not zero; normalised"),
+    DEM2DI_ROW(dem2d_wall_desc, segment, DEM2DI_SWITCH, "- false"),
+    DEM2DI_ROW(dem2d_wall_desc, end, DEM2DI_VECTOR, "m 0; of segments not point"),
+    DEM2DI_ROW(dem2d_wall_desc, velocity, DEM2DI_VECTOR, "m/s 0; MOVING only"),
+    DEM2DI_ROW(dem2d_wall_desc, stress, DEM2DI_FINITE, "Pa 0; SERVO only"),
+    DEM2DI_ROW(dem2d_wall_desc, max_speed, DEM2DI_FROM_0, "m/s none; > 0 for SERVO"),
+    DEM2DI_ROW(dem2d_wall_desc, spans, DEM2DI_HANDLE, "- none; two walls, or both zero"),
+};
+
+static const dem2di_field dem2di_used_fields[] = {
+    DEM2DI_ROW(dem2d_pair_desc, normal_stiffness, DEM2DI_FROM_0, ""),
+    DEM2DI_ROW(dem2d_pair_desc, tangential_stiffness, DEM2DI_FROM_0, ""),
+    DEM2DI_ROW(dem2d_pair_desc, friction, DEM2DI_FROM_0, ""),
+    DEM2DI_ROW(dem2d_pair_desc, damping_ratio, DEM2DI_FROM_0, ""),
+    DEM2DI_ROW(dem2d_pair_desc, rolling_friction, DEM2DI_FROM_0, "")};
+
+/* --- columns ------------------------------------------------------------------------------------
+   Each array of the world is a column: one line of dem2di_columns says what is done with it. Tables
+   of fields say what numbers there are in the columns that are saved. */
+
+#define DEM2DI_SAVED(name, of, field, range) \
+    { name, range, sizeof(((of *)0)->field), offsetof(of, field) DEM2DI_FIELD_TEXT("") }
+/* Columns of plain numbers. */
+#define DEM2DI_PLAIN(name, type, range) \
+    { name, range, sizeof(type), 0 DEM2DI_FIELD_TEXT("") }
+
+static const dem2di_field dem2di_setting_fields[] = {
+    DEM2DI_SAVED("time_step", dem2d_world, time_step, DEM2DI_POSITIVE),
+    DEM2DI_SAVED("made_step", dem2d_world, made_step, DEM2DI_POSITIVE),
+    DEM2DI_SAVED("gravity", dem2d_world, gravity, DEM2DI_VECTOR),
+    DEM2DI_SAVED("local_damping", dem2d_world, local_damping, DEM2DI_FRACTION),
+    DEM2DI_SAVED("global_damping", dem2d_world, global_damping, DEM2DI_FROM_0),
+    DEM2DI_SAVED("contact_tolerance", dem2d_world, tolerance, DEM2DI_POSITIVE),
+    DEM2DI_SAVED("max_iterations", dem2d_world, max_iterations, DEM2DI_WHOLE(1, 1 << 30)),
+    DEM2DI_SAVED("solver", dem2d_world, solver, DEM2DI_CHOICE(DEM2D_SOLVER_COUNT)),
+    DEM2DI_SAVED("faces", dem2d_world, faces, DEM2DI_CHOICE(DEM2D_FACE_RULE_COUNT)),
+    DEM2DI_SAVED("check_time_step", dem2d_world, check_time_step, DEM2DI_SWITCH),
+    DEM2DI_SAVED("steps", dem2d_world, steps, DEM2DI_COUNTER),
+    DEM2DI_SAVED("timed_at", dem2d_world, timed_at, DEM2DI_COUNTER),
+    DEM2DI_SAVED("timed", dem2d_world, timed, DEM2DI_ANY_NUMBER)}; /* a sum, which may overflow */
+
+/* What of the list outlives it, counters, lengths. */
+static const dem2di_field dem2di_progress_fields[] = {
+    DEM2DI_SAVED("has_law", dem2d_world, has_law, DEM2DI_SWITCH),
+    DEM2DI_SAVED("law_tag", dem2d_world, law_tag, DEM2DI_TAG),
+    DEM2DI_SAVED("redirected", dem2d_world, redirected, DEM2DI_SWITCH),
+    DEM2DI_SAVED("list_stale", dem2d_world, list_stale, DEM2DI_SWITCH),
+    DEM2DI_SAVED("list_worn", dem2d_world, list_worn, DEM2DI_SWITCH),
+    DEM2DI_SAVED("check_due", dem2d_world, check_due, DEM2DI_SWITCH),
+    DEM2DI_SAVED("skin_fixed", dem2d_world, skin_fixed, DEM2DI_SWITCH),
+    DEM2DI_SAVED("scattered", dem2d_world, scattered, DEM2DI_SWITCH),
+    DEM2DI_SAVED("bounded", dem2d_world, bounded, DEM2DI_SWITCH),
+    DEM2DI_SAVED("skin", dem2d_world, skin, DEM2DI_POSITIVE),
+    DEM2DI_SAVED("interval", dem2d_world, interval, DEM2DI_FROM_0),
+    DEM2DI_SAVED("spread", dem2d_world, spread, DEM2DI_FROM_0),
+    DEM2DI_SAVED("worn", dem2d_world, worn, DEM2DI_ANY_NUMBER),
+    DEM2DI_SAVED("creep", dem2d_world, creep, DEM2DI_ANY_NUMBER),
+    DEM2DI_SAVED("rounding", dem2d_world, rounding, DEM2DI_ANY_NUMBER),
+    DEM2DI_SAVED("listed_at", dem2d_world, listed_at, DEM2DI_COUNTER),
+    DEM2DI_SAVED("list_rebuilds", dem2d_world, rebuilds, DEM2DI_COUNTER),
+    DEM2DI_SAVED("slow_time_step", dem2d_world, slow_time_step, DEM2DI_COUNTER),
+    DEM2DI_SAVED("fast_motion", dem2d_world, fast_motion, DEM2DI_COUNTER),
+    DEM2DI_SAVED("support_calls", dem2d_world, count.calls, DEM2DI_COUNTER),
+    DEM2DI_SAVED("collisions", dem2d_world, count.collisions, DEM2DI_COUNTER),
+    DEM2DI_SAVED("separations", dem2d_world, count.separations, DEM2DI_COUNTER),
+    DEM2DI_SAVED("unsound", dem2d_world, count.unsound, DEM2DI_COUNTER),
+    DEM2DI_SAVED("proofs", dem2d_world, count.proofs, DEM2DI_COUNTER),
+    DEM2DI_SAVED("shapes", dem2d_world, template_count, DEM2DI_WHOLE(0, 1 << 30)),
+    DEM2DI_SAVED("materials", dem2d_world, material_count, DEM2DI_WHOLE(0, DEM2DI_MATERIALS_MAX)),
+    DEM2DI_SAVED("ids", dem2d_world, name_count, DEM2DI_WHOLE(0, 1 << 30)),
+    DEM2DI_SAVED("free_id", dem2d_world, free_name, DEM2DI_WHOLE(-1, 1 << 30)),
+    DEM2DI_SAVED("particles", dem2d_world, body_count, DEM2DI_WHOLE(0, 1 << 30)),
+    DEM2DI_SAVED("walls", dem2d_world, wall_count, DEM2DI_WHOLE(0, 1 << 30)),
+    DEM2DI_SAVED("disc_pairs", dem2d_world, list.discs, DEM2DI_WHOLE(0, 1 << 30)),
+    DEM2DI_SAVED("pairs", dem2d_world, list.pairs, DEM2DI_WHOLE(0, 1 << 30)),
+    DEM2DI_SAVED("contacts", dem2d_world, list.count, DEM2DI_WHOLE(0, 1 << 30))};
+
+/* Gravity and damping are looked at in each step. */
+static const dem2di_field dem2di_plan_fields[] = {
+    DEM2DI_SAVED("friction", dem2d_world, plan.friction, DEM2DI_SWITCH),
+    DEM2DI_SAVED("spin", dem2d_world, plan.spin, DEM2DI_SWITCH),
+    DEM2DI_SAVED("turns", dem2d_world, plan.turns, DEM2DI_SWITCH),
+    DEM2DI_SAVED("one_law", dem2d_world, plan.one_law, DEM2DI_SWITCH),
+    DEM2DI_SAVED("material", dem2d_world, plan.material, DEM2DI_WHOLE(0, DEM2DI_MATERIALS_MAX)),
+    DEM2DI_SAVED("joints", dem2d_world, plan.joints, DEM2DI_SWITCH),
+    DEM2DI_SAVED("full", dem2d_world, plan.full, DEM2DI_SWITCH),
+    DEM2DI_SAVED("friction_again", dem2d_world, plan.friction_again, DEM2DI_SWITCH),
+    DEM2DI_SAVED("full_again", dem2d_world, plan.full_again, DEM2DI_SWITCH),
+    DEM2DI_SAVED("faces", dem2d_world, plan.faces, DEM2DI_SWITCH)};
+
+#define DEM2DI_ACCOUNT(name, place) DEM2DI_SAVED(name, dem2d_world, ledger.place, DEM2DI_ANY_NUMBER)
+
+static const dem2di_field dem2di_ledger_fields[] = {
+    DEM2DI_SAVED("kept", dem2d_world, ledger.kept, DEM2DI_SWITCH),
+    DEM2DI_SAVED("edited", dem2d_world, ledger.edited, DEM2DI_SWITCH),
+    DEM2DI_ACCOUNT("gravity", sum[DEM2DI_GRAVITY]),
+    DEM2DI_ACCOUNT("half_gravity", half[DEM2DI_GRAVITY]),
+    DEM2DI_ACCOUNT("walls", sum[DEM2DI_BY_WALLS]),
+    DEM2DI_ACCOUNT("half_walls", half[DEM2DI_BY_WALLS]),
+    DEM2DI_ACCOUNT("driving", sum[DEM2DI_DRIVING]),
+    DEM2DI_ACCOUNT("half_driving", half[DEM2DI_DRIVING]),
+    DEM2DI_ACCOUNT("damping", sum[DEM2DI_DAMPED]),
+    DEM2DI_ACCOUNT("half_damping", half[DEM2DI_DAMPED]),
+    DEM2DI_ACCOUNT("friction", sum[DEM2DI_RUBBED]),
+    DEM2DI_ACCOUNT("dashpots", sum[DEM2DI_DASHED]),
+    DEM2DI_ACCOUNT("kinetic", kinetic),
+    DEM2DI_ACCOUNT("given", given),
+    DEM2DI_ACCOUNT("closure", closure),
+    DEM2DI_ACCOUNT("turnover", turnover),
+    DEM2DI_ACCOUNT("normal", stored.normal),
+    DEM2DI_ACCOUNT("tangential", stored.tangential),
+    DEM2DI_ACCOUNT("rolling", stored.rolling)};
+
+static const dem2di_field dem2di_template_fields[] = {
+    DEM2DI_SAVED("generation", dem2di_template, generation, DEM2DI_HANDLE)};
+
+static const dem2di_field dem2di_slot_fields[] = {
+    DEM2DI_SAVED("slot", dem2di_name, slot, DEM2DI_TAG)};
+
+static const dem2di_field dem2di_name_fields[] = {
+    DEM2DI_SAVED("generation", dem2di_name, generation, DEM2DI_HANDLE)};
+
+static const dem2di_field dem2di_body_fields[] = {
+    DEM2DI_SAVED("scale", dem2di_body, scale, DEM2DI_POSITIVE),
+    DEM2DI_SAVED("shape", dem2di_body, shape_index, DEM2DI_WHOLE(-1, 1 << 30)),
+    DEM2DI_SAVED("id", dem2di_body, index, DEM2DI_WHOLE(0, 1 << 30)),
+    DEM2DI_SAVED("material", dem2di_body, material, DEM2DI_WHOLE(0, DEM2DI_MATERIALS_MAX - 1)),
+    DEM2DI_SAVED("motion", dem2di_body, motion, DEM2DI_WHOLE(0, DEM2D_DRIVEN)),
+    DEM2DI_SAVED("redirected", dem2di_body, redirected, DEM2DI_SWITCH)};
+
+/* The radius follows from the shape. */
+static const dem2di_field dem2di_state_fields[] = {
+    DEM2DI_SAVED("position", dem2di_state, x, DEM2DI_VECTOR),
+    DEM2DI_SAVED("rotation", dem2di_state, q, DEM2DI_VECTOR),
+    DEM2DI_SAVED("velocity", dem2di_state, v, DEM2DI_VECTOR),
+    DEM2DI_SAVED("angular_velocity", dem2di_state, w, DEM2DI_FINITE)};
+
+static const dem2di_field dem2di_velocity_fields[] = {
+    DEM2DI_SAVED("velocity", dem2di_velocities, v, DEM2DI_VECTOR),
+    DEM2DI_SAVED("angular_velocity", dem2di_velocities, w, DEM2DI_FINITE)};
+
+static const dem2di_field dem2di_wall_id_fields[] = {
+    DEM2DI_SAVED("alive", dem2di_wall, alive, DEM2DI_SWITCH),
+    DEM2DI_SAVED("generation", dem2di_wall, generation, DEM2DI_HANDLE)};
+
+static const dem2di_field dem2di_wall_list_fields[] = {
+    DEM2DI_SAVED("listed", dem2di_wall, listed, DEM2DI_VECTOR),
+    DEM2DI_SAVED("skin", dem2di_wall, skin, DEM2DI_FROM_0),
+    DEM2DI_SAVED("used_material", dem2di_wall, used_material,
+                 DEM2DI_WHOLE(0, DEM2DI_MATERIALS_MAX))};
+
+static const dem2di_field dem2di_wall_state_fields[] = {
+    DEM2DI_SAVED("point", dem2di_wall_state, point, DEM2DI_VECTOR),
+    DEM2DI_SAVED("velocity", dem2di_wall_state, velocity, DEM2DI_VECTOR),
+    DEM2DI_SAVED("force", dem2di_wall_state, force, DEM2DI_VECTOR),
+    DEM2DI_SAVED("drift", dem2di_wall_state, drift, DEM2DI_FINITE),
+    DEM2DI_SAVED("stiffness", dem2di_wall_state, backing.stiffness, DEM2DI_MAY_OVERFLOW),
+    DEM2DI_SAVED("impedance", dem2di_wall_state, backing.impedance, DEM2DI_MAY_OVERFLOW),
+    DEM2DI_SAVED("mass", dem2di_wall_state, backing.mass, DEM2DI_MAY_OVERFLOW)};
+
+static const dem2di_field dem2di_key_fields[] = {
+    DEM2DI_SAVED("a", dem2di_key, a, DEM2DI_WHOLE(-1, 1 << 30)),
+    DEM2DI_SAVED("b", dem2di_key, b, DEM2DI_WHOLE(0, 1 << 30))};
+
+static const dem2di_field dem2di_link_fields[] = {
+    DEM2DI_SAVED("normal", dem2di_link, normal, DEM2DI_VECTOR),
+    DEM2DI_SAVED("arms", dem2di_link, arms, DEM2DI_FINITE),
+    DEM2DI_SAVED("depth", dem2di_link, depth, DEM2DI_FINITE),
+    DEM2DI_SAVED("normal_force", dem2di_link, force, DEM2DI_FINITE),
+    DEM2DI_SAVED("shear", dem2di_link, shear, DEM2DI_FINITE)};
+
+static const dem2di_field dem2di_start_fields[] = {
+    DEM2DI_SAVED("budget", dem2di_link, budget, DEM2DI_FINITE),
+    DEM2DI_SAVED("feature", dem2di_link, feature.own, DEM2DI_TAG),
+    DEM2DI_SAVED("corners", dem2di_link, feature.corner, DEM2DI_TAG)};
+
+static const dem2di_field dem2di_ends_fields[] = {
+    DEM2DI_SAVED("weights", dem2di_ends, weight, DEM2DI_FINITE),
+    DEM2DI_SAVED("depths", dem2di_ends, depth, DEM2DI_FINITE),
+    DEM2DI_SAVED("offsets", dem2di_ends, offset, DEM2DI_FINITE),
+    DEM2DI_SAVED("shears", dem2di_ends, shear, DEM2DI_FINITE),
+    DEM2DI_SAVED("energy", dem2di_ends, energy, DEM2DI_FINITE),
+    DEM2DI_SAVED("corners", dem2di_ends, corner, DEM2DI_TAG)};
+
+/* Energy and state are the caller's: anything. */
+static const dem2di_field dem2di_extra_fields[] = {
+    DEM2DI_SAVED("viscous_forces", dem2di_extra, viscous, DEM2DI_FINITE),
+    DEM2DI_SAVED("moment", dem2di_extra, moment, DEM2DI_FINITE),
+    DEM2DI_SAVED("energy", dem2di_extra, energy, DEM2DI_ANY_NUMBER),
+    DEM2DI_SAVED("state", dem2di_extra, state, DEM2DI_ANY_NUMBER)};
+
+static const dem2di_field dem2di_any_field[] = {DEM2DI_PLAIN("value", double, DEM2DI_ANY_NUMBER)};
+static const dem2di_field dem2di_finite_field[] = {DEM2DI_PLAIN("value", double, DEM2DI_FINITE)};
+static const dem2di_field dem2di_way_field[] = {DEM2DI_PLAIN("value", double, DEM2DI_FROM_0)};
+static const dem2di_field dem2di_bool_field[] = {DEM2DI_PLAIN("value", bool, DEM2DI_SWITCH)};
+
+/* A shape and its slot among the templates. */
+typedef struct dem2di_slot_shape {
+    int slot;
+    dem2d_shape shape;
+} dem2di_slot_shape;
+
+#define DEM2DI_OF_SHAPE(name, field, range)                                \
+    {                                                                      \
+        name, range, sizeof(((dem2di_slot_shape *)0)->shape.field),        \
+            offsetof(dem2di_slot_shape, shape.field) DEM2DI_FIELD_TEXT("") \
+    }
+
+static const dem2di_field dem2di_shape_fields[] = {
+    DEM2DI_SAVED("slot", dem2di_slot_shape, slot, DEM2DI_COUNT),
+    DEM2DI_OF_SHAPE("type", type, DEM2DI_CHOICE(DEM2D_SHAPE_TYPE_COUNT)),
+    DEM2DI_OF_SHAPE("count", count, DEM2DI_COUNT),
+    DEM2DI_OF_SHAPE("parts", parts, DEM2DI_COUNT),
+    DEM2DI_OF_SHAPE("a", a, DEM2DI_FROM_0),
+    DEM2DI_OF_SHAPE("b", b, DEM2DI_FROM_0),
+    DEM2DI_OF_SHAPE("deviation", deviation, DEM2DI_FROM_0),
+    DEM2DI_OF_SHAPE("rounding", rounding, DEM2DI_FROM_0),
+    DEM2DI_OF_SHAPE("circumscribed", circumscribed, DEM2DI_POSITIVE),
+    DEM2DI_OF_SHAPE("inscribed", inscribed, DEM2DI_FROM_0),
+    DEM2DI_OF_SHAPE("rho_min", rho_min, DEM2DI_FROM_0),
+    DEM2DI_OF_SHAPE("rho_max", rho_max, DEM2DI_MAY_OVERFLOW), /* where an arc is flat at a point */
+    DEM2DI_OF_SHAPE("area", mass.area, DEM2DI_POSITIVE),
+    DEM2DI_OF_SHAPE("polar_moment", mass.polar_moment, DEM2DI_POSITIVE),
+    DEM2DI_OF_SHAPE("offset", offset, DEM2DI_VECTOR),
+    DEM2DI_OF_SHAPE("tag", function_tag, DEM2DI_TAG)};
+
+static const dem2di_field dem2di_vec_field[] = {DEM2DI_PLAIN("value", dem2d_vec, DEM2DI_VECTOR)};
+
+static const dem2di_field dem2di_arc_fields[] = {
+    DEM2DI_SAVED("start", dem2di_arc, start, DEM2DI_VECTOR),
+    DEM2DI_SAVED("d0", dem2di_arc, d0, DEM2DI_VECTOR),
+    DEM2DI_SAVED("d1", dem2di_arc, d1, DEM2DI_VECTOR),
+    DEM2DI_SAVED("d2", dem2di_arc, d2, DEM2DI_VECTOR)};
+
+static const dem2di_field dem2di_block_fields[] = {
+    DEM2DI_SAVED("a", dem2di_block, a, DEM2DI_FINITE),
+    DEM2DI_SAVED("b", dem2di_block, b, DEM2DI_FINITE)};
+
+enum {
+    DEM2DI_MOVES = 1,  /* with the particles, when these are sorted in memory */
+    DEM2DI_SWAPS = 2,  /* with the column on the next line, which holds the next step's values */
+    DEM2DI_HASHED = 4, /* callers see it, or it decides what they will see */
+    DEM2DI_FIRST = 8,  /* of its group in a snapshot, which has it even if all is 0: no number of
+                          rows takes memory without as many bytes */
+    DEM2DI_SHARES = 16 /* its memory is that of another line, or of the world itself */
+};
+
+/* A column in an object: a world, or a shape. */
 typedef struct dem2di_column {
+    const char *name; /* in snapshots; NULL: it is not saved */
     dem2di_group group;
-    size_t at, size; /* where the world has its pointer; of an element */
+    size_t at, size; /* where the object has its pointer; of an element */
     int treatment;
+    const dem2di_field *fields;
+    int count; /* of fields */
 } dem2di_column;
 
-#define DEM2DI_COLUMN(group, pointer, treatment) \
-    { group, offsetof(dem2d_world, pointer), sizeof *((dem2d_world *)NULL)->pointer, treatment }
+#define DEM2DI_COLUMN(name, group, pointer, treatment, fields)                             \
+    {                                                                                      \
+        name, group, offsetof(dem2d_world, pointer), sizeof(*((dem2d_world *)0)->pointer), \
+            treatment, fields                                                              \
+    }
+#define DEM2DI_SHAPE_COLUMN(name, group, pointer, fields)        \
+    {                                                            \
+        name, group, offsetof(dem2di_slot_shape, shape.pointer), \
+            sizeof(*((dem2di_slot_shape *)0)->shape.pointer),    \
+            DEM2DI_SHARES | DEM2DI_FIRST | DEM2DI_HASHED, fields \
+    }
+#define DEM2DI_NONE NULL, 0 /* no fields */
 
 static const dem2di_column dem2di_columns[] = {
-    DEM2DI_COLUMN(DEM2DI_TEMPLATES, templates, 0),
-    DEM2DI_COLUMN(DEM2DI_MATERIALS, materials, 0),
-    DEM2DI_COLUMN(DEM2DI_LAWS, laws, 0),
-    DEM2DI_COLUMN(DEM2DI_LAWS, used_laws, 0),
-    DEM2DI_COLUMN(DEM2DI_NAMES, names, 0),
-    DEM2DI_COLUMN(DEM2DI_BODIES, before, DEM2DI_MOVES | DEM2DI_SWAPS),
-    DEM2DI_COLUMN(DEM2DI_BODIES, now, DEM2DI_MOVES),
-    DEM2DI_COLUMN(DEM2DI_BODIES, bodies, DEM2DI_MOVES),
-    DEM2DI_COLUMN(DEM2DI_BODIES, inverse, DEM2DI_MOVES),
-    DEM2DI_COLUMN(DEM2DI_BODIES, wear, 0),
-    DEM2DI_COLUMN(DEM2DI_BODIES, list.first, 0),
-    DEM2DI_COLUMN(DEM2DI_TRAVELS, travel, DEM2DI_MOVES | DEM2DI_SWAPS),
-    DEM2DI_COLUMN(DEM2DI_TRAVELS, next_travel, 0),
-    DEM2DI_COLUMN(DEM2DI_TRAVELS, lever, DEM2DI_MOVES),
-    DEM2DI_COLUMN(DEM2DI_MADE, made, DEM2DI_MOVES),
-    DEM2DI_COLUMN(DEM2DI_WALLS, walls, 0),
-    DEM2DI_COLUMN(DEM2DI_WALLS, wall_before, DEM2DI_SWAPS),
-    DEM2DI_COLUMN(DEM2DI_WALLS, wall_now, DEM2DI_SWAPS),
-    DEM2DI_COLUMN(DEM2DI_WALLS, wall_next, 0),
-    DEM2DI_COLUMN(DEM2DI_KEYS, list.keys, 0),
-    DEM2DI_COLUMN(DEM2DI_KEYS, list.touched, 0),
-    DEM2DI_COLUMN(DEM2DI_SPRINGS, list.shear, DEM2DI_SWAPS),
-    DEM2DI_COLUMN(DEM2DI_SPRINGS, list.next_shear, 0),
-    DEM2DI_COLUMN(DEM2DI_LINKS, list.links, DEM2DI_SWAPS),
-    DEM2DI_COLUMN(DEM2DI_LINKS, list.next_links, 0),
-    DEM2DI_COLUMN(DEM2DI_ENDS, list.ends, DEM2DI_SWAPS),
-    DEM2DI_COLUMN(DEM2DI_ENDS, list.next_ends, 0),
-    DEM2DI_COLUMN(DEM2DI_EXTRAS, list.extras, DEM2DI_SWAPS),
-    DEM2DI_COLUMN(DEM2DI_EXTRAS, list.next_extras, 0),
-    DEM2DI_COLUMN(DEM2DI_INCIDENT, list.incident, 0),
-    DEM2DI_COLUMN(DEM2DI_TALLIES, tallies, 0),
-    {DEM2DI_SCRATCH, offsetof(dem2d_world, scratch), DEM2DI_LINE, 0},
+    {"world", DEM2DI_WORLD, 0, 0, DEM2DI_SHARES | DEM2DI_HASHED, DEM2DI_ALL(dem2di_setting_fields)},
+    {"progress", DEM2DI_WORLD, 0, 0, DEM2DI_SHARES, DEM2DI_ALL(dem2di_progress_fields)},
+    {"plan", DEM2DI_WORLD, 0, 0, DEM2DI_SHARES, DEM2DI_ALL(dem2di_plan_fields)},
+    {"ledger", DEM2DI_WORLD, 0, 0, DEM2DI_SHARES, DEM2DI_ALL(dem2di_ledger_fields)},
+    DEM2DI_COLUMN("templates", DEM2DI_TEMPLATES, templates, DEM2DI_FIRST,
+                  DEM2DI_ALL(dem2di_template_fields)),
+    DEM2DI_COLUMN("materials", DEM2DI_MATERIALS, materials, DEM2DI_FIRST | DEM2DI_HASHED,
+                  DEM2DI_ALL(dem2di_material_fields)),
+    DEM2DI_COLUMN("laws", DEM2DI_LAWS, laws, DEM2DI_FIRST | DEM2DI_HASHED,
+                  DEM2DI_ALL(dem2di_pair_fields)),
+    DEM2DI_COLUMN("used_laws", DEM2DI_LAWS, used_laws, 0, DEM2DI_ALL(dem2di_used_fields)),
+    DEM2DI_COLUMN("ids", DEM2DI_NAMES, names, DEM2DI_FIRST | DEM2DI_HASHED,
+                  DEM2DI_ALL(dem2di_name_fields)),
+    DEM2DI_COLUMN("slots", DEM2DI_NAMES, names, DEM2DI_SHARES, DEM2DI_ALL(dem2di_slot_fields)),
+    DEM2DI_COLUMN("particles", DEM2DI_BODIES, bodies, DEM2DI_FIRST | DEM2DI_MOVES | DEM2DI_HASHED,
+                  DEM2DI_ALL(dem2di_body_fields)),
+    DEM2DI_COLUMN("before", DEM2DI_BODIES, before, DEM2DI_MOVES | DEM2DI_SWAPS | DEM2DI_HASHED,
+                  DEM2DI_ALL(dem2di_state_fields)),
+    DEM2DI_COLUMN("now", DEM2DI_BODIES, now, DEM2DI_MOVES | DEM2DI_HASHED,
+                  DEM2DI_ALL(dem2di_state_fields)),
+    DEM2DI_COLUMN("wear", DEM2DI_BODIES, wear, 0, DEM2DI_ALL(dem2di_any_field)),
+    DEM2DI_COLUMN(NULL, DEM2DI_BODIES, inverse, DEM2DI_MOVES, DEM2DI_NONE),
+    DEM2DI_COLUMN(NULL, DEM2DI_BODIES, list.first, 0, DEM2DI_NONE),
+    DEM2DI_COLUMN("travel", DEM2DI_TRAVELS, travel, DEM2DI_MOVES | DEM2DI_SWAPS,
+                  DEM2DI_ALL(dem2di_way_field)),
+    DEM2DI_COLUMN(NULL, DEM2DI_TRAVELS, next_travel, 0, DEM2DI_NONE),
+    DEM2DI_COLUMN(NULL, DEM2DI_TRAVELS, lever, DEM2DI_MOVES, DEM2DI_NONE),
+    DEM2DI_COLUMN("made", DEM2DI_MADE, made, DEM2DI_MOVES | DEM2DI_HASHED,
+                  DEM2DI_ALL(dem2di_velocity_fields)),
+    DEM2DI_COLUMN("wall_ids", DEM2DI_WALLS, walls, DEM2DI_FIRST | DEM2DI_HASHED,
+                  DEM2DI_ALL(dem2di_wall_id_fields)),
+    DEM2DI_COLUMN("walls", DEM2DI_WALLS, walls, DEM2DI_SHARES | DEM2DI_HASHED,
+                  DEM2DI_ALL(dem2di_wall_fields)),
+    DEM2DI_COLUMN("wall_list", DEM2DI_WALLS, walls, DEM2DI_SHARES,
+                  DEM2DI_ALL(dem2di_wall_list_fields)),
+    DEM2DI_COLUMN("wall_before", DEM2DI_WALLS, wall_before, DEM2DI_SWAPS | DEM2DI_HASHED,
+                  DEM2DI_ALL(dem2di_wall_state_fields)),
+    DEM2DI_COLUMN("wall_now", DEM2DI_WALLS, wall_now, DEM2DI_SWAPS | DEM2DI_HASHED,
+                  DEM2DI_ALL(dem2di_wall_state_fields)),
+    DEM2DI_COLUMN(NULL, DEM2DI_WALLS, wall_next, 0, DEM2DI_NONE),
+    DEM2DI_COLUMN("pairs", DEM2DI_KEYS, list.keys, DEM2DI_FIRST | DEM2DI_HASHED,
+                  DEM2DI_ALL(dem2di_key_fields)),
+    DEM2DI_COLUMN("touched", DEM2DI_KEYS, list.touched, 0, DEM2DI_ALL(dem2di_bool_field)),
+    DEM2DI_COLUMN("shear", DEM2DI_SPRINGS, list.shear, DEM2DI_SWAPS,
+                  DEM2DI_ALL(dem2di_finite_field)),
+    DEM2DI_COLUMN(NULL, DEM2DI_SPRINGS, list.next_shear, 0, DEM2DI_NONE),
+    DEM2DI_COLUMN("links", DEM2DI_LINKS, list.links, DEM2DI_SWAPS | DEM2DI_HASHED,
+                  DEM2DI_ALL(dem2di_link_fields)),
+    DEM2DI_COLUMN(NULL, DEM2DI_LINKS, list.next_links, 0, DEM2DI_NONE),
+    DEM2DI_COLUMN("searches", DEM2DI_LINKS, list.links, DEM2DI_SHARES,
+                  DEM2DI_ALL(dem2di_start_fields)),
+    DEM2DI_COLUMN("ends", DEM2DI_ENDS, list.ends, DEM2DI_SWAPS | DEM2DI_HASHED,
+                  DEM2DI_ALL(dem2di_ends_fields)),
+    DEM2DI_COLUMN(NULL, DEM2DI_ENDS, list.next_ends, 0, DEM2DI_NONE),
+    DEM2DI_COLUMN("extras", DEM2DI_EXTRAS, list.extras, DEM2DI_SWAPS | DEM2DI_HASHED,
+                  DEM2DI_ALL(dem2di_extra_fields)),
+    DEM2DI_COLUMN(NULL, DEM2DI_EXTRAS, list.next_extras, 0, DEM2DI_NONE),
+    DEM2DI_COLUMN(NULL, DEM2DI_INCIDENT, list.incident, 0, DEM2DI_NONE),
+    DEM2DI_COLUMN(NULL, DEM2DI_TALLIES, tallies, 0, DEM2DI_NONE),
+    {NULL, DEM2DI_SCRATCH, offsetof(dem2d_world, scratch), DEM2DI_LINE, 0, DEM2DI_NONE},
+    /* of each shape, what its support points come from: the rest follows with the same bits */
+    {"shape", DEM2DI_SHAPE, 0, 0, DEM2DI_SHARES | DEM2DI_HASHED, DEM2DI_ALL(dem2di_shape_fields)},
+    DEM2DI_SHAPE_COLUMN("corners", DEM2DI_SHAPE_COUNT, corners, DEM2DI_ALL(dem2di_vec_field)),
+    DEM2DI_SHAPE_COLUMN("given", DEM2DI_SHAPE_COUNT, given, DEM2DI_ALL(dem2di_arc_fields)),
+    DEM2DI_SHAPE_COLUMN("arcs", DEM2DI_SHAPE_PARTS, arcs, DEM2DI_ALL(dem2di_arc_fields)),
+    DEM2DI_SHAPE_COLUMN("tangents", DEM2DI_SHAPE_PARTS, tangents, DEM2DI_ALL(dem2di_vec_field)),
+    DEM2DI_SHAPE_COLUMN("terms", DEM2DI_SHAPE_BLOCKS, blocks, DEM2DI_ALL(dem2di_block_fields)),
+    DEM2DI_SHAPE_COLUMN("least_rho", DEM2DI_SHAPE_SECTORS, least_rho,
+                        DEM2DI_ALL(dem2di_finite_field)),
 };
 
 #define DEM2DI_COLUMNS ((int)(sizeof dem2di_columns / sizeof *dem2di_columns))
 
-static void *dem2di_column_get(const dem2d_world *world, const dem2di_column *column) {
+static void *dem2di_column_get(const void *object, const dem2di_column *column) {
     void *array;
-    memcpy(&array, (const char *)world + column->at, sizeof array);
+    memcpy(&array, (const char *)object + column->at, sizeof array);
     return array;
 }
 
@@ -11066,7 +11394,7 @@ static bool dem2di_group_reserve(dem2d_world *world, dem2di_group group, int nee
     if (grown == old) return true;
     for (int k = 0; k < DEM2DI_COLUMNS; k++) {
         made[k] = NULL;
-        if (columns[k].group != group) continue;
+        if (columns[k].group != group || (columns[k].treatment & DEM2DI_SHARES)) continue;
         made[k] = dem2di_lengthened(env, dem2di_column_get(world, &columns[k]), columns[k].size,
                                     old, grown);
         if (made[k] != NULL) continue;
@@ -11085,6 +11413,7 @@ static bool dem2di_group_reserve(dem2d_world *world, dem2di_group group, int nee
 static void dem2di_columns_release(dem2d_world *world) {
     for (int k = 0; k < DEM2DI_COLUMNS; k++) {
         const dem2di_column *column = &dem2di_columns[k];
+        if (column->treatment & DEM2DI_SHARES) continue;
         dem2di_release(&world->env, dem2di_column_get(world, column),
                        (size_t)world->capacity[column->group], column->size);
     }
@@ -11153,7 +11482,8 @@ static dem2d_result dem2di_out_of_memory(const dem2d_world *world, const char *w
 
 DEM2D_API void dem2d_world_destroy(dem2d_world *world) {
     if (world == NULL) return;
-    for (int i = 0; i < world->template_count; i++) dem2d_shape_destroy(world->templates[i].shape);
+    for (int i = 0; i < world->capacity[DEM2DI_TEMPLATES]; i++)
+        dem2d_shape_destroy(world->templates[i].shape);
     dem2d_shape_destroy(world->line);
     dem2di_columns_release(world);
     dem2d_env user = world->user_env;
@@ -11204,6 +11534,7 @@ DEM2D_API dem2d_result dem2d_world_create(const dem2d_world_desc *desc, dem2d_wo
     made->law = desc->law;
     made->law_user = desc->law_user;
     made->law_tag = desc->law_tag;
+    made->has_law = desc->law != NULL;
     made->parallel_for = desc->parallel_for;
     made->parallel_user = desc->parallel_user;
     made->skin_fixed = desc->skin > 0;
@@ -11303,8 +11634,6 @@ DEM2D_API const dem2d_shape *dem2d_world_shape(const dem2d_world *world, dem2d_s
     return world != NULL && dem2di_shape_lives(world, id) ? world->templates[id.index].shape : NULL;
 }
 
-#define DEM2DI_MATERIALS_MAX 256 /* as declared: so many squared are the pairs of laws */
-
 /* Springs in series, doubled: two equal materials meet with their own stiffness. */
 static double dem2di_mean_stiffness(double a, double b) {
     double mean = a / 2 + b / 2; /* of the greatest numbers, too */
@@ -11344,37 +11673,19 @@ static inline const dem2d_pair_desc *dem2di_law_of(const dem2d_world *world, int
     return dem2di_law(world, world->bodies[key->a].material, material);
 }
 
-static const dem2di_field dem2di_material_fields[] = {
-    DEM2DI_ROW(dem2d_material_desc, density, DEM2DI_POSITIVE, "kg/m2 none; walls ignore it"),
-    DEM2DI_ROW(dem2d_material_desc, normal_stiffness, DEM2DI_POSITIVE, "N/m none"),
-    DEM2DI_ROW(dem2d_material_desc, tangential_stiffness, DEM2DI_FROM_0, "N/m 0"),
-    DEM2DI_ROW(dem2d_material_desc, friction, DEM2DI_FROM_0, "- 0"),
-    DEM2DI_ROW(dem2d_material_desc, damping_ratio, DEM2DI_FROM_0, "- 0"),
-    DEM2DI_ROW(dem2d_material_desc, rolling_friction, DEM2DI_FROM_0, "- 0"),
-};
-
-static const dem2di_field dem2di_pair_fields[] = {
-    DEM2DI_ROW(dem2d_pair_desc, normal_stiffness, DEM2DI_POSITIVE, "N/m none"),
-    DEM2DI_ROW(dem2d_pair_desc, tangential_stiffness, DEM2DI_FROM_0, "N/m 0"),
-    DEM2DI_ROW(dem2d_pair_desc, friction, DEM2DI_FROM_0, "- 0"),
-    DEM2DI_ROW(dem2d_pair_desc, damping_ratio, DEM2DI_FROM_0, "- 0"),
-    DEM2DI_ROW(dem2d_pair_desc, rolling_friction, DEM2DI_FROM_0, "- 0"),
-};
-
-/* Wider tables of laws with the old entries in place. */
-static bool dem2di_widen_laws(dem2d_world *world, int side) {
-    int old = world->laws_side, wider = side < 4 ? 4 : 2 * side;
+/* Room for the laws of one material more; those that are there keep their places. */
+static bool dem2di_widen_laws(dem2d_world *world) {
+    int old = world->laws_side, wider = old + 1;
     dem2d_pair_desc *tables[2];
-    if (side <= old) return true;
     if (!dem2di_group_reserve(world, DEM2DI_LAWS, wider * wider)) return false;
     tables[0] = world->laws;
     tables[1] = world->used_laws;
     for (int row = old - 1; row >= 0; row--)
-        for (int k = 0; k < 2; k++) {
-            dem2d_pair_desc *to = tables[k] + row * wider;
-            memmove(to, tables[k] + row * old, (size_t)old * sizeof *to);
-            memset(to + old, 0, (size_t)(wider - old) * sizeof *to);
-        }
+        for (int k = 0; k < 2; k++)
+            memmove(tables[k] + row * wider, tables[k] + row * old, (size_t)old * sizeof **tables);
+    for (int i = 0; i <= old; i++) /* no force pass has known them */
+        memset(&world->used_laws[i * wider + old], 0, sizeof **tables),
+            memset(&world->used_laws[old * wider + i], 0, sizeof **tables);
     world->laws_side = wider;
     return true;
 }
@@ -11388,8 +11699,7 @@ DEM2D_API dem2d_result dem2d_world_add_material(dem2d_world *world, const dem2d_
     int slot = world->material_count;
     if (slot == DEM2DI_MATERIALS_MAX)
         return dem2di_fail(&world->env, DEM2D_OUT_OF_RANGE, slot, "more than %d materials", slot);
-    if (!dem2di_group_reserve(world, DEM2DI_MATERIALS, slot + 1) ||
-        !dem2di_widen_laws(world, slot + 1))
+    if (!dem2di_group_reserve(world, DEM2DI_MATERIALS, slot + 1) || !dem2di_widen_laws(world))
         return dem2di_out_of_memory(world, "a material");
     world->materials[slot] = *desc;
     world->material_count++;
@@ -11878,20 +12188,6 @@ DEM2D_API dem2d_result dem2d_world_drive_particle(dem2d_world *world, dem2d_part
     world->ledger.edited = true;
     return DEM2D_OK;
 }
-
-static const dem2di_field dem2di_wall_fields[] = {
-    DEM2DI_ROW(dem2d_wall_desc, length, DEM2DI_FROM_0, "m none; of a servo > 0 or spans"),
-    DEM2DI_ROW(dem2d_wall_desc, mode, DEM2DI_CHOICE(DEM2D_WALL_SERVO + 1), "- STILL"),
-    DEM2DI_ROW(dem2d_wall_desc, material, DEM2DI_HANDLE, "- none; a material of this world"),
-    DEM2DI_ROW(dem2d_wall_desc, point, DEM2DI_VECTOR, "m 0"),
-    DEM2DI_ROW(dem2d_wall_desc, normal, DEM2DI_VECTOR, "- none; not zero; normalised"),
-    DEM2DI_ROW(dem2d_wall_desc, segment, DEM2DI_SWITCH, "- false"),
-    DEM2DI_ROW(dem2d_wall_desc, end, DEM2DI_VECTOR, "m 0; of segments not point"),
-    DEM2DI_ROW(dem2d_wall_desc, velocity, DEM2DI_VECTOR, "m/s 0; MOVING only"),
-    DEM2DI_ROW(dem2d_wall_desc, stress, DEM2DI_FINITE, "Pa 0; SERVO only"),
-    DEM2DI_ROW(dem2d_wall_desc, max_speed, DEM2DI_FROM_0, "m/s none; > 0 for SERVO"),
-    DEM2DI_ROW(dem2d_wall_desc, spans, DEM2DI_HANDLE, "- none; two walls, or both zero"),
-};
 
 static dem2d_result dem2di_check_spans(const dem2d_world *world, const dem2d_wall_desc *desc) {
     int given = 0;
@@ -15245,43 +15541,33 @@ static dem2d_result dem2di_writer_close(const dem2d_env *env, const char *path,
 }
 
 /* ============================================================================================
-   >>snapshot  State hash, snapshots: one list of fields for hash, save and load
+   >>snapshot  State hash, snapshots: both follow the tables of columns and fields
    uses: config, memory, fields, support, shapes, broad, law, motion, world, list, measures, output
    ============================================================================================ */
 
-/* A snapshot is a mark, a version, its size in bytes, what dem2di_archive_world lists, and a
-   checksum of all before it: little-endian words, doubles by their bits. The mark ends as lines end
-   on different systems, so that a copy as text is noticed. Whoever changes the list of fields
-   changes the version. */
+/* To save, load, check and hash one number more, give it a line in the table of fields of its
+   struct; an array more, a line in dem2di_columns. A number that a snapshot does not have is 0, and
+   what is 0 is not hashed: older snapshots can be read, and hashes stay what they were, if 0 means
+   what was the case before there was the number.
+
+   A snapshot is a sequence of words of 8 bytes, little-endian: doubles by their bits, whole numbers
+   in two's complement, names as 24 characters with zeros at the end. First a mark, a version and
+   the size in bytes, then records, last a checksum of all words before it. The mark ends as lines
+   end on different systems, so that a copy as text is noticed. A record is a column:
+       name, number of rows, number of fields;
+       of each field the name, and how many numbers it has, plus 256 if they are doubles;
+       row by row the numbers.
+   Columns that are 0 all over are left out. A name that is not known here is an error that tells
+   it: a later version has written it, and its state must not be lost in silence. The number of the
+   version changes only when these rules do. */
 #define DEM2DI_SNAPSHOT_MARK 0x0A0D64326D65648Du /* 8D "dem2d" 0D 0A */
 #define DEM2DI_SNAPSHOT_VERSION 4u
 #define DEM2DI_SNAPSHOT_HEAD 24 /* bytes: mark, version, size */
 #define DEM2DI_SNAPSHOT_TAIL 8  /* the checksum */
+#define DEM2DI_NAME_WORDS 3
+#define DEM2DI_FIELDS 64 /* of a column at most */
 
-typedef enum dem2di_aim {
-    DEM2DI_HASHING,
-    DEM2DI_SIZING, /* counts bytes */
-    DEM2DI_SAVING,
-    DEM2DI_LOADING
-} dem2di_aim;
-
-#define DEM2DI_CHUNK                                                             \
-    4096 /* bytes written at once: a multiple of the 8 of a word of the checksum \
-          */
-
-/* What is done with fields. After a failure nothing is, and nothing that was loaded may be used. */
-typedef struct dem2di_archive {
-    dem2di_aim aim;
-    dem2d_result result; /* the first failure */
-    const dem2d_env *env;
-    uint64_t hash;
-    uint64_t size;                   /* bytes so far */
-    const unsigned char *next, *end; /* loading: what is left */
-    const dem2d_load_desc *load;
-    unsigned char chunk[DEM2DI_CHUNK]; /* saving: on their way */
-    size_t used;
-    dem2di_writer writer;
-} dem2di_archive;
+#define DEM2DI_HASH_START 0x243F6A8885A308D3u /* pi - 3: not 0, of which zeros would make 0 */
 
 /* One to one in either argument, so that no change of a single word can be lost. */
 static uint64_t dem2di_hash_word(uint64_t hash, uint64_t word) {
@@ -15289,615 +15575,717 @@ static uint64_t dem2di_hash_word(uint64_t hash, uint64_t word) {
     return hash ^ hash >> 32;
 }
 
-static uint64_t dem2di_word_of(const unsigned char *bytes, size_t count) {
+static uint64_t dem2di_word_of(const unsigned char *bytes) {
     uint64_t word = 0;
-    for (size_t k = 0; k < count; k++) word |= (uint64_t)bytes[k] << 8 * k;
+    for (int k = 0; k < 8; k++) word |= (uint64_t)bytes[k] << 8 * k;
     return word;
 }
 
-static uint64_t dem2di_hash_bytes(uint64_t hash, const unsigned char *bytes, size_t count) {
-    for (size_t i = 0; i < count; i += 8)
-        hash = dem2di_hash_word(hash, dem2di_word_of(bytes + i, count - i < 8 ? count - i : 8));
-    return hash;
+/* Word k of a name. */
+static uint64_t dem2di_name_word(const char *name, int k) {
+    unsigned char bytes[8 * DEM2DI_NAME_WORDS] = {0};
+    memcpy(bytes, name, strlen(name));
+    return dem2di_word_of(bytes + 8 * k);
 }
 
-static void dem2di_archive_start(const dem2d_env *env, dem2di_aim aim, dem2di_archive *ar) {
-    memset(ar, 0, sizeof *ar);
-    ar->aim = aim;
-    ar->env = env;
-    ar->hash = 0x243F6A8885A308D3u; /* pi - 3: not 0, of which zeros would make 0 */
-}
-
-static bool dem2di_archive_good(const dem2di_archive *ar) {
-    return ar->result == DEM2D_OK;
-}
-
-/* Has something just been loaded? */
-static bool dem2di_archive_loaded(const dem2di_archive *ar) {
-    return ar->aim == DEM2DI_LOADING && ar->result == DEM2D_OK;
-}
-
-/* What has been loaded can't be. The log knows, or is told here. */
-static void dem2di_archive_check(dem2di_archive *ar, dem2d_result result) {
-    if (dem2di_archive_loaded(ar) && result != DEM2D_OK) ar->result = DEM2D_FORMAT;
-}
-
-static void dem2di_archive_expect(dem2di_archive *ar, bool holds, const char *else_what) {
-    if (dem2di_archive_loaded(ar) && !holds)
-        ar->result = dem2di_fail(ar->env, DEM2D_FORMAT, -1, "snapshot: %s", else_what);
-}
-
-/* Is there room for what is to be loaded? */
-static bool dem2di_archive_room(dem2di_archive *ar, bool reserved) {
-    if (dem2di_archive_good(ar) && !reserved)
-        ar->result = dem2di_fail(ar->env, DEM2D_OUT_OF_MEMORY, -1, "no memory for a snapshot");
-    return dem2di_archive_good(ar);
-}
-
-static void dem2di_archive_flush(dem2di_archive *ar) {
-    if (!dem2di_archive_good(ar) || ar->used == 0) return;
-    dem2di_put_bytes(&ar->writer, (const char *)ar->chunk, ar->used);
-    ar->hash = dem2di_hash_bytes(ar->hash, ar->chunk, ar->used);
-    ar->used = 0;
-    if (!ar->writer.good) ar->result = DEM2D_IO; /* the log is told at the end */
-}
-
-/* --- numbers -----------------------------------------------------------------------------------
+/* --- numbers of fields --------------------------------------------------------------------------
  */
 
-/* The lowest `bytes` of a word. */
-static void dem2di_archive_word(dem2di_archive *ar, uint64_t *word, int bytes) {
-    if (!dem2di_archive_good(ar)) return;
-    ar->size += (uint64_t)bytes;
-    switch (ar->aim) {
-    case DEM2DI_SIZING:
-        break;
-    case DEM2DI_HASHING:
-        ar->hash = dem2di_hash_word(ar->hash, *word);
-        break;
-    case DEM2DI_SAVING:
-        for (int k = 0; k < bytes; k++) {
-            ar->chunk[ar->used++] = (unsigned char)(*word >> 8 * k & 255);
-            if (ar->used == DEM2DI_CHUNK) dem2di_archive_flush(ar);
-        }
-        break;
-    case DEM2DI_LOADING:
-        dem2di_archive_expect(ar, ar->end - ar->next >= bytes, "fields are missing");
-        if (!dem2di_archive_good(ar)) return;
-        *word = dem2di_word_of(ar->next, (size_t)bytes);
-        ar->next += bytes;
-        break;
+/* Bytes in memory of one of the numbers that a field has. */
+static size_t dem2di_number_size(const dem2di_field *field) {
+    size_t size = sizeof(double);
+    if (field->type == DEM2DI_INT || field->type == DEM2DI_ENUM) size = sizeof(int);
+    if (field->type == DEM2DI_ID) size = sizeof(uint32_t);
+    return field->size < size ? field->size : size; /* bool, uint8_t, enums where they are short */
+}
+
+static int dem2di_numbers_of(const dem2di_field *field) {
+    return (int)(field->size / dem2di_number_size(field));
+}
+
+static bool dem2di_is_real(const dem2di_field *field) {
+    return field->type == DEM2DI_DOUBLE || field->type == DEM2DI_VEC;
+}
+
+/* Number k of a field as a word, and from a word that fits. */
+static uint64_t dem2di_number_get(const dem2di_field *field, const void *row, int k) {
+    size_t size = dem2di_number_size(field);
+    const char *at = (const char *)row + field->offset + (size_t)k * size;
+    uint64_t word = 0;
+    int32_t half;
+    if (size == 1) return *(const uint8_t *)at;
+    if (size == 2) return *(const uint16_t *)(const void *)at;
+    if (size == 4) memcpy(&half, at, size);
+    if (size == 4) return field->type == DEM2DI_ID ? (uint32_t)half : (uint64_t)(int64_t)half;
+    memcpy(&word, at, sizeof word);
+    return word;
+}
+
+static void dem2di_number_set(const dem2di_field *field, void *row, int k, uint64_t word) {
+    size_t size = dem2di_number_size(field);
+    char *at = (char *)row + field->offset + (size_t)k * size;
+    uint32_t half = (uint32_t)(word & UINT32_MAX);
+    if (size == 1) *(uint8_t *)at = (uint8_t)half;
+    if (size == 2) *(uint16_t *)(void *)at = (uint16_t)half;
+    if (size == 4) memcpy(at, &half, size);
+    if (size == 8) memcpy(at, &word, size);
+}
+
+static bool dem2di_number_fits(const dem2di_field *field, uint64_t all) {
+    double value;
+    int64_t whole;
+    memcpy(&value, &all, sizeof value);
+    memcpy(&whole, &all, sizeof whole);
+    if (dem2di_is_real(field))
+        return (field->flags & DEM2DI_ANY) != 0 || dem2di_in_range(field, value);
+    if (field->type == DEM2DI_BOOL) return whole == 0 || whole == 1;
+    if (field->type == DEM2DI_ID) return whole >= 0 && whole <= UINT32_MAX;
+    return (field->type == DEM2DI_INT64 || (whole >= INT_MIN && whole <= INT_MAX)) &&
+           dem2di_in_range(field, (double)whole);
+}
+
+/* --- rows ---------------------------------------------------------------------------------------
+ */
+
+/* How many there are of a column in its object, a world or a slot_shape. */
+static int dem2di_rows(const void *object, const dem2di_column *column) {
+    int rows[DEM2DI_GROUPS] = {0};
+    if (column->group >= DEM2DI_SHAPE) {
+        const dem2d_shape *shape = &((const dem2di_slot_shape *)object)->shape;
+        rows[DEM2DI_SHAPE] = 1;
+        rows[DEM2DI_SHAPE_COUNT] = shape->count;
+        rows[DEM2DI_SHAPE_PARTS] = shape->parts;
+        rows[DEM2DI_SHAPE_BLOCKS] = dem2di_block_count(shape->count);
+        rows[DEM2DI_SHAPE_SECTORS] = DEM2DI_RHO_SECTORS;
+        bool there = column->group == DEM2DI_SHAPE || dem2di_column_get(object, column) != NULL;
+        return there ? rows[column->group] : 0;
+    }
+    const dem2d_world *w = (const dem2d_world *)object;
+    int others = w->list.count - w->list.discs;
+    rows[DEM2DI_WORLD] = 1;
+    rows[DEM2DI_TEMPLATES] = w->template_count;
+    rows[DEM2DI_MATERIALS] = w->material_count;
+    rows[DEM2DI_LAWS] = w->material_count * w->material_count;
+    rows[DEM2DI_NAMES] = w->name_count;
+    rows[DEM2DI_BODIES] = w->body_count;
+    rows[DEM2DI_TRAVELS] = w->plan.turns ? w->body_count : 0;
+    rows[DEM2DI_MADE] = w->redirected ? w->body_count : 0;
+    rows[DEM2DI_WALLS] = w->wall_count;
+    rows[DEM2DI_KEYS] = w->list.count;
+    rows[DEM2DI_SPRINGS] = w->plan.friction ? w->list.discs : 0;
+    rows[DEM2DI_LINKS] = others;
+    rows[DEM2DI_ENDS] = w->plan.faces ? others : 0;
+    rows[DEM2DI_EXTRAS] = w->plan.full ? others : 0;
+    return rows[column->group];
+}
+
+/* Does something with a column of an object. */
+typedef void dem2di_column_fn(void *context, const void *object, const dem2di_column *column);
+
+/* The columns of a world, then those of each of its shapes. */
+static void dem2di_for_columns(const dem2d_world *w, dem2di_column_fn *act, void *context) {
+    const dem2di_column *shapes = dem2di_columns, *end = dem2di_columns + DEM2DI_COLUMNS;
+    for (; shapes->group < DEM2DI_SHAPE; shapes++) act(context, w, shapes);
+    for (int i = 0; i < w->template_count; i++) {
+        dem2di_slot_shape object;
+        if (w->templates[i].shape == NULL) continue;
+        object.slot = i;
+        object.shape = *w->templates[i].shape;
+        for (const dem2di_column *column = shapes; column < end; column++)
+            act(context, &object, column);
     }
 }
 
-/* A whole number of 1 (not below 0), 4 or 8 bytes; what is loaded is from low to high. */
-static int64_t dem2di_archive_whole(dem2di_archive *ar, const char *name, int64_t value, int bytes,
-                                    int64_t low, int64_t high) {
-    uint64_t word = (uint64_t)value;
-    int64_t got;
-    dem2di_archive_word(ar, &word, bytes);
-    if (!dem2di_archive_loaded(ar)) return value;
-    if (bytes == 4 && word > INT32_MAX) word |= (uint64_t)UINT32_MAX << 32;
-    memcpy(&got, &word, sizeof got);
-    if (got >= low && got <= high) return got;
-    ar->result = dem2di_fail(ar->env, DEM2D_FORMAT, -1, "snapshot: %s = %lld is out of range", name,
-                             (long long)got);
-    return value;
+/* Row 0 of a column: one that is alone is the object itself. */
+static void *dem2di_rows_start(const void *object, const dem2di_column *column) {
+    void *itself;
+    memcpy(&itself, &object, sizeof itself);
+    bool alone = column->group == DEM2DI_WORLD || column->group == DEM2DI_SHAPE;
+    return alone ? itself : dem2di_column_get(object, column);
 }
 
-static void dem2di_archive_int(dem2di_archive *ar, const char *name, int *value, int low,
-                               int high) {
-    int got = (int)dem2di_archive_whole(ar, name, *value, 4, low, high);
-    if (dem2di_archive_loaded(ar)) *value = got;
-}
+/* A row in which all that has no meaning is 0. */
+typedef union dem2di_row {
+    dem2di_link link;
+    dem2di_velocities made;
+    dem2di_state state;
+    dem2di_key key;
+} dem2di_row;
 
-static void dem2di_archive_bool(dem2di_archive *ar, const char *name, bool *value) {
-    bool got = dem2di_archive_whole(ar, name, *value, 1, 0, 1) != 0;
-    if (dem2di_archive_loaded(ar)) *value = got;
-}
-
-/* A counter of steps or of what they did: too low to overflow. */
-static void dem2di_archive_tally(dem2di_archive *ar, const char *name, int64_t *value) {
-    int64_t got = dem2di_archive_whole(ar, name, *value, 8, 0, (int64_t)1 << 62);
-    if (dem2di_archive_loaded(ar)) *value = got;
-}
-
-/* Length of an array whose elements take at least so many bytes each: never more than there are. */
-static void dem2di_archive_count(dem2di_archive *ar, const char *name, int *value, int least) {
-    int64_t most = 1 << 30;
-    if (ar->aim == DEM2DI_LOADING && (ar->end - ar->next) / least < most)
-        most = (ar->end - ar->next) / least;
-    int got = (int)dem2di_archive_whole(ar, name, *value, 4, 0, most);
-    if (dem2di_archive_loaded(ar)) *value = got;
-}
-
-static void dem2di_archive_generation(dem2di_archive *ar, uint32_t *value) {
-    uint64_t word = *value;
-    dem2di_archive_word(ar, &word, 4);
-    if (dem2di_archive_loaded(ar)) *value = (uint32_t)word;
-}
-
-/* Any double. */
-static void dem2di_archive_bits(dem2di_archive *ar, double *value) {
-    uint64_t word;
-    memcpy(&word, value, sizeof word);
-    dem2di_archive_word(ar, &word, 8);
-    if (dem2di_archive_loaded(ar)) memcpy(value, &word, sizeof word);
-}
-
-static void dem2di_archive_finite(dem2di_archive *ar, const char *name, double *value) {
-    dem2di_archive_bits(ar, value);
-    dem2di_archive_check(ar, dem2di_check_number(ar->env, name, *value, DEM2DI_FINITE));
-}
-
-static void dem2di_archive_positive(dem2di_archive *ar, const char *name, double *value) {
-    dem2di_archive_bits(ar, value);
-    dem2di_archive_check(ar, dem2di_check_number(ar->env, name, *value, DEM2DI_POSITIVE));
-}
-
-static void dem2di_archive_not_negative(dem2di_archive *ar, const char *name, double *value) {
-    dem2di_archive_bits(ar, value);
-    dem2di_archive_check(ar, dem2di_check_number(ar->env, name, *value, DEM2DI_FROM_0));
-}
-
-static void dem2di_archive_vec(dem2di_archive *ar, const char *name, dem2d_vec *value) {
-    dem2di_archive_finite(ar, name, &value->x);
-    dem2di_archive_finite(ar, name, &value->y);
-}
-
-/* --- what there is ------------------------------------------------------------------------------
-   The same functions hash, save and load; results of `whole` are assigned to copies. */
-
-static void dem2di_archive_settings(dem2di_archive *ar, dem2d_world *w) {
-    dem2di_archive_positive(ar, "time_step", &w->time_step);
-    dem2di_archive_positive(ar, "made_step", &w->made_step);
-    dem2di_archive_vec(ar, "gravity", &w->gravity);
-    dem2di_archive_not_negative(ar, "local_damping", &w->local_damping);
-    dem2di_archive_not_negative(ar, "global_damping", &w->global_damping);
-    dem2di_archive_expect(ar, w->local_damping < 1, "local_damping is 1 or more");
-    dem2di_archive_positive(ar, "contact_tolerance", &w->tolerance);
-    dem2di_archive_int(ar, "max_iterations", &w->max_iterations, 1, 1 << 30);
-    w->solver =
-        (dem2d_solver)dem2di_archive_whole(ar, "solver", w->solver, 4, 0, DEM2D_SOLVER_COUNT - 1);
-    w->faces = (dem2d_face_rule)dem2di_archive_whole(ar, "faces", w->faces, 4, 0,
-                                                     DEM2D_FACE_RULE_COUNT - 1);
-    dem2di_archive_bool(ar, "check_time_step", &w->check_time_step);
-    dem2di_archive_tally(ar, "steps", &w->steps);
-    dem2di_archive_tally(ar, "timed_at", &w->timed_at);
-    dem2di_archive_expect(ar, w->timed_at <= w->steps, "timed_at is to come");
-    dem2di_archive_bits(ar, &w->timed); /* a sum, which may overflow */
-}
-
-static void dem2di_archive_material(dem2di_archive *ar, dem2d_material_desc *material) {
-    dem2di_archive_positive(ar, "density", &material->density);
-    dem2di_archive_positive(ar, "normal_stiffness", &material->normal_stiffness);
-    dem2di_archive_not_negative(ar, "tangential_stiffness", &material->tangential_stiffness);
-    dem2di_archive_not_negative(ar, "friction", &material->friction);
-    dem2di_archive_not_negative(ar, "damping_ratio", &material->damping_ratio);
-    dem2di_archive_not_negative(ar, "rolling_friction", &material->rolling_friction);
-}
-
-/* All 0 where a material has come after the last force pass. */
-static void dem2di_archive_law(dem2di_archive *ar, dem2d_pair_desc *law) {
-    dem2di_archive_not_negative(ar, "normal_stiffness", &law->normal_stiffness);
-    dem2di_archive_not_negative(ar, "tangential_stiffness", &law->tangential_stiffness);
-    dem2di_archive_not_negative(ar, "friction", &law->friction);
-    dem2di_archive_not_negative(ar, "damping_ratio", &law->damping_ratio);
-    dem2di_archive_not_negative(ar, "rolling_friction", &law->rolling_friction);
-}
-
-/* A symmetric table. */
-static void dem2di_archive_laws(dem2di_archive *ar, const dem2d_world *w, dem2d_pair_desc *laws) {
-    for (int a = 0; a < w->material_count; a++)
-        for (int b = 0; b <= a; b++) {
-            dem2d_pair_desc *law = &laws[a * w->laws_side + b];
-            dem2di_archive_law(ar, law);
-            if (dem2di_archive_loaded(ar)) laws[b * w->laws_side + a] = *law;
+/* Row i of what is saved: in the column, or made of it. */
+static const void *dem2di_saved_row(const void *object, const dem2di_column *column, int i,
+                                    dem2di_row *made) {
+    const dem2d_world *w = (const dem2d_world *)object;
+    if (column->group == DEM2DI_WORLD || column->group == DEM2DI_SHAPE) return object;
+    const char *start = (const char *)dem2di_column_get(object, column);
+    if (column->group == DEM2DI_MADE && !w->bodies[i].redirected) {
+        memset(&made->made, 0, sizeof made->made);
+        return made;
+    }
+    if (column->fields == dem2di_bool_field && i >= w->list.discs) {
+        memset(made, 0, sizeof *made);
+        return made;
+    }
+    if (column->group == DEM2DI_LINKS) { /* of contacts that are apart: what the next search uses */
+        int contact = w->list.discs + i;
+        bool plane = contact >= w->list.pairs && w->list.keys[contact].a >= 0 &&
+                     !w->walls[w->list.keys[contact].b].desc.segment;
+        made->link = w->list.links[i];
+        if (!(made->link.depth > 0)) {
+            memset(&made->link.arms, 0, sizeof made->link.arms);
+            made->link.force = made->link.shear = 0;
         }
+        if (contact >= w->list.pairs) made->link.budget = 0;
+        if (plane) memset(&made->link.feature, 0, sizeof made->link.feature);
+        return made;
+    }
+    return start + (size_t)i * column->size;
 }
 
-static void dem2di_archive_materials(dem2di_archive *ar, dem2d_world *w) {
-    dem2di_archive_count(ar, "materials", &w->material_count, (int)sizeof *w->materials);
-    dem2di_archive_expect(ar, w->material_count <= DEM2DI_MATERIALS_MAX, "too many materials");
-    if (!dem2di_archive_good(ar)) return;
-    int n = w->material_count;
-    bool fits = ar->aim != DEM2DI_LOADING ||
-                (dem2di_group_reserve(w, DEM2DI_MATERIALS, n) && dem2di_widen_laws(w, n));
-    if (!dem2di_archive_room(ar, fits)) return;
-    for (int i = 0; i < n; i++) dem2di_archive_material(ar, &w->materials[i]);
-    dem2di_archive_laws(ar, w, w->laws);
+/* --- the hash -----------------------------------------------------------------------------------
+ */
+
+/* The hash of the columns so far, and of the fields of one more. */
+typedef struct dem2di_hashing {
+    const dem2d_world *world;
+    uint64_t hash;
+    const dem2di_column *column;
+    uint64_t field[DEM2DI_FIELDS];
+} dem2di_hashing;
+
+/* Numbers that are not 0, each with its place in the column. */
+static void dem2di_hash_row(dem2di_hashing *hashing, uint64_t place, const void *row) {
+    for (int f = 0; f < hashing->column->count; f++) {
+        const dem2di_field *field = &hashing->column->fields[f];
+        for (int k = 0; k < dem2di_numbers_of(field); k++) {
+            uint64_t number = dem2di_number_get(field, row, k), *hash = &hashing->field[f];
+            if (number == 0) continue;
+            *hash = dem2di_hash_word(dem2di_hash_word(*hash, place << 8 | (uint64_t)k), number);
+        }
+    }
 }
 
-static void dem2di_archive_custom(dem2di_archive *ar, dem2d_shape *shape) {
-    dem2di_archive_int(ar, "tag", &shape->function_tag, INT_MIN, INT_MAX);
-    if (!dem2di_archive_loaded(ar)) return;
+/* Fields by name, so that one that is new, and 0 all over, leaves no trace. */
+static void dem2di_hash_fields(dem2di_hashing *hashing) {
+    for (int f = 0; f < hashing->column->count; f++) {
+        if (hashing->field[f] == 0) continue;
+        for (int k = 0; k < DEM2DI_NAME_WORDS; k++) {
+            uint64_t column = dem2di_name_word(hashing->column->name, k);
+            uint64_t field = dem2di_name_word(hashing->column->fields[f].name, k);
+            hashing->hash = dem2di_hash_word(dem2di_hash_word(hashing->hash, column), field);
+        }
+        hashing->hash = dem2di_hash_word(hashing->hash, hashing->field[f]);
+    }
+}
+
+/* Row of a hashed column for a place in the order of ids; NULL: nothing is there. Poses are as a
+   caller sees them: a refused step may have changed how rotations are held. */
+static const void *dem2di_hashed_row(const dem2d_world *w, const dem2di_column *column, int place,
+                                     dem2di_row *made) {
+    dem2di_group group = column->group;
+    int slot = place;
+    if (group == DEM2DI_WORLD) return w;
+    const char *start = (const char *)dem2di_column_get(w, column);
+    if (group == DEM2DI_BODIES || group == DEM2DI_MADE) slot = w->names[place].slot;
+    if (slot < 0 || (group == DEM2DI_NAMES && w->names[place].slot < 0)) return NULL;
+    if (group == DEM2DI_MADE && !w->bodies[slot].redirected) return NULL;
+    if (group == DEM2DI_WALLS && !w->walls[place].alive) return NULL;
+    if (group == DEM2DI_TEMPLATES && w->templates[place].shape == NULL) return NULL;
+    const char *row = start + (size_t)slot * column->size;
+    if (column->fields != dem2di_state_fields) return row;
+    memcpy(&made->state, row, sizeof made->state);
+    made->state.q = dem2di_pose_of(w, (const dem2di_state *)(const void *)start, slot).rotation;
+    return made;
+}
+
+/* Row of a column of contacts for an open one of the last force pass, by ids. */
+static const void *dem2di_contact_row(const dem2d_world *w, const dem2di_column *column,
+                                      const dem2di_tour *walk, dem2di_row *made) {
+    const dem2di_key *key = &w->list.keys[walk->contact];
+    if (column->group == DEM2DI_ENDS) return dem2di_ends_at(w, walk->contact, false);
+    if (column->group == DEM2DI_EXTRAS) return dem2di_extra_at(w, walk->contact, false);
+    if (column->group == DEM2DI_LINKS) {
+        made->link = walk->link;
+        if (made->link.shear == 0) made->link.shear = 0; /* not -0: springs may be there or not */
+        return made;
+    }
+    made->key.a = w->bodies[key->a].index;
+    made->key.b = walk->walls ? -1 - key->b : w->bodies[key->b].index;
+    return made;
+}
+
+static void dem2di_hash_contacts(dem2di_hashing *hashing) {
+    const dem2d_world *w = hashing->world;
+    dem2di_row made;
+    uint64_t place = 0;
+    for (int walls = 0; walls < 2; walls++) {
+        dem2di_tour walk = dem2di_tour_start(walls == 1);
+        for (; dem2di_tour_next(w, &walk); place++) {
+            const void *row = dem2di_contact_row(w, hashing->column, &walk, &made);
+            if (row != NULL) dem2di_hash_row(hashing, place, row);
+        }
+    }
+}
+
+static void dem2di_hash_column(void *context, const void *object, const dem2di_column *column) {
+    dem2di_hashing *hashing = (dem2di_hashing *)context;
+    dem2di_group group = column->group;
+    dem2di_row made;
+    if (!(column->treatment & DEM2DI_HASHED)) return;
+    hashing->column = column;
+    memset(hashing->field, 0, sizeof hashing->field);
+    bool contacts = group >= DEM2DI_KEYS && group < DEM2DI_SHAPE;
+    bool by_id = group == DEM2DI_BODIES || group == DEM2DI_MADE;
+    int rows = by_id ? hashing->world->name_count : dem2di_rows(object, column);
+    const char *row = (const char *)dem2di_rows_start(object, column);
+    if (contacts) dem2di_hash_contacts(hashing);
+    for (int i = 0; i < rows && !contacts; i++, row += column->size) {
+        const void *at = row;
+        if (group < DEM2DI_SHAPE) at = dem2di_hashed_row(hashing->world, column, i, &made);
+        if (at != NULL) dem2di_hash_row(hashing, (uint64_t)i, at);
+    }
+    dem2di_hash_fields(hashing);
+}
+
+DEM2D_API uint64_t dem2d_world_hash(const dem2d_world *world) {
+    if (world == NULL) return 0;
+    dem2di_hashing hashing;
+    memset(&hashing, 0, sizeof hashing);
+    hashing.world = world;
+    hashing.hash = DEM2DI_HASH_START;
+    dem2di_for_columns(world, dem2di_hash_column, &hashing);
+    uint64_t hash = dem2di_hash_word(hashing.hash, 0); /* low bits come from high ones too */
+    return hash != 0 ? hash : 1;
+}
+
+/* --- saving -------------------------------------------------------------------------------------
+ */
+
+#define DEM2DI_CHUNK 4096 /* bytes written at once */
+
+/* Words on their way, or only their number. */
+typedef struct dem2di_saver {
+    bool counts;
+    uint64_t words, hash;
+    size_t used;
+    unsigned char chunk[DEM2DI_CHUNK];
+    dem2di_writer writer;
+} dem2di_saver;
+
+static void dem2di_saver_start(dem2di_saver *saver, bool counts) {
+    memset(saver, 0, sizeof *saver);
+    saver->counts = counts;
+    saver->hash = DEM2DI_HASH_START;
+}
+
+static void dem2di_saver_flush(dem2di_saver *saver) {
+    dem2di_put_bytes(&saver->writer, (const char *)saver->chunk, saver->used);
+    saver->used = 0;
+}
+
+static void dem2di_put_word(dem2di_saver *saver, uint64_t word) {
+    saver->words++;
+    if (saver->counts) return;
+    saver->hash = dem2di_hash_word(saver->hash, word);
+    for (int k = 0; k < 8; k++) saver->chunk[saver->used++] = (unsigned char)(word >> 8 * k & 255);
+    if (saver->used == DEM2DI_CHUNK) dem2di_saver_flush(saver);
+}
+
+static void dem2di_put_name(dem2di_saver *saver, const char *name) {
+    for (int k = 0; k < DEM2DI_NAME_WORDS; k++) dem2di_put_word(saver, dem2di_name_word(name, k));
+}
+
+/* All numbers of a column, to a saver or (NULL) not. Returns whether any is not 0. */
+static bool dem2di_put_rows(dem2di_saver *saver, const void *object, const dem2di_column *column) {
+    uint64_t bits = 0;
+    for (int i = 0; i < dem2di_rows(object, column); i++) {
+        dem2di_row made;
+        const void *row = dem2di_saved_row(object, column, i, &made);
+        for (int f = 0; f < column->count; f++)
+            for (int k = 0; k < dem2di_numbers_of(&column->fields[f]); k++) {
+                uint64_t number = dem2di_number_get(&column->fields[f], row, k);
+                bits |= number;
+                if (saver != NULL) dem2di_put_word(saver, number);
+            }
+    }
+    return bits != 0;
+}
+
+static void dem2di_put_column(void *context, const void *object, const dem2di_column *column) {
+    dem2di_saver *saver = (dem2di_saver *)context;
+    int rows = dem2di_rows(object, column);
+    bool always = (column->treatment & DEM2DI_FIRST) != 0;
+    if (column->name == NULL || rows == 0) return;
+    if (!always && !dem2di_put_rows(NULL, object, column)) return;
+    dem2di_put_name(saver, column->name);
+    dem2di_put_word(saver, (uint64_t)rows);
+    dem2di_put_word(saver, (uint64_t)column->count);
+    for (int f = 0; f < column->count; f++) {
+        uint64_t doubles = dem2di_is_real(&column->fields[f]) ? 256 : 0;
+        dem2di_put_name(saver, column->fields[f].name);
+        dem2di_put_word(saver, (uint64_t)dem2di_numbers_of(&column->fields[f]) + doubles);
+    }
+    (void)dem2di_put_rows(saver, object, column);
+}
+
+/* To where the saver writes, which is closed. */
+static dem2d_result dem2di_save(const dem2d_world *world, const char *path, dem2di_saver *saver) {
+    dem2di_saver sizing;
+    dem2di_saver_start(&sizing, true);
+    dem2di_for_columns(world, dem2di_put_column, &sizing);
+    dem2di_put_word(saver, DEM2DI_SNAPSHOT_MARK);
+    dem2di_put_word(saver, DEM2DI_SNAPSHOT_VERSION);
+    dem2di_put_word(saver, DEM2DI_SNAPSHOT_HEAD + 8 * sizing.words + DEM2DI_SNAPSHOT_TAIL);
+    dem2di_for_columns(world, dem2di_put_column, saver);
+    dem2di_put_word(saver, saver->hash);
+    dem2di_saver_flush(saver);
+    return dem2di_writer_close(&world->env, path, &saver->writer);
+}
+
+/* Aside first: whatever happens, the path holds the old file or all of the new one. */
+static dem2d_result dem2di_save_aside(const dem2d_world *world, const char *path, const char *aside,
+                                      dem2di_saver *saver) {
+    const dem2d_env *env = &world->env;
+    dem2d_result result = dem2di_writer_open(env, NULL, NULL, aside, false, &saver->writer);
+    if (result != DEM2D_OK) return result;
+    result = dem2di_save(world, aside, saver);
+#if defined(_WIN32)
+    if (result == DEM2D_OK) (void)remove(path); /* rename does not replace there */
+#endif
+    if (result == DEM2D_OK && rename(aside, path) != 0)
+        result = dem2di_fail(env, DEM2D_IO, -1, "could not rename %s to %s", aside, path);
+    if (result != DEM2D_OK) (void)remove(aside);
+    return result;
+}
+
+DEM2D_API dem2d_result dem2d_world_save(const dem2d_world *world, const dem2d_save_desc *desc,
+                                        const char *path) {
+    dem2d_save_desc plain;
+    if (world == NULL) return DEM2D_NULL_ARGUMENT;
+    memset(&plain, 0, sizeof plain);
+    if (desc == NULL) desc = &plain;
+    const dem2d_env *env = &world->env;
+    dem2di_saver saver;
+    dem2di_saver_start(&saver, false);
+    if (path == NULL || desc->write != NULL) { /* or neither, or both: that is told there */
+        dem2d_result result =
+            dem2di_writer_open(env, desc->write, desc->user, path, false, &saver.writer);
+        return result == DEM2D_OK ? dem2di_save(world, path, &saver) : result;
+    }
+    static const char part[] = ".part";
+    size_t length = strlen(path), room = length + sizeof part;
+    char *aside = (char *)dem2di_allocate(&world->user_env, room, 1);
+    if (aside == NULL) return dem2di_out_of_memory(world, "a file name");
+    memcpy(aside, path, length);
+    memcpy(aside + length, part, sizeof part);
+    dem2d_result result = dem2di_save_aside(world, path, aside, &saver);
+    dem2di_release(&world->user_env, aside, room, 1);
+    return result;
+}
+
+/* --- loading ------------------------------------------------------------------------------------
+ */
+
+/* A world that is being loaded. After a failure nothing more is done, and it must not be used. */
+typedef struct dem2di_loader {
+    const dem2d_load_desc *desc;
+    dem2d_world *world;
+    const dem2d_env *env;
+    dem2d_result result;             /* the first failure */
+    const unsigned char *next, *end; /* what is left */
+    uint64_t seen;                   /* columns: bits; of shapes those of the last one */
+    dem2di_slot_shape shape;         /* the last one */
+} dem2di_loader;
+
+static bool dem2di_load_good(const dem2di_loader *loader) {
+    return loader->result == DEM2D_OK;
+}
+
+static void dem2di_load_expect(dem2di_loader *loader, bool holds, const char *else_what) {
+    if (dem2di_load_good(loader) && !holds)
+        loader->result = dem2di_fail(loader->env, DEM2D_FORMAT, -1, "snapshot: %s", else_what);
+}
+
+/* What has been loaded can't be. The log knows. */
+static void dem2di_load_check(dem2di_loader *loader, dem2d_result result) {
+    if (dem2di_load_good(loader) && result != DEM2D_OK) loader->result = DEM2D_FORMAT;
+}
+
+static void dem2di_load_room(dem2di_loader *loader, bool reserved) {
+    if (dem2di_load_good(loader) && !reserved)
+        loader->result = dem2di_fail(loader->env, DEM2D_OUT_OF_MEMORY, -1, "no memory for a world");
+}
+
+/* About a field (or NULL) of a column. */
+static void dem2di_load_refuse(dem2di_loader *loader, dem2d_result result, const char *what,
+                               const char *column, const char *field) {
+    if (!dem2di_load_good(loader)) return;
+    loader->result =
+        dem2di_fail(loader->env, result, -1, "snapshot: %s: column %s%s%s", what, column,
+                    field != NULL ? ", field " : "", field != NULL ? field : "");
+}
+
+static uint64_t dem2di_take_word(dem2di_loader *loader) {
+    dem2di_load_expect(loader, loader->end - loader->next >= 8, "it ends within a record");
+    if (!dem2di_load_good(loader)) return 0;
+    loader->next += 8;
+    return dem2di_word_of(loader->next - 8);
+}
+
+/* A name of at most 24 characters, fit to be told. */
+static void dem2di_take_name(dem2di_loader *loader, char name[8 * DEM2DI_NAME_WORDS + 1]) {
+    for (int k = 0; k < 8 * DEM2DI_NAME_WORDS; k += 8) {
+        uint64_t word = dem2di_take_word(loader);
+        for (int i = 0; i < 8; i++) {
+            int byte = (int)(word >> 8 * i & 255);
+            name[k + i] = (char)(byte == 0 || (byte > ' ' && byte <= '~') ? byte : '?');
+        }
+    }
+    name[8 * DEM2DI_NAME_WORDS] = 0;
+}
+
+/* A column of a snapshot: the fields that it has, and how many numbers of each. */
+typedef struct dem2di_record {
+    const dem2di_column *column;
+    void *object;
+    uint64_t rows, fields, width, given; /* words of a row; which fields: bits */
+    const dem2di_field *field[DEM2DI_FIELDS];
+    int numbers[DEM2DI_FIELDS];
+} dem2di_record;
+
+/* The next field of a record: one that is known, of the same type, of no more numbers. */
+static void dem2di_take_field(dem2di_loader *loader, dem2di_record *record) {
+    const dem2di_column *column = record->column;
+    char name[8 * DEM2DI_NAME_WORDS + 1];
+    int f = 0;
+    dem2di_take_name(loader, name);
+    uint64_t numbers = dem2di_take_word(loader);
+    while (f < column->count && strcmp(column->fields[f].name, name) != 0) f++;
+    if (f == column->count) {
+        dem2di_load_refuse(loader, DEM2D_FORMAT_VERSION, "not known here", column->name, name);
+        return;
+    }
+    const dem2di_field *field = &column->fields[f];
+    if (dem2di_is_real(field)) numbers -= 256;
+    if ((record->given >> f & 1) || numbers < 1 || numbers > (uint64_t)dem2di_numbers_of(field)) {
+        dem2di_load_refuse(loader, DEM2D_FORMAT, "of another type", column->name, name);
+        return;
+    }
+    record->field[record->fields] = field;
+    record->numbers[record->fields++] = (int)numbers;
+    record->width += numbers;
+    record->given |= (uint64_t)1 << f;
+}
+
+/* May the fields that are not `given` be 0? */
+static void dem2di_load_zeros(dem2di_loader *loader, const dem2di_column *column, uint64_t given) {
+    for (int f = 0; f < column->count; f++)
+        if (!(given >> f & 1) && !dem2di_number_fits(&column->fields[f], 0))
+            dem2di_load_refuse(loader, DEM2D_FORMAT, "missing", column->name,
+                               column->fields[f].name);
+}
+
+static void dem2di_load_reserve(dem2di_loader *loader, const dem2di_column *column, int rows) {
+    if (column->group == DEM2DI_WORLD || column->group >= DEM2DI_SHAPE) return;
+    if (!dem2di_load_good(loader)) return;
+    int more = column->group == DEM2DI_BODIES; /* the end of the last particle's contacts */
+    dem2di_load_room(loader,
+                     dem2di_group_reserve(loader->world, (dem2di_group)column->group, rows + more));
+}
+
+static void dem2di_take_rows(dem2di_loader *loader, const dem2di_record *record) {
+    const dem2di_column *column = record->column;
+    char *row = (char *)dem2di_rows_start(record->object, column);
+    for (uint64_t i = 0; i < record->rows && dem2di_load_good(loader); i++, row += column->size)
+        for (uint64_t f = 0; f < record->fields; f++)
+            for (int k = 0; k < record->numbers[f]; k++) {
+                uint64_t word = dem2di_take_word(loader);
+                if (dem2di_number_fits(record->field[f], word))
+                    dem2di_number_set(record->field[f], row, k, word);
+                else
+                    dem2di_load_refuse(loader, DEM2D_FORMAT, "out of range", column->name,
+                                       record->field[f]->name);
+            }
+}
+
+/* Columns that were not there are 0. Those that show by their bytes how many rows there are must be
+   there. */
+static void dem2di_load_missing(dem2di_loader *loader, const void *object, bool shape) {
+    for (int k = 0; k < DEM2DI_COLUMNS && dem2di_load_good(loader); k++) {
+        const dem2di_column *column = &dem2di_columns[k];
+        if ((column->group >= DEM2DI_SHAPE) != shape || (loader->seen >> k & 1)) continue;
+        int rows = dem2di_rows(object, column);
+        if (rows == 0) continue;
+        if (column->treatment & DEM2DI_FIRST)
+            dem2di_load_refuse(loader, DEM2D_FORMAT, "missing", column->name, NULL);
+        dem2di_load_zeros(loader, column, 0);
+        dem2di_load_reserve(loader, column, rows);
+    }
+}
+
+/* Before the next shape, and after the last: has it all arrays of its type? */
+static void dem2di_load_shape_end(dem2di_loader *loader) {
+    if (loader->shape.shape.circumscribed > 0) dem2di_load_missing(loader, &loader->shape, true);
+    memset(&loader->shape, 0, sizeof loader->shape);
+    for (int k = 0; k < DEM2DI_COLUMNS; k++)
+        if (dem2di_columns[k].group >= DEM2DI_SHAPE) loader->seen &= ~((uint64_t)1 << k);
+}
+
+/* The column of the next record: of the world, or of its last shape. */
+static void dem2di_take_column(dem2di_loader *loader, dem2di_record *record) {
+    char name[8 * DEM2DI_NAME_WORDS + 1];
+    int k = 0;
+    memset(record, 0, sizeof *record);
+    dem2di_take_name(loader, name);
+    while (k < DEM2DI_COLUMNS &&
+           (dem2di_columns[k].name == NULL || strcmp(dem2di_columns[k].name, name) != 0))
+        k++;
+    if (k == DEM2DI_COLUMNS) {
+        dem2di_load_refuse(loader, DEM2D_FORMAT_VERSION, "not known here", name, NULL);
+        return;
+    }
+    record->column = &dem2di_columns[k];
+    record->object = loader->world;
+    if (record->column->group == DEM2DI_SHAPE) dem2di_load_shape_end(loader);
+    if (record->column->group >= DEM2DI_SHAPE) record->object = &loader->shape;
+    if (loader->seen >> k & 1) dem2di_load_refuse(loader, DEM2D_FORMAT, "there twice", name, NULL);
+    loader->seen |= (uint64_t)1 << k;
+}
+
+/* A custom shape's function is the caller's. */
+static void dem2di_load_custom(dem2di_loader *loader, dem2d_shape *shape) {
+    const dem2d_load_desc *desc = loader->desc;
     const dem2d_custom_desc *found = NULL;
-    if (ar->load->custom != NULL)
-        found = ar->load->custom(ar->load->custom_user, shape->function_tag);
+    if (desc->custom != NULL) found = desc->custom(desc->custom_user, shape->function_tag);
     if (found == NULL || found->support == NULL) {
-        ar->result = dem2di_fail(ar->env, DEM2D_NULL_ARGUMENT, -1,
-                                 "custom: no support function for tag %d", shape->function_tag);
+        loader->result = dem2di_fail(loader->env, DEM2D_NULL_ARGUMENT, -1,
+                                     "custom: no support function for tag %d", shape->function_tag);
         return;
     }
     shape->function = found->support;
     shape->function_user = found->user;
 }
 
-static void dem2di_archive_arc(dem2di_archive *ar, dem2di_arc *arc) {
-    dem2di_archive_vec(ar, "arc", &arc->start);
-    dem2di_archive_vec(ar, "arc", &arc->d0);
-    dem2di_archive_vec(ar, "arc", &arc->d1);
-    dem2di_archive_vec(ar, "arc", &arc->d2);
-}
-
-/* What a shape's support points come from. The table of sectors and the multiples of a Fourier
-   series follow from it with the same bits. */
-static void dem2di_archive_kernel(dem2di_archive *ar, dem2d_shape *shape) {
-    for (int k = 0; shape->corners != NULL && k < shape->count; k++)
-        dem2di_archive_vec(ar, "corner", &shape->corners[k]);
-    for (int k = 0; shape->given != NULL && k < shape->count; k++)
-        dem2di_archive_arc(ar, &shape->given[k]);
-    for (int k = 0; shape->arcs != NULL && k < shape->parts; k++)
-        dem2di_archive_arc(ar, &shape->arcs[k]);
-    for (int k = 0; shape->tangents != NULL && k < shape->parts; k++)
-        dem2di_archive_vec(ar, "tangent", &shape->tangents[k]);
-    for (int n = 1; shape->blocks != NULL && n <= shape->count; n++) {
-        double *a = &shape->blocks[(n - 1) / 4].a[(n - 1) % 4];
-        double *b = &shape->blocks[(n - 1) / 4].b[(n - 1) % 4];
-        dem2di_archive_finite(ar, "a", a);
-        dem2di_archive_finite(ar, "b", b);
-        if (dem2di_archive_loaded(ar)) dem2di_fourier_term(shape, n, *a, *b);
-    }
-    for (int k = 0; shape->least_rho != NULL && k < DEM2DI_RHO_SECTORS; k++)
-        dem2di_archive_finite(ar, "floor", &shape->least_rho[k]);
-    if (!dem2di_archive_loaded(ar)) return;
-    if (shape->sectors > 0) dem2di_fill_sectors(shape);
-    dem2di_find_edges(shape);
-}
-
-/* A shape, which is made when it is loaded. */
-static void dem2di_archive_shape(dem2di_archive *ar, const dem2d_env *env, dem2d_shape **shape) {
-    int type = *shape != NULL ? (int)(*shape)->type : 0;
-    int count = *shape != NULL ? (*shape)->count : 0;
-    dem2di_archive_int(ar, "type", &type, 0, DEM2D_SHAPE_TYPE_COUNT - 1);
-    dem2di_archive_count(ar, "count", &count, 2 * (int)sizeof(double));
-    int parts = *shape != NULL ? (*shape)->parts : type == DEM2D_POLYGON ? count : 0;
-    if (type == DEM2D_BEZIER) dem2di_archive_count(ar, "parts", &parts, 8 * (int)sizeof(double));
-    if (dem2di_archive_loaded(ar)) {
-        int least = type == DEM2D_POLYGON ? 3 : type == DEM2D_BEZIER ? 2 : 0;
-        bool counts = least > 0 || type == DEM2D_FOURIER;
-        dem2di_archive_expect(ar, count >= least && (counts || count == 0), "count of a shape");
-        dem2di_archive_expect(ar, parts >= (type == DEM2D_BEZIER ? 3 : 0), "parts of a shape");
-        if (!dem2di_archive_good(ar)) return;
-        *shape = dem2di_shape_allocate(env, (dem2d_shape_type)type, count, parts);
-        if (*shape == NULL) ar->result = DEM2D_OUT_OF_MEMORY; /* the log knows */
-    }
-    if (!dem2di_archive_good(ar)) return;
-    dem2d_shape *s = *shape;
-    dem2di_archive_not_negative(ar, "a", &s->a);
-    dem2di_archive_not_negative(ar, "b", &s->b);
-    dem2di_archive_not_negative(ar, "rounding", &s->rounding);
-    dem2di_archive_positive(ar, "circumscribed", &s->circumscribed);
-    dem2di_archive_not_negative(ar, "inscribed", &s->inscribed);
-    dem2di_archive_not_negative(ar, "rho_min", &s->rho_min);
-    dem2di_archive_bits(ar, &s->rho_max); /* infinite where an arc is flat at a point */
-    dem2di_archive_expect(ar, s->rho_max >= 0, "rho_max of a shape");
-    if (s->type == DEM2D_BEZIER) dem2di_archive_not_negative(ar, "deviation", &s->deviation);
-    dem2di_archive_positive(ar, "area", &s->mass.area);
-    dem2di_archive_positive(ar, "polar_moment", &s->mass.polar_moment);
-    dem2di_archive_vec(ar, "offset", &s->offset);
-    if (s->type == DEM2D_CUSTOM) dem2di_archive_custom(ar, s);
-    dem2di_archive_kernel(ar, s);
-}
-
-/* The slots of templates, free ones too. */
-static void dem2di_archive_templates(dem2di_archive *ar, dem2d_world *w) {
-    dem2di_archive_count(ar, "templates", &w->template_count, 5);
-    bool fits =
-        ar->aim != DEM2DI_LOADING || dem2di_group_reserve(w, DEM2DI_TEMPLATES, w->template_count);
-    if (!dem2di_archive_room(ar, fits)) w->template_count = 0;
-    for (int i = 0; i < w->template_count && dem2di_archive_good(ar); i++) {
-        dem2di_template *place = &w->templates[i];
-        bool there = place->shape != NULL;
-        dem2di_archive_generation(ar, &place->generation);
-        dem2di_archive_bool(ar, "there", &there);
-        if (!there || !dem2di_archive_good(ar)) continue;
-        dem2di_archive_shape(ar, &w->env, &place->shape);
-    }
-}
-
-static void dem2di_archive_body(dem2di_archive *ar, const dem2d_world *w, dem2di_body *body) {
-    dem2di_archive_positive(ar, "scale", &body->scale);
-    dem2di_archive_int(ar, "shape", &body->shape_index, -1, w->template_count - 1);
-    dem2di_archive_int(ar, "index", &body->index, 0, INT_MAX);
-    body->material =
-        (uint16_t)dem2di_archive_whole(ar, "material", body->material, 4, 0, w->material_count - 1);
-    body->motion = (uint8_t)dem2di_archive_whole(ar, "motion", body->motion, 4, 0, DEM2D_DRIVEN);
-    dem2di_archive_bool(ar, "redirected", &body->redirected);
-}
-
-static void dem2di_archive_velocity(dem2di_archive *ar, dem2di_velocities *velocity) {
-    dem2di_archive_vec(ar, "velocity made", &velocity->v);
-    dem2di_archive_finite(ar, "angular velocity made", &velocity->w);
-}
-
-/* The radius follows from the shape. */
-static void dem2di_archive_state(dem2di_archive *ar, dem2di_state *state) {
-    dem2di_archive_vec(ar, "position", &state->x);
-    dem2di_archive_finite(ar, "rotation", &state->q.c);
-    dem2di_archive_finite(ar, "rotation", &state->q.s);
-    dem2di_archive_vec(ar, "velocity", &state->v);
-    dem2di_archive_finite(ar, "angular_velocity", &state->w);
-}
-
-static void dem2di_archive_wall(dem2di_archive *ar, const dem2d_world *w, dem2d_wall_desc *wall) {
-    dem2di_archive_not_negative(ar, "length", &wall->length);
-    wall->mode =
-        (dem2d_wall_mode)dem2di_archive_whole(ar, "mode", wall->mode, 4, 0, DEM2D_WALL_SERVO);
-    wall->material.index = (uint32_t)dem2di_archive_whole(ar, "material", wall->material.index, 4,
-                                                          0, w->material_count - 1);
-    dem2di_archive_generation(ar, &wall->material.generation);
-    dem2di_archive_vec(ar, "point", &wall->point);
-    dem2di_archive_vec(ar, "normal", &wall->normal);
-    dem2di_archive_bool(ar, "segment", &wall->segment);
-    dem2di_archive_vec(ar, "end", &wall->end);
-    dem2di_archive_vec(ar, "velocity", &wall->velocity);
-    dem2di_archive_finite(ar, "stress", &wall->stress);
-    dem2di_archive_not_negative(ar, "max_speed", &wall->max_speed);
-    for (int i = 0; i < 2; i++) {
-        dem2di_archive_generation(ar, &wall->spans[i].index);
-        dem2di_archive_generation(ar, &wall->spans[i].generation);
-    }
-}
-
-static void dem2di_archive_wall_state(dem2di_archive *ar, dem2di_wall_state *state) {
-    dem2di_archive_vec(ar, "point", &state->point);
-    dem2di_archive_vec(ar, "velocity", &state->velocity);
-    dem2di_archive_vec(ar, "force", &state->force);
-    dem2di_archive_finite(ar, "drift", &state->drift);
-    dem2di_backing *backing = &state->backing;
-    dem2di_archive_bits(ar, &backing->stiffness); /* sums may overflow */
-    dem2di_archive_bits(ar, &backing->impedance);
-    dem2di_archive_bits(ar, &backing->mass);
-    dem2di_archive_expect(ar,
-                          backing->stiffness >= 0 && backing->impedance >= 0 && backing->mass >= 0,
-                          "what a servo wall pushed against");
-}
-
-/* Of an open contact, beside its normal and depth. */
-static void dem2di_archive_hold(dem2di_archive *ar, dem2di_link *link) {
-    dem2di_archive_finite(ar, "arm of A", &link->arms.a_n);
-    dem2di_archive_finite(ar, "arm of A", &link->arms.a_t);
-    dem2di_archive_finite(ar, "arm of B", &link->arms.b_n);
-    dem2di_archive_finite(ar, "arm of B", &link->arms.b_t);
-    dem2di_archive_finite(ar, "normal force", &link->force);
-    dem2di_archive_finite(ar, "shear", &link->shear);
-}
-
-static void dem2di_archive_ends(dem2di_archive *ar, dem2di_ends *ends) {
-    for (int k = 0; k < 2; k++) {
-        dem2di_archive_finite(ar, "weight", &ends->weight[k]);
-        dem2di_archive_finite(ar, "depth", &ends->depth[k]);
-        dem2di_archive_finite(ar, "offset", &ends->offset[k]);
-        dem2di_archive_finite(ar, "shear", &ends->shear[k]);
-        dem2di_archive_int(ar, "corner", &ends->corner[k], INT_MIN, INT_MAX);
-    }
-    dem2di_archive_finite(ar, "energy", &ends->energy);
-}
-
-/* What the full law keeps beside it. */
-static void dem2di_archive_extra(dem2di_archive *ar, dem2di_extra *extra) {
-    for (int k = 0; k < 2; k++) dem2di_archive_finite(ar, "viscous force", &extra->viscous[k]);
-    dem2di_archive_finite(ar, "moment", &extra->moment);
-    dem2di_archive_bits(ar, &extra->energy); /* the caller's, as the state: anything */
-    for (int k = 0; k < 2; k++) dem2di_archive_bits(ar, &extra->state[k]);
-}
-
-/* --- the hash -----------------------------------------------------------------------------------
+/* A shape whose numbers are known is made; its arrays come next, with 8 bytes an element at least.
  */
-
-/* Poses as a caller sees them: a refused step may have changed how rotations are held. */
-static void dem2di_hash_particles(dem2di_archive *ar, const dem2d_world *w) {
-    for (int index = 0; index < w->name_count; index++) {
-        int slot = w->names[index].slot;
-        if (slot < 0) continue;
-        dem2di_body body = w->bodies[slot];
-        uint32_t generation = w->names[index].generation;
-        dem2di_archive_generation(ar, &generation);
-        dem2di_archive_body(ar, w, &body);
-        for (int next = 0; next < 2; next++) {
-            const dem2di_state *states = dem2di_states_at(w, next == 1);
-            dem2di_state state = states[slot];
-            state.q = dem2di_pose_of(w, states, slot).rotation;
-            dem2di_archive_state(ar, &state);
-        }
-        if (!body.redirected) continue;
-        dem2di_velocities made = w->made[slot];
-        dem2di_archive_velocity(ar, &made);
-    }
-}
-
-static void dem2di_hash_walls(dem2di_archive *ar, const dem2d_world *w) {
-    for (int j = 0; j < w->wall_count; j++) {
-        dem2di_wall wall = w->walls[j];
-        dem2di_wall_state states[2] = {w->wall_before[j], w->wall_now[j]};
-        if (!wall.alive) continue;
-        dem2di_archive_int(ar, "wall", &j, 0, INT_MAX);
-        dem2di_archive_generation(ar, &wall.generation);
-        dem2di_archive_wall(ar, w, &wall.desc);
-        for (int k = 0; k < 2; k++) dem2di_archive_wall_state(ar, &states[k]);
-    }
-}
-
-/* Open contacts at the last force pass; those that are apart may be listed or not. */
-static void dem2di_hash_contacts(dem2di_archive *ar, const dem2d_world *w, bool walls) {
-    dem2di_tour walk = dem2di_tour_start(walls);
-    while (dem2di_tour_next(w, &walk)) {
-        const dem2di_key *key = &w->list.keys[walk.contact];
-        const dem2di_ends *two = dem2di_ends_at(w, walk.contact, false);
-        dem2d_pair_desc law = *dem2di_law_at(w, walk.contact, false);
-        int a = w->bodies[key->a].index, b = walls ? key->b : w->bodies[key->b].index;
-        dem2di_archive_int(ar, "a", &a, 0, INT_MAX);
-        dem2di_archive_int(ar, "b", &b, 0, INT_MAX);
-        dem2di_archive_vec(ar, "normal", &walk.link.normal);
-        dem2di_archive_finite(ar, "depth", &walk.link.depth);
-        if (walk.link.shear == 0) walk.link.shear = 0; /* not -0: springs may be there or not */
-        dem2di_archive_hold(ar, &walk.link);
-        dem2di_archive_law(ar, &law);
-        const dem2di_extra *beside = dem2di_extra_at(w, walk.contact, false);
-        dem2di_extra extra; /* all zero is as good as none: it comes with a law, before any force */
-        memset(&extra, 0, sizeof extra);
-        if (beside != NULL) extra = *beside;
-        dem2di_archive_extra(ar, &extra);
-        if (two == NULL) continue;
-        dem2di_ends ends = *two;
-        dem2di_archive_ends(ar, &ends);
-    }
-}
-
-DEM2D_API uint64_t dem2d_world_hash(const dem2d_world *world) {
-    if (world == NULL) return 0;
-    dem2di_archive ar;
-    dem2d_world own = *world; /* its arrays are only read: nothing is loaded */
-    dem2di_archive_start(&world->env, DEM2DI_HASHING, &ar);
-    dem2di_archive_settings(&ar, &own);
-    dem2di_archive_materials(&ar, &own);
-    for (int i = 0; i < own.template_count; i++) {
-        if (own.templates[i].shape == NULL) continue;
-        dem2di_archive_int(&ar, "template", &i, 0, INT_MAX);
-        dem2di_archive_generation(&ar, &own.templates[i].generation);
-        dem2di_archive_shape(&ar, &own.env, &own.templates[i].shape);
-    }
-    dem2di_hash_particles(&ar, &own);
-    dem2di_hash_walls(&ar, &own);
-    dem2di_hash_contacts(&ar, &own, false);
-    dem2di_hash_contacts(&ar, &own, true);
-    ar.hash = dem2di_hash_word(dem2di_hash_word(ar.hash, ar.size),
-                               0); /* low bits come from high ones too */
-    return ar.hash != 0 ? ar.hash : 1;
-}
-
-/* --- snapshots ----------------------------------------------------------------------------------
- */
-
-/* What of the list outlives it. */
-static void dem2di_archive_progress(dem2di_archive *ar, dem2d_world *w) {
-    dem2di_archive_bool(ar, "redirected", &w->redirected);
-    dem2di_archive_bool(ar, "check_due", &w->check_due);
-    dem2di_archive_bool(ar, "list_stale", &w->list_stale);
-    dem2di_archive_bool(ar, "list_worn", &w->list_worn);
-    dem2di_archive_bool(ar, "skin_fixed", &w->skin_fixed);
-    dem2di_archive_bool(ar, "scattered", &w->scattered);
-    dem2di_archive_bool(ar, "bounded", &w->bounded);
-    dem2di_archive_positive(ar, "skin", &w->skin);
-    dem2di_archive_not_negative(ar, "interval", &w->interval);
-    dem2di_archive_not_negative(ar, "spread", &w->spread);
-    dem2di_archive_bits(ar, &w->worn);
-    dem2di_archive_bits(ar, &w->creep);
-    dem2di_archive_bits(ar, &w->rounding);
-    dem2di_archive_tally(ar, "listed_at", &w->listed_at);
-    dem2di_archive_expect(ar, w->listed_at <= w->steps, "listed_at is to come");
-    dem2di_archive_tally(ar, "list_rebuilds", &w->rebuilds);
-    dem2di_archive_tally(ar, "slow_time_step", &w->slow_time_step);
-    dem2di_archive_tally(ar, "fast_motion", &w->fast_motion);
-    dem2di_archive_tally(ar, "support_calls", &w->count.calls);
-    dem2di_archive_tally(ar, "collisions", &w->count.collisions);
-    dem2di_archive_tally(ar, "separations", &w->count.separations);
-    dem2di_archive_tally(ar, "unsound", &w->count.unsound);
-    for (int k = 0; k < DEM2D_PROOF_COUNT; k++)
-        dem2di_archive_tally(ar, "proofs", &w->count.proofs[k]);
-}
-
-static void dem2di_archive_ledger(dem2di_archive *ar, dem2di_ledger *ledger) {
-    dem2di_archive_bool(ar, "ledger", &ledger->kept);
-    dem2di_archive_bool(ar, "ledger", &ledger->edited);
-    for (int k = 0; k < DEM2DI_ACCOUNTS; k++) dem2di_archive_bits(ar, &ledger->sum[k]);
-    for (int k = 0; k < DEM2DI_HALVES; k++) dem2di_archive_bits(ar, &ledger->half[k]);
-    dem2di_archive_bits(ar, &ledger->kinetic);
-    dem2di_archive_bits(ar, &ledger->given);
-    dem2di_archive_bits(ar, &ledger->closure);
-    dem2di_archive_bits(ar, &ledger->turnover);
-    dem2di_archive_bits(ar, &ledger->stored.normal);
-    dem2di_archive_bits(ar, &ledger->stored.tangential);
-    dem2di_archive_bits(ar, &ledger->stored.rolling);
-}
-
-/* Whether there is a caller's law, and which: it is given once more. */
-static void dem2di_archive_callers_law(dem2di_archive *ar, dem2d_world *w) {
-    bool has = w->law != NULL;
-    dem2di_archive_bool(ar, "law", &has);
-    dem2di_archive_int(ar, "law_tag", &w->law_tag, INT_MIN, INT_MAX);
-    if (!dem2di_archive_loaded(ar) || !has) return;
-    const dem2d_load_desc *load = ar->load;
-    if (load->law == NULL || load->law_tag != w->law_tag) {
-        const char *which = load->law == NULL ? "law: none is given" : "law_tag is another";
-        ar->result = dem2di_fail(ar->env, DEM2D_NULL_ARGUMENT, -1, "%s: the world's has tag %d",
-                                 which, w->law_tag);
+static void dem2di_load_shape(dem2di_loader *loader) {
+    dem2d_world *w = loader->world;
+    const dem2di_slot_shape given = loader->shape;
+    int slot = given.slot, count = given.shape.count, parts = given.shape.parts;
+    dem2d_shape_type type = given.shape.type;
+    int least = type == DEM2D_POLYGON ? 3 : type == DEM2D_BEZIER ? 2 : 0;
+    bool counts = least > 0 || type == DEM2D_FOURIER;
+    int64_t most = (loader->end - loader->next) / 8;
+    dem2di_load_expect(loader, slot < w->capacity[DEM2DI_TEMPLATES] && slot < w->template_count,
+                       "a shape without a slot");
+    if (dem2di_load_good(loader))
+        dem2di_load_expect(loader, w->templates[slot].shape == NULL, "two shapes in a slot");
+    dem2di_load_expect(loader, count >= least && count <= most && (counts || count == 0),
+                       "count of a shape");
+    dem2di_load_expect(loader,
+                       type == DEM2D_BEZIER ? parts >= 3 && parts <= most
+                                            : parts == (type == DEM2D_POLYGON ? count : 0),
+                       "parts of a shape");
+    if (!dem2di_load_good(loader)) return;
+    dem2d_shape *shape = dem2di_shape_allocate(&w->env, type, count, parts);
+    if (shape == NULL) {
+        loader->result = DEM2D_OUT_OF_MEMORY; /* the log knows */
         return;
     }
-    w->law = load->law;
-    w->law_user = load->law_user;
+    w->templates[slot].shape = shape;
+    loader->shape.shape = *shape;
+    for (int f = 0; f < (int)(sizeof dem2di_shape_fields / sizeof *dem2di_shape_fields); f++) {
+        const dem2di_field *field = &dem2di_shape_fields[f];
+        for (int k = 0; k < dem2di_numbers_of(field); k++)
+            dem2di_number_set(field, &loader->shape, k, dem2di_number_get(field, &given, k));
+    }
+    if (type == DEM2D_CUSTOM) dem2di_load_custom(loader, &loader->shape.shape);
+    *shape = loader->shape.shape;
 }
 
-/* Gravity and damping are looked at in each step. */
-static void dem2di_archive_plan(dem2di_archive *ar, const dem2d_world *w, dem2di_plan *plan) {
-    int materials = w->material_count;
-    dem2di_archive_bool(ar, "friction", &plan->friction);
-    dem2di_archive_bool(ar, "spin", &plan->spin);
-    dem2di_archive_bool(ar, "turns", &plan->turns);
-    dem2di_archive_bool(ar, "one_law", &plan->one_law);
-    dem2di_archive_int(ar, "material", &plan->material, 0, materials > 0 ? materials - 1 : 0);
-    dem2di_archive_bool(ar, "friction_again", &plan->friction_again);
-    dem2di_archive_bool(ar, "full_again", &plan->full_again);
-    dem2di_archive_bool(ar, "faces", &plan->faces);
-    dem2di_archive_bool(ar, "joints", &plan->joints);
-    dem2di_archive_bool(ar, "full", &plan->full);
+static void dem2di_load_record(dem2di_loader *loader) {
+    dem2di_record record;
+    dem2di_take_column(loader, &record);
+    uint64_t rows = dem2di_take_word(loader), fields = dem2di_take_word(loader);
+    while (fields-- > 0 && dem2di_load_good(loader)) dem2di_take_field(loader, &record);
+    if (!dem2di_load_good(loader)) return;
+    const dem2di_column *column = record.column;
+    uint64_t left = (uint64_t)(loader->end - loader->next) / 8;
+    int expected = dem2di_rows(record.object, column);
+    record.rows = rows;
+    if (expected < 0 || rows != (uint64_t)expected || record.width == 0 ||
+        rows > left / record.width)
+        dem2di_load_refuse(loader, DEM2D_FORMAT, "another number of rows", column->name, NULL);
+    dem2di_load_zeros(loader, column, record.given);
+    dem2di_load_reserve(loader, column, expected);
+    if (dem2di_load_good(loader)) dem2di_take_rows(loader, &record);
+    if (dem2di_load_good(loader) && column->group == DEM2DI_SHAPE) dem2di_load_shape(loader);
 }
 
-/* What follows of a particle that has been loaded. */
-static void dem2di_archive_revive(dem2di_archive *ar, dem2d_world *w, int slot) {
+/* --- what has been loaded: does it fit together, and what follows of it --------------------------
+ */
+
+static void dem2di_check_settings(dem2di_loader *loader) {
+    dem2d_world *w = loader->world;
+    const dem2d_load_desc *desc = loader->desc;
+    dem2di_load_expect(loader, w->timed_at <= w->steps, "timed_at is to come");
+    dem2di_load_expect(loader, w->listed_at <= w->steps, "listed_at is to come");
+    dem2di_load_expect(loader, w->list.discs <= w->list.pairs && w->list.pairs <= w->list.count,
+                       "kinds of contacts");
+    dem2di_load_expect(loader, w->plan.material < (w->material_count > 0 ? w->material_count : 1),
+                       "material of the plan");
+    if (!dem2di_load_good(loader) || !w->has_law) return;
+    if (desc->law == NULL || desc->law_tag != w->law_tag) {
+        const char *which = desc->law == NULL ? "law: none is given" : "law_tag is another";
+        loader->result = dem2di_fail(loader->env, DEM2D_NULL_ARGUMENT, -1,
+                                     "%s: the world's has tag %d", which, w->law_tag);
+        return;
+    }
+    w->law = desc->law;
+    w->law_user = desc->law_user;
+}
+
+/* Tables of shapes follow from their numbers. */
+static void dem2di_finish_shapes(dem2di_loader *loader) {
+    dem2di_load_shape_end(loader);
+    for (int i = 0; i < loader->world->template_count && dem2di_load_good(loader); i++) {
+        dem2d_shape *shape = loader->world->templates[i].shape;
+        if (shape == NULL) continue;
+        for (int n = 1; shape->blocks != NULL && n <= shape->count; n++) {
+            const dem2di_block *block = &shape->blocks[(n - 1) / 4];
+            dem2di_fourier_term(shape, n, block->a[(n - 1) % 4], block->b[(n - 1) % 4]);
+        }
+        if (shape->sectors > 0) dem2di_fill_sectors(shape);
+        dem2di_find_edges(shape);
+    }
+}
+
+/* A particle has a template and a material, and what follows of them. */
+static void dem2di_finish_body(dem2di_loader *loader, int slot) {
+    dem2d_world *w = loader->world;
     const dem2di_body *body = &w->bodies[slot];
-    if (!dem2di_archive_loaded(ar)) return;
     for (int next = 0; next < 2; next++) {
         dem2d_rot q = dem2di_states_at(w, next == 1)[slot].q;
         double off = w->plan.turns ? q.c * q.c + q.s * q.s - 1 : q.c / 2147483648.0;
-        dem2di_archive_expect(ar, fabs(off) < (w->plan.turns ? 1e-9 : 1), "no rotation");
+        dem2di_load_expect(loader, fabs(off) < (w->plan.turns ? 1e-9 : 1), "no rotation");
     }
+    dem2di_load_expect(loader, w->redirected || !body->redirected, "a particle redirected");
+    dem2di_load_expect(loader, body->material < w->material_count, "a particle without a material");
     w->holes += body->shape_index < 0;
-    if (body->shape_index < 0 || !dem2di_archive_good(ar)) return;
+    if (body->shape_index < 0 || !dem2di_load_good(loader)) return;
+    bool there =
+        body->shape_index < w->template_count && w->templates[body->shape_index].shape != NULL;
+    dem2di_load_expect(loader, there, "a particle without a shape");
+    if (!dem2di_load_good(loader)) return;
     dem2di_template *place = &w->templates[body->shape_index];
-    dem2di_archive_expect(ar, place->shape != NULL, "a particle without a shape");
-    if (!dem2di_archive_good(ar)) return;
     double mass = dem2di_body_mass(w, body), inertia = dem2di_body_inertia(w, body);
-    dem2di_archive_check(ar, dem2di_check_number(ar->env, "mass", mass, DEM2DI_POSITIVE));
-    dem2di_archive_check(ar, dem2di_check_number(ar->env, "inertia", inertia, DEM2DI_POSITIVE));
+    dem2di_load_check(loader, dem2di_check_number(loader->env, "mass", mass, DEM2DI_POSITIVE));
+    dem2di_load_check(loader,
+                      dem2di_check_number(loader->env, "inertia", inertia, DEM2DI_POSITIVE));
     place->users++;
     w->inverse[slot] = dem2di_inverse_of(w, body);
     w->now[slot].radius = w->before[slot].radius = place->shape->circumscribed * body->scale;
     if (w->plan.turns) w->lever[slot] = dem2di_lever_of(w, slot);
-}
-
-/* Particles in the order of memory, removed ones too until the list is renewed. */
-static void dem2di_archive_bodies(dem2di_archive *ar, dem2d_world *w) {
-    dem2di_archive_count(ar, "particles", &w->body_count, 100);
-    dem2di_archive_count(ar, "names", &w->name_count, 8);
-    dem2di_archive_int(ar, "free_name", &w->free_name, -1, w->name_count - 1);
-    int n = w->body_count;
-    bool fits = ar->aim != DEM2DI_LOADING || (dem2di_reserve_bodies(w, n) &&
-                                              dem2di_group_reserve(w, DEM2DI_NAMES, w->name_count));
-    if (!dem2di_archive_room(ar, fits)) return;
-    for (int i = 0; i < n && dem2di_archive_good(ar); i++) {
-        dem2di_body body = w->bodies[i];
-        dem2di_archive_body(ar, w, &body);
-        dem2di_archive_expect(ar, w->redirected || !body.redirected, "a particle redirected");
-        if (dem2di_archive_loaded(ar)) w->bodies[i] = body;
-        dem2di_archive_state(ar, &w->before[i]);
-        dem2di_archive_state(ar, &w->now[i]);
-        if (body.redirected && dem2di_archive_good(ar)) dem2di_archive_velocity(ar, &w->made[i]);
-        dem2di_archive_bits(ar, &w->wear[i]);
-        dem2di_archive_revive(ar, w, i);
-        if (w->plan.turns) dem2di_archive_not_negative(ar, "travel", &w->travel[i]);
-    }
 }
 
 /* Living names and particles know each other, and the free ones are in one list. */
@@ -15915,35 +16303,28 @@ static bool dem2di_names_agree(const dem2d_world *w) {
         if (body->index >= w->name_count) return false;
         if (body->shape_index >= 0 && w->names[body->index].slot != slot) return false;
     }
-    for (; unused > 0 && index >= 0; unused--) {
+    for (; unused > 0 && index >= 0 && index < w->name_count; unused--) {
         if (w->names[index].slot >= 0) return false;
         index = -2 - w->names[index].slot;
     }
     return unused == 0 && index == -1;
 }
 
-static void dem2di_archive_names(dem2di_archive *ar, dem2d_world *w) {
-    for (int i = 0; i < w->name_count && dem2di_archive_good(ar); i++) {
-        dem2di_archive_int(ar, "slot", &w->names[i].slot, -1 - w->name_count, w->body_count - 1);
-        dem2di_archive_generation(ar, &w->names[i].generation);
-    }
-    if (dem2di_archive_loaded(ar)) dem2di_archive_expect(ar, dem2di_names_agree(w), "ids differ");
-}
-
-/* What follows of the walls that have been loaded. */
-static void dem2di_archive_erect(dem2di_archive *ar, dem2d_world *w) {
-    for (int j = 0; j < w->wall_count && dem2di_archive_loaded(ar); j++) {
+static void dem2di_finish_walls(dem2di_loader *loader) {
+    dem2d_world *w = loader->world;
+    for (int j = 0; j < w->wall_count && dem2di_load_good(loader); j++) {
         dem2di_wall *wall = &w->walls[j];
         wall->span[0] = wall->span[1] = -1;
-        if (!wall->alive) continue;
+        dem2di_load_expect(loader, wall->used_material < w->material_count, "used_material");
+        if (!wall->alive || !dem2di_load_good(loader)) continue;
         dem2d_vec n = wall->desc.normal;
-        dem2di_archive_check(ar, dem2di_check_wall(w, &wall->desc));
-        dem2di_archive_expect(ar, dem2di_is_unit(n.x, n.y), "a normal is not of unit length");
-        if (dem2di_archive_loaded(ar) && !dem2di_line_make(w, &wall->desc))
-            ar->result = DEM2D_OUT_OF_MEMORY;
-        if (!dem2di_archive_good(ar)) return;
+        dem2di_load_check(loader, dem2di_check_wall(w, &wall->desc));
+        dem2di_load_expect(loader, dem2di_is_unit(n.x, n.y), "a normal is not of unit length");
+        if (dem2di_load_good(loader) && !dem2di_line_make(w, &wall->desc))
+            loader->result = DEM2D_OUT_OF_MEMORY; /* the log knows */
+        if (!dem2di_load_good(loader)) return;
         if (wall->desc.segment) dem2di_segment_set(wall);
-        for (int i = 0; i < 2 && dem2di_archive_good(ar); i++) {
+        for (int i = 0; i < 2; i++) {
             if (wall->desc.spans[i].generation == 0) continue;
             wall->span[i] = (int)wall->desc.spans[i].index;
             w->walls[wall->span[i]].users++;
@@ -15951,85 +16332,17 @@ static void dem2di_archive_erect(dem2di_archive *ar, dem2d_world *w) {
     }
 }
 
-/* The slots of walls, free ones too. */
-static void dem2di_archive_walls(dem2di_archive *ar, dem2d_world *w) {
-    dem2di_archive_count(ar, "walls", &w->wall_count, 100);
-    bool fits = ar->aim != DEM2DI_LOADING || dem2di_group_reserve(w, DEM2DI_WALLS, w->wall_count);
-    if (!dem2di_archive_room(ar, fits)) return;
-    int materials = w->material_count;
-    for (int j = 0; j < w->wall_count && dem2di_archive_good(ar); j++) {
-        dem2di_wall wall = w->walls[j];
-        dem2di_archive_bool(ar, "alive", &wall.alive);
-        dem2di_archive_generation(ar, &wall.generation);
-        dem2di_archive_wall(ar, w, &wall.desc);
-        dem2di_archive_vec(ar, "listed", &wall.listed);
-        dem2di_archive_not_negative(ar, "skin", &wall.skin);
-        dem2di_archive_int(ar, "used_material", &wall.used_material, 0, materials - 1);
-        if (dem2di_archive_loaded(ar)) w->walls[j] = wall;
-        dem2di_archive_wall_state(ar, &w->wall_before[j]);
-        dem2di_archive_wall_state(ar, &w->wall_now[j]);
-    }
-    dem2di_archive_erect(ar, w);
-}
-
 /* A contact is of two that live, in the kind it is listed in; a forgotten one may be anything. */
 static bool dem2di_key_sound(const dem2d_world *w, int contact) {
     const dem2di_key *key = &w->list.keys[contact];
     if (key->a < 0) return w->list_stale;
-    const dem2di_body *a = &w->bodies[key->a];
-    if (a->shape_index < 0) return false;
-    if (contact >= w->list.pairs) return w->walls[key->b].alive;
-    const dem2di_body *b = &w->bodies[key->b];
-    if (b->shape_index < 0 || key->a == key->b) return false;
+    if (key->a >= w->body_count || w->bodies[key->a].shape_index < 0) return false;
+    if (contact >= w->list.pairs) return key->b < w->wall_count && w->walls[key->b].alive;
+    if (key->b >= w->body_count || w->bodies[key->b].shape_index < 0) return false;
+    const dem2di_body *a = &w->bodies[key->a], *b = &w->bodies[key->b];
     bool round = dem2di_shape_of(w, a)->type == DEM2D_CIRCLE &&
                  dem2di_shape_of(w, b)->type == DEM2D_CIRCLE && dem2di_has_disc_kernel(w, &w->plan);
-    return round == (contact < w->list.discs) && (round || w->plan.turns);
-}
-
-static void dem2di_archive_keys(dem2di_archive *ar, dem2d_world *w) {
-    dem2di_list *list = &w->list;
-    dem2di_archive_count(ar, "contacts", &list->count, 4);
-    dem2di_archive_int(ar, "pairs", &list->pairs, 0, list->count);
-    dem2di_archive_int(ar, "discs", &list->discs, 0, list->pairs);
-    bool fits =
-        ar->aim != DEM2DI_LOADING ||
-        (dem2di_list_reserve(w, &w->plan, list->discs, list->count) &&
-         dem2di_tallies_reserve(w, list->discs, list->count) &&
-         dem2di_scratch_reserve(
-             w, dem2di_loads_bytes(w, (size_t)list->count, (size_t)(list->count - list->pairs))));
-    if (!dem2di_archive_room(ar, fits)) return;
-    for (int i = 0; i < list->count && dem2di_archive_good(ar); i++) {
-        int others = i < list->pairs ? w->body_count : w->wall_count;
-        dem2di_archive_int(ar, "a", &list->keys[i].a, -1, w->body_count - 1);
-        if (list->keys[i].a < 0) continue;
-        dem2di_archive_int(ar, "b", &list->keys[i].b, 0, others - 1);
-        if (dem2di_archive_loaded(ar))
-            dem2di_archive_expect(ar, dem2di_key_sound(w, i), "no such contact");
-    }
-}
-
-/* What a contact remembers: of one that is apart only what the next look starts from. */
-static void dem2di_archive_memory(dem2di_archive *ar, const dem2d_world *w, int contact) {
-    const dem2di_list *list = &w->list;
-    if (list->keys[contact].a < 0) return;
-    if (contact < list->discs) {
-        if (w->plan.friction) dem2di_archive_finite(ar, "shear", &list->shear[contact]);
-        if (w->steps == w->listed_at) dem2di_archive_bool(ar, "touched", &list->touched[contact]);
-        return;
-    }
-    dem2di_link *link = &list->links[contact - list->discs];
-    dem2di_archive_vec(ar, "normal", &link->normal);
-    dem2di_archive_finite(ar, "depth", &link->depth);
-    if (link->depth > 0) dem2di_archive_hold(ar, link);
-    if (link->depth > 0 && w->plan.faces)
-        dem2di_archive_ends(ar, &list->ends[contact - list->discs]);
-    if (link->depth > 0 && w->plan.full)
-        dem2di_archive_extra(ar, &list->extras[contact - list->discs]);
-    if (contact >= list->pairs && !w->walls[list->keys[contact].b].desc.segment) return;
-    if (contact < list->pairs) dem2di_archive_finite(ar, "budget", &link->budget);
-    dem2di_archive_int(ar, "feature", &link->feature.own, INT_MIN, INT_MAX);
-    for (int k = 0; k < 2; k++)
-        dem2di_archive_int(ar, "corner", &link->feature.corner[k], INT_MIN, INT_MAX);
+    return a != b && round == (contact < w->list.discs) && (round || w->plan.turns);
 }
 
 /* May the next step go by the plan without a look at the scene? Where the list is not stale, only
@@ -16046,94 +16359,41 @@ static bool dem2di_plan_holds(const dem2d_world *w) {
 }
 
 /* The contacts of each particle, and what a step expects of the list. */
-static void dem2di_archive_relist(dem2di_archive *ar, dem2d_world *w) {
+static void dem2di_finish_list(dem2di_loader *loader) {
+    dem2d_world *w = loader->world;
     dem2di_list *list = &w->list;
-    if (!dem2di_archive_loaded(ar)) return;
-    dem2di_archive_expect(ar, dem2di_plan_holds(w), "the plan is of another scene");
-    if (!dem2di_archive_good(ar)) return;
+    for (int i = 0; i < list->count && dem2di_load_good(loader); i++)
+        dem2di_load_expect(loader, dem2di_key_sound(w, i), "no such contact");
+    if (!dem2di_load_good(loader)) return;
+    dem2di_load_expect(loader, dem2di_plan_holds(w), "the plan is of another scene");
+    if (!dem2di_load_good(loader)) return;
     int entries =
         dem2di_incident_count(list->keys, list->pairs, list->count, list->first + 1, w->body_count);
-    bool fits = entries < INT_MAX && dem2di_group_reserve(w, DEM2DI_INCIDENT, entries + 1);
-    if (!dem2di_archive_room(ar, fits)) return;
+    size_t loads = dem2di_loads_bytes(w, (size_t)list->count, (size_t)(list->count - list->pairs));
+    dem2di_load_room(loader, entries < INT_MAX &&
+                                 dem2di_group_reserve(w, DEM2DI_INCIDENT, entries + 1) &&
+                                 dem2di_tallies_reserve(w, list->discs, list->count) &&
+                                 dem2di_scratch_reserve(w, loads));
+    if (!dem2di_load_good(loader)) return;
     dem2di_incident_make(w);
     dem2di_loads_clear(w);
 }
 
-/* All of a world. Not here: capacities, and scratch memory that each step or list fills anew. */
-static void dem2di_archive_world(dem2di_archive *ar, dem2d_world *w) {
-    dem2di_archive_settings(ar, w);
-    dem2di_archive_progress(ar, w);
-    dem2di_archive_ledger(ar, &w->ledger);
-    dem2di_archive_callers_law(ar, w);
-    dem2di_archive_materials(ar, w);
-    if (dem2di_archive_good(ar)) dem2di_archive_laws(ar, w, w->used_laws);
-    dem2di_archive_templates(ar, w);
-    dem2di_archive_plan(ar, w, &w->plan);
-    if (dem2di_archive_good(ar)) dem2di_archive_bodies(ar, w);
-    if (dem2di_archive_good(ar)) dem2di_archive_names(ar, w);
-    if (dem2di_archive_good(ar)) dem2di_archive_walls(ar, w);
-    if (dem2di_archive_good(ar)) dem2di_archive_keys(ar, w);
-    for (int i = 0; dem2di_archive_good(ar) && i < w->list.count; i++)
-        dem2di_archive_memory(ar, w, i);
-    dem2di_archive_relist(ar, w);
-}
-
-/* To where the archive writes, which is closed. */
-static dem2d_result dem2di_save(const dem2d_world *world, const char *path, dem2di_archive *ar) {
-    dem2di_archive sizing;
-    dem2d_world own = *world; /* its arrays are only read: nothing is loaded */
-    dem2di_archive_start(&world->env, DEM2DI_SIZING, &sizing);
-    dem2di_archive_world(&sizing, &own);
-    uint64_t head[3] = {DEM2DI_SNAPSHOT_MARK, DEM2DI_SNAPSHOT_VERSION,
-                        DEM2DI_SNAPSHOT_HEAD + sizing.size + DEM2DI_SNAPSHOT_TAIL};
-    for (int k = 0; k < 3; k++) dem2di_archive_word(ar, &head[k], 8);
-    dem2di_archive_world(ar, &own);
-    dem2di_archive_flush(ar);
-    uint64_t checksum = ar->hash;
-    dem2di_archive_word(ar, &checksum, 8);
-    dem2di_archive_flush(ar);
-    return dem2di_writer_close(&world->env, path, &ar->writer);
-}
-
-/* Aside first: whatever happens, the path holds the old file or all of the new one. */
-static dem2d_result dem2di_save_aside(const dem2d_world *world, const char *path, const char *aside,
-                                      dem2di_archive *ar) {
-    const dem2d_env *env = &world->env;
-    dem2d_result result = dem2di_writer_open(env, NULL, NULL, aside, false, &ar->writer);
-    if (result != DEM2D_OK) return result;
-    result = dem2di_save(world, aside, ar);
-#if defined(_WIN32)
-    if (result == DEM2D_OK) (void)remove(path); /* rename does not replace there */
-#endif
-    if (result == DEM2D_OK && rename(aside, path) != 0)
-        result = dem2di_fail(env, DEM2D_IO, -1, "could not rename %s to %s", aside, path);
-    if (result != DEM2D_OK) (void)remove(aside);
-    return result;
-}
-
-DEM2D_API dem2d_result dem2d_world_save(const dem2d_world *world, const dem2d_save_desc *desc,
-                                        const char *path) {
-    dem2d_save_desc plain;
-    if (world == NULL) return DEM2D_NULL_ARGUMENT;
-    memset(&plain, 0, sizeof plain);
-    if (desc == NULL) desc = &plain;
-    const dem2d_env *env = &world->env;
-    dem2di_archive ar;
-    dem2di_archive_start(env, DEM2DI_SAVING, &ar);
-    if (path == NULL || desc->write != NULL) { /* or neither, or both: that is told there */
-        dem2d_result result =
-            dem2di_writer_open(env, desc->write, desc->user, path, false, &ar.writer);
-        return result == DEM2D_OK ? dem2di_save(world, path, &ar) : result;
-    }
-    static const char part[] = ".part";
-    size_t length = strlen(path), room = length + sizeof part;
-    char *aside = (char *)dem2di_allocate(&world->user_env, room, 1);
-    if (aside == NULL) return dem2di_out_of_memory(world, "a file name");
-    memcpy(aside, path, length);
-    memcpy(aside + length, part, sizeof part);
-    dem2d_result result = dem2di_save_aside(world, path, aside, &ar);
-    dem2di_release(&world->user_env, aside, room, 1);
-    return result;
+static void dem2di_finish_world(dem2di_loader *loader) {
+    dem2d_world *w = loader->world;
+    dem2di_check_settings(loader);
+    if (dem2di_load_good(loader)) dem2di_load_missing(loader, w, false);
+    if (!dem2di_load_good(loader)) return;
+    w->laws_side = w->material_count;
+    for (int a = 0; a < w->material_count; a++)
+        for (int b = 0; b < a; b++) *dem2di_law(w, b, a) = *dem2di_law(w, a, b);
+    dem2di_load_room(loader, dem2di_reserve_bodies(w, w->body_count));
+    dem2di_finish_shapes(loader);
+    for (int i = 0; i < w->body_count && dem2di_load_good(loader); i++)
+        dem2di_finish_body(loader, i);
+    if (dem2di_load_good(loader)) dem2di_load_expect(loader, dem2di_names_agree(w), "ids differ");
+    dem2di_finish_walls(loader);
+    dem2di_finish_list(loader);
 }
 
 /* Bytes of a snapshot, and where they come from. */
@@ -16179,14 +16439,14 @@ static dem2d_result dem2di_source_read(dem2di_source *source) {
     unsigned char head[DEM2DI_SNAPSHOT_HEAD], beyond;
     dem2d_result result = dem2di_source_take(source, head, sizeof head);
     if (result != DEM2D_OK) return result;
-    uint64_t version = dem2di_word_of(head + 8, 8), size = dem2di_word_of(head + 16, 8);
-    if (dem2di_word_of(head, 8) != DEM2DI_SNAPSHOT_MARK)
+    uint64_t version = dem2di_word_of(head + 8), size = dem2di_word_of(head + 16);
+    if (dem2di_word_of(head) != DEM2DI_SNAPSHOT_MARK)
         return dem2di_fail(env, DEM2D_FORMAT, -1, "snapshot: does not begin as one");
     if (version != DEM2DI_SNAPSHOT_VERSION)
         return dem2di_fail(env, DEM2D_FORMAT_VERSION, -1, "snapshot of version %llu, not %u",
                            (unsigned long long)version, DEM2DI_SNAPSHOT_VERSION);
     size_t most = SIZE_MAX / 2, rest = (size_t)(size - DEM2DI_SNAPSHOT_HEAD);
-    if (size < DEM2DI_SNAPSHOT_HEAD + DEM2DI_SNAPSHOT_TAIL || size > most)
+    if (size < DEM2DI_SNAPSHOT_HEAD + DEM2DI_SNAPSHOT_TAIL || size > most || size % 8 != 0)
         return dem2di_fail(env, DEM2D_FORMAT, -1, "snapshot: size of %llu bytes",
                            (unsigned long long)size);
     while (source->size < rest && result == DEM2D_OK) result = dem2di_source_grow(source, rest);
@@ -16194,40 +16454,49 @@ static dem2d_result dem2di_source_read(dem2di_source *source) {
     bool more = source->file != NULL ? fread(&beyond, 1, 1, source->file) == 1
                                      : desc->read(desc->user, (char *)&beyond, 1);
     if (more) return dem2di_fail(env, DEM2D_FORMAT, -1, "snapshot: bytes after its end");
-    dem2di_archive ar;
-    dem2di_archive_start(env, DEM2DI_HASHING, &ar);
-    source->size -= DEM2DI_SNAPSHOT_TAIL;
-    uint64_t checksum = dem2di_hash_bytes(ar.hash, head, sizeof head);
-    checksum = dem2di_hash_bytes(checksum, source->bytes, source->size);
-    source->size += DEM2DI_SNAPSHOT_TAIL;
-    if (checksum == dem2di_word_of(source->bytes + rest - DEM2DI_SNAPSHOT_TAIL, 8)) return DEM2D_OK;
+    uint64_t checksum = DEM2DI_HASH_START;
+    for (int k = 0; k < DEM2DI_SNAPSHOT_HEAD; k += 8)
+        checksum = dem2di_hash_word(checksum, dem2di_word_of(head + k));
+    rest -= DEM2DI_SNAPSHOT_TAIL;
+    for (size_t k = 0; k < rest; k += 8)
+        checksum = dem2di_hash_word(checksum, dem2di_word_of(source->bytes + k));
+    if (checksum == dem2di_word_of(source->bytes + rest)) return DEM2D_OK;
     return dem2di_fail(env, DEM2D_FORMAT, -1, "snapshot: the checksum is another");
+}
+
+/* What a snapshot does not have is 0, not the default of a new world. */
+static void dem2di_clear_settings(dem2d_world *world) {
+    for (const dem2di_column *column = dem2di_columns; column->group == DEM2DI_WORLD; column++)
+        for (int f = 0; f < column->count; f++)
+            for (int k = 0; k < dem2di_numbers_of(&column->fields[f]); k++)
+                dem2di_number_set(&column->fields[f], world, k, 0);
 }
 
 /* A world from bytes that have been read. */
 static dem2d_result dem2di_source_load(const dem2di_source *source, dem2d_world **world) {
     const dem2d_load_desc *desc = source->desc;
-    dem2di_archive ar;
+    dem2di_loader loader;
     dem2d_world_desc empty;
-    dem2d_world *made;
     memset(&empty, 0, sizeof empty);
     empty.time_step = 1; /* until it is loaded */
     empty.env = desc->env;
     empty.parallel_for = desc->parallel_for;
     empty.parallel_user = desc->parallel_user;
-    dem2d_result result = dem2d_world_create(&empty, &made);
+    memset(&loader, 0, sizeof loader);
+    dem2d_result result = dem2d_world_create(&empty, &loader.world);
     if (result != DEM2D_OK) return result;
-    dem2di_archive_start(&made->env, DEM2DI_LOADING, &ar);
-    ar.load = desc;
-    ar.next = source->bytes;
-    ar.end = source->bytes + source->size - DEM2DI_SNAPSHOT_TAIL;
-    dem2di_archive_world(&ar, made);
-    dem2di_archive_expect(&ar, ar.next == ar.end, "more fields than there are");
-    if (ar.result == DEM2D_OK)
-        *world = made;
+    loader.desc = desc;
+    loader.env = &loader.world->env;
+    loader.next = source->bytes;
+    loader.end = source->bytes + source->size - DEM2DI_SNAPSHOT_TAIL;
+    dem2di_clear_settings(loader.world);
+    while (loader.next < loader.end && dem2di_load_good(&loader)) dem2di_load_record(&loader);
+    dem2di_finish_world(&loader);
+    if (loader.result == DEM2D_OK)
+        *world = loader.world;
     else
-        dem2d_world_destroy(made);
-    return ar.result;
+        dem2d_world_destroy(loader.world);
+    return loader.result;
 }
 
 DEM2D_API dem2d_result dem2d_world_load(const dem2d_load_desc *desc, const char *path,
@@ -17107,7 +17376,9 @@ DEM2D_API dem2d_result dem2d_world_write_csv(const dem2d_world *world, const dem
 
    CHANGES
      0.6.0  Runs differ from those of 0.5.0 with friction between circles, dashpots, polybeziers,
-            two contact points with friction, and servo walls. Snapshots of version 4.
+            two contact points with friction, and servo walls. Snapshots (version 4) name their
+            arrays and fields, so that later headers read them; those of before are refused. The
+            state hash is made by the same tables: it has other values.
             Papers: the manual lists what differs from each of their equations and steps. A world
             with DEM2D_GJK_EPA takes every pair anew in every step, circles too, from the line of
             centres; DEM2D_ONE_POINT takes the middle at walls, too. dem2d_contact.residual is

@@ -9,11 +9,58 @@
 #include <sys/stat.h>
 #include <unistd.h>
 
+/* --- snapshots as words -------------------------------------------------------------------------
+ */
+
+static void put_word(char *bytes, uint64_t word) {
+    for (int k = 0; k < 8; k++) bytes[k] = (char)(word >> 8 * k & 255);
+}
+
+static uint64_t get_word(const char *bytes) {
+    uint64_t word = 0;
+    for (int k = 0; k < 8; k++) word |= (uint64_t)(unsigned char)bytes[k] << 8 * k;
+    return word;
+}
+
+/* A record of a snapshot: name, rows and fields; name and numbers of each field, with 256 added for
+   doubles; then the numbers. */
+typedef struct record {
+    size_t at, rows_at, end;
+    uint64_t rows, fields, width;
+} record;
+
+enum { RECORD_HEAD = 40, FIELD_HEAD = 32 };
+
+static record record_at(const scene_bytes *bytes, size_t at) {
+    record r = {at, at + RECORD_HEAD, 0, 0, 0, 0};
+    r.rows = get_word(bytes->bytes + at + 24), r.fields = get_word(bytes->bytes + at + 32);
+    for (uint64_t f = 0; f < r.fields; f++, r.rows_at += FIELD_HEAD) {
+        const uint64_t numbers = get_word(bytes->bytes + r.rows_at + 24);
+        assert_in_range(numbers & 255, 1, 8);
+        assert_true((numbers & ~(uint64_t)511) == 0);
+        r.width += numbers & 255;
+    }
+    r.end = r.rows_at + 8 * r.width * r.rows;
+    assert_true(r.end <= bytes->size - 8);
+    return r;
+}
+
+static record record_named(const scene_bytes *bytes, const char *name) {
+    record r = record_at(bytes, 24);
+    while (strncmp(bytes->bytes + r.at, name, 24) != 0) r = record_at(bytes, r.end);
+    return r;
+}
+
 /* --- two worlds, the same -----------------------------------------------------------------------
  */
 
 static void assert_same_bytes(const dem2d_world *a, const dem2d_world *b) {
     scene_bytes x = scene_save(a), y = scene_save(b);
+    for (size_t at = 24; at < x.size - 8; at = record_at(&x, at).end) {
+        const record r = record_at(&x, at), other = record_at(&y, at);
+        if (r.end != other.end || memcmp(x.bytes + at, y.bytes + at, r.end - at) != 0)
+            fail_msg("column %s differs", x.bytes + at);
+    }
     assert_int_equal(x.size, y.size);
     assert_memory_equal(x.bytes, y.bytes, x.size);
     free(x.bytes), free(y.bytes);
@@ -353,8 +400,12 @@ static bool edit_world(snapshot_scene *s, int which) {
     assert_ok(dem2d_world_get_particle(s->world, another, &at));
     wall.material = s->rubber, wall.point = vec(0, -0.5), wall.normal = vec(0, 1);
     switch (which) {
-    case 0: assert_ok(dem2d_world_set_gravity(s->world, vec(1, -2))); break;
-    case 1: assert_ok(dem2d_world_set_damping(s->world, 0.5, 1)); break;
+    case 0:
+        assert_ok(dem2d_world_set_gravity(s->world, vec(1, -2)));
+        break;
+    case 1:
+        assert_ok(dem2d_world_set_damping(s->world, 0.5, 1));
+        break;
     case 2: /* the last of friction, rolling and dashpots goes */
     case 3:
         for (int k = 0; k < 3; k++)
@@ -364,15 +415,27 @@ static bool edit_world(snapshot_scene *s, int which) {
         break;
     case 4:
     case 5:
-        assert_ok(dem2d_world_drive_particle(
-            s->world, grain, which == 4 ? DEM2D_DRIVEN : DEM2D_FREE, vec(1, 0), 2));
+        assert_ok(dem2d_world_drive_particle(s->world, grain,
+                                             which == 4 ? DEM2D_DRIVEN : DEM2D_FREE, vec(1, 0), 2));
         break;
-    case 6: assert_ok(dem2d_world_move_particle(s->world, grain, vec(0.1, -3), 1)); break;
-    case 7: assert_ok(dem2d_world_remove_particle(s->world, grain)); break;
-    case 8: (void)scene_add_grain(s, 0, 0.0625, -3); break;
-    case 9: assert_ok(dem2d_world_set_wall(s->world, s->walls[0], &wall)); break;
-    case 10: assert_ok(dem2d_world_add_wall(s->world, &wall, &id)); break;
-    case 11: assert_ok(dem2d_world_remove_wall(s->world, s->walls[0])); break;
+    case 6:
+        assert_ok(dem2d_world_move_particle(s->world, grain, vec(0.1, -3), 1));
+        break;
+    case 7:
+        assert_ok(dem2d_world_remove_particle(s->world, grain));
+        break;
+    case 8:
+        (void)scene_add_grain(s, 0, 0.0625, -3);
+        break;
+    case 9:
+        assert_ok(dem2d_world_set_wall(s->world, s->walls[0], &wall));
+        break;
+    case 10:
+        assert_ok(dem2d_world_add_wall(s->world, &wall, &id));
+        break;
+    case 11:
+        assert_ok(dem2d_world_remove_wall(s->world, s->walls[0]));
+        break;
     case 12: /* where it overlaps another */
         at.pose.position.x += 0.01;
         assert_ok(dem2d_world_move_particle(s->world, grain, at.pose.position, 1));
@@ -381,8 +444,11 @@ static bool edit_world(snapshot_scene *s, int which) {
         (void)scene_add_grain(s, 0, at.pose.position.x, at.pose.position.y + 0.01);
         break;
     case 14:
-    case 15: fix_half(s, which == 15); break;
-    default: return false;
+    case 15:
+        fix_half(s, which == 15);
+        break;
+    default:
+        return false;
     }
     return true;
 }
@@ -879,40 +945,155 @@ static void test_appended(void **state) {
     }
 }
 
-static void put_word(char *bytes, uint64_t word) {
-    for (int k = 0; k < 8; k++) bytes[k] = (char)(word >> 8 * k & 255);
+/* The checksum by its definition. */
+static uint64_t checksum_of(const scene_bytes *bytes) {
+    uint64_t hash = 0x243F6A8885A308D3u;
+    for (size_t i = 0; i < bytes->size - 8; i += 8) {
+        hash = (hash ^ get_word(bytes->bytes + i)) * 0x9E3779B97F4A7C15u;
+        hash ^= hash >> 32;
+    }
+    return hash;
 }
 
-static uint64_t get_word(const char *bytes) {
-    uint64_t word = 0;
-    for (int k = 0; k < 8; k++) word |= (uint64_t)(unsigned char)bytes[k] << 8 * k;
-    return word;
+/* Size and checksum as they should be. */
+static void make_right(scene_bytes *bytes) {
+    put_word(bytes->bytes + 16, bytes->size);
+    put_word(bytes->bytes + bytes->size - 8, checksum_of(bytes));
 }
 
-/* The layout, byte by byte, and the checksum by its definition. */
+/* The layout, word by word. */
 static void test_layout(void **state) {
     (void)state;
     static const unsigned char mark[8] = {0x8D, 'd', 'e', 'm', '2', 'd', '\r', '\n'};
     scene_bytes bytes = small_snapshot(SCENE_MIXED);
-    uint64_t hash = 0x243F6A8885A308D3u;
-    char last[8] = {0};
+    const size_t end = bytes.size - 8;
+    const double step = 1e-4, falling = -9.81;
+    uint64_t word;
+    int records = 0;
     assert_memory_equal(bytes.bytes, mark, 8);
     assert_int_equal(get_word(bytes.bytes + 8), DEM2DI_SNAPSHOT_VERSION);
     assert_int_equal(get_word(bytes.bytes + 16), bytes.size);
-    for (size_t i = 0; i < bytes.size - 8; i += 8) {
-        const size_t left = bytes.size - 8 - i;
-        memcpy(last, bytes.bytes + i, left < 8 ? left : 8);
-        if (left < 8) memset(last + left, 0, 8 - left);
-        hash = (hash ^ get_word(last)) * 0x9E3779B97F4A7C15u;
-        hash ^= hash >> 32;
-    }
-    assert_int_equal(get_word(bytes.bytes + bytes.size - 8), hash);
-    put_word(last, 0x3FF0000000000000u); /* little-endian: 1.0, if there is one */
-    const double step = 1e-4;
-    uint64_t word;
-    memcpy(&word, &step, 8);
-    assert_int_equal(get_word(bytes.bytes + 24), word); /* the first field */
+    assert_int_equal(get_word(bytes.bytes + end), checksum_of(&bytes));
+    for (size_t at = 24; at < end; at = record_at(&bytes, at).end) records++;
+    assert_true(records > 20);
+    const record world = record_at(&bytes, 24);
+    const char *third = bytes.bytes + world.at + RECORD_HEAD + 2 * FIELD_HEAD;
+    assert_string_equal(bytes.bytes + world.at, "world");
+    assert_int_equal(world.rows, 1);
+    assert_string_equal(third, "gravity");
+    assert_int_equal(get_word(third + 24), 256 + 2);
+    memcpy(&word, &step, 8); /* doubles by their bits */
+    assert_int_equal(get_word(bytes.bytes + world.rows_at), word);
+    memcpy(&word, &falling, 8);
+    assert_int_equal(get_word(bytes.bytes + world.rows_at + 24), word);
     free(bytes.bytes);
+}
+
+/* --- other versions -----------------------------------------------------------------------------
+ */
+
+static void cut_bytes(scene_bytes *bytes, size_t at, size_t count) {
+    bytes->size -= count;
+    memmove(bytes->bytes + at, bytes->bytes + at + count, bytes->size - at);
+}
+
+/* What a header without this column would have written. */
+static void cut_column(scene_bytes *bytes, const char *name) {
+    const record r = record_named(bytes, name);
+    cut_bytes(bytes, r.at, r.end - r.at);
+    make_right(bytes);
+}
+
+/* What a header would have written whose field has fewer numbers, or 0: is not there. */
+static void cut_field(scene_bytes *bytes, const char *column, const char *field, uint64_t left) {
+    const record r = record_named(bytes, column);
+    size_t at = r.at + RECORD_HEAD, before = 0;
+    while (strcmp(bytes->bytes + at, field) != 0) {
+        before += 8 * (get_word(bytes->bytes + at + 24) & 255);
+        at += FIELD_HEAD;
+    }
+    const uint64_t numbers = get_word(bytes->bytes + at + 24);
+    const size_t cut = 8 * ((numbers & 255) - left);
+    for (uint64_t i = r.rows; i > 0; i--)
+        cut_bytes(bytes, r.rows_at + 8 * r.width * (i - 1) + before + 8 * left, cut);
+    put_word(bytes->bytes + at + 24, (numbers & 256) + left);
+    put_word(bytes->bytes + r.at + 32, r.fields - (left == 0));
+    if (left == 0) cut_bytes(bytes, at, FIELD_HEAD);
+    make_right(bytes);
+}
+
+/* Columns and fields that a snapshot does not have are 0, all else is as it was. */
+static void test_earlier(void **state) {
+    (void)state;
+    scene_bytes bytes = small_snapshot(SCENE_FULL);
+    dem2d_world *whole = load_with(&bytes, NULL, false);
+    const int calls = COUNT_OF(whole->count.proofs);
+    assert_true(whole->wear[0] != 0 && whole->global_damping != 0 && whole->skin > 0);
+    whole->count.proofs[calls - 1] = 0;
+    cut_column(&bytes, "wear");
+    cut_field(&bytes, "world", "global_damping", 0);
+    cut_field(&bytes, "progress", "proofs", (uint64_t)calls - 1);
+    dem2d_world *part = load_with(&bytes, NULL, false);
+    for (int i = 0; i < part->body_count; i++) {
+        assert_true(part->wear[i] == 0);
+        part->wear[i] = whole->wear[i];
+    }
+    assert_true(part->global_damping == 0);
+    part->global_damping = whole->global_damping;
+    assert_same_world(whole, part);
+    assert_ok(dem2d_world_step(part, 50, NULL));
+    dem2d_world_destroy(whole), dem2d_world_destroy(part);
+    free(bytes.bytes);
+}
+
+static void check_refused(scene_bytes *bytes, dem2d_result result, const char *text) {
+    test_env env;
+    test_env_init(&env);
+    make_right(bytes);
+    assert_result(try_load(bytes, &env), result);
+    assert_logged(&env, result, -1, text);
+    free(bytes->bytes);
+}
+
+/* What can't be 0 must be there. */
+static void test_needed(void **state) {
+    (void)state;
+    static const char *const columns[] = {"ids",   "particles", "wall_ids",
+                                          "pairs", "laws",      "corners"};
+    for (int i = 0; i < COUNT_OF(columns); i++) {
+        scene_bytes bytes = small_snapshot(SCENE_FULL);
+        cut_column(&bytes, columns[i]);
+        check_refused(&bytes, DEM2D_FORMAT, columns[i]);
+    }
+    scene_bytes bytes = small_snapshot(SCENE_FULL);
+    cut_field(&bytes, "particles", "scale", 0);
+    check_refused(&bytes, DEM2D_FORMAT, "scale");
+}
+
+/* What a later version has added is refused by its name, as is what makes no sense. */
+static void test_later(void **state) {
+    (void)state;
+    scene_bytes bytes = small_snapshot(SCENE_FULL);
+    memcpy(bytes.bytes + record_named(&bytes, "wear").at, "charge\0", 8);
+    check_refused(&bytes, DEM2D_FORMAT_VERSION, "charge");
+    bytes = small_snapshot(SCENE_FULL);
+    memcpy(bytes.bytes + record_named(&bytes, "now").at + RECORD_HEAD, "momentum", 9);
+    check_refused(&bytes, DEM2D_FORMAT_VERSION, "momentum");
+    bytes = small_snapshot(SCENE_FULL);
+    memcpy(bytes.bytes + record_named(&bytes, "now").at, "before\0", 8);
+    check_refused(&bytes, DEM2D_FORMAT, "before");
+    bytes = small_snapshot(SCENE_FULL);
+    put_word(bytes.bytes + record_named(&bytes, "now").at + RECORD_HEAD + 24, 2); /* no doubles */
+    check_refused(&bytes, DEM2D_FORMAT, "position");
+    bytes = small_snapshot(SCENE_FULL);
+    put_word(bytes.bytes + record_named(&bytes, "now").at + 24, (uint64_t)1 << 40);
+    check_refused(&bytes, DEM2D_FORMAT, "rows");
+    for (uint64_t version = 0; version < 6; version++) {
+        if (version == DEM2DI_SNAPSHOT_VERSION) continue;
+        bytes = small_snapshot(SCENE_CIRCLES);
+        put_word(bytes.bytes + 8, version);
+        check_refused(&bytes, DEM2D_FORMAT_VERSION, "version");
+    }
 }
 
 /* Any byte changed and the checksum made right: refused, or a world that can be stepped. */
@@ -923,8 +1104,8 @@ static void test_crafted(void **state) {
                                 SCENE_DASHED,  SCENE_FULL,  SCENE_LAW};
     int refused = 0, taken = 0;
     for (int n = 0; n < COUNT_OF(kinds); n++) {
-        const int kind = kinds[n], rare = test_long() ? 7 : 17; /* odd: all bytes of numbers */
-        const int stride = kind == SCENE_RUBBING ? 1 : kind == SCENE_DASHED ? 3 : rare;
+        const int kind = kinds[n], rare = test_long() ? 7 : 37; /* odd: all bytes of numbers */
+        const int stride = kind == SCENE_RUBBING ? 3 : kind == SCENE_DASHED ? 7 : rare;
         scene_bytes bytes = small_snapshot(kind);
         const size_t body = bytes.size - 8;
         for (size_t i = 24; i < body; i += (size_t)stride)
@@ -937,9 +1118,7 @@ static void test_crafted(void **state) {
                 test_env_init(&env);
                 desc.env = &env.env;
                 bytes.bytes[i] = (char)values[k];
-                put_word(bytes.bytes + body,
-                         dem2di_hash_bytes(0x243F6A8885A308D3u, (const unsigned char *)bytes.bytes,
-                                           body));
+                make_right(&bytes);
                 const dem2d_result result = dem2d_world_load(&desc, NULL, &world);
                 if (result == DEM2D_OK) {
                     (void)dem2d_world_hash(world);
@@ -947,7 +1126,8 @@ static void test_crafted(void **state) {
                     (void)dem2d_world_hash(world);
                     taken++;
                 } else {
-                    assert_true(result == DEM2D_FORMAT || result == DEM2D_NULL_ARGUMENT);
+                    assert_true(result == DEM2D_FORMAT || result == DEM2D_FORMAT_VERSION ||
+                                result == DEM2D_NULL_ARGUMENT);
                     assert_null(world);
                     refused++;
                 }
@@ -1227,22 +1407,40 @@ static void test_arguments(void **state) {
 
 int main(void) {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(test_resume),         cmocka_unit_test(test_resume_blocks),
-        cmocka_unit_test(test_resume_empty),   cmocka_unit_test(test_resume_changed),
-        cmocka_unit_test(test_resume_refused), cmocka_unit_test(test_settings),
+        cmocka_unit_test(test_resume),
+        cmocka_unit_test(test_resume_blocks),
+        cmocka_unit_test(test_resume_empty),
+        cmocka_unit_test(test_resume_changed),
+        cmocka_unit_test(test_resume_refused),
+        cmocka_unit_test(test_settings),
         cmocka_unit_test(test_refused),
-        cmocka_unit_test(test_servo),          cmocka_unit_test(test_one_material),
-        cmocka_unit_test(test_resume_joints),  cmocka_unit_test(test_ids),
-        cmocka_unit_test(test_hash_changes),   cmocka_unit_test(test_hash_stays),
-        cmocka_unit_test(test_hash_skins),     cmocka_unit_test(test_hash_zeros),
-        cmocka_unit_test(test_hash_ids),       cmocka_unit_test(test_golden),
-        cmocka_unit_test(test_flipped),        cmocka_unit_test(test_cut),
-        cmocka_unit_test(test_appended),       cmocka_unit_test(test_layout),
-        cmocka_unit_test(test_crafted),        cmocka_unit_test(test_writes_fail),
-        cmocka_unit_test(test_memory_fails),   cmocka_unit_test(test_files),
-        cmocka_unit_test(test_custom),         cmocka_unit_test(test_law),
-        cmocka_unit_test(test_joint_moves),    cmocka_unit_test(test_strange_law),
-        cmocka_unit_test(test_arguments),      cmocka_unit_test(test_flat_arc),
+        cmocka_unit_test(test_servo),
+        cmocka_unit_test(test_one_material),
+        cmocka_unit_test(test_resume_joints),
+        cmocka_unit_test(test_ids),
+        cmocka_unit_test(test_hash_changes),
+        cmocka_unit_test(test_hash_stays),
+        cmocka_unit_test(test_hash_skins),
+        cmocka_unit_test(test_hash_zeros),
+        cmocka_unit_test(test_hash_ids),
+        cmocka_unit_test(test_golden),
+        cmocka_unit_test(test_flipped),
+        cmocka_unit_test(test_cut),
+        cmocka_unit_test(test_appended),
+        cmocka_unit_test(test_layout),
+        cmocka_unit_test(test_earlier),
+        cmocka_unit_test(test_needed),
+        cmocka_unit_test(test_later),
+        cmocka_unit_test(test_crafted),
+        cmocka_unit_test(test_writes_fail),
+        cmocka_unit_test(test_memory_fails),
+        cmocka_unit_test(test_files),
+        cmocka_unit_test(test_custom),
+        cmocka_unit_test(test_law),
+        cmocka_unit_test(test_joint_moves),
+        cmocka_unit_test(test_strange_law),
+        cmocka_unit_test(test_arguments),
+        cmocka_unit_test(test_flat_arc),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }
