@@ -9861,18 +9861,13 @@ static void dem2di_gjk_epa(dem2di_pair *pair, dem2d_vec start, double tolerance,
 
 /* Depth of overlapping shapes, else separation (with `detect`) or distance. The feature of the last
    step (may be NULL) is tried first; it may be that of any pair, or all 0. */
-static void dem2di_contact_again(dem2di_pair *pair, dem2d_solver solver, const dem2di_feature *last,
+static void dem2di_contact_solve(dem2di_pair *pair, dem2d_solver solver, const dem2di_feature *last,
                                  dem2d_vec start, double tolerance, int cap, bool detect,
                                  dem2di_search *search) {
     if (solver == DEM2D_GJK_EPA)
         dem2di_gjk_epa(pair, start, tolerance, cap, detect, search);
     else
         dem2di_certified(pair, last, start, tolerance, cap, detect, search);
-}
-
-static void dem2di_contact_solve(dem2di_pair *pair, dem2d_solver solver, dem2d_vec start,
-                                 double tolerance, int cap, bool detect, dem2di_search *search) {
-    dem2di_contact_again(pair, solver, NULL, start, tolerance, cap, detect, search);
 }
 
 /* Depth of two circles in closed form, with d from centre to centre. Concentric circles get the
@@ -10046,8 +10041,8 @@ DEM2D_API dem2d_result dem2d_pair_contact(const dem2d_shape *a, dem2d_pose pose_
         search.proof = DEM2D_BY_FORM;
         search.state = dem2di_state_of(&pair, &search);
     } else {
-        dem2di_contact_solve(&pair, used.solver, dem2di_start(&pair, used.start), used.tolerance,
-                             used.max_iterations, false, &search);
+        dem2di_contact_solve(&pair, used.solver, NULL, dem2di_start(&pair, used.start),
+                             used.tolerance, used.max_iterations, false, &search);
     }
     dem2di_contact_report(&pair, &search, &pose_a, &pose_b, used.skip_points, contact);
     return DEM2D_OK;
@@ -13530,11 +13525,11 @@ static void dem2di_pair_search(const dem2d_world *world, dem2di_pair *pair, cons
     bool known = last->normal.x != 0 || last->normal.y != 0;
     pair->calls = 0;
     if (known && world->solver != DEM2D_GJK_EPA) {
-        dem2di_contact_again(pair, world->solver, &last->feature, last->normal, world->tolerance,
+        dem2di_contact_solve(pair, world->solver, &last->feature, last->normal, world->tolerance,
                              world->max_iterations, true, search);
         if (last->depth >= 0 || -search->upper > dem2di_gap_unsure(world, pair->size)) return;
     }
-    dem2di_contact_again(pair, world->solver, NULL, dem2di_centres(pair), world->tolerance,
+    dem2di_contact_solve(pair, world->solver, NULL, dem2di_centres(pair), world->tolerance,
                          world->max_iterations, true, search);
 }
 
@@ -17251,82 +17246,80 @@ DEM2D_API dem2d_result dem2d_pvd_write(const dem2d_env *env, const dem2d_pvd_des
 /* --- histories ----------------------------------------------------------------------------------
  */
 
-#define DEM2DI_CSV_COLUMNS 18
+/* A column of a history. */
+typedef struct dem2di_csv_column {
+    const char *name;
+    double value;
+} dem2di_csv_column;
 
-static void dem2di_csv_values(const dem2d_world *world, double values[DEM2DI_CSV_COLUMNS]) {
+/* Room for the columns of a world: 18, and 11 of its ledger. */
+#define DEM2DI_CSV_COLUMNS 29
+
+/* The columns of a world, with those of its ledger if it keeps one. Returns their number. */
+static int dem2di_csv_columns(const dem2d_world *world,
+                              dem2di_csv_column columns[DEM2DI_CSV_COLUMNS]) {
     dem2d_energy energy;
     dem2d_equilibrium rest;
     dem2d_packing packing;
     dem2d_stats stats;
+    dem2d_ledger l;
     (void)dem2d_world_energy(world, &energy);
     (void)dem2d_world_equilibrium(world, &rest);
     (void)dem2d_world_packing(world, &packing);
     (void)dem2d_world_stats(world, &stats);
-    const double all[DEM2DI_CSV_COLUMNS] = {(double)stats.steps,
-                                            stats.time,
-                                            energy.translational,
-                                            energy.rotational,
-                                            energy.normal,
-                                            energy.tangential,
-                                            energy.rolling,
-                                            energy.potential,
-                                            rest.kinetic_ratio,
-                                            rest.mean_speed,
-                                            rest.max_speed,
-                                            rest.unbalanced,
-                                            packing.coordination,
-                                            packing.coordination_loaded,
-                                            (double)packing.rattlers,
-                                            (double)stats.contacts,
-                                            (double)stats.wall_contacts,
-                                            packing.max_overlap};
-    memcpy(values, all, sizeof all);
+    memset(&l, 0, sizeof l);
+    if (world->ledger.kept) (void)dem2d_world_ledger(world, &l);
+    const dem2di_csv_column all[DEM2DI_CSV_COLUMNS] = {
+        {"step", (double)stats.steps},
+        {"time", stats.time},
+        {"translational", energy.translational},
+        {"rotational", energy.rotational},
+        {"normal", energy.normal},
+        {"tangential", energy.tangential},
+        {"rolling", energy.rolling},
+        {"potential", energy.potential},
+        {"kinetic_ratio", rest.kinetic_ratio},
+        {"mean_speed", rest.mean_speed},
+        {"max_speed", rest.max_speed},
+        {"unbalanced", rest.unbalanced},
+        {"coordination", packing.coordination},
+        {"coordination_loaded", packing.coordination_loaded},
+        {"rattlers", (double)packing.rattlers},
+        {"contacts", (double)stats.contacts},
+        {"wall_contacts", (double)stats.wall_contacts},
+        {"max_overlap", packing.max_overlap},
+        {"ledger_kinetic", l.kinetic},
+        {"ledger_normal", l.normal},
+        {"ledger_tangential", l.tangential},
+        {"ledger_gravity", l.gravity},
+        {"ledger_walls", l.walls},
+        {"ledger_driven", l.driven},
+        {"ledger_friction", l.friction},
+        {"ledger_dashpot", l.dashpot},
+        {"ledger_damping", l.damping},
+        {"ledger_given", l.given},
+        {"ledger_closure", l.closure},
+    };
+    memcpy(columns, all, sizeof all);
+    return world->ledger.kept ? DEM2DI_CSV_COLUMNS : 18;
 }
 
-#define DEM2DI_CSV_LEDGER 11
-
-/* The columns of the ledger; returns their number, 0 for a world without a ledger. */
-static int dem2di_csv_ledger(const dem2d_world *world, double values[DEM2DI_CSV_LEDGER]) {
-    dem2d_ledger l;
-    if (!world->ledger.kept) return 0;
-    (void)dem2d_world_ledger(world, &l);
-    const double all[DEM2DI_CSV_LEDGER] = {l.kinetic, l.normal, l.tangential, l.gravity,
-                                           l.walls,   l.driven, l.friction,   l.dashpot,
-                                           l.damping, l.given,  l.closure};
-    memcpy(values, all, sizeof all);
-    return DEM2DI_CSV_LEDGER;
-}
-
-static void dem2di_csv_header(const dem2d_world *world, const dem2d_csv_desc *desc,
-                              dem2di_writer *writer) {
-    dem2di_put(writer, "step,time,translational,rotational,normal,tangential,rolling,potential,"
-                       "kinetic_ratio,mean_speed,max_speed,unbalanced,coordination,"
-                       "coordination_loaded,rattlers,contacts,wall_contacts,max_overlap");
-    if (world->ledger.kept)
-        dem2di_put(writer, ",ledger_kinetic,ledger_normal,ledger_tangential,ledger_gravity,"
-                           "ledger_walls,ledger_driven,ledger_friction,ledger_dashpot,"
-                           "ledger_damping,ledger_given,ledger_closure");
-    for (int i = 0; i < desc->count; i++) {
-        dem2di_put(writer, ",");
-        dem2di_put(writer, desc->names[i]);
+/* A header line if this is the first row, then the row. */
+static void dem2di_csv_rows(const dem2d_world *world, const dem2d_csv_desc *desc,
+                            dem2di_writer *writer) {
+    dem2di_csv_column columns[DEM2DI_CSV_COLUMNS];
+    int own = dem2di_csv_columns(world, columns);
+    for (int row = desc->append ? 1 : 0; row < 2; row++) {
+        for (int i = 0; i < own + desc->count; i++) {
+            const char *name = i < own ? columns[i].name : desc->names[i - own];
+            if (i > 0) dem2di_put(writer, ",");
+            if (row == 0)
+                dem2di_put(writer, name);
+            else
+                dem2di_put_number(writer, i < own ? columns[i].value : desc->values[i - own]);
+        }
+        dem2di_put(writer, "\n");
     }
-    dem2di_put(writer, "\n");
-}
-
-static void dem2di_csv_row(const dem2d_world *world, const dem2d_csv_desc *desc,
-                           dem2di_writer *writer) {
-    double values[DEM2DI_CSV_COLUMNS + DEM2DI_CSV_LEDGER];
-    dem2di_csv_values(world, values);
-    int own = DEM2DI_CSV_COLUMNS + dem2di_csv_ledger(world, values + DEM2DI_CSV_COLUMNS);
-    for (int i = 0; i < own; i++) {
-        if (i > 0) dem2di_put(writer, ",");
-        dem2di_put_number(writer, values[i]);
-    }
-    for (int i = 0; i < desc->count; i++) {
-        dem2di_put(writer, ",");
-        dem2di_put_number(writer, desc->values[i]);
-    }
-    dem2di_put(writer, "\n");
 }
 
 static const dem2di_field dem2di_csv_fields[] = {
@@ -17353,8 +17346,7 @@ DEM2D_API dem2d_result dem2d_world_write_csv(const dem2d_world *world, const dem
     if (result == DEM2D_OK)
         result = dem2di_writer_open(env, desc->write, desc->user, path, desc->append, &writer);
     if (result != DEM2D_OK) return result;
-    if (!desc->append) dem2di_csv_header(world, desc, &writer);
-    dem2di_csv_row(world, desc, &writer);
+    dem2di_csv_rows(world, desc, &writer);
     return dem2di_writer_close(env, path, &writer);
 }
 
