@@ -16577,13 +16577,6 @@ static int dem2di_next_particle(const dem2d_world *world, int *index) {
     return -1;
 }
 
-static void dem2di_box_grow(dem2d_box *all, bool first, dem2d_vec lower, dem2d_vec upper) {
-    all->lower.x = first ? lower.x : dem2di_min(all->lower.x, lower.x);
-    all->lower.y = first ? lower.y : dem2di_min(all->lower.y, lower.y);
-    all->upper.x = first ? upper.x : dem2di_max(all->upper.x, upper.x);
-    all->upper.y = first ? upper.y : dem2di_max(all->upper.y, upper.y);
-}
-
 /* Extend the box to a half-plane beside it, if the distance is at most a third of its size: farther
    ones would make the rest of the picture small. */
 static void dem2di_box_reach(const dem2d_world *world, int j, double size, dem2d_box *all) {
@@ -16592,29 +16585,30 @@ static void dem2di_box_reach(const dem2d_world *world, int j, double size, dem2d
     nearest.y = n.y > 0 ? all->lower.y : all->upper.y;
     double gap = dem2di_dot(n, dem2di_sub(nearest, world->wall_before[j].point));
     if (!(gap > 0 && gap <= size / 3)) return;
-    dem2d_vec foot = dem2di_along(nearest, -gap, n);
-    dem2di_box_grow(all, false, foot, foot);
+    dem2di_box_add(all, dem2di_along(nearest, -gap, n));
 }
 
 /* The bounding box of particles and segments and, if `beside`, of half-planes beside them, with a
    margin of a twentieth of the larger side; a unit square if there are none. */
 static dem2d_box dem2di_scene_box(const dem2d_world *world, bool beside) {
-    dem2d_box all = {{0, 0}, {1, 1}};
-    bool first = true;
+    dem2d_box all = {{HUGE_VAL, HUGE_VAL}, {-HUGE_VAL, -HUGE_VAL}};
     int index = 0;
-    for (int slot; (slot = dem2di_next_particle(world, &index)) >= 0; first = false) {
+    for (int slot; (slot = dem2di_next_particle(world, &index)) >= 0;) {
         dem2d_box box;
         dem2d_pose pose = dem2di_pose_of(world, world->before, slot);
         (void)dem2d_shape_aabb(dem2di_shape_of(world, &world->bodies[slot]), pose, &box);
-        dem2di_box_grow(&all, first, box.lower, box.upper);
+        dem2di_box_add(&all, box.lower);
+        dem2di_box_add(&all, box.upper);
     }
     for (int j = 0; j < world->wall_count; j++) {
         if (!world->walls[j].alive || !world->walls[j].desc.segment) continue;
         dem2d_vec point = world->wall_before[j].point;
-        dem2d_vec end = dem2di_segment_end(&world->walls[j], point);
-        dem2di_box_grow(&all, first, point, point);
-        dem2di_box_grow(&all, false, end, end);
-        first = false;
+        dem2di_box_add(&all, point);
+        dem2di_box_add(&all, dem2di_segment_end(&world->walls[j], point));
+    }
+    if (all.lower.x > all.upper.x) { /* none: a unit square */
+        all.lower = dem2di_vec(0, 0);
+        all.upper = dem2di_vec(1, 1);
     }
     dem2d_vec size = dem2di_sub(all.upper, all.lower);
     for (int j = 0; beside && j < world->wall_count; j++)
