@@ -7,6 +7,7 @@
    along both normals were found equal at that place. */
 #include "dem2d.h"
 #include "testing.h"
+#include "world_scene.h"
 
 #include <float.h>
 
@@ -633,8 +634,8 @@ static void check_image(const dem2d_vec *points, int count, double rounding, dou
         dem2d_shape *shape = polygon(k == 0 ? points : image, count, rounding);
         const dem2d_vec normal = k == 0 ? n : map(n);
         const double low = -reach(shape, still(), vec(-normal.x, -normal.y)) + depth;
-        assert_ok(dem2d_wall_contact(shape, still(), vec(low * normal.x, low * normal.y), normal,
-                                     &c[k]));
+        assert_ok(
+            dem2d_wall_contact(shape, still(), vec(low * normal.x, low * normal.y), normal, &c[k]));
         dem2d_shape_destroy(shape);
     }
     assert_int_equal(c[0].count, c[1].count);
@@ -708,8 +709,8 @@ enum { X, Y, TURN_A, TURN_B, WAYS };
 
 /* The energy of two shapes, and the force of their contact along all ways; false when one point
    carries it. */
-static bool energy_of(const dem2d_shape *a, const dem2d_shape *b, const double q[WAYS],
-                      double *energy, double force[WAYS]) {
+static bool pair_energy(const dem2d_shape *a, const dem2d_shape *b, const double q[WAYS],
+                        double *energy, double force[WAYS]) {
     dem2d_contact_desc desc = {0};
     dem2d_contact c;
     desc.tolerance = 1e-14;
@@ -751,14 +752,14 @@ static void test_points_conserve(void **state) {
         const dem2d_vec up = vec(0, 1), down = vec(0, -1);
         q[Y] = reach(a, dem2d_pose_make(0, 0, q[TURN_A], 1), up) - depth +
                reach(b, dem2d_pose_make(0, 0, q[TURN_B], 1), down);
-        if (!energy_of(a, b, q, &energy, force)) continue;
+        if (!pair_energy(a, b, q, &energy, force)) continue;
         looked++;
         bool two = true;
         for (int i = 0; i < WAYS; i++) {
             const double at = q[i];
             for (int k = 0; k < 2; k++) {
                 q[i] = at + (k ? -step : step);
-                two = energy_of(a, b, q, &ways[k], unused) && two;
+                two = pair_energy(a, b, q, &ways[k], unused) && two;
             }
             q[i] = at;
             worst = fmax(worst, fabs(force[i] + (ways[0] - ways[1]) / (2 * step)));
@@ -789,8 +790,8 @@ static dem2d_shape *unequal_sides(void) {
         for (int k = 0; k < 5; k++)
             control[6 * i + k] =
                 vec(from.x + c[k] * (to.x - from.x), from.y + c[k] * (to.y - from.y));
-        control[6 * i + 5] = vec(to.x + cut / other / 3 * (next.x - to.x),
-                                 to.y + cut / other / 3 * (next.y - to.y));
+        control[6 * i + 5] =
+            vec(to.x + cut / other / 3 * (next.x - to.x), to.y + cut / other / 3 * (next.y - to.y));
     }
     dem2d_shape *shape;
     assert_ok(dem2d_shape_create_bezier(NULL, control, 2 * SIDES, &shape));
@@ -809,7 +810,7 @@ static void test_next_straight_arc(void **state) {
     q[Y] = reach(shapes[BOX], dem2d_pose_make(0, 0, 0, 1), vec(0, 1)) + 0.96;
     for (int i = 0; i <= STEPS; i++) {
         q[TURN_B] = i * turn;
-        twos += energy_of(shapes[BOX], b, q, &energy, force);
+        twos += pair_energy(shapes[BOX], b, q, &energy, force);
         const double most = hypot(force[X], force[Y]) * 0.2 * turn;
         if (i > 0) worst = fmax(worst, fabs(energy - last) / most);
         last = energy;
@@ -821,12 +822,6 @@ static void test_next_straight_arc(void **state) {
 
 /* --- scenes ---------------------------------------------------------------------------------- */
 
-typedef struct scene {
-    dem2d_world *world;
-    dem2d_material_id material;
-    dem2d_wall_id floor;
-} scene;
-
 static dem2d_world_desc basic_desc(double time_step) {
     dem2d_world_desc desc = {0};
     desc.time_step = time_step, desc.contact_tolerance = 1e-12, desc.gravity.y = -G;
@@ -834,69 +829,25 @@ static dem2d_world_desc basic_desc(double time_step) {
 }
 
 static scene make_scene(const dem2d_world_desc *desc, double kt, double friction) {
-    const dem2d_material_desc material = {DENSITY, KN, kt, friction, 0, 0};
-    scene s;
-    memset(&s, 0, sizeof s);
-    assert_ok(dem2d_world_create(desc, &s.world));
-    assert_ok(dem2d_world_add_material(s.world, &material, &s.material));
-    return s;
-}
-
-static dem2d_wall_id add_wall(const scene *s, dem2d_vec point, dem2d_vec normal) {
-    dem2d_wall_desc desc = {0};
-    dem2d_wall_id id;
-    desc.material = s->material, desc.point = point, desc.normal = normal;
-    assert_ok(dem2d_world_add_wall(s->world, &desc, &id));
-    return id;
+    dem2d_material_desc material = stone_desc(kt, friction);
+    material.density = DENSITY;
+    return open_scene(desc, &material);
 }
 
 static scene floor_scene(const dem2d_world_desc *desc, double kt, double friction) {
-    scene s = make_scene(desc, kt, friction);
-    s.floor = add_wall(&s, vec(0, 0), vec(0, 1));
+    const scene s = make_scene(desc, kt, friction);
+    add_floor(&s);
     return s;
 }
 
 static dem2d_particle_id add(const scene *s, const dem2d_shape *shape, dem2d_motion motion,
                              double x, double y, double angle) {
-    dem2d_particle_desc desc = {0};
-    dem2d_particle_id id;
-    assert_ok(dem2d_world_add_shape(s->world, shape, &desc.shape));
-    desc.scale = 1, desc.material = s->material, desc.motion = motion;
-    desc.position = vec(x, y), desc.angle = angle;
-    assert_ok(dem2d_world_add_particle(s->world, &desc, &id));
-    return id;
+    return add_copy(s, shape, motion, vec(x, y), angle, vec(0, 0), 0);
 }
 
-static void step(const scene *s, int count) {
-    assert_ok(dem2d_world_step(s->world, count, NULL));
-}
-
-static dem2d_particle_info particle(const scene *s, dem2d_particle_id id) {
-    dem2d_particle_info info;
-    assert_ok(dem2d_world_get_particle(s->world, id, &info));
-    return info;
-}
-
-static double angle_of(const scene *s, dem2d_particle_id id) {
-    return dem2d_rot_angle(particle(s, id).pose.rotation);
-}
-
-static dem2d_vec wall_force(const scene *s) {
-    dem2d_wall_info info;
-    assert_ok(dem2d_world_get_wall(s->world, s->floor, &info));
-    return info.force;
-}
-
-static int contacts(const scene *s, dem2d_contact_info *list, int room) {
-    int count;
-    assert_ok(dem2d_world_contacts(s->world, list, room, &count));
-    return count;
-}
-
-static dem2d_stats stats(const scene *s) {
-    dem2d_stats info;
-    assert_ok(dem2d_world_stats(s->world, &info));
-    return info;
+static dem2d_vec floor_force(const scene *s) {
+    const dem2d_wall_id first = {0, 1};
+    return wall_of(s, first).force;
 }
 
 static dem2d_energy energy(const scene *s) {
@@ -925,17 +876,17 @@ static void test_box_at_rest(void **state) {
     const dem2d_world_desc desc = basic_desc(2e-4);
     const scene s = floor_scene(&desc, KN, 0.5);
     const dem2d_particle_id id = add(&s, shapes[BOX], DEM2D_FREE, 0, 0.5005, 1e-3);
-    const double weight = particle(&s, id).mass * G;
+    const double weight = grain_of(&s, id).mass * G;
     dem2d_contact_info c;
     set_damping(&s, 0.5);
     step(&s, 20000);
-    assert_near(-wall_force(&s).y, weight, 1e-6);
+    assert_near(-floor_force(&s).y, weight, 1e-6);
     assert_within(angle_of(&s, id), 0, 1e-4);
-    assert_int_equal(contacts(&s, &c, 1), 1);
+    assert_int_equal(contacts_of(&s, &c, 1), 1);
     assert_int_equal(c.points, 2);
     assert_near(c.normal_force, weight, 1e-6);
     assert_near(c.depth, weight / (2 * KN), 0.02);
-    assert_near(particle(&s, id).pose.position.y, 0.5 - weight / (2 * KN), 1e-7);
+    assert_near(grain_of(&s, id).pose.position.y, 0.5 - weight / (2 * KN), 1e-7);
     dem2d_world_destroy(s.world);
 }
 
@@ -956,12 +907,12 @@ static void test_box_on_box(void **state) {
         dem2d_contact_info c;
         set_damping(&s, 0.5);
         step(&s, 30000);
-        assert_int_equal(contacts(&s, &c, 1), 1);
+        assert_int_equal(contacts_of(&s, &c, 1), 1);
         assert_int_equal(c.points, 2);
         /* tilted by the unequal load of both points, so the normal force is the weight to tilt^2 */
-        assert_near(c.normal_force, particle(&s, id).mass * G, 1e-5);
+        assert_near(c.normal_force, grain_of(&s, id).mass * G, 1e-5);
         assert_within(angle_of(&s, id), 0, rows[i].x == 0 ? 1e-4 : 2e-2);
-        assert_within(length(particle(&s, id).velocity), 0, 1e-6);
+        assert_within(length(grain_of(&s, id).velocity), 0, 1e-6);
         dem2d_world_destroy(s.world);
     }
 }
@@ -993,12 +944,12 @@ static void test_stack_at_rest(void **state) {
     const scene s = make_stack(DEM2D_CERTIFIED, ids);
     const double time = 1, weight = DENSITY * G;
     set_damping(&s, 0);
-    for (int i = 0; i < STACK; i++) at[i] = particle(&s, ids[i]).pose.position;
+    for (int i = 0; i < STACK; i++) at[i] = grain_of(&s, ids[i]).pose.position;
     step(&s, (int)(time / 5e-4));
-    assert_near(-wall_force(&s).y, STACK * weight, 1e-6);
+    assert_near(-floor_force(&s).y, STACK * weight, 1e-6);
     double y = 0.5;
     for (int i = 0; i < STACK; i++) {
-        const dem2d_vec now = particle(&s, ids[i]).pose.position;
+        const dem2d_vec now = grain_of(&s, ids[i]).pose.position;
         y -= weight * (STACK - i) / (2 * KN);
         assert_within(angle_of(&s, ids[i]), 0, 1e-4);
         assert_within(length(sub(now, at[i])) / time, 0, 1e-6);
@@ -1014,13 +965,13 @@ static void test_stack_by_both_solvers(void **state) {
     dem2d_particle_id ids[2][STACK];
     const scene s[2] = {make_stack(DEM2D_CERTIFIED, ids[0]), make_stack(DEM2D_GJK_EPA, ids[1])};
     for (int i = 0; i < STACK; i++) {
-        const dem2d_pose a = particle(&s[0], ids[0][i]).pose, b = particle(&s[1], ids[1][i]).pose;
+        const dem2d_pose a = grain_of(&s[0], ids[0][i]).pose, b = grain_of(&s[1], ids[1][i]).pose;
         assert_within(length(sub(a.position, b.position)), 0, 1e-7);
         assert_within(dem2d_rot_angle(a.rotation) - dem2d_rot_angle(b.rotation), 0, 1e-7);
     }
     for (int i = 0; i < 2; i++) {
-        assert_near(-wall_force(&s[i]).y, STACK * DENSITY * G, 1e-6);
-        assert_int_equal(stats(&s[i]).not_converged, 0);
+        assert_near(-floor_force(&s[i]).y, STACK * DENSITY * G, 1e-6);
+        assert_int_equal(stats_of(&s[i]).not_converged, 0);
         dem2d_world_destroy(s[i].world);
     }
 }
@@ -1050,16 +1001,16 @@ static void test_block_slides(void **state) {
         const double mu = frictions[i], b = atan(mu) + 0.5 * DEGREE;
         dem2d_particle_id id;
         const scene s = on_slope(width, height, mu, atan(mu) - 0.5 * DEGREE, &id);
-        const dem2d_vec rest = particle(&s, id).pose.position;
+        const dem2d_vec rest = grain_of(&s, id).pose.position;
         set_damping(&s, 0);
         step(&s, 5000);
-        const dem2d_particle_info stuck = particle(&s, id);
+        const dem2d_particle_info stuck = grain_of(&s, id);
         assert_within(length(sub(stuck.pose.position, rest)), 0, 1e-6);
-        assert_within(wall_force(&s).x, stuck.mass * G * sin(b - DEGREE), 1e-3 * stuck.mass * G);
+        assert_within(floor_force(&s).x, stuck.mass * G * sin(b - DEGREE), 1e-3 * stuck.mass * G);
         set_gravity(&s, b);
         step(&s, 10000); /* 1 s */
         const double slide = 0.5 * G * (sin(b) - mu * cos(b));
-        assert_near(particle(&s, id).pose.position.x - rest.x, slide, 0.03);
+        assert_near(grain_of(&s, id).pose.position.x - rest.x, slide, 0.03);
         assert_within(angle_of(&s, id), 0, 0.01);
         dem2d_world_destroy(s.world);
     }
@@ -1073,9 +1024,9 @@ static void test_block_topples(void **state) {
         const double height = 1, width = ratios[i] * height, edge = atan(ratios[i]);
         dem2d_particle_id id;
         const scene s = on_slope(width, height, 0.9, edge - 0.5 * DEGREE, &id);
-        const dem2d_vec rest = particle(&s, id).pose.position;
+        const dem2d_vec rest = grain_of(&s, id).pose.position;
         step(&s, 10000);
-        assert_within(length(sub(particle(&s, id).pose.position, rest)), 0, 1e-5);
+        assert_within(length(sub(grain_of(&s, id).pose.position, rest)), 0, 1e-5);
         assert_within(angle_of(&s, id), 0, 0.5 * DEGREE);
         set_damping(&s, 0);
         set_gravity(&s, edge + 0.5 * DEGREE);
@@ -1098,7 +1049,7 @@ static double rocking_drift(dem2d_face_rule rule, double time_step) {
     const scene s = floor_scene(&desc, 0, 0);
     const double y = reach(shapes[BOX], dem2d_pose_make(0, 0, tilt, 1), vec(0, -1));
     const dem2d_particle_id id = add(&s, shapes[BOX], DEM2D_FREE, 0, y, tilt);
-    const double lifted = particle(&s, id).mass * G * (y - 0.5);
+    const double lifted = grain_of(&s, id).mass * G * (y - 0.5);
     double lowest = tilt;
     for (int i = 0; i < (int)(20 / (10 * time_step)); i++) {
         step(&s, i ? 10 : 1);
@@ -1156,9 +1107,9 @@ static probe force_pass(dem2d_face_rule rule, const dem2d_shape *a, const dem2d_
             add(&s, b, DEM2D_FREE, pb->position.x, pb->position.y, dem2d_rot_angle(pb->rotation));
     step(&s, 1);
     p.energy = energy(&s).normal;
-    p.count = contacts(&s, &p.c, 1);
+    p.count = contacts_of(&s, &p.c, 1);
     for (int i = 0; i < (b ? 2 : 1); i++) {
-        const dem2d_particle_info info = particle(&s, ids[i]);
+        const dem2d_particle_info info = grain_of(&s, ids[i]);
         p.force[i] = info.force, p.torque[i] = info.torque;
     }
     dem2d_world_destroy(s.world);
@@ -1188,12 +1139,12 @@ static void test_shear_at_rest(void **state) {
         const scene s = pair ? make_scene(&desc, KN, 0.5) : floor_scene(&desc, KN, 0.5);
         if (pair) add(&s, shapes[LARGE], DEM2D_FIXED, 0, -0.5, 0);
         const dem2d_particle_id id = add(&s, shapes[BOX], DEM2D_FREE, 0, 0.499, 0);
-        const double weight = particle(&s, id).mass * G, slope = 10 * DEGREE;
+        const double weight = grain_of(&s, id).mass * G, slope = 10 * DEGREE;
         dem2d_contact_info c;
         set_gravity(&s, slope);
         set_damping(&s, 0.5);
         step(&s, 40000);
-        assert_int_equal(contacts(&s, &c, 1), 1);
+        assert_int_equal(contacts_of(&s, &c, 1), 1);
         assert_int_equal(c.points, 2);
         const double tilt = angle_of(&s, id);
         /* force along the floor, from the components along the contact's own axes */
@@ -1227,7 +1178,7 @@ static void drive(driver *d, double v, double spin, int count) {
         assert_ok(dem2d_world_drive_particle(d->s.world, d->id, DEM2D_DRIVEN,
                                              vec(v + spin * pivot.y, -spin * pivot.x), spin));
         step(&d->s, 1);
-        assert_int_equal(contacts(&d->s, &c, 1), 1);
+        assert_int_equal(contacts_of(&d->s, &c, 1), 1);
         assert_between(c.points, 1, 2);
         d->points[c.points]++;
         d->most = fmax(d->most, fabs(c.tangential_force - d->last));
@@ -1243,7 +1194,7 @@ static void test_shear_from_two_to_one(void **state) {
     const double depth = 2e-3, speed = 0.01, spin = 0.05, dt = 1e-4, friction = 0.5;
     for (int pair = 0; pair < 2; pair++) {
         const dem2d_world_desc desc = basic_desc(dt);
-        driver d = {{NULL, {0, 0}, {0, 0}}, {0, 0}, {-0.5, -0.5}, false, 0, 0, 0, {0, 0, 0}};
+        driver d = {{NULL, {0, 0}}, {0, 0}, {-0.5, -0.5}, false, 0, 0, 0, {0, 0, 0}};
         d.s = pair ? make_scene(&desc, KN, friction) : floor_scene(&desc, KN, friction);
         if (pair) add(&d.s, shapes[LARGE], DEM2D_FIXED, 0, -0.5, 0);
         d.id = add(&d.s, shapes[BOX], DEM2D_DRIVEN, 0, 0.5 - depth, 0);
@@ -1277,7 +1228,7 @@ static void test_shear_over_a_corner(void **state) {
     const double depth = 2e-3, speed = 0.01, spin = 0.5, dt = 1e-4, start = 40 * DEGREE;
     for (int pair = 0; pair < 2; pair++) {
         const dem2d_world_desc desc = basic_desc(dt);
-        driver d = {{NULL, {0, 0}, {0, 0}}, {0, 0}, {-0.5, -0.5}, false, 0, 0, 0, {0, 0, 0}};
+        driver d = {{NULL, {0, 0}}, {0, 0}, {-0.5, -0.5}, false, 0, 0, 0, {0, 0, 0}};
         const dem2d_vec corner = turn(d.pivot, start);
         d.s = pair ? make_scene(&desc, KN, 0.5) : floor_scene(&desc, KN, 0.5);
         if (pair) add(&d.s, shapes[LARGE], DEM2D_FIXED, 0, -0.5, 0);
@@ -1302,7 +1253,7 @@ static void test_shear_of_a_roller(void **state) {
     const double depth = 1e-3, speed = 0.01, spin = 0.5, dt = 1e-4, friction = 0.5;
     for (int pair = 0; pair < 2; pair++) {
         const dem2d_world_desc desc = basic_desc(dt);
-        driver d = {{NULL, {0, 0}, {0, 0}}, {0, 0}, {0, -0.5}, true, 0, 0, 0, {0, 0, 0}};
+        driver d = {{NULL, {0, 0}}, {0, 0}, {0, -0.5}, true, 0, 0, 0, {0, 0, 0}};
         const double height = reach(shapes[GON64], still(), vec(0, -1)) - depth;
         d.s = pair ? make_scene(&desc, KN, friction) : floor_scene(&desc, KN, friction);
         if (pair) add(&d.s, shapes[LARGE], DEM2D_FIXED, 0, -0.5, 0);
@@ -1321,7 +1272,8 @@ static void test_shear_of_a_roller(void **state) {
     }
 }
 
-/* Two driven shapes turn and slide on each other; the world knows them in this order or the other. */
+/* Two driven shapes turn and slide on each other; the world knows them in this order or the other.
+ */
 static scene driven_pair(uint64_t seed, const int kinds[2], bool swapped) {
     dem2d_world_desc desc = basic_desc(1e-3);
     uint64_t random = seed;
@@ -1345,14 +1297,15 @@ static scene driven_pair(uint64_t seed, const int kinds[2], bool swapped) {
     for (int k = 0; k < 2; k++) {
         const int i = swapped ? 1 - k : k;
         id[i] = add(&s, shapes[kinds[i]], DEM2D_DRIVEN, at[i].x, at[i].y, angle[i]);
-        assert_ok(dem2d_world_drive_particle(s.world, id[i], DEM2D_DRIVEN,
-                                             i == 1 ? v : vec(0, 0), spin[i]));
+        assert_ok(dem2d_world_drive_particle(s.world, id[i], DEM2D_DRIVEN, i == 1 ? v : vec(0, 0),
+                                             spin[i]));
     }
     return s;
 }
 
-/* Which of two grains has the lower id changes rounding only: each point keeps its spring, whoever's
-   corner it is at, as edges and normals come and go. Returns the steps with two points. */
+/* Which of two grains has the lower id changes rounding only: each point keeps its spring,
+   whoever's corner it is at, as edges and normals come and go. Returns the steps with two points.
+ */
 static int check_order(uint64_t seed, const int kinds[2]) {
     const scene s[2] = {driven_pair(seed, kinds, false), driven_pair(seed, kinds, true)};
     int twos = 0;
@@ -1360,7 +1313,7 @@ static int check_order(uint64_t seed, const int kinds[2]) {
         dem2d_contact_info c[2];
         for (int k = 0; k < 2; k++) {
             step(&s[k], 1);
-            if (contacts(&s[k], &c[k], 1) == 0) memset(&c[k], 0, sizeof c[k]);
+            if (contacts_of(&s[k], &c[k], 1) == 0) memset(&c[k], 0, sizeof c[k]);
         }
         /* a tie of the least depth: either normal is right */
         if (length(vec(c[0].normal.x + c[1].normal.x, c[0].normal.y + c[1].normal.y)) > 1e-6) break;
@@ -1407,8 +1360,8 @@ static void test_deep_images(void **state) {
             const dem2d_particle_id id =
                 add(&s, shape, DEM2D_DRIVEN, 0, y, k == 0 ? angle : -angle);
             step(&s, 1);
-            assert_int_equal(contacts(&s, &c[k], 1), 1);
-            info[k] = particle(&s, id);
+            assert_int_equal(contacts_of(&s, &c[k], 1), 1);
+            info[k] = grain_of(&s, id);
             dem2d_shape_destroy(shape);
             dem2d_world_destroy(s.world);
         }
@@ -1526,7 +1479,7 @@ static gas make_gas(dem2d_solver solver, dem2d_face_rule faces) {
     g.s = make_scene(&desc, 0, 0);
     for (int i = 0; i < 4; i++) {
         const dem2d_vec normal = turn(vec(0, 1), i * 90 * DEGREE);
-        add_wall(&g.s, vec(1.2 - 1.2 * normal.x, 1.2 - 1.2 * normal.y), normal);
+        add_plane(&g.s, 1.2 - 1.2 * normal.x, 1.2 - 1.2 * normal.y, normal.x, normal.y);
     }
     for (int i = 0; i < GRAINS; i++) {
         dem2d_particle_desc grain = {0};
@@ -1548,7 +1501,7 @@ static void brute_force(const gas *g, double depth[GRAINS][GRAINS]) {
     dem2d_contact_desc exact = {0};
     dem2d_particle_info at[GRAINS];
     exact.tolerance = 1e-12;
-    for (int i = 0; i < GRAINS; i++) at[i] = particle(&g->s, g->ids[i]);
+    for (int i = 0; i < GRAINS; i++) at[i] = grain_of(&g->s, g->ids[i]);
     for (int i = 0; i < GRAINS; i++)
         for (int j = i + 1; j < GRAINS; j++) {
             const dem2d_vec d = sub(at[j].pose.position, at[i].pose.position);
@@ -1569,7 +1522,7 @@ static int step_and_compare(const gas *g) {
     const double unsure = 4e-12; /* sum of the tolerances, of sizes below 1 */
     brute_force(g, depth);
     step(&g->s, 1);
-    const int count = contacts(&g->s, list, COUNT_OF(list));
+    const int count = contacts_of(&g->s, list, COUNT_OF(list));
     for (int i = 0; i < count; i++) {
         if (list[i].b.generation == 0) continue; /* a wall */
         double *expected = &depth[list[i].a.index][list[i].b.index];
@@ -1581,14 +1534,14 @@ static int step_and_compare(const gas *g) {
         for (int j = i + 1; j < GRAINS; j++)
             if (depth[i][j] > unsure) {
                 print_error("grains %d and %d overlap by %.3g and were not met, step %d\n", i, j,
-                            depth[i][j], (int)stats(&g->s).steps);
+                            depth[i][j], (int)stats_of(&g->s).steps);
                 fail();
             }
     return count;
 }
 
 static void assert_counts(const scene *s) {
-    const dem2d_stats n = stats(s);
+    const dem2d_stats n = stats_of(s);
     int64_t sum = n.separations;
     for (int i = 0; i < DEM2D_PROOF_COUNT; i++) {
         assert_true(n.proofs[i] >= 0);
@@ -1617,7 +1570,7 @@ static void test_no_contact_is_late(void **state) {
         for (int i = 0; i < rows[row].steps; i++) {
             const dem2d_particle_id id = g.ids[random_below(&random, GRAINS)];
             const dem2d_vec way = direction(random_between(&random, -3, 3));
-            const dem2d_vec at = particle(&g.s, id).pose.position;
+            const dem2d_vec at = grain_of(&g.s, id).pose.position;
             if (i % 10 == 0)
                 assert_ok(dem2d_world_drive_particle(g.s.world, id, DEM2D_FREE,
                                                      vec(2 * way.x, 2 * way.y),
@@ -1658,7 +1611,7 @@ static void test_skipped_collisions(void **state) {
     dem2d_particle_id ids[ROW * ROW];
     const scene s = make_lattice(ids);
     step(&s, 5000);
-    const dem2d_stats n = stats(&s);
+    const dem2d_stats n = stats_of(&s);
     assert_true(n.pairs >= 2 * ROW * (ROW - 1)); /* or there was nothing to skip */
     assert_int_equal(n.contacts, 0);
     assert_true(n.collisions >= n.separations);
@@ -1679,25 +1632,25 @@ static void test_skips_end_at_once(void **state) {
         const dem2d_shape *sa = shapes[a % 3 ? ROUNDED : OVAL],
                           *sb = shapes[b % 3 ? ROUNDED : OVAL];
         step(&s, 1000);
-        const dem2d_vec at = particle(&s, ids[b]).pose.position;
+        const dem2d_vec at = grain_of(&s, ids[b]).pose.position;
         const dem2d_motion motion = way == 3 ? DEM2D_DRIVEN : DEM2D_FREE;
         if (way == 0) { /* moved by hand */
             assert_ok(dem2d_world_move_particle(s.world, ids[b], vec(at.x - 0.4, at.y), 0));
         } else if (way == 1) { /* put near, then turned by hand */
             assert_ok(dem2d_world_move_particle(s.world, ids[b], vec(at.x - 0.12, at.y), 0));
             step(&s, 500);
-            const dem2d_vec near = particle(&s, ids[b]).pose.position;
+            const dem2d_vec near = grain_of(&s, ids[b]).pose.position;
             assert_ok(dem2d_world_move_particle(s.world, ids[b], near, 0.7));
         }
         if (way >= 2) assert_ok(dem2d_world_drive_particle(s.world, ids[b], motion, vec(-3, 0), 2));
         bool overlaps = false;
         for (int i = 0; i < 200 && !overlaps; i++) {
             dem2d_contact c;
-            assert_ok(dem2d_pair_contact(sa, particle(&s, ids[a]).pose, sb,
-                                         particle(&s, ids[b]).pose, NULL, &c));
+            assert_ok(dem2d_pair_contact(sa, grain_of(&s, ids[a]).pose, sb,
+                                         grain_of(&s, ids[b]).pose, NULL, &c));
             overlaps = c.depth > 0;
             step(&s, 1);
-            assert_int_equal(stats(&s).contacts, overlaps);
+            assert_int_equal(stats_of(&s).contacts, overlaps);
         }
         assert_true(overlaps);
         dem2d_world_destroy(s.world);

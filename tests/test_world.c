@@ -2,17 +2,13 @@
    repeat bit for bit, and failures in the middle of a step. */
 #include "dem2d.h"
 #include "testing.h"
+#include "world_scene.h"
 
 #include <float.h>
 
 #define G 9.81
 
 /* --- building blocks ------------------------------------------------------------------------- */
-
-typedef struct scene {
-    dem2d_world *world;
-    dem2d_material_id material;
-} scene;
 
 static const dem2d_material_desc stone = {2700, 1e7, 1e7, 0.4, 0, 0};
 
@@ -22,50 +18,26 @@ static dem2d_world_desc basic_desc(void) {
     return desc;
 }
 
-static scene make_scene(const dem2d_world_desc *desc, const dem2d_material_desc *material) {
-    scene s;
-    assert_ok(dem2d_world_create(desc, &s.world));
-    assert_ok(dem2d_world_add_material(s.world, material, &s.material));
-    return s;
-}
-
 static dem2d_shape_id add_disc(dem2d_world *world, double radius) {
-    dem2d_shape *shape;
-    dem2d_shape_id id;
-    assert_ok(dem2d_shape_create_circle(NULL, radius, &shape));
-    assert_ok(dem2d_world_add_shape(world, shape, &id));
-    dem2d_shape_destroy(shape);
-    return id;
+    const scene s = {world, {0, 0}};
+    return give_shape(&s, make_disc(radius));
 }
 
-static dem2d_particle_desc grain_desc(const scene *s, dem2d_shape_id shape, double x, double y) {
-    dem2d_particle_desc desc = {0};
-    desc.scale = 1, desc.shape = shape, desc.material = s->material;
-    desc.position = vec(x, y);
-    return desc;
+/* A grain of size 1. */
+static dem2d_particle_desc one_desc(const scene *s, dem2d_shape_id shape, double x, double y) {
+    return grain_desc(s, shape, 1, vec(x, y));
 }
 
-static dem2d_particle_id add_grain(const scene *s, dem2d_shape_id shape, double x, double y) {
-    const dem2d_particle_desc desc = grain_desc(s, shape, x, y);
-    dem2d_particle_id id;
-    assert_ok(dem2d_world_add_particle(s->world, &desc, &id));
-    return id;
+static dem2d_particle_id add_one(const scene *s, dem2d_shape_id shape, double x, double y) {
+    const dem2d_particle_desc desc = one_desc(s, shape, x, y);
+    return add_grain(s, &desc);
 }
 
 static dem2d_wall_desc wall_desc(const scene *s, double x, double y, double nx, double ny) {
-    dem2d_wall_desc desc = {0};
-    desc.material = s->material, desc.point = vec(x, y), desc.normal = vec(nx, ny);
-    return desc;
+    return plane_desc(s, vec(x, y), vec(nx, ny));
 }
 
-static dem2d_wall_id add_wall(const scene *s, double x, double y, double nx, double ny) {
-    const dem2d_wall_desc desc = wall_desc(s, x, y, nx, ny);
-    dem2d_wall_id id;
-    assert_ok(dem2d_world_add_wall(s->world, &desc, &id));
-    return id;
-}
-
-static void step(dem2d_world *world, int count) {
+static void run(dem2d_world *world, int count) {
     int done = -1;
     assert_ok(dem2d_world_step(world, count, &done));
     assert_int_equal(done, count);
@@ -293,7 +265,7 @@ static void make_pile(pile *p, test_env *env, const pile_desc *desc) {
         const int kind = desc->kinds == DISCS    ? DEM2D_CIRCLE
                          : desc->kinds == SMOOTH ? smooth[i % COUNT_OF(smooth)]
                                                  : i % (DEM2D_SHAPE_TYPE_COUNT + 1);
-        dem2d_particle_desc grain = grain_desc(&p->scene, p->shapes[kind], 0, 0);
+        dem2d_particle_desc grain = one_desc(&p->scene, p->shapes[kind], 0, 0);
         dem2d_particle_id id;
         grain.position.x = size * (0.05 + 0.08 * (i % 6) + random_between(&random, -0.004, 0.004));
         grain.position.y = size * (0.04 + 0.07 * (i / 6));
@@ -410,7 +382,7 @@ enum { MATERIALS, PAIRS, PARTICLES, WALLS };
 static dem2d_result add_bad(int what, const scene *s, dem2d_shape_id shape, const bad_field *bad) {
     dem2d_material_desc material = stone;
     dem2d_pair_desc meeting = {1e6, 1e6, 0.5, 0, 0};
-    dem2d_particle_desc grain = grain_desc(s, shape, 0, 0);
+    dem2d_particle_desc grain = one_desc(s, shape, 0, 0);
     dem2d_wall_desc plane = wall_desc(s, 0, 0, 0, 1);
     dem2d_material_id material_id;
     dem2d_particle_id particle_id;
@@ -445,7 +417,7 @@ static void test_add_errors(void **state) {
     dem2d_world_desc desc = basic_desc();
     test_env_init(&env);
     desc.env = &env.env;
-    const scene s = make_scene(&desc, &stone);
+    const scene s = open_scene(&desc, &stone);
     const dem2d_shape_id disc = add_disc(s.world, 0.1);
     for (int what = MATERIALS; what <= WALLS; what++) {
         for (int i = 0; i < tables[what].count; i++) {
@@ -459,7 +431,7 @@ static void test_add_errors(void **state) {
     }
     assert_int_equal(stats(s.world).particles, 0);
     assert_int_equal(stats(s.world).walls, 0);
-    dem2d_particle_desc fixed = grain_desc(&s, disc, 0, 0);
+    dem2d_particle_desc fixed = one_desc(&s, disc, 0, 0);
     dem2d_particle_id id;
     fixed.motion = DEM2D_FIXED, fixed.velocity.x = 1;
     assert_result(dem2d_world_add_particle(s.world, &fixed, &id), DEM2D_OUT_OF_RANGE);
@@ -487,14 +459,14 @@ static void check_all_null(const dem2d_result *results, int count) {
 static void test_null_arguments(void **state) {
     (void)state;
     const dem2d_world_desc desc = basic_desc();
-    const scene s = make_scene(&desc, &stone);
+    const scene s = open_scene(&desc, &stone);
     dem2d_world *const w = s.world;
     const dem2d_shape_id disc = add_disc(w, 0.1);
     const dem2d_shape *const shape = dem2d_world_shape(w, disc);
-    const dem2d_particle_desc grain_d = grain_desc(&s, disc, 0, 0);
+    const dem2d_particle_desc grain_d = one_desc(&s, disc, 0, 0);
     const dem2d_wall_desc wall_d = wall_desc(&s, 0, 0, 0, 1);
-    const dem2d_particle_id grain = add_grain(&s, disc, 0, 0);
-    const dem2d_wall_id floor = add_wall(&s, 0, -1, 0, 1);
+    const dem2d_particle_id grain = add_one(&s, disc, 0, 0);
+    const dem2d_wall_id floor = add_plane(&s, 0, -1, 0, 1);
     dem2d_shape_id shape_id;
     dem2d_material_id material_id;
     dem2d_particle_id grain_id;
@@ -534,10 +506,10 @@ static void test_null_arguments(void **state) {
 static void test_null_queries(void **state) {
     (void)state;
     const dem2d_world_desc desc = basic_desc();
-    const scene s = make_scene(&desc, &stone);
+    const scene s = open_scene(&desc, &stone);
     dem2d_world *const w = s.world;
-    const dem2d_particle_id grain = add_grain(&s, add_disc(w, 0.1), 0, 0);
-    const dem2d_wall_id floor = add_wall(&s, 0, -1, 0, 1);
+    const dem2d_particle_id grain = add_one(&s, add_disc(w, 0.1), 0, 0);
+    const dem2d_wall_id floor = add_plane(&s, 0, -1, 0, 1);
     const dem2d_svg_desc svg = {0};
     dem2d_particle_info particle_info;
     dem2d_wall_info wall_info;
@@ -602,10 +574,10 @@ static void check_stale(dem2d_world *w, dem2d_shape_id shape, dem2d_material_id 
 static void test_ids(void **state) {
     (void)state;
     const dem2d_world_desc desc = basic_desc();
-    const scene s = make_scene(&desc, &stone);
+    const scene s = open_scene(&desc, &stone);
     const dem2d_shape_id disc = add_disc(s.world, 0.1), spare = add_disc(s.world, 0.2);
-    const dem2d_particle_id grain = add_grain(&s, disc, 0, 0);
-    const dem2d_wall_id left = add_wall(&s, -1, 0, 1, 0), right = add_wall(&s, 1, 0, -1, 0);
+    const dem2d_particle_id grain = add_one(&s, disc, 0, 0);
+    const dem2d_wall_id left = add_plane(&s, -1, 0, 1, 0), right = add_plane(&s, 1, 0, -1, 0);
     dem2d_wall_desc lid_desc = wall_desc(&s, 0, 1, 0, -1);
     dem2d_wall_id lid;
     dem2d_material_id other = s.material;
@@ -627,17 +599,17 @@ static void test_ids(void **state) {
     check_stale(s.world, spare, other, grain, right);
     /* new objects may take the slots; the old ids still name nothing */
     const dem2d_shape_id new_disc = add_disc(s.world, 0.3);
-    const dem2d_particle_id new_grain = add_grain(&s, disc, 0, 0);
-    const dem2d_wall_id new_wall = add_wall(&s, 1, 0, -1, 0);
+    const dem2d_particle_id new_grain = add_one(&s, disc, 0, 0);
+    const dem2d_wall_id new_wall = add_plane(&s, 1, 0, -1, 0);
     check_stale(s.world, spare, other, grain, right);
     assert_non_null(dem2d_world_shape(s.world, new_disc));
     assert_near(particle(s.world, new_grain).mass, 2700 * 0.01L * TEST_PI, 1e-14);
     assert_near(wall(s.world, new_wall).point.x, 1, 0);
 
-    dem2d_particle_desc bad = grain_desc(&s, spare, 0, 0);
+    dem2d_particle_desc bad = one_desc(&s, spare, 0, 0);
     dem2d_particle_id id;
     assert_result(dem2d_world_add_particle(s.world, &bad, &id), DEM2D_STALE_ID);
-    bad = grain_desc(&s, disc, 0, 0), bad.material = other;
+    bad = one_desc(&s, disc, 0, 0), bad.material = other;
     assert_result(dem2d_world_add_particle(s.world, &bad, &id), DEM2D_STALE_ID);
     assert_result(dem2d_world_add_wall(s.world, &lid_desc, &lid), DEM2D_STALE_ID); /* span right */
     lid_desc = wall_desc(&s, 0, 1, 0, -1), lid_desc.material = other;
@@ -667,26 +639,26 @@ static void check_meeting(const dem2d_pair_desc *given, double kn, double kt, do
                               second = {1e9, 3e6, 1.2e6, 0.2, 0, 0};
     dem2d_world_desc desc = basic_desc();
     desc.time_step = 1e-5;
-    scene s = make_scene(&desc, &first);
+    scene s = open_scene(&desc, &first);
     const dem2d_shape_id disc = add_disc(s.world, 1);
-    dem2d_particle_desc slider = grain_desc(&s, disc, 0, 1.999);
+    dem2d_particle_desc slider = one_desc(&s, disc, 0, 1.999);
     dem2d_particle_id id;
     slider.motion = DEM2D_DRIVEN, slider.velocity.x = 1e-2;
     assert_ok(dem2d_world_add_particle(s.world, &slider, &id));
     const dem2d_material_id material = s.material;
     assert_ok(dem2d_world_add_material(s.world, &second, &s.material));
-    add_grain(&s, disc, 0, 0);
+    add_one(&s, disc, 0, 0);
     if (given) assert_ok(dem2d_world_set_pair(s.world, material, s.material, given));
-    step(s.world, 100);
+    run(s.world, 100);
     dem2d_contact_info c = only_contact(s.world);
     assert_near(c.normal_force / c.depth, kn, 1e-13);
     const double before = fabs(c.tangential_force);
-    step(s.world, 100);
+    run(s.world, 100);
     c = only_contact(s.world);
     assert_between(fabs(c.tangential_force), 0, 0.9 * mu * c.normal_force);
     /* 100 steps of 1e-7 m; the lever arm is short of the radius by half of 1e-3 */
     assert_near(fabs(c.tangential_force) - before, kt * 1e-5, 1e-3);
-    step(s.world, 20000);
+    run(s.world, 20000);
     c = only_contact(s.world);
     assert_near(fabs(c.tangential_force), mu * c.normal_force, 1e-13);
     dem2d_world_destroy(s.world);
@@ -705,17 +677,17 @@ static void test_motion(void **state) {
     (void)state;
     dem2d_world_desc desc = basic_desc();
     desc.gravity.y = -G;
-    const scene s = make_scene(&desc, &stone);
+    const scene s = open_scene(&desc, &stone);
     const dem2d_shape_id disc = add_disc(s.world, 0.1);
-    dem2d_particle_desc grain = grain_desc(&s, disc, 0, 0);
+    dem2d_particle_desc grain = one_desc(&s, disc, 0, 0);
     dem2d_particle_id fixed, driven;
     grain.motion = DEM2D_FIXED;
     assert_ok(dem2d_world_add_particle(s.world, &grain, &fixed));
     grain.motion = DEM2D_DRIVEN, grain.position.x = 0.15; /* overlaps: forces must not matter */
     grain.velocity = vec(0.02, 0.01), grain.angular_velocity = 0.5;
     assert_ok(dem2d_world_add_particle(s.world, &grain, &driven));
-    const dem2d_particle_id loose = add_grain(&s, disc, 5, 0);
-    step(s.world, 1000);
+    const dem2d_particle_id loose = add_one(&s, disc, 5, 0);
+    run(s.world, 1000);
     assert_same_bits(particle(s.world, fixed).pose.position.x, 0);
     assert_same_bits(particle(s.world, fixed).pose.position.y, 0);
     dem2d_particle_info info = particle(s.world, driven);
@@ -738,17 +710,17 @@ static void test_motion(void **state) {
     assert_result(dem2d_world_move_particle(s.world, loose, vec(NAN, 2), 1), DEM2D_NOT_FINITE);
     assert_result(dem2d_world_move_particle(s.world, loose, vec(0, 2), NAN), DEM2D_NOT_FINITE);
     assert_ok(dem2d_world_drive_particle(s.world, loose, DEM2D_DRIVEN, vec(0, 1), 0));
-    step(s.world, 10);
+    run(s.world, 10);
     assert_near(particle(s.world, loose).pose.position.y, 2.001, 1e-14);
     assert_ok(dem2d_world_drive_particle(s.world, loose, DEM2D_FIXED, vec(0, 0), 0));
-    step(s.world, 10);
+    run(s.world, 10);
     assert_near(particle(s.world, loose).pose.position.y, 2.001, 1e-14);
     assert_result(dem2d_world_drive_particle(s.world, loose, DEM2D_FIXED, vec(1, 0), 0),
                   DEM2D_OUT_OF_RANGE);
     assert_result(dem2d_world_drive_particle(s.world, loose, DEM2D_FREE, vec(1, NAN), 0),
                   DEM2D_NOT_FINITE);
     assert_ok(dem2d_world_remove_particle(s.world, driven));
-    step(s.world, 1);
+    run(s.world, 1);
     assert_int_equal(stats(s.world).particles, 2);
     assert_int_equal(stats(s.world).contacts, 0);
     dem2d_world_destroy(s.world);
@@ -758,17 +730,17 @@ static void test_motion(void **state) {
 static void test_move_resets_friction(void **state) {
     (void)state;
     const dem2d_world_desc desc = basic_desc();
-    const scene s = make_scene(&desc, &stone);
+    const scene s = open_scene(&desc, &stone);
     const dem2d_shape_id ground = add_disc(s.world, 100); /* heavy: it stays where it is */
-    const dem2d_particle_id id = add_grain(&s, add_disc(s.world, 0.1), 0, 100.1 - 1e-4);
-    add_grain(&s, ground, 0, 0);
+    const dem2d_particle_id id = add_one(&s, add_disc(s.world, 0.1), 0, 100.1 - 1e-4);
+    add_one(&s, ground, 0, 0);
     assert_ok(dem2d_world_drive_particle(s.world, id, DEM2D_DRIVEN, vec(0.01, 0), 0));
-    step(s.world, 100);
+    run(s.world, 100);
     const double wound = fabs(only_contact(s.world).tangential_force);
     assert_near(wound, 0.4 * 1e7 * 1e-4, 1e-3); /* slid by 1e-4 m: at the cap */
     const dem2d_vec here = particle(s.world, id).pose.position;
     assert_ok(dem2d_world_move_particle(s.world, id, here, 0));
-    step(s.world, 1);
+    run(s.world, 1);
     assert_between(fabs(only_contact(s.world).tangential_force), 0, 0.05 * wound);
     dem2d_world_destroy(s.world);
 }
@@ -778,8 +750,8 @@ static void test_move_resets_friction(void **state) {
 static void test_wall_motion(void **state) {
     (void)state;
     const dem2d_world_desc desc = basic_desc();
-    const scene s = make_scene(&desc, &stone);
-    const dem2d_wall_id left = add_wall(&s, 0, 0, 3, 0);
+    const scene s = open_scene(&desc, &stone);
+    const dem2d_wall_id left = add_plane(&s, 0, 0, 3, 0);
     dem2d_wall_desc mover = wall_desc(&s, 2, 0, -1, 0);
     dem2d_wall_id right, lid;
     mover.mode = DEM2D_WALL_MOVING, mover.velocity = vec(-0.5, 0.25);
@@ -787,7 +759,7 @@ static void test_wall_motion(void **state) {
     dem2d_wall_desc top = wall_desc(&s, 0, 5, 0, -1);
     top.spans[0] = left, top.spans[1] = right;
     assert_ok(dem2d_world_add_wall(s.world, &top, &lid));
-    step(s.world, 1001); /* the last force pass is at step 1000 */
+    run(s.world, 1001); /* the last force pass is at step 1000 */
     assert_near(wall(s.world, left).normal.x, 1, 0);
     assert_same_bits(wall(s.world, left).point.x, 0);
     assert_within(wall(s.world, right).point.x, 2 - 0.5L * 0.1001L, 1e-12);
@@ -795,7 +767,7 @@ static void test_wall_motion(void **state) {
     assert_near(wall(s.world, left).length, 0, 0);
     mover.mode = DEM2D_WALL_STILL, mover.point = vec(1.5, 0), mover.velocity = vec(0, 0);
     assert_ok(dem2d_world_set_wall(s.world, right, &mover));
-    step(s.world, 10);
+    run(s.world, 10);
     assert_near(wall(s.world, right).point.x, 1.5, 0);
     assert_near(wall(s.world, lid).length, 1.5, 1e-15);
     dem2d_world_destroy(s.world);
@@ -809,20 +781,20 @@ static void check_servo(int n, bool boxes, double stress) {
     const double width = 0.1001;
     dem2d_world_desc desc = basic_desc();
     desc.time_step = 2e-5, desc.local_damping = 0.7;
-    const scene s = make_scene(&desc, &smooth);
+    const scene s = open_scene(&desc, &smooth);
     dem2d_shape *box;
     dem2d_shape_id shape = add_disc(s.world, 0.05);
     assert_ok(dem2d_shape_create_polygon(NULL, square, 4, 0, &box));
     if (boxes) assert_ok(dem2d_world_add_shape(s.world, box, &shape));
     dem2d_shape_destroy(box);
-    for (int i = 0; i < n; i++) add_grain(&s, shape, width / 2, 0.05 + 0.1001 * i);
-    const dem2d_wall_id floor = add_wall(&s, 0, 0, 0, 1);
+    for (int i = 0; i < n; i++) add_one(&s, shape, width / 2, 0.05 + 0.1001 * i);
+    const dem2d_wall_id floor = add_plane(&s, 0, 0, 0, 1);
     dem2d_wall_desc lid = wall_desc(&s, 0, 0.1002 * n, 0, -1);
     dem2d_wall_id id;
-    lid.spans[0] = add_wall(&s, 0, 0, 1, 0), lid.spans[1] = add_wall(&s, width, 0, -1, 0);
+    lid.spans[0] = add_plane(&s, 0, 0, 1, 0), lid.spans[1] = add_plane(&s, width, 0, -1, 0);
     lid.mode = DEM2D_WALL_SERVO, lid.stress = stress, lid.max_speed = 0.1;
     assert_ok(dem2d_world_add_wall(s.world, &lid, &id));
-    step(s.world, 50000);
+    run(s.world, 50000);
     assert_near(wall(s.world, id).length, width, 1e-12);
     assert_near(wall(s.world, id).target, stress, 0);
     /* at rest to a thousandth of the load; boxes rattle in their single contact points */
@@ -868,14 +840,14 @@ static servo_press make_press(const servo_case *c) {
     desc.time_step = pi * sqrt(mass / kn) / c->steps;
     desc.law = c->law, desc.local_damping = c->local_damping;
     desc.gravity.y = -c->weight * kn * overlap / mass;
-    const scene s = make_scene(&desc, &stone);
+    const scene s = open_scene(&desc, &stone);
     dem2d_shape *box;
     dem2d_shape_id shape = add_disc(s.world, r);
     assert_ok(dem2d_shape_create_polygon(NULL, square, 4, 0, &box));
     if (c->box) assert_ok(dem2d_world_add_shape(s.world, box, &shape));
     dem2d_shape_destroy(box);
-    add_grain(&s, shape, 0, r);
-    add_wall(&s, 0, 0, 0, 1);
+    add_one(&s, shape, 0, r);
+    add_plane(&s, 0, 0, 0, 1);
     servo_press p = {s.world, {0, 0}, kn * overlap, c->top_speed * unit};
     dem2d_wall_desc lid = wall_desc(&s, 0.5, 2 * r + overlap, 0, -1);
     lid.mode = DEM2D_WALL_SERVO, lid.stress = p.target, lid.max_speed = p.top_speed, lid.length = 1;
@@ -890,9 +862,9 @@ static void check_press(const servo_case *c) {
     servo_press p = make_press(c);
     const int steps = (int)(10 * c->steps);
     double mean = 0, error = 0, speed = 0;
-    step(p.world, (int)((200 + 4 / pi / c->top_speed) * c->steps));
+    run(p.world, (int)((200 + 4 / pi / c->top_speed) * c->steps));
     for (int i = 0; i < steps; i++) {
-        step(p.world, 1);
+        run(p.world, 1);
         const dem2d_wall_info lid = wall(p.world, p.lid);
         mean += lid.stress / steps;
         error = fmax(error, fabs(lid.stress / p.target - 1));
@@ -941,7 +913,7 @@ static void test_servo_refused(void **state) {
     const servo_case c = {false, false, 0.2, 30, 10, NULL, 0, 0};
     servo_press p = make_press(&c);
     int done = -1;
-    step(p.world, 100);
+    run(p.world, 100);
     assert_ok(dem2d_world_set_time_step(p.world, 1));
     const uint64_t hash = dem2d_world_hash(p.world);
     assert_result(dem2d_world_step(p.world, 1, &done), DEM2D_TIME_STEP);
@@ -958,11 +930,11 @@ static void test_servo_facing(void **state) {
     const double r = 0.05, target = 1e4, mass = 2000 * pi * r * r, tc = pi * sqrt(mass / 1e7);
     dem2d_world_desc desc = {0};
     desc.time_step = tc / 30;
-    const scene s = make_scene(&desc, &rubber);
+    const scene s = open_scene(&desc, &rubber);
     const dem2d_shape_id disc = add_disc(s.world, r);
     dem2d_wall_id walls[2];
     for (int i = 0; i < 5; i++) {
-        dem2d_particle_desc grain = grain_desc(&s, disc, 2.01 * r * i, 0);
+        dem2d_particle_desc grain = one_desc(&s, disc, 2.01 * r * i, 0);
         grain.velocity.x = target / sqrt(1e7 * mass);
         dem2d_particle_id id;
         assert_ok(dem2d_world_add_particle(s.world, &grain, &id));
@@ -972,7 +944,7 @@ static void test_servo_facing(void **state) {
         side.mode = DEM2D_WALL_SERVO, side.stress = target, side.max_speed = 1, side.length = 1;
         assert_ok(dem2d_world_add_wall(s.world, &side, &walls[i]));
     }
-    step(s.world, 600 * 30);
+    run(s.world, 600 * 30);
     for (int i = 0; i < 2; i++) {
         assert_near(wall(s.world, walls[i]).stress, target, 1e-4);
         assert_between(fabs(wall(s.world, walls[i]).velocity.x), 0, 1e-3);
@@ -984,12 +956,12 @@ static void test_servo_facing(void **state) {
 static void test_servo_speed(void **state) {
     (void)state;
     const dem2d_world_desc desc = basic_desc();
-    const scene s = make_scene(&desc, &stone);
+    const scene s = open_scene(&desc, &stone);
     dem2d_wall_desc lid = wall_desc(&s, 0, 1, 0, -1);
     dem2d_wall_id id;
     lid.mode = DEM2D_WALL_SERVO, lid.stress = 1e5, lid.max_speed = 0.1, lid.length = 1;
     assert_ok(dem2d_world_add_wall(s.world, &lid, &id));
-    step(s.world, 1000);
+    run(s.world, 1000);
     assert_near(wall(s.world, id).velocity.y, -0.1, 1e-12);
     assert_within(wall(s.world, id).point.y, 1 - 0.01, 2e-5); /* the first step may start at rest */
     dem2d_world_destroy(s.world);
@@ -1001,11 +973,11 @@ static void test_servo_speed(void **state) {
 static scene make_row(dem2d_particle_id ids[3]) {
     const dem2d_material_desc smooth = {2700, 1e6, 0, 0, 0, 0};
     const dem2d_world_desc desc = basic_desc();
-    const scene s = make_scene(&desc, &smooth);
+    const scene s = open_scene(&desc, &smooth);
     const dem2d_shape_id disc = add_disc(s.world, 1);
-    ids[0] = add_grain(&s, disc, 0, 0);
-    ids[1] = add_grain(&s, disc, 1.998, 0);
-    dem2d_particle_desc small = grain_desc(&s, disc, 1.998 + 1.496, 0);
+    ids[0] = add_one(&s, disc, 0, 0);
+    ids[1] = add_one(&s, disc, 1.998, 0);
+    dem2d_particle_desc small = one_desc(&s, disc, 1.998 + 1.496, 0);
     small.scale = 0.5;
     assert_ok(dem2d_world_add_particle(s.world, &small, &ids[2]));
     return s;
@@ -1017,7 +989,7 @@ static void test_lists(void **state) {
     dem2d_contact_info contacts[2];
     int count = -1;
     const scene s = make_row(ids);
-    step(s.world, 1);
+    run(s.world, 1);
     memset(list, 0x77, sizeof list);
     const dem2d_particle_id untouched = list[2];
     assert_ok(dem2d_world_particles(s.world, NULL, 0, &count));
@@ -1051,7 +1023,7 @@ static void test_packing_and_stats(void **state) {
     dem2d_particle_id ids[3];
     const scene s = make_row(ids);
     dem2d_packing packing;
-    step(s.world, 1);
+    run(s.world, 1);
     assert_ok(dem2d_world_packing(s.world, &packing));
     assert_near(packing.coordination, 4.0L / 3, 1e-15);
     assert_near(packing.coordination_loaded, 2, 1e-15); /* only the middle one has two */
@@ -1066,11 +1038,11 @@ static void test_packing_and_stats(void **state) {
     assert_true(first.pairs >= 2 && first.list_rebuilds >= 1);
     assert_int_equal(first.not_converged, 0);
     /* a wall under the small one only: the greatest overlap may be with it */
-    add_wall(&s, 0, -0.4, 0, 1);
+    add_plane(&s, 0, -0.4, 0, 1);
     assert_ok(dem2d_world_move_particle(s.world, ids[0], vec(0, 50), 0));
     assert_ok(dem2d_world_move_particle(s.world, ids[1], vec(50, 50), 0));
     assert_ok(dem2d_world_move_particle(s.world, ids[2], vec(0, 0), 0));
-    step(s.world, 1);
+    run(s.world, 1);
     assert_ok(dem2d_world_packing(s.world, &packing));
     assert_near(packing.max_overlap, 0.1 / 0.5, 1e-12);
     assert_int_equal(stats(s.world).wall_contacts, 1);
@@ -1091,7 +1063,7 @@ static void test_bytes(void **state) {
     const pile_desc desc = {60, 0, ALL, true, 0, 0.3, 0.4};
     test_env_init(&env);
     make_pile(&p, &env, &desc);
-    step(p.scene.world, 100);
+    run(p.scene.world, 100);
     assert_int_equal(stats(p.scene.world).bytes, env.bytes);
     end_pile(&p, &env);
 }
@@ -1101,8 +1073,8 @@ static void test_energy(void **state) {
     (void)state;
     dem2d_world_desc desc = basic_desc();
     desc.gravity = vec(3, -G);
-    const scene s = make_scene(&desc, &stone);
-    dem2d_particle_desc grain = grain_desc(&s, add_disc(s.world, 0.1), 1, 2);
+    const scene s = open_scene(&desc, &stone);
+    dem2d_particle_desc grain = one_desc(&s, add_disc(s.world, 0.1), 1, 2);
     dem2d_particle_id id;
     dem2d_energy e;
     grain.velocity = vec(1, 5), grain.angular_velocity = 7;
@@ -1111,7 +1083,7 @@ static void test_energy(void **state) {
     long double total = 0;
     for (int i = 0; i < 1000; i++) {
         const dem2d_particle_info before = particle(s.world, id);
-        step(s.world, 1);
+        run(s.world, 1);
         const dem2d_particle_info after = particle(s.world, id);
         assert_ok(dem2d_world_energy(s.world, &e));
         const long double v0 = hypotl(before.velocity.x, before.velocity.y);
@@ -1139,7 +1111,7 @@ static void test_spring_energy(void **state) {
     assert_ok(dem2d_world_set_pair(s.world, s.material, s.material, &sticky));
     assert_ok(dem2d_world_move_particle(s.world, ids[2], vec(50, 0), 0));
     assert_ok(dem2d_world_drive_particle(s.world, ids[0], DEM2D_DRIVEN, vec(0, 0.01), 0));
-    step(s.world, 50);
+    run(s.world, 50);
     const dem2d_contact_info c = only_contact(s.world);
     assert_ok(dem2d_world_energy(s.world, &e));
     assert_near(e.normal, 1e6 * c.depth * c.depth / 2, 1e-13);
@@ -1176,10 +1148,10 @@ static void test_weight(void **state) {
     make_pile(&p, &env, &desc);
     const double weight = weight_of(p.scene.world);
     for (int i = 0; i < 40; i++) {
-        step(p.scene.world, 5000);
+        run(p.scene.world, 5000);
         if (fabs(carried(&p) - weight) < 1e-7 * weight && kinetic(p.scene.world) < 1e-9) break;
     }
-    step(p.scene.world, 1000); /* at rest, not passing by */
+    run(p.scene.world, 1000); /* at rest, not passing by */
     assert_near(carried(&p), weight, 1e-6);
     assert_between(kinetic(p.scene.world), 0, 1e-8);
     end_pile(&p, &env);
@@ -1195,9 +1167,9 @@ static void test_stress(void **state) {
     dem2d_stress stress;
     test_env_init(&env);
     make_pile(&p, &env, &desc);
-    step(p.scene.world, 10000); /* fall first */
+    run(p.scene.world, 10000); /* fall first */
     assert_ok(dem2d_world_set_gravity(p.scene.world, vec(0, 0)));
-    step(p.scene.world, 20000);
+    run(p.scene.world, 20000);
     const dem2d_wall_info floor = wall(p.scene.world, p.walls[0]);
     const dem2d_wall_info left = wall(p.scene.world, p.walls[1]);
     const dem2d_wall_info right = wall(p.scene.world, p.walls[2]);
@@ -1219,14 +1191,14 @@ static void test_local_damping(void **state) {
     (void)state;
     dem2d_world_desc desc = basic_desc();
     desc.gravity.y = -G, desc.local_damping = 0.3;
-    const scene s = make_scene(&desc, &stone);
-    dem2d_particle_desc grain = grain_desc(&s, add_disc(s.world, 0.1), 0, 0);
+    const scene s = open_scene(&desc, &stone);
+    dem2d_particle_desc grain = one_desc(&s, add_disc(s.world, 0.1), 0, 0);
     dem2d_particle_id up, down;
     grain.velocity.y = 2;
     assert_ok(dem2d_world_add_particle(s.world, &grain, &up));
     grain.velocity.y = -2, grain.position.x = 1;
     assert_ok(dem2d_world_add_particle(s.world, &grain, &down));
-    step(s.world, 1000); /* 0.1 s: the upward one does not turn round */
+    run(s.world, 1000); /* 0.1 s: the upward one does not turn round */
     assert_near(2 - particle(s.world, up).velocity.y, G * 0.13L, 1e-12);
     assert_near(particle(s.world, down).velocity.y + 2, -G * 0.07L, 1e-12);
     dem2d_world_destroy(s.world);
@@ -1237,15 +1209,15 @@ static void test_global_damping(void **state) {
     const double xi = 40, dt = 1e-3;
     dem2d_world_desc desc = basic_desc();
     desc.gravity.y = -G, desc.global_damping = xi, desc.time_step = dt;
-    const scene s = make_scene(&desc, &stone);
-    dem2d_particle_desc grain = grain_desc(&s, add_disc(s.world, 0.1), 0, 0);
+    const scene s = open_scene(&desc, &stone);
+    dem2d_particle_desc grain = one_desc(&s, add_disc(s.world, 0.1), 0, 0);
     dem2d_particle_id id;
     grain.velocity = vec(3, 2), grain.angular_velocity = 5;
     assert_ok(dem2d_world_add_particle(s.world, &grain, &id));
     long double vx = 3, vy = 2, spin = 5;
     const long double keep_part = 1 - xi * dt / 2, whole = 1 + xi * dt / 2;
     for (int i = 0; i < 200; i++) {
-        step(s.world, 1);
+        run(s.world, 1);
         vx = keep_part * vx / whole, spin = keep_part * spin / whole;
         vy = (keep_part * vy - dt * G) / whole;
         assert_near(particle(s.world, id).velocity.x, vx, 1e-13);
@@ -1265,23 +1237,23 @@ static void test_pile_settles(void **state) {
     test_env_init(&env);
     make_pile(&p, &env, &desc);
     for (int i = 0; i < 30; i++) {
-        step(p.scene.world, 100);
+        run(p.scene.world, 100);
         keep(&now, p.scene.world, p.walls, 3); /* checks that every number is finite */
         peak = fmax(peak, kinetic(p.scene.world));
     }
-    step(p.scene.world, 27000);
+    run(p.scene.world, 27000);
     assert_between(kinetic(p.scene.world), 0, 1e-2 * peak);
     assert_int_equal(stats(p.scene.world).not_converged, 0);
     /* mixed grains jitter on their faces: the mean over a while is the weight */
     double up = 0;
     for (int i = 0; i < 1000; i++) {
-        step(p.scene.world, 1);
+        run(p.scene.world, 1);
         up += carried(&p) / 1000;
     }
     assert_near(up, weight_of(p.scene.world), 5e-2);
     /* the list has stopped growing: no more allocations */
     const int calls = env.calls;
-    step(p.scene.world, 1000);
+    run(p.scene.world, 1000);
     assert_int_equal(env.calls, calls);
     end_pile(&p, &env);
 }
@@ -1293,7 +1265,7 @@ static void run_pile(const pile_desc *desc, int steps, world_state *result) {
     pile p;
     test_env_init(&env);
     make_pile(&p, &env, desc);
-    step(p.scene.world, steps);
+    run(p.scene.world, steps);
     keep(result, p.scene.world, p.walls, desc->lid ? 4 : 3);
     end_pile(&p, &env);
 }
@@ -1344,15 +1316,15 @@ static void test_time_step_bounds(void **state) {
     for (int i = 0; i < COUNT_OF(tangential); i++) {
         const dem2d_material_desc material = {2700, 1e7, tangential[i], 0.5, 0, 0};
         const dem2d_world_desc desc = basic_desc();
-        const scene s = make_scene(&desc, &material);
-        const dem2d_particle_id id = add_grain(&s, add_disc(s.world, 0.1), 0, 0.1 - 1e-7);
+        const scene s = open_scene(&desc, &material);
+        const dem2d_particle_id id = add_one(&s, add_disc(s.world, 0.1), 0, 0.1 - 1e-7);
         dem2d_particle_id worst = {7, 7};
         double safe, limit;
         assert_ok(dem2d_world_time_step_bounds(s.world, &safe, &limit, &worst));
         assert_true(limit == HUGE_VAL && safe > 0 && safe < 1);
         assert_int_equal(worst.generation, 0);
-        add_wall(&s, 0, 0, 0, 1);
-        step(s.world, 1);
+        add_plane(&s, 0, 0, 0, 1);
+        run(s.world, 1);
         assert_ok(dem2d_world_time_step_bounds(s.world, &safe, &limit, &worst));
         /* I = m R^2 / 2: sliding and turning together have 3 kt / m; lever arm to 1e-6 */
         const double mass = particle(s.world, id).mass;
@@ -1368,7 +1340,7 @@ static void test_time_step_bounds(void **state) {
     const scene row = make_row(ids); /* kt = 0, 2 free ones: 2 sqrt(m / 2k) and 2 sqrt(m / k) */
     double safe, limit;
     assert_ok(dem2d_world_remove_particle(row.world, ids[2]));
-    step(row.world, 1);
+    run(row.world, 1);
     assert_ok(dem2d_world_time_step_bounds(row.world, &safe, &limit, NULL));
     const double mass = particle(row.world, ids[0]).mass;
     assert_between(safe, 2 * sqrt(mass / 6e6) * (1 - 1e-12), 2 * sqrt(mass / 2e6) * (1 + 1e-12));
@@ -1389,9 +1361,9 @@ static void test_time_step_too_long(void **state) {
     for (int i = 0; i < 2; i++) {
         dem2d_world_desc desc = basic_desc();
         desc.gravity.y = -G, desc.env = i ? NULL : &env.env, desc.skip_time_step_check = i;
-        twins[i] = make_scene(&desc, &smooth);
-        const dem2d_particle_id id = add_grain(&twins[i], add_disc(twins[i].world, 0.1), 0, 0.09);
-        add_wall(&twins[i], 0, 0, 0, 1);
+        twins[i] = open_scene(&desc, &smooth);
+        const dem2d_particle_id id = add_one(&twins[i], add_disc(twins[i].world, 0.1), 0, 0.09);
+        add_plane(&twins[i], 0, 0, 0, 1);
         const double mass = particle(twins[i].world, id).mass;
         assert_ok(dem2d_world_set_time_step(twins[i].world, 1.5 * 2 * sqrt(mass / 1e7)));
     }
@@ -1399,13 +1371,13 @@ static void test_time_step_too_long(void **state) {
     assert_logged(&env, DEM2D_TIME_STEP, 0, NULL); /* particle 0 */
     assert_between(done, 0, 999);
     assert_int_equal(stats(twins[0].world).steps, done);
-    step(twins[1].world, done);
+    run(twins[1].world, done);
     keep(&failed, twins[0].world, NULL, 0);
     keep(&twin_state, twins[1].world, NULL, 0);
     assert_same_state(&failed, &twin_state, 0);
-    step(twins[1].world, 1); /* nobody looks */
+    run(twins[1].world, 1); /* nobody looks */
     assert_ok(dem2d_world_set_time_step(twins[0].world, 1e-5));
-    step(twins[0].world, 10);
+    run(twins[0].world, 10);
     for (int i = 0; i < 2; i++) dem2d_world_destroy(twins[i].world);
     assert_clean(&env);
 }
@@ -1417,11 +1389,11 @@ static void test_slow_time_step(void **state) {
     const scene s = make_row(ids);
     const double mass = particle(s.world, ids[0]).mass;
     assert_ok(dem2d_world_move_particle(s.world, ids[2], vec(50, 0), 0));
-    step(s.world, 1);
+    run(s.world, 1);
     assert_int_equal(stats(s.world).slow_time_step, 0);
     assert_ok(dem2d_world_set_time_step(s.world, 1.8 * sqrt(mass / 1e6)));
     assert_ok(dem2d_world_move_particle(s.world, ids[2], vec(60, 0), 0)); /* renews it */
-    step(s.world, 1);
+    run(s.world, 1);
     assert_true(stats(s.world).slow_time_step >= 1);
     dem2d_world_destroy(s.world);
 }
@@ -1439,7 +1411,7 @@ static void test_state_error(void **state) {
     int count, done = -1;
     test_env_init(&env);
     make_pile(&p, &env, &desc);
-    step(p.scene.world, 10000);
+    run(p.scene.world, 10000);
     assert_ok(dem2d_world_particles(p.scene.world, ids, 30, &count));
     assert_ok(dem2d_world_drive_particle(p.scene.world, ids[7], DEM2D_FREE, vec(1e308, -1e308), 0));
     assert_ok(dem2d_world_set_time_step(p.scene.world, 10)); /* 10 * 1e308 overflows at once */
@@ -1453,7 +1425,7 @@ static void test_state_error(void **state) {
     assert_same_state(&before, &failed, 0);
     assert_ok(dem2d_world_drive_particle(p.scene.world, ids[7], DEM2D_FREE, vec(0, 0), 0));
     assert_ok(dem2d_world_set_time_step(p.scene.world, 1e-4));
-    step(p.scene.world, 100);
+    run(p.scene.world, 100);
     keep(&failed, p.scene.world, p.walls, 4);
     end_pile(&p, &env);
 }
@@ -1467,8 +1439,8 @@ static void test_state_error_later(void **state) {
     for (int i = 0; i < 2; i++) {
         dem2d_world_desc desc = basic_desc();
         desc.time_step = 1, desc.skip_time_step_check = true;
-        twins[i] = make_scene(&desc, &stone);
-        dem2d_particle_desc grain = grain_desc(&twins[i], add_disc(twins[i].world, 1), 0, 0);
+        twins[i] = open_scene(&desc, &stone);
+        dem2d_particle_desc grain = one_desc(&twins[i], add_disc(twins[i].world, 1), 0, 0);
         dem2d_particle_id id;
         assert_ok(dem2d_world_add_particle(twins[i].world, &grain, &id));
         grain.position.y = 10, grain.velocity.x = 1.6e308;
@@ -1478,7 +1450,7 @@ static void test_state_error_later(void **state) {
     assert_between(done, 0,
                    1); /* the second step overflows, if the first is not too wild already */
     assert_int_equal(stats(twins[0].world).steps, done);
-    step(twins[1].world, done);
+    run(twins[1].world, done);
     keep(&failed, twins[0].world, NULL, 0);
     keep(&twin_state, twins[1].world, NULL, 0);
     assert_same_state(&failed, &twin_state, 0);
@@ -1557,7 +1529,7 @@ static void test_svg(void **state) {
     test_env_init(&env);
     make_pile(&p, &env, &desc);
     svg.write = take, svg.user = &out;
-    step(p.scene.world, 3000);
+    run(p.scene.world, 3000);
     keep(&before, p.scene.world, p.walls, 3);
     assert_ok(dem2d_world_write_svg(p.scene.world, &svg, NULL));
     const int with_all = count_shapes(text[0]);
@@ -1609,7 +1581,7 @@ static void test_svg_changes_nothing(void **state) {
         dem2d_svg_desc svg = {0};
         svg.write = take, svg.user = &out, svg.force_chains = true;
         assert_ok(dem2d_world_write_svg(p.scene.world, &svg, NULL));
-        step(p.scene.world, 100);
+        run(p.scene.world, 100);
     }
     keep(&drawn, p.scene.world, p.walls, 4);
     assert_same_state(&plain, &drawn, 0);
@@ -1622,10 +1594,10 @@ static void test_changes_are_checked(void **state) {
     const dem2d_world_desc desc = basic_desc();
     const dem2d_pair_desc hard = {1e13, 1e13, 0.4, 0, 0};
     for (int change = 0; change < 2; change++) {
-        const scene s = make_scene(&desc, &stone);
-        const dem2d_particle_id id = add_grain(&s, add_disc(s.world, 0.1), 0, 0.1 - 1e-5);
-        add_wall(&s, 0, 0, 0, 1);
-        step(s.world, 1);
+        const scene s = open_scene(&desc, &stone);
+        const dem2d_particle_id id = add_one(&s, add_disc(s.world, 0.1), 0, 0.1 - 1e-5);
+        add_plane(&s, 0, 0, 0, 1);
+        run(s.world, 1);
         double safe, limit;
         assert_ok(dem2d_world_time_step_bounds(s.world, &safe, &limit, NULL));
         if (change == 0) assert_ok(dem2d_world_set_time_step(s.world, 1.5 * limit));
@@ -1646,21 +1618,21 @@ static void test_set_wall_and_contacts(void **state) {
     (void)state;
     const dem2d_world_desc desc = basic_desc();
     for (int turn = 0; turn < 2; turn++) {
-        const scene s = make_scene(&desc, &stone);
-        const dem2d_particle_id id = add_grain(&s, add_disc(s.world, 0.1), 0, 0.1 - 1e-4);
-        const dem2d_wall_id floor = add_wall(&s, 0, 0, 0, 1);
+        const scene s = open_scene(&desc, &stone);
+        const dem2d_particle_id id = add_one(&s, add_disc(s.world, 0.1), 0, 0.1 - 1e-4);
+        const dem2d_wall_id floor = add_plane(&s, 0, 0, 0, 1);
         assert_ok(dem2d_world_drive_particle(s.world, id, DEM2D_DRIVEN, vec(0.01, 0), 0));
-        step(s.world, 20);
+        run(s.world, 20);
         const double wound = only_contact(s.world).tangential_force;
         assert_true(fabs(wound) > 0);
         assert_ok(dem2d_world_drive_particle(s.world, id, DEM2D_DRIVEN, vec(0, 0), 0));
-        step(s.world, 1); /* winds by the last of the moves */
+        run(s.world, 1); /* winds by the last of the moves */
         const double stopped = only_contact(s.world).tangential_force;
         assert_near(stopped, wound * 20 / 19, 1e-9);
         dem2d_wall_desc again = wall_desc(&s, 0, 0, 0, 1);
         if (turn) again = wall_desc(&s, 0, 0.2 - 2e-4, 0, -1);
         assert_ok(dem2d_world_set_wall(s.world, floor, &again));
-        step(s.world, 1);
+        run(s.world, 1);
         assert_within(only_contact(s.world).tangential_force, turn ? 0 : stopped, 1e-9 * 1e3);
         dem2d_world_destroy(s.world);
     }
@@ -1669,11 +1641,11 @@ static void test_set_wall_and_contacts(void **state) {
 static void test_porosity(void **state) {
     (void)state;
     const dem2d_world_desc desc = basic_desc();
-    const scene s = make_scene(&desc, &stone);
+    const scene s = open_scene(&desc, &stone);
     const dem2d_box region = {{-0.1, -0.2}, {0.15, 0.2}}, flat = {{0, 0}, {1, 0}};
     const dem2d_box endless = {{0, 0}, {1, NAN}};
     double porosity = -7;
-    add_grain(&s, add_disc(s.world, 0.1), 0, 0);
+    add_one(&s, add_disc(s.world, 0.1), 0, 0);
     assert_result(dem2d_world_porosity(s.world, &flat, &porosity), DEM2D_OUT_OF_RANGE);
     assert_result(dem2d_world_porosity(s.world, &endless, &porosity), DEM2D_NOT_FINITE);
     assert_result(dem2d_world_porosity(NULL, &region, &porosity), DEM2D_NULL_ARGUMENT);
