@@ -2,6 +2,7 @@
    at walls; EPA's residual; branch directions; the swarm's settings. */
 #include "dem2d.h"
 #include "testing.h"
+#include "world_scene.h"
 
 #include <math.h>
 
@@ -9,67 +10,42 @@
 
 enum { GRAINS = 24, WALLS = 3 };
 
-typedef struct scene {
-    dem2d_world *world;
+typedef struct heap {
+    scene s;
     dem2d_particle_id grains[GRAINS];
-} scene;
+} heap;
 
 static dem2d_shape *make_shape(int kind) {
     const dem2d_vec corners[4] = {{0, 0}, {2, 0.2}, {1.6, 1.5}, {0.2, 1.2}};
     const double a[4] = {2.0, 0, 0.08, 0.03}, b[4] = {0, 0, 0.05, 0.02};
-    dem2d_shape *shape;
     if (kind == 0) return make_disc(1);
     if (kind == 1) return make_ellipse(1.3, 0.8);
-    if (kind == 2) assert_ok(dem2d_shape_create_polygon(NULL, corners, 4, 0, &shape));
-    if (kind == 3) assert_ok(dem2d_shape_create_fourier(NULL, a, b, 3, &shape));
-    return shape;
+    return kind == 2 ? make_polygon(corners, 4, 0) : make_series(a, b, 3);
 }
 
 /* A heap of circles, ellipses, polygons and FS in a box, while it is falling. */
-static scene make_heap(dem2d_solver solver, dem2d_face_rule faces) {
-    scene s;
+static heap make_heap(dem2d_solver solver, dem2d_face_rule faces) {
+    const dem2d_material_desc material = stone_desc(KN, 0.3);
     dem2d_world_desc desc = {0};
-    dem2d_material_desc stone = {0};
-    dem2d_material_id material;
     dem2d_shape_id shapes[4];
+    heap h;
     desc.time_step = 1e-4, desc.gravity.y = -9.81, desc.local_damping = 0.3;
     desc.solver = solver, desc.faces = faces;
-    assert_ok(dem2d_world_create(&desc, &s.world));
-    stone.density = 2700, stone.normal_stiffness = stone.tangential_stiffness = KN;
-    stone.friction = 0.3;
-    assert_ok(dem2d_world_add_material(s.world, &stone, &material));
-    for (int k = 0; k < 4; k++) {
-        dem2d_shape *shape = make_shape(k);
-        assert_ok(dem2d_world_add_shape(s.world, shape, &shapes[k]));
-        dem2d_shape_destroy(shape);
-    }
+    h.s = open_scene(&desc, &material);
+    for (int k = 0; k < 4; k++) shapes[k] = give_shape(&h.s, make_shape(k));
     for (int i = 0; i < GRAINS; i++) {
-        dem2d_particle_desc grain = {0};
-        grain.shape = shapes[(i * 7) % 4], grain.scale = 0.025, grain.material = material;
-        grain.position = vec(0.035 + 0.062 * (i % 4), 0.035 + 0.062 * (double)(i / 4));
+        const dem2d_vec at = vec(0.035 + 0.062 * (i % 4), 0.035 + 0.062 * (double)(i / 4));
+        dem2d_particle_desc grain = grain_desc(&h.s, shapes[(i * 7) % 4], 0.025, at);
         grain.angle = i;
-        assert_ok(dem2d_world_add_particle(s.world, &grain, &s.grains[i]));
+        h.grains[i] = add_grain(&h.s, &grain);
     }
-    for (int i = 0; i < WALLS; i++) {
-        dem2d_wall_desc wall = {0};
-        dem2d_wall_id id;
-        wall.material = material;
-        wall.normal = i == 0 ? vec(0, 1) : vec(i == 1 ? 1 : -1, 0);
-        wall.point.x = i == 2 ? 0.26 : 0;
-        assert_ok(dem2d_world_add_wall(s.world, &wall, &id));
-    }
-    return s;
-}
-
-static dem2d_stats stats_of(const dem2d_world *world) {
-    dem2d_stats stats;
-    assert_ok(dem2d_world_stats(world, &stats));
-    return stats;
+    add_floor(&h.s), add_plane(&h.s, 0, 0, 1, 0), add_plane(&h.s, 0.26, 0, -1, 0);
+    return h;
 }
 
 /* Looks and support calls that a step of the papers makes for the present positions: of each pair
    whose bounding circles overlap, GJK and EPA from the line of centres. */
-static void expect_step(const scene *s, int64_t *looks, int64_t *gaps, int64_t *calls) {
+static void expect_step(const heap *h, int64_t *looks, int64_t *gaps, int64_t *calls) {
     dem2d_contact_desc desc = {0};
     desc.solver = DEM2D_GJK_EPA, desc.tolerance = 1e-8, desc.skip_points = true;
     *looks = *gaps = *calls = 0;
@@ -77,13 +53,13 @@ static void expect_step(const scene *s, int64_t *looks, int64_t *gaps, int64_t *
         for (int k = 0; k < i; k++) {
             dem2d_particle_info a, b;
             dem2d_contact contact;
-            assert_ok(dem2d_world_get_particle(s->world, s->grains[k], &a));
-            assert_ok(dem2d_world_get_particle(s->world, s->grains[i], &b));
+            assert_ok(dem2d_world_get_particle(h->s.world, h->grains[k], &a));
+            assert_ok(dem2d_world_get_particle(h->s.world, h->grains[i], &b));
             const double dx = b.pose.position.x - a.pose.position.x;
             const double dy = b.pose.position.y - a.pose.position.y;
             if (sqrt(dx * dx + dy * dy) >= a.radius + b.radius) continue;
-            const dem2d_shape *one = dem2d_world_shape(s->world, a.shape);
-            const dem2d_shape *other = dem2d_world_shape(s->world, b.shape);
+            const dem2d_shape *one = dem2d_world_shape(h->s.world, a.shape);
+            const dem2d_shape *other = dem2d_world_shape(h->s.world, b.shape);
             assert_ok(dem2d_pair_overlap(one, a.pose, other, b.pose, &desc, &contact));
             if (contact.depth > 0)
                 assert_ok(dem2d_pair_contact(one, a.pose, other, b.pose, &desc, &contact));
@@ -95,13 +71,13 @@ static void expect_step(const scene *s, int64_t *looks, int64_t *gaps, int64_t *
 
 /* Support calls at walls: one for each grain but circles that reaches a wall with its bounding
    circle. */
-static int64_t wall_calls(const scene *s) {
+static int64_t wall_calls(const heap *h) {
     int64_t calls = 0;
     for (int i = 0; i < GRAINS; i++) {
         dem2d_particle_info grain;
         dem2d_shape_info shape;
-        assert_ok(dem2d_world_get_particle(s->world, s->grains[i], &grain));
-        assert_ok(dem2d_shape_get(dem2d_world_shape(s->world, grain.shape), &shape));
+        assert_ok(dem2d_world_get_particle(h->s.world, h->grains[i], &grain));
+        assert_ok(dem2d_shape_get(dem2d_world_shape(h->s.world, grain.shape), &shape));
         if (shape.type == DEM2D_CIRCLE) continue;
         calls += grain.pose.position.y < grain.radius;
         calls += grain.pose.position.x < grain.radius;
@@ -112,23 +88,23 @@ static int64_t wall_calls(const scene *s) {
 
 static void test_every_pair_anew(void **state) {
     (void)state;
-    scene s = make_heap(DEM2D_GJK_EPA, DEM2D_ONE_POINT);
+    heap h = make_heap(DEM2D_GJK_EPA, DEM2D_ONE_POINT);
     for (int step = 0; step < 3000; step++) {
         int64_t looks = 0, gaps = 0, calls = 0, walls = 0;
         const bool ask = step % 100 == 0;
-        const dem2d_stats before = stats_of(s.world);
-        if (ask) expect_step(&s, &looks, &gaps, &calls), walls = wall_calls(&s);
-        assert_ok(dem2d_world_step(s.world, 1, NULL));
+        const dem2d_stats before = stats_of(&h.s);
+        if (ask) expect_step(&h, &looks, &gaps, &calls), walls = wall_calls(&h);
+        assert_ok(dem2d_world_step(h.s.world, 1, NULL));
         if (!ask) continue;
-        const dem2d_stats after = stats_of(s.world);
+        const dem2d_stats after = stats_of(&h.s);
         assert_int_equal(after.collisions - before.collisions, looks);
         assert_int_equal(after.separations - before.separations, gaps);
         assert_int_equal(after.support_calls - before.support_calls, calls + walls);
     }
-    const dem2d_stats end = stats_of(s.world);
-    assert_true(end.contacts > GRAINS / 2);
+    const dem2d_stats end = stats_of(&h.s);
+    assert_true(end.contacts + end.wall_contacts > GRAINS / 2); /* the scene has some */
     assert_true(end.proofs[DEM2D_BY_FORM] == 0 && end.proofs[DEM2D_BY_POLYTOPE] > 0);
-    dem2d_world_destroy(s.world);
+    dem2d_world_destroy(h.s.world);
 }
 
 /* Of the papers' rule the middle between support point and foot point, else the foot point; the
@@ -217,12 +193,12 @@ static void test_residual(void **state) {
 static void test_branch_directions(void **state) {
     (void)state;
     enum { BINS = 9, MOST = 4 * GRAINS };
-    scene s = make_heap(DEM2D_CERTIFIED, DEM2D_TWO_POINTS);
+    heap h = make_heap(DEM2D_CERTIFIED, DEM2D_TWO_POINTS);
     dem2d_contact_info contacts[MOST];
     double values[BINS], expected[BINS] = {0}, normals[BINS];
     int count, others = 0;
-    assert_ok(dem2d_world_step(s.world, 4000, NULL));
-    assert_ok(dem2d_world_contacts(s.world, contacts, MOST, &count));
+    assert_ok(dem2d_world_step(h.s.world, 4000, NULL));
+    assert_ok(dem2d_world_contacts(h.s.world, contacts, MOST, &count));
     assert_in_range(count, GRAINS, MOST);
     for (int i = 0; i < count; i++) {
         if (contacts[i].b.generation == 0) continue;
@@ -231,14 +207,14 @@ static void test_branch_directions(void **state) {
         expected[(int)(BINS * (angle < 0 ? angle + 1 : angle))]++;
         expected[(int)(BINS * (angle + 0.5))]++;
     }
-    assert_ok(dem2d_world_histogram(s.world, DEM2D_HISTOGRAM_ALONG_BRANCH, BINS, values));
-    assert_ok(dem2d_world_histogram(s.world, DEM2D_HISTOGRAM_NORMAL, BINS, normals));
+    assert_ok(dem2d_world_histogram(h.s.world, DEM2D_HISTOGRAM_ALONG_BRANCH, BINS, values));
+    assert_ok(dem2d_world_histogram(h.s.world, DEM2D_HISTOGRAM_NORMAL, BINS, normals));
     for (int i = 0; i < BINS; i++) {
         assert_true(values[i] == expected[i]);
         others += values[i] != normals[i];
     }
     assert_true(others > 0);
-    dem2d_world_destroy(s.world);
+    dem2d_world_destroy(h.s.world);
 }
 
 /* The settings are what is used: the defaults given give the same bits, others not. */

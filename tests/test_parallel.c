@@ -177,7 +177,7 @@ static void run_items(void *user, dem2d_phase phase, int count, dem2d_task_fn *t
 
 /* --- scenes ---------------------------------------------------------------------------------- */
 
-typedef struct scene {
+typedef struct scene_row {
     const char *name;
     bool discs; /* else five shapes */
     double friction;
@@ -193,9 +193,9 @@ typedef struct scene {
     int rounds; /* the state is compared after each */
     int steps;  /* of a round; 0 for 40 */
     calls calls;
-} scene;
+} scene_row;
 
-static scene scenes[] = {
+static scene_row scenes[] = {
     {.name = "discs with friction", .discs = true, .friction = 0.4, .rounds = 3},
     {.name = "discs without friction", .discs = true, .rounds = 3},
     {.name = "five shapes fall between walls", .friction = 0.4, .rounds = 3},
@@ -248,27 +248,18 @@ typedef struct run {
 static dem2d_shape *make_shape(int kind) {
     static const double corners[5][2] = {
         {-0.9, -0.4}, {0.6, -0.7}, {0.9, 0.1}, {0.3, 0.8}, {-0.6, 0.6}};
-    static const double joints[4][2] = {{1, 0}, {0, 0.75}, {-0.7, 0}, {0, -0.75}};
-    const double f = RADIUS, handle = 0.5522847498; /* of a quarter circle */
+    const double f = RADIUS, reach[4] = {f, 0.75 * f, 0.7 * f, 0.75 * f};
     const double a[4] = {1.8 * f, 0, 0.08 * f, 0.03 * f}, b[4] = {0, 0, 0.06 * f, 0.02 * f};
-    dem2d_vec points[12];
-    dem2d_shape *shape = NULL;
-    if (kind == 0) assert_ok(dem2d_shape_create_circle(NULL, f, &shape));
-    if (kind == 1) assert_ok(dem2d_shape_create_ellipse(NULL, f, 0.7 * f, &shape));
+    dem2d_vec points[5];
+    if (kind == 0) return make_disc(f);
+    if (kind == 1) return make_ellipse(f, 0.7 * f);
+    if (kind == 3) return make_oval(reach, 0.5522847498);
+    if (kind == 4) return make_series(a, b, 3);
     for (int i = 0; i < 5; i++) points[i] = vec(f * corners[i][0], f * corners[i][1]);
-    if (kind == 2) assert_ok(dem2d_shape_create_polygon(NULL, points, 5, 0, &shape));
-    for (int i = 0; i < 4; i++) {
-        const double *p = joints[i], *q = joints[(i + 1) % 4];
-        points[3 * i] = vec(f * p[0], f * p[1]);
-        points[3 * i + 1] = vec(f * (p[0] + handle * q[0]), f * (p[1] + handle * q[1]));
-        points[3 * i + 2] = vec(f * (q[0] + handle * p[0]), f * (q[1] + handle * p[1]));
-    }
-    if (kind == 3) assert_ok(dem2d_shape_create_bezier(NULL, points, 4, &shape));
-    if (kind == 4) assert_ok(dem2d_shape_create_fourier(NULL, a, b, 3, &shape));
-    return shape;
+    return make_polygon(points, 5, 0);
 }
 
-static dem2d_particle_id add_grain(run *r, const scene *s, int place) {
+static dem2d_particle_id add_grain(run *r, const scene_row *s, int place) {
     dem2d_particle_desc desc = {0};
     dem2d_particle_id id;
     r->random = (uint64_t)place + 7; /* whenever it comes */
@@ -290,7 +281,7 @@ static dem2d_particle_id add_grain(run *r, const scene *s, int place) {
 
 /* Grains with the same ids in an order of memory of their own: those that were there before have
    left their ids in that order. */
-static void add_in_order(run *r, const scene *s, uint64_t seed) {
+static void add_in_order(run *r, const scene_row *s, uint64_t seed) {
     dem2d_particle_id ids[GRAINS];
     int order[GRAINS];
     uint64_t random = seed;
@@ -337,7 +328,7 @@ static void own_law(void *user, const dem2d_law_input *in, dem2d_law_output *out
     out->state[0] = in->state[0] + in->depth, out->state[1] = in->moment;
 }
 
-static void add_walls(run *r, const scene *s) {
+static void add_walls(run *r, const scene_row *s) {
     const double width = PITCH * COLUMNS, height = PITCH * GRAINS / COLUMNS;
     const double at[WALLS][4] = {{0, 0, 0, 1}, {0, 0, 1, 0}, {width, 0, -1, 0}, {0, height, 0, -1}};
     r->wall_count = s->lid ? 4 : 3;
@@ -356,7 +347,7 @@ static void add_walls(run *r, const scene *s) {
 }
 
 /* Without a runner the library does its work itself. */
-static void make_empty(run *r, const scene *s, const runner *runner, calls *calls) {
+static void make_empty(run *r, const scene_row *s, const runner *runner, calls *calls) {
     dem2d_material_desc stone = {2700, 1e6, s->friction > 0 ? 1e6 : 0, s->friction, 0, 0};
     dem2d_world_desc desc = {0};
     memset(r, 0, sizeof *r);
@@ -379,7 +370,7 @@ static void make_empty(run *r, const scene *s, const runner *runner, calls *call
     add_walls(r, s);
 }
 
-static void make_run(run *r, const scene *s, const runner *runner, calls *calls) {
+static void make_run(run *r, const scene_row *s, const runner *runner, calls *calls) {
     make_empty(r, s, runner, calls);
     for (int i = 0; i < GRAINS; i++) add_grain(r, s, i);
 }
@@ -392,7 +383,7 @@ static void end_run(run *r) {
 }
 
 /* Every seventh grain leaves, and new ones come above. */
-static void change(run *r, const scene *s, int round) {
+static void change(run *r, const scene_row *s, int round) {
     dem2d_particle_id ids[2 * GRAINS];
     int count;
     assert_ok(dem2d_world_particles(r->world, ids, COUNT_OF(ids), &count));
@@ -401,7 +392,7 @@ static void change(run *r, const scene *s, int round) {
     for (int i = 0; i < 2 * COLUMNS; i++) add_grain(r, s, GRAINS + 2 * COLUMNS * round + i);
 }
 
-static void take_round(run *r, const scene *s, int round) {
+static void take_round(run *r, const scene_row *s, int round) {
     if (s->change && round > 0) change(r, s, round);
     assert_ok(dem2d_world_step(r->world, s->steps ? s->steps : 40, NULL));
 }
@@ -514,7 +505,7 @@ static void put_state(numbers *n, const run *r) {
 /* --- tests ----------------------------------------------------------------------------------- */
 
 /* What the scene has is there: else little was tested. */
-static void check_books(const dem2d_world *world, const scene *s) {
+static void check_books(const dem2d_world *world, const scene_row *s) {
     dem2d_ledger l;
     dem2d_energy e;
     assert_ok(dem2d_world_ledger(world, &l));
@@ -527,7 +518,7 @@ static void check_books(const dem2d_world *world, const scene *s) {
 }
 
 /* order: of the particles in memory, see add_in_order; -1 as they come. */
-static numbers run_scene(scene *s, const runner *runner, int order) {
+static numbers run_scene(scene_row *s, const runner *runner, int order) {
     static run r;
     numbers n = {NULL, 0, 0};
     if (order < 0)
@@ -562,7 +553,7 @@ static void assert_same(const numbers *one, const numbers *other, const char *na
 }
 
 static void test_scene(void **state) {
-    scene *s = *state;
+    scene_row *s = *state;
     numbers one = run_scene(s, NULL, -1);
     for (int i = 0; i < COUNT_OF(runners); i++) {
         numbers other = run_scene(s, &runners[i], -1);
@@ -577,7 +568,7 @@ static void test_storage(void **state) {
     static const char *const names[] = {"by ids", "at random", "at random, then by place"};
     (void)state;
     for (int i = 0; i < COUNT_OF(scenes); i++) {
-        scene *s = &scenes[i];
+        scene_row *s = &scenes[i];
         if (s->solver == DEM2D_GJK_EPA) continue; /* slow */
         numbers one = run_scene(s, NULL, 0);
         for (int order = 1; order < COUNT_OF(names); order++) {
@@ -591,7 +582,7 @@ static void test_storage(void **state) {
 
 /* A step that fails: two grains in different blocks fly off the numbers, or the time step is too
    long. The same error about the same grain, and the world as it was before. */
-static numbers run_failure(scene *s, const runner *runner, bool flies) {
+static numbers run_failure(scene_row *s, const runner *runner, bool flies) {
     static run r;
     dem2d_particle_id ids[GRAINS];
     numbers n = {NULL, 0, 0};
@@ -623,7 +614,7 @@ static numbers run_failure(scene *s, const runner *runner, bool flies) {
 
 static void test_failure(void **state) {
     (void)state;
-    static scene s = {.name = "a step that fails", .friction = 0.4};
+    static scene_row s = {.name = "a step that fails", .friction = 0.4};
     for (int flies = 0; flies < 2; flies++) {
         numbers one = run_failure(&s, NULL, flies);
         for (int i = 0; i < COUNT_OF(runners); i++) {

@@ -6,13 +6,13 @@
 
 enum { GRAINS = 36, KINDS = 6, LINKS = 20, WALLS = 4 + LINKS, ROOM = 12000 };
 
-typedef struct scene {
+typedef struct scene_row {
     const char *name;
     bool discs, full, law, chain;
     dem2d_face_rule faces;
-} scene;
+} scene_row;
 
-static scene scenes[] = {
+static scene_row scenes[] = {
     {.name = "discs by the full law", .discs = true, .full = true},
     {.name = "all shapes by the full law", .full = true},
     {.name = "one point", .full = true, .chain = true, .faces = DEM2D_ONE_POINT},
@@ -49,25 +49,15 @@ static void put(numbers *n, const char *what, int dimension, const double *value
 static dem2d_shape *make_shape(int kind, double f) {
     static const double corners[5][2] = {
         {-0.9, -0.6}, {0.7, -0.8}, {1.1, 0.1}, {0.4, 0.9}, {-0.6, 0.7}};
-    static const double arcs[4][2] = {{1.1, 0}, {0, 0.75}, {-0.7, 0}, {0, -0.75}};
-    const double handle = 0.5522847498, a[4] = {1.8 * f, 0, 0.08 * f, 0.03 * f};
-    const double b[4] = {0, 0, 0.06 * f, 0.02 * f};
-    dem2d_vec points[12];
-    dem2d_shape *shape = NULL;
-    if (kind == 0) assert_ok(dem2d_shape_create_circle(NULL, f, &shape));
-    if (kind == 1) assert_ok(dem2d_shape_create_ellipse(NULL, 1.2 * f, 0.8 * f, &shape));
-    if (kind == 2) assert_ok(dem2d_shape_create_fourier(NULL, a, b, 3, &shape));
+    const double reach[4] = {1.1 * f, 0.75 * f, 0.7 * f, 0.75 * f};
+    const double a[4] = {1.8 * f, 0, 0.08 * f, 0.03 * f}, b[4] = {0, 0, 0.06 * f, 0.02 * f};
+    dem2d_vec points[5];
+    if (kind == 0) return make_disc(f);
+    if (kind == 1) return make_ellipse(1.2 * f, 0.8 * f);
+    if (kind == 2) return make_series(a, b, 3);
+    if (kind == 5) return make_oval(reach, 0.5522847498);
     for (int i = 0; i < 5; i++) points[i] = vec(f * corners[i][0], f * corners[i][1]);
-    if (kind == 3) assert_ok(dem2d_shape_create_polygon(NULL, points, 5, 0, &shape));
-    if (kind == 4) assert_ok(dem2d_shape_create_polygon(NULL, points, 5, 0.2 * f, &shape));
-    for (int i = 0; i < 4; i++) {
-        const double *p = arcs[i], *q = arcs[(i + 1) % 4];
-        points[3 * i] = vec(f * p[0], f * p[1]);
-        points[3 * i + 1] = vec(f * (p[0] + handle * q[0]), f * (p[1] + handle * q[1]));
-        points[3 * i + 2] = vec(f * (q[0] + handle * p[0]), f * (q[1] + handle * p[1]));
-    }
-    if (kind == 5) assert_ok(dem2d_shape_create_bezier(NULL, points, 4, &shape));
-    return shape;
+    return make_polygon(points, 5, kind == 3 ? 0 : 0.2 * f);
 }
 
 /* Its state is a length. */
@@ -83,8 +73,8 @@ static void own_law(void *user, const dem2d_law_input *in, dem2d_law_output *out
     out->state[0] = in->state[0] + in->depth;
 }
 
-static void add_walls(dem2d_world *world, const scene *s, dem2d_material_id material, double size,
-                      dem2d_wall_id walls[WALLS]) {
+static void add_walls(dem2d_world *world, const scene_row *s, dem2d_material_id material,
+                      double size, dem2d_wall_id walls[WALLS]) {
     static const double at[4][4] = {{0, 0, 0, 1}, {0, 0, 1, 0}, {0.5, 0, -1, 0}, {0, 0.6, 0, -1}};
     static const double height[LINKS + 1] = {4, 3, 2, 3, 3, 3, 1, 0, 2, 2, 2,
                                              2, 0, 3, 0, 2, 2, 2, 0, 1, 3};
@@ -109,7 +99,7 @@ static void add_walls(dem2d_world *world, const scene *s, dem2d_material_id mate
     }
 }
 
-static dem2d_world *make_world(const scene *s, double size, dem2d_wall_id walls[WALLS]) {
+static dem2d_world *make_world(const scene_row *s, double size, dem2d_wall_id walls[WALLS]) {
     dem2d_material_desc stone = {2700, 1e7 * size * size, 5e6 * size * size, 0.4, 0, 0};
     dem2d_world_desc desc = {0};
     dem2d_particle_desc grain = {0};
@@ -214,7 +204,7 @@ static void put_walls(numbers *n, const dem2d_world *world, const dem2d_wall_id 
     }
 }
 
-static void run(const scene *s, int power, numbers *n) {
+static void run(const scene_row *s, int power, numbers *n) {
     const double size = ldexp(1, power);
     dem2d_wall_id walls[WALLS];
     dem2d_stats stats;
@@ -239,7 +229,7 @@ static void run(const scene *s, int power, numbers *n) {
 static void test_scaled(void **state) {
     static const int powers[] = {40, -40, 1};
     static numbers first, scaled;
-    const scene *s = *state;
+    const scene_row *s = *state;
     run(s, 0, &first);
     for (int k = 0; k < COUNT_OF(powers); k++) {
         run(s, powers[k], &scaled);

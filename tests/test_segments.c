@@ -2,42 +2,21 @@
    over them, boxes across them, hoppers. */
 #include "dem2d.h"
 #include "testing.h"
+#include "world_scene.h"
 
 #define KN 1e7
 
-static dem2d_world *make_world(double friction, dem2d_vec gravity, bool ledger,
-                               dem2d_material_id *material) {
+static scene make_scene(double friction, dem2d_vec gravity, bool ledger) {
+    const dem2d_material_desc material = stone_desc(KN / 2, friction);
     dem2d_world_desc desc = {0};
-    dem2d_material_desc stone = {0};
-    dem2d_world *world;
     desc.time_step = 1e-5, desc.gravity = gravity, desc.ledger = ledger;
-    stone.density = 2700, stone.normal_stiffness = KN, stone.tangential_stiffness = KN / 2;
-    stone.friction = friction;
-    assert_ok(dem2d_world_create(&desc, &world));
-    assert_ok(dem2d_world_add_material(world, &stone, material));
-    return world;
-}
-
-static dem2d_wall_id add_segment(dem2d_world *world, dem2d_material_id material, dem2d_vec from,
-                                 dem2d_vec to) {
-    dem2d_wall_desc desc = {0};
-    dem2d_wall_id id;
-    desc.material = material, desc.segment = true, desc.point = from, desc.end = to;
-    assert_ok(dem2d_world_add_wall(world, &desc, &id));
-    return id;
+    return open_scene(&desc, &material);
 }
 
 /* Takes the shape. */
-static dem2d_particle_id add(dem2d_world *world, dem2d_material_id material, dem2d_shape *shape,
-                             dem2d_vec at, double angle, dem2d_vec velocity) {
-    dem2d_particle_desc desc = {0};
-    dem2d_particle_id id;
-    assert_ok(dem2d_world_add_shape(world, shape, &desc.shape));
-    dem2d_shape_destroy(shape);
-    desc.scale = 1, desc.material = material, desc.position = at, desc.angle = angle;
-    desc.velocity = velocity;
-    assert_ok(dem2d_world_add_particle(world, &desc, &id));
-    return id;
+static dem2d_particle_id add(const scene *s, dem2d_shape *shape, dem2d_vec at, double angle,
+                             dem2d_vec velocity) {
+    return add_shape(s, shape, DEM2D_FREE, at, angle, velocity, 0);
 }
 
 enum { DISC, ELLIPSE, BOX, ROUNDED, LOBES, SHAPES };
@@ -45,13 +24,10 @@ enum { DISC, ELLIPSE, BOX, ROUNDED, LOBES, SHAPES };
 static dem2d_shape *make_shape(int kind) {
     const dem2d_vec corners[4] = {{0, 0}, {0.1, 0}, {0.1, 0.06}, {0, 0.06}};
     const double a[4] = {0.09, 0, 0, 0.003}, b[4] = {0, 0, 0, 0};
-    dem2d_shape *shape = NULL;
-    if (kind == DISC) assert_ok(dem2d_shape_create_circle(NULL, 0.05, &shape));
-    if (kind == ELLIPSE) assert_ok(dem2d_shape_create_ellipse(NULL, 0.06, 0.03, &shape));
-    if (kind == BOX) assert_ok(dem2d_shape_create_polygon(NULL, corners, 4, 0, &shape));
-    if (kind == ROUNDED) assert_ok(dem2d_shape_create_polygon(NULL, corners, 4, 0.01, &shape));
-    if (kind == LOBES) assert_ok(dem2d_shape_create_fourier(NULL, a, b, 3, &shape));
-    return shape;
+    if (kind == DISC) return make_disc(0.05);
+    if (kind == ELLIPSE) return make_ellipse(0.06, 0.03);
+    if (kind == LOBES) return make_series(a, b, 3);
+    return make_polygon(corners, 4, kind == ROUNDED ? 0.01 : 0);
 }
 
 /* Least over all directions of the support value of shape minus segment, by a scan. */
@@ -84,8 +60,7 @@ static void test_depth(void **state) {
     uint64_t random = 5;
     int found = 0;
     for (int i = 0; i < 400; i++) {
-        dem2d_material_id material;
-        dem2d_world *world = make_world(0.3, vec(0, 0), false, &material);
+        scene s = make_scene(0.3, vec(0, 0), false);
         const double angle = random_between(&random, 0, 6.28), length = i % 2 ? 0.03 : 0.4;
         const dem2d_vec from = vec(1, 2);
         const dem2d_vec to = vec(from.x + length * cos(angle), from.y + length * sin(angle));
@@ -94,15 +69,15 @@ static void test_depth(void **state) {
         const dem2d_vec at = vec(from.x + place * cos(angle) - away * sin(angle),
                                  from.y + place * sin(angle) + away * cos(angle));
         const double turn = random_between(&random, 0, 6.28);
-        add_segment(world, material, from, to);
+        add_segment(&s, from, to);
         dem2d_shape *shape = make_shape(i % SHAPES);
         const dem2d_pose pose = dem2d_pose_make(at.x, at.y, turn, 1);
         const long double depth = scan_depth(shape, pose, from, to);
-        add(world, material, shape, at, turn, vec(0, 0));
-        assert_ok(dem2d_world_step(world, 1, NULL));
+        add(&s, shape, at, turn, vec(0, 0));
+        step(&s, 1);
         dem2d_contact_info contact;
         int count;
-        assert_ok(dem2d_world_contacts(world, &contact, 1, &count));
+        assert_ok(dem2d_world_contacts(s.world, &contact, 1, &count));
         assert_int_equal(count, depth > 0);
         if (depth > 0 && contact.points == 1) assert_within(contact.depth, depth, 1e-9);
         if (depth > 0) {
@@ -110,7 +85,7 @@ static void test_depth(void **state) {
             assert_true(contact.wall.generation > 0 && contact.normal_force > 0);
             found++;
         }
-        dem2d_world_destroy(world);
+        close_scene(&s);
     }
     assert_true(found > 100);
 }
@@ -126,35 +101,34 @@ static void test_flat_joints(void **state) {
             const bool two = kind == BOX || kind == ROUNDED;
             dem2d_particle_info info[2];
             for (int pieces = 0; pieces < 2; pieces++) {
-                dem2d_material_id material;
-                dem2d_world *world = make_world(rough ? 0.5 : 0, vec(0, -9.81), true, &material);
+                scene s = make_scene(rough ? 0.5 : 0, vec(0, -9.81), true);
                 const int count = pieces ? 7 : 1;
                 for (int k = 0; k < count; k++) /* some to the left, some to the right */
                     if (k % 2)
-                        add_segment(world, material, vec(2.0 * k / count - 0.5, 0),
+                        add_segment(&s, vec(2.0 * k / count - 0.5, 0),
                                     vec(2.0 * (k + 1) / count - 0.5, 0));
                     else
-                        add_segment(world, material, vec(2.0 * (k + 1) / count - 0.5, 0),
+                        add_segment(&s, vec(2.0 * (k + 1) / count - 0.5, 0),
                                     vec(2.0 * k / count - 0.5, 0));
                 dem2d_shape *shape = make_shape(kind);
                 dem2d_support low;
                 assert_ok(dem2d_shape_support(shape, still(), vec(0, -1), &low));
                 const double y = low.value - 2e-5;
-                dem2d_particle_id id = add(world, material, shape, vec(0, y), 0, vec(1, 0));
+                dem2d_particle_id id = add(&s, shape, vec(0, y), 0, vec(1, 0));
                 for (int i = 0; i < 400; i++) {
                     int open;
                     dem2d_contact_info contacts[4];
-                    assert_ok(dem2d_world_step(world, 100, NULL));
-                    assert_ok(dem2d_world_contacts(world, contacts, 4, &open));
+                    step(&s, 100);
+                    assert_ok(dem2d_world_contacts(s.world, contacts, 4, &open));
                     int points = 0;
                     for (int c = 0; c < open; c++) points += contacts[c].points;
                     assert_true(points <= (two ? 2 : 1));
                 }
                 dem2d_ledger ledger;
-                assert_ok(dem2d_world_ledger(world, &ledger));
+                assert_ok(dem2d_world_ledger(s.world, &ledger));
                 assert_within(ledger.closure, 0, (rough && two ? 1e-2 : 1e-4) * ledger.given);
-                assert_ok(dem2d_world_get_particle(world, id, &info[pieces]));
-                dem2d_world_destroy(world);
+                assert_ok(dem2d_world_get_particle(s.world, id, &info[pieces]));
+                close_scene(&s);
             }
             const double far = rough && two ? 1e-3 : 2e-5;
             assert_within(info[1].pose.position.x, info[0].pose.position.x, far);
@@ -185,103 +159,99 @@ static double total_force(const dem2d_world *world, dem2d_vec *sum) {
    trough: two. */
 static void test_joint_kinds(void **state) {
     (void)state;
-    dem2d_material_id material;
     dem2d_vec force;
-    dem2d_world *world = make_world(0, vec(0, 0), false, &material);
-    add_segment(world, material, vec(0, 0), vec(-1, -1));
-    add_segment(world, material, vec(1, -1), vec(0, 0));
-    add_segment(world, material, vec(0, 0), vec(0, -1));
-    add(world, material, make_shape(DISC), vec(0.01, 0.048), 0, vec(0, 0));
-    assert_ok(dem2d_world_step(world, 1, NULL));
-    assert_int_equal(total_force(world, &force), 1);
+    scene s = make_scene(0, vec(0, 0), false);
+    add_segment(&s, vec(0, 0), vec(-1, -1));
+    add_segment(&s, vec(1, -1), vec(0, 0));
+    add_segment(&s, vec(0, 0), vec(0, -1));
+    add(&s, make_shape(DISC), vec(0.01, 0.048), 0, vec(0, 0));
+    step(&s, 1);
+    assert_int_equal(total_force(s.world, &force), 1);
     const double distance = hypot(0.01, 0.048);
     assert_near(-force.y, KN * (0.05 - distance) * 0.048 / distance, 1e-9);
-    dem2d_world_destroy(world);
-    world = make_world(0, vec(0, 0), false, &material);
-    add_segment(world, material, vec(-1, 1), vec(0, 0));
-    add_segment(world, material, vec(0, 0), vec(1, 1));
-    add(world, material, make_shape(DISC), vec(0, 0.07), 0, vec(0, 0));
-    assert_ok(dem2d_world_step(world, 1, NULL));
-    assert_int_equal(total_force(world, &force), 2);
+    close_scene(&s);
+    s = make_scene(0, vec(0, 0), false);
+    add_segment(&s, vec(-1, 1), vec(0, 0));
+    add_segment(&s, vec(0, 0), vec(1, 1));
+    add(&s, make_shape(DISC), vec(0, 0.07), 0, vec(0, 0));
+    step(&s, 1);
+    assert_int_equal(total_force(s.world, &force), 2);
     assert_near(-force.y, 2 * KN * (0.05 - 0.07 / sqrt(2)) / sqrt(2), 1e-9);
-    dem2d_world_destroy(world);
+    close_scene(&s);
     /* a box on a flat joint: four corners of two common parts, two points */
-    world = make_world(0, vec(0, 0), false, &material);
-    add_segment(world, material, vec(-1, 0), vec(0, 0));
-    add_segment(world, material, vec(0, 0), vec(1, 0));
-    add(world, material, make_shape(BOX), vec(0.01, 0.03 - 1e-5), 0, vec(0, 0));
-    assert_ok(dem2d_world_step(world, 1, NULL));
-    assert_int_equal(total_force(world, &force), 2);
+    s = make_scene(0, vec(0, 0), false);
+    add_segment(&s, vec(-1, 0), vec(0, 0));
+    add_segment(&s, vec(0, 0), vec(1, 0));
+    add(&s, make_shape(BOX), vec(0.01, 0.03 - 1e-5), 0, vec(0, 0));
+    step(&s, 1);
+    assert_int_equal(total_force(s.world, &force), 2);
     assert_near(-force.y, 2 * KN * 1e-5, 1e-9);
-    dem2d_world_destroy(world);
+    close_scene(&s);
 }
 
 /* Discs fall through a hopper and out: none is lost in the walls, all arrive below. A segment may
    move, be servo-controlled, replaced and removed. */
 static void test_hopper(void **state) {
     (void)state;
-    dem2d_material_id material;
-    dem2d_world *world = make_world(0.1, vec(0, -9.81), false, &material);
-    assert_ok(dem2d_world_set_damping(world, 0.1, 0));
-    assert_ok(dem2d_world_set_time_step(world, 4e-5));
+    scene s = make_scene(0.1, vec(0, -9.81), false);
+    assert_ok(dem2d_world_set_damping(s.world, 0.1, 0));
+    assert_ok(dem2d_world_set_time_step(s.world, 4e-5));
     const dem2d_vec left[3] = {{-0.4, 1.2}, {-0.4, 0.5}, {-0.15, 0}};
     for (int k = 0; k < 2; k++) {
-        add_segment(world, material, left[k], left[k + 1]);
-        add_segment(world, material, vec(-left[k].x, left[k].y),
-                    vec(-left[k + 1].x, left[k + 1].y));
+        add_segment(&s, left[k], left[k + 1]);
+        add_segment(&s, vec(-left[k].x, left[k].y), vec(-left[k + 1].x, left[k + 1].y));
     }
     dem2d_particle_id ids[40];
     for (int i = 0; i < 40; i++)
-        ids[i] = add(world, material, make_shape(i % SHAPES),
-                     vec(-0.26 + 0.13 * (i % 5), 0.55 + 0.13 * (i / 5)), i, vec(0, 0));
-    assert_ok(dem2d_world_step(world, 40000, NULL));
+        ids[i] = add(&s, make_shape(i % SHAPES), vec(-0.26 + 0.13 * (i % 5), 0.55 + 0.13 * (i / 5)),
+                     i, vec(0, 0));
+    step(&s, 40000);
     for (int i = 0; i < 40; i++) {
         dem2d_particle_info info;
-        assert_ok(dem2d_world_get_particle(world, ids[i], &info));
+        assert_ok(dem2d_world_get_particle(s.world, ids[i], &info));
         assert_true(info.pose.position.y < 0);
         assert_true(isfinite(info.pose.position.x));
     }
-    dem2d_world_destroy(world);
+    close_scene(&s);
 }
 
 static void test_moves(void **state) {
     (void)state;
-    dem2d_material_id material;
-    dem2d_world *world = make_world(0.3, vec(0, 0), false, &material);
-    dem2d_wall_id floor_id = add_segment(world, material, vec(-0.2, 0), vec(0.2, 0));
-    dem2d_particle_id id = add(world, material, make_shape(DISC), vec(0, 0.05), 0, vec(0, 0));
+    scene s = make_scene(0.3, vec(0, 0), false);
+    dem2d_wall_id floor_id = add_segment(&s, vec(-0.2, 0), vec(0.2, 0));
+    dem2d_particle_id id = add(&s, make_shape(DISC), vec(0, 0.05), 0, vec(0, 0));
     dem2d_wall_desc lid = {0};
     dem2d_wall_id lid_id;
     dem2d_wall_info info;
-    lid.material = material, lid.segment = true, lid.mode = DEM2D_WALL_SERVO;
+    lid.material = s.material, lid.segment = true, lid.mode = DEM2D_WALL_SERVO;
     lid.point = vec(0.1, 0.11), lid.end = vec(-0.1, 0.11); /* its left is below */
     lid.stress = 1e4, lid.max_speed = 0.1;
-    assert_ok(dem2d_world_add_wall(world, &lid, &lid_id));
-    assert_ok(dem2d_world_set_damping(world, 0.5, 0));
-    assert_ok(dem2d_world_step(world, 30000, NULL));
-    assert_ok(dem2d_world_get_wall(world, lid_id, &info));
+    assert_ok(dem2d_world_add_wall(s.world, &lid, &lid_id));
+    assert_ok(dem2d_world_set_damping(s.world, 0.5, 0));
+    step(&s, 30000);
+    assert_ok(dem2d_world_get_wall(s.world, lid_id, &info));
     assert_near(info.length, 0.2, 1e-14);
     assert_near(info.stress, 1e4, 1e-3);
     assert_near(info.end.y, info.point.y, 1e-12);
     assert_near(info.normal.y, -1, 1e-12);
     dem2d_wall_desc moving = {0};
-    moving.material = material, moving.segment = true, moving.mode = DEM2D_WALL_MOVING;
+    moving.material = s.material, moving.segment = true, moving.mode = DEM2D_WALL_MOVING;
     moving.point = vec(-0.2, 0), moving.end = vec(0.2, 0), moving.velocity = vec(0.5, 0);
-    assert_ok(dem2d_world_set_wall(world, floor_id, &moving));
-    assert_ok(dem2d_world_step(world, 1000, NULL));
+    assert_ok(dem2d_world_set_wall(s.world, floor_id, &moving));
+    step(&s, 1000);
     dem2d_particle_info disc;
-    assert_ok(dem2d_world_get_particle(world, id, &disc));
+    assert_ok(dem2d_world_get_particle(s.world, id, &disc));
     assert_true(disc.velocity.x > 0); /* dragged along */
     moving.end = moving.point;
-    assert_result(dem2d_world_set_wall(world, floor_id, &moving), DEM2D_OUT_OF_RANGE);
+    assert_result(dem2d_world_set_wall(s.world, floor_id, &moving), DEM2D_OUT_OF_RANGE);
     moving.end.x = (double)NAN;
-    assert_result(dem2d_world_set_wall(world, floor_id, &moving), DEM2D_NOT_FINITE);
+    assert_result(dem2d_world_set_wall(s.world, floor_id, &moving), DEM2D_NOT_FINITE);
     moving.segment = false, moving.normal = vec(0, 1); /* it would be saved with the wall */
-    assert_result(dem2d_world_set_wall(world, floor_id, &moving), DEM2D_NOT_FINITE);
+    assert_result(dem2d_world_set_wall(s.world, floor_id, &moving), DEM2D_NOT_FINITE);
     moving.segment = true;
-    assert_ok(dem2d_world_remove_wall(world, lid_id));
-    assert_ok(dem2d_world_step(world, 10, NULL));
-    dem2d_world_destroy(world);
+    assert_ok(dem2d_world_remove_wall(s.world, lid_id));
+    step(&s, 10);
+    close_scene(&s);
 }
 
 /* Regular polygons cut through by a longer segment along two of their edges: the overlap is that of
@@ -292,7 +262,6 @@ static void test_cut_through(void **state) {
         for (int i = -9; i <= 9; i++)
             for (int edge = 0; edge < corners; edge++) {
                 dem2d_vec points[12];
-                dem2d_material_id material;
                 dem2d_contact_info contact;
                 dem2d_shape *shape;
                 int count;
@@ -303,15 +272,15 @@ static void test_cut_through(void **state) {
                 }
                 const dem2d_vec n = direction(2 * edge * TEST_PI / corners);
                 assert_ok(dem2d_shape_create_polygon(NULL, points, corners, 0, &shape));
-                dem2d_world *world = make_world(0, vec(0, 0), false, &material);
-                add_segment(world, material, vec(h * n.x - 0.2 * n.y, h * n.y + 0.2 * n.x),
+                scene s = make_scene(0, vec(0, 0), false);
+                add_segment(&s, vec(h * n.x - 0.2 * n.y, h * n.y + 0.2 * n.x),
                             vec(h * n.x + 0.1 * n.y, h * n.y - 0.1 * n.x));
-                add(world, material, shape, vec(0, 0), 0, vec(0, 0));
-                assert_ok(dem2d_world_step(world, 1, NULL));
-                assert_ok(dem2d_world_contacts(world, &contact, 1, &count));
+                add(&s, shape, vec(0, 0), 0, vec(0, 0));
+                step(&s, 1);
+                assert_ok(dem2d_world_contacts(s.world, &contact, 1, &count));
                 assert_int_equal(count, 1);
                 assert_within(contact.depth, 0.05 - fabs(h), 1e-14);
-                dem2d_world_destroy(world);
+                close_scene(&s);
             }
 }
 

@@ -3,6 +3,7 @@
 #include "dem2d.h"
 #include "inside.h"
 #include "testing.h"
+#include "world_scene.h"
 
 #include <float.h>
 #include <limits.h>
@@ -10,55 +11,42 @@
 
 /* --- a scene of all that there is ------------------------------------------------------------ */
 
-typedef struct scene {
-    dem2d_world *world;
-    dem2d_material_id materials[2];
+typedef struct full_scene {
+    scene base;
+    dem2d_material_id other;
     dem2d_shape_id shapes[3]; /* a disc, a sharp pentagon, an ellipse */
     dem2d_wall_id walls[4];   /* left, right, floor, lid */
-} scene;
+} full_scene;
 
-static void add_shapes(scene *s) {
-    static const dem2d_vec corners[5] = {
-        {-0.9, -0.6}, {0.7, -0.8}, {1.1, 0.1}, {0.4, 0.9}, {-0.6, 0.7}};
-    dem2d_shape *shapes[3];
-    assert_ok(dem2d_shape_create_circle(NULL, 1, &shapes[0]));
-    assert_ok(dem2d_shape_create_polygon(NULL, corners, 5, 0, &shapes[1]));
-    assert_ok(dem2d_shape_create_ellipse(NULL, 1, 0.7, &shapes[2]));
-    for (int i = 0; i < 3; i++) {
-        assert_ok(dem2d_world_add_shape(s->world, shapes[i], &s->shapes[i]));
-        dem2d_shape_destroy(shapes[i]);
-    }
-}
-
-static dem2d_wall_id add_wall(const scene *s, dem2d_vec point, dem2d_vec normal) {
-    dem2d_wall_desc wall = {0};
-    dem2d_wall_id id;
-    wall.material = s->materials[0], wall.point = point, wall.normal = normal, wall.length = 1;
-    assert_ok(dem2d_world_add_wall(s->world, &wall, &id));
-    return id;
+/* Of length 1. */
+static dem2d_wall_id put_plane(const full_scene *s, dem2d_vec point, dem2d_vec normal) {
+    dem2d_wall_desc wall = plane_desc(&s->base, point, normal);
+    wall.length = 1;
+    return add_wall(&s->base, &wall);
 }
 
 /* An empty world with shapes and materials. */
-static void make_scene(scene *s, const dem2d_env *env) {
+static void make_scene(full_scene *s, const dem2d_env *env) {
+    static const dem2d_vec corners[5] = {
+        {-0.9, -0.6}, {0.7, -0.8}, {1.1, 0.1}, {0.4, 0.9}, {-0.6, 0.7}};
+    const dem2d_material_desc stone = stone_desc(1e7, 0.4);
     dem2d_world_desc desc = {0};
-    dem2d_material_desc stone = {0};
     memset(s, 0, sizeof *s);
     desc.time_step = 1e-4, desc.gravity.y = -9.81, desc.local_damping = 0.3, desc.env = env;
-    assert_ok(dem2d_world_create(&desc, &s->world));
-    stone.density = 2700, stone.normal_stiffness = 1e7, stone.tangential_stiffness = 1e7;
-    stone.friction = 0.4;
-    for (int i = 0; i < 2; i++)
-        assert_ok(dem2d_world_add_material(s->world, &stone, &s->materials[i]));
-    add_shapes(s);
+    s->base = open_scene(&desc, &stone);
+    assert_ok(dem2d_world_add_material(s->base.world, &stone, &s->other));
+    s->shapes[0] = give_shape(&s->base, make_disc(1));
+    s->shapes[1] = give_shape(&s->base, make_polygon(corners, 5, 0));
+    s->shapes[2] = give_shape(&s->base, make_ellipse(1, 0.7));
 }
 
 /* Grains that fall into a box, one in seven fixed or driven, one removed; ids have gaps. */
-static void fill_scene(scene *s, int count) {
+static void fill_scene(full_scene *s, int count) {
     dem2d_particle_id id, gone = {0, 0};
     for (int i = 0; i < count; i++) {
         dem2d_particle_desc grain = {0};
         grain.scale = 0.04 + 0.001 * (i % 5), grain.shape = s->shapes[i % 3];
-        grain.material = s->materials[i % 2], grain.angle = i;
+        grain.material = i % 2 ? s->other : s->base.material, grain.angle = i;
         grain.position.x = 0.06 + 0.095 * (i % 5) + 0.004 * (i % 2);
         grain.position.y = 0.05 + 0.09 * (i / 5), grain.velocity.y = -1;
         grain.angular_velocity = i % 4;
@@ -67,23 +55,19 @@ static void fill_scene(scene *s, int count) {
             grain.motion = DEM2D_FIXED;
             grain.velocity.y = 0, grain.angular_velocity = 0;
         }
-        assert_ok(dem2d_world_add_particle(s->world, &grain, &id));
+        assert_ok(dem2d_world_add_particle(s->base.world, &grain, &id));
         if (i == 1) gone = id;
     }
-    assert_ok(dem2d_world_remove_particle(s->world, gone));
-    s->walls[0] = add_wall(s, vec(0, 0), vec(1, 0));
-    s->walls[1] = add_wall(s, vec(0.5, 0), vec(-1, 0));
-    s->walls[2] = add_wall(s, vec(0, 0), vec(0, 1));
-    s->walls[3] = add_wall(s, vec(0, 0.9), vec(0.1, -1));
-    assert_ok(dem2d_world_remove_wall(s->world, s->walls[0]));
-    s->walls[0] = add_wall(s, vec(0, 0), vec(2, 0));
+    assert_ok(dem2d_world_remove_particle(s->base.world, gone));
+    s->walls[0] = put_plane(s, vec(0, 0), vec(1, 0));
+    s->walls[1] = put_plane(s, vec(0.5, 0), vec(-1, 0));
+    s->walls[2] = put_plane(s, vec(0, 0), vec(0, 1));
+    s->walls[3] = put_plane(s, vec(0, 0.9), vec(0.1, -1));
+    assert_ok(dem2d_world_remove_wall(s->base.world, s->walls[0]));
+    s->walls[0] = put_plane(s, vec(0, 0), vec(2, 0));
 }
 
 enum { GRAINS = 40, NUMBERS = 8000 };
-
-static void step(const scene *s, int count) {
-    assert_ok(dem2d_world_step(s->world, count, NULL));
-}
 
 /* --- where bytes go -------------------------------------------------------------------------- */
 
@@ -183,32 +167,32 @@ static const char *text_of(writer_fn *writer, const dem2d_world *world) {
 static void test_failing_callbacks(void **state) {
     (void)state;
     test_env env;
-    scene s;
+    full_scene s;
     test_env_init(&env);
     make_scene(&s, &env.env);
     fill_scene(&s, 7);
-    step(&s, 400);
+    step(&s.base, 400);
     for (int w = 0; w < COUNT_OF(writers); w++) {
         sink *out = sink_start(SINK_ROOM - 1, INT_MAX);
-        assert_ok(writers[w](s.world, take, out, NULL));
+        assert_ok(writers[w](s.base.world, take, out, NULL));
         const size_t bytes = out->used;
         const int calls = out->calls;
         assert_true(calls > 5);
         for (size_t n = 0; n < bytes; n++) {
             out = sink_start(n, INT_MAX);
-            assert_result(writers[w](s.world, take, out, NULL), DEM2D_IO);
+            assert_result(writers[w](s.base.world, take, out, NULL), DEM2D_IO);
             assert_int_equal(out->failures, 1);
         }
         for (int n = 0; n < calls; n++) {
             out = sink_start(SINK_ROOM - 1, n);
-            assert_result(writers[w](s.world, take, out, NULL), DEM2D_IO);
+            assert_result(writers[w](s.base.world, take, out, NULL), DEM2D_IO);
             assert_int_equal(out->calls, n + 1);
         }
         if (writers[w] != put_pvd) assert_logged(&env, DEM2D_IO, -1, "callback");
         out = sink_start(bytes, calls);
-        assert_ok(writers[w](s.world, take, out, NULL));
+        assert_ok(writers[w](s.base.world, take, out, NULL));
     }
-    dem2d_world_destroy(s.world);
+    dem2d_world_destroy(s.base.world);
     assert_clean(&env);
 }
 
@@ -221,28 +205,28 @@ static bool exists(const char *path) {
 static void test_failing_paths(void **state) {
     (void)state;
     test_env env;
-    scene s;
+    full_scene s;
     test_env_init(&env);
     make_scene(&s, &env.env);
     fill_scene(&s, 40);
-    step(&s, 400);
+    step(&s.base, 400);
     const bool full = exists("/dev/full"); /* takes bytes into a buffer, then fails */
     for (int w = 0; w < COUNT_OF(writers); w++) {
         test_log_clear(&env);
-        assert_result(writers[w](s.world, NULL, NULL, "no/such/folder/file"), DEM2D_IO);
+        assert_result(writers[w](s.base.world, NULL, NULL, "no/such/folder/file"), DEM2D_IO);
         if (writers[w] != put_pvd) assert_logged(&env, DEM2D_IO, -1, "folder");
-        assert_result(writers[w](s.world, NULL, NULL, NULL), DEM2D_NULL_ARGUMENT);
-        assert_result(writers[w](s.world, take, NULL, "build/test_writers.none"),
+        assert_result(writers[w](s.base.world, NULL, NULL, NULL), DEM2D_NULL_ARGUMENT);
+        assert_result(writers[w](s.base.world, take, NULL, "build/test_writers.none"),
                       DEM2D_OUT_OF_RANGE);
         assert_false(exists("build/test_writers.none"));
         if (!full) continue;
-        assert_result(writers[w](s.world, NULL, NULL, "/dev/full"), DEM2D_IO);
+        assert_result(writers[w](s.base.world, NULL, NULL, "/dev/full"), DEM2D_IO);
         if (writers[w] != put_pvd) assert_logged(&env, DEM2D_IO, -1, "full");
     }
     if (full) /* more than any buffer: a write fails before the close */
-        assert_result(put_part(s.world, NULL, NULL, "/dev/full", DEM2D_VTP_PARTICLES, 2000),
+        assert_result(put_part(s.base.world, NULL, NULL, "/dev/full", DEM2D_VTP_PARTICLES, 2000),
                       DEM2D_IO);
-    dem2d_world_destroy(s.world);
+    dem2d_world_destroy(s.base.world);
     assert_clean(&env);
 }
 
@@ -274,22 +258,22 @@ static char *read_file(const char *path) {
 static void test_files(void **state) {
     (void)state;
     const char *const path = "build/test_writers.file";
-    scene s;
+    full_scene s;
     make_scene(&s, NULL);
     fill_scene(&s, 20);
-    step(&s, 400);
+    step(&s.base, 400);
     for (int w = 0; w < COUNT_OF(writers); w++) {
-        assert_ok(writers[w](s.world, NULL, NULL, path));
-        assert_string_equal(read_file(path), text_of(writers[w], s.world));
+        assert_ok(writers[w](s.base.world, NULL, NULL, path));
+        assert_string_equal(read_file(path), text_of(writers[w], s.base.world));
     }
     assert_int_equal(remove(path), 0);
-    dem2d_world_destroy(s.world);
+    dem2d_world_destroy(s.base.world);
 }
 
 static void test_null_arguments(void **state) {
     (void)state;
     test_env env;
-    scene s;
+    full_scene s;
     const dem2d_svg_desc svg = {0};
     const dem2d_vtp_desc vtp = {0};
     const dem2d_csv_desc csv = {0};
@@ -297,29 +281,30 @@ static void test_null_arguments(void **state) {
     test_env_init(&env);
     make_scene(&s, &env.env);
     assert_result(dem2d_world_write_svg(NULL, &svg, "x"), DEM2D_NULL_ARGUMENT);
-    assert_result(dem2d_world_write_svg(s.world, NULL, NULL), DEM2D_NULL_ARGUMENT);
+    assert_result(dem2d_world_write_svg(s.base.world, NULL, NULL), DEM2D_NULL_ARGUMENT);
     assert_result(dem2d_world_write_vtp(NULL, &vtp, "x"), DEM2D_NULL_ARGUMENT);
-    assert_result(dem2d_world_write_vtp(s.world, NULL, NULL), DEM2D_NULL_ARGUMENT);
+    assert_result(dem2d_world_write_vtp(s.base.world, NULL, NULL), DEM2D_NULL_ARGUMENT);
     assert_result(dem2d_world_write_csv(NULL, &csv, "x"), DEM2D_NULL_ARGUMENT);
-    assert_result(dem2d_world_write_csv(s.world, NULL, NULL), DEM2D_NULL_ARGUMENT);
-    assert_ok(dem2d_world_write_vtp(s.world, NULL, "build/test_writers_plain.vtp")); /* all zero */
-    assert_ok(dem2d_world_write_csv(s.world, NULL, "build/test_writers_plain.csv"));
+    assert_result(dem2d_world_write_csv(s.base.world, NULL, NULL), DEM2D_NULL_ARGUMENT);
+    assert_ok(
+        dem2d_world_write_vtp(s.base.world, NULL, "build/test_writers_plain.vtp")); /* all zero */
+    assert_ok(dem2d_world_write_csv(s.base.world, NULL, "build/test_writers_plain.csv"));
     assert_result(dem2d_pvd_write(&env.env, NULL, "x"), DEM2D_NULL_ARGUMENT);
     assert_logged(&env, DEM2D_NULL_ARGUMENT, -1, "desc");
     for (int points = -1; points <= 2; points++) {
         if (points == 0) continue;
         wrong.outline_points = points;
-        assert_result(dem2d_world_write_vtp(s.world, &wrong, "x"), DEM2D_OUT_OF_RANGE);
+        assert_result(dem2d_world_write_vtp(s.base.world, &wrong, "x"), DEM2D_OUT_OF_RANGE);
         assert_logged(&env, DEM2D_OUT_OF_RANGE, -1, "outline_points");
     }
     wrong.outline_points = 0;
     for (int part = -1; part <= DEM2D_VTP_PART_COUNT; part += DEM2D_VTP_PART_COUNT + 1) {
         wrong.part = (dem2d_vtp_part)part;
-        assert_result(dem2d_world_write_vtp(s.world, &wrong, "x"), DEM2D_OUT_OF_RANGE);
+        assert_result(dem2d_world_write_vtp(s.base.world, &wrong, "x"), DEM2D_OUT_OF_RANGE);
         assert_logged(&env, DEM2D_OUT_OF_RANGE, -1, "part");
     }
     assert_false(exists("x"));
-    dem2d_world_destroy(s.world);
+    dem2d_world_destroy(s.base.world);
     assert_clean(&env);
 }
 
@@ -359,37 +344,37 @@ static void ask_everything(const dem2d_world *world) {
 static void test_output_changes_nothing(void **state) {
     (void)state;
     enum { STEPS = 2000 };
-    scene s[2];
+    full_scene s[2];
     dem2d_stats stats[2];
     for (int i = 0; i < 2; i++) {
         make_scene(&s[i], NULL);
         fill_scene(&s[i], GRAINS);
         for (int k = 0; k < STEPS; k += 10) {
-            step(&s[i], 10);
-            if (i == 1) ask_everything(s[i].world);
+            step(&s[i].base, 10);
+            if (i == 1) ask_everything(s[i].base.world);
         }
         memset(&stats[i], 0, sizeof stats[i]);
-        assert_ok(dem2d_world_stats(s[i].world, &stats[i]));
+        assert_ok(dem2d_world_stats(s[i].base.world, &stats[i]));
     }
     assert_memory_equal(&stats[0], &stats[1], sizeof stats[0]);
     assert_true(stats[0].contacts > 10);
     dem2d_particle_id ids[GRAINS];
     int count;
-    assert_ok(dem2d_world_particles(s[0].world, ids, GRAINS, &count));
+    assert_ok(dem2d_world_particles(s[0].base.world, ids, GRAINS, &count));
     assert_int_equal(count, GRAINS - 1);
     for (int k = 0; k < count; k++) {
         dem2d_particle_info info[2];
         memset(info, 0, sizeof info);
         for (int i = 0; i < 2; i++)
-            assert_ok(dem2d_world_get_particle(s[i].world, ids[k], &info[i]));
+            assert_ok(dem2d_world_get_particle(s[i].base.world, ids[k], &info[i]));
         assert_memory_equal(&info[0], &info[1], sizeof info[0]);
     }
     static dem2d_contact_info contacts[2][400];
     memset(contacts, 0, sizeof contacts);
     for (int i = 0; i < 2; i++)
-        assert_ok(dem2d_world_contacts(s[i].world, contacts[i], 400, &count));
+        assert_ok(dem2d_world_contacts(s[i].base.world, contacts[i], 400, &count));
     assert_memory_equal(contacts[0], contacts[1], sizeof contacts[0]);
-    for (int i = 0; i < 2; i++) dem2d_world_destroy(s[i].world);
+    for (int i = 0; i < 2; i++) dem2d_world_destroy(s[i].base.world);
 }
 
 /* --- pictures -------------------------------------------------------------------------------- */
@@ -410,17 +395,18 @@ static void test_scale_bar(void **state) {
     static const char *const labels[4] = {">0.5 m<", ">2e-07 m<", ">5000 m<", ">1 m<"};
     static const double lengths[4] = {0.5, 2e-7, 5000, 1};
     for (int i = 0; i < 4; i++) {
-        scene s;
+        full_scene s;
         dem2d_particle_desc grain = {0};
         dem2d_particle_id id;
         make_scene(&s, NULL);
-        grain.scale = sizes[i], grain.shape = s.shapes[0], grain.material = s.materials[0];
-        assert_ok(dem2d_world_add_particle(s.world, &grain, &id));
-        const dem2d_wall_id gone = add_wall(&s, vec(0, 0), vec(1, 0));
-        (void)add_wall(&s, vec(0, 0), vec(1, 2));             /* a line from border to border */
-        (void)add_wall(&s, vec(0, -2 * sizes[i]), vec(0, 1)); /* below the picture */
-        assert_ok(dem2d_world_remove_wall(s.world, gone));
-        const char *text = text_of(put_svg, s.world), *bar = strstr(text, "<g stroke=\"#222\"");
+        grain.scale = sizes[i], grain.shape = s.shapes[0], grain.material = s.base.material;
+        assert_ok(dem2d_world_add_particle(s.base.world, &grain, &id));
+        const dem2d_wall_id gone = put_plane(&s, vec(0, 0), vec(1, 0));
+        (void)put_plane(&s, vec(0, 0), vec(1, 2));             /* a line from border to border */
+        (void)put_plane(&s, vec(0, -2 * sizes[i]), vec(0, 1)); /* below the picture */
+        assert_ok(dem2d_world_remove_wall(s.base.world, gone));
+        const char *text = text_of(put_svg, s.base.world),
+                   *bar = strstr(text, "<g stroke=\"#222\"");
         assert_non_null(strstr(text, labels[i]));
         assert_non_null(bar);
         assert_within(attribute(bar, "x2") - attribute(bar, "x1"),
@@ -437,7 +423,7 @@ static void test_scale_bar(void **state) {
         assert_within(fabs(attribute(line, "y1") - attribute(line, "y2")), 400, 0.011);
         const char *next = strstr(line + 1, "<line");
         assert_true(next == NULL || next > strstr(line, "</g>")); /* only one is in sight */
-        dem2d_world_destroy(s.world);
+        dem2d_world_destroy(s.base.world);
     }
 }
 
@@ -448,10 +434,10 @@ static void test_locales(void **state) {
     static const char *const names[] = {"de_DE.UTF-8", "ps_AF.UTF-8"};
     static char plain[SINK_ROOM];
     char half[32];
-    scene s;
+    full_scene s;
     make_scene(&s, NULL);
     fill_scene(&s, 12);
-    step(&s, 300);
+    step(&s.base, 300);
     for (int k = 0; k < COUNT_OF(names); k++) {
         if (!setlocale(LC_NUMERIC, names[k])) {
             print_message("skipped: no locale %s\n", names[k]);
@@ -461,13 +447,13 @@ static void test_locales(void **state) {
         assert_string_not_equal(half, "0.5");
         for (int i = 0; i < COUNT_OF(writers); i++) {
             setlocale(LC_NUMERIC, "C");
-            strcpy(plain, text_of(writers[i], s.world));
+            strcpy(plain, text_of(writers[i], s.base.world));
             setlocale(LC_NUMERIC, names[k]);
-            assert_string_equal(text_of(writers[i], s.world), plain);
+            assert_string_equal(text_of(writers[i], s.base.world), plain);
         }
         setlocale(LC_NUMERIC, "C");
     }
-    dem2d_world_destroy(s.world);
+    dem2d_world_destroy(s.base.world);
 }
 
 /* --- histories ------------------------------------------------------------------------------- */
@@ -478,15 +464,15 @@ static const char csv_header[] =
     "contacts,"
     "max_overlap";
 
-static void check_row(const scene *s, const char *row) {
+static void check_row(const full_scene *s, const char *row) {
     dem2d_stats stats;
     dem2d_energy energy;
     dem2d_equilibrium rest;
     dem2d_packing packing;
-    assert_ok(dem2d_world_stats(s->world, &stats));
-    assert_ok(dem2d_world_energy(s->world, &energy));
-    assert_ok(dem2d_world_equilibrium(s->world, &rest));
-    assert_ok(dem2d_world_packing(s->world, &packing));
+    assert_ok(dem2d_world_stats(s->base.world, &stats));
+    assert_ok(dem2d_world_energy(s->base.world, &energy));
+    assert_ok(dem2d_world_equilibrium(s->base.world, &rest));
+    assert_ok(dem2d_world_packing(s->base.world, &packing));
     const double expected[] = {(double)stats.steps,
                                (double)stats.steps * 1e-4,
                                energy.translational,
@@ -519,22 +505,22 @@ static void test_csv(void **state) {
     (void)state;
     const char *const path = "build/test_writers.csv";
     char header[400];
-    scene s;
+    full_scene s;
     make_scene(&s, NULL);
     fill_scene(&s, 30);
     snprintf(header, sizeof header, "%s,strain,q/p 1\n", csv_header);
     for (int i = 0; i < 3; i++) {
-        const char *text = text_of(put_csv, s.world);
+        const char *text = text_of(put_csv, s.base.world);
         assert_memory_equal(text, header, strlen(header));
         check_row(&s, text + strlen(header)); /* the first is before the first step: inf */
         assert_true(strchr(strchr(text, '\n') + 1, '\n')[1] == '\0'); /* one row */
-        step(&s, 400);
+        step(&s.base, 400);
     }
     dem2d_csv_desc desc = {0};
     for (int i = 0; i < 3; i++) {
         desc.append = i > 0;
-        assert_ok(dem2d_world_write_csv(s.world, &desc, path));
-        step(&s, 1);
+        assert_ok(dem2d_world_write_csv(s.base.world, &desc, path));
+        step(&s.base, 1);
     }
     const char *text = read_file(path);
     const size_t length = strlen(csv_header);
@@ -548,15 +534,15 @@ static void test_csv(void **state) {
     assert_true(steps[0] == 1200 && steps[1] == 1201 && steps[2] == 1202);
     assert_true(strchr(text, '\n')[1] == '\0');
     assert_int_equal(remove(path), 0);
-    dem2d_world_destroy(s.world);
+    dem2d_world_destroy(s.base.world);
 }
 
-static void check_refused(const scene *s, const test_env *env, const dem2d_csv_desc *desc,
+static void check_refused(const full_scene *s, const test_env *env, const dem2d_csv_desc *desc,
                           dem2d_result result, int index, const char *word) {
     sink *out = sink_start(SINK_ROOM - 1, INT_MAX);
     dem2d_csv_desc with = *desc;
     with.write = take, with.user = out;
-    assert_result(dem2d_world_write_csv(s->world, &with, NULL), result);
+    assert_result(dem2d_world_write_csv(s->base.world, &with, NULL), result);
     assert_logged(env, result, index, word);
     assert_int_equal(out->calls, 0);
 }
@@ -586,18 +572,18 @@ static const char *svg_text(const dem2d_world *world, dem2d_svg_desc desc) {
 }
 
 /* Discs of radius 1 in rows that overlap a little, one row on a floor. */
-static void make_rows(scene *s, int columns, int rows) {
+static void make_rows(full_scene *s, int columns, int rows) {
     make_scene(s, NULL);
     dem2d_shape *disc = make_disc(1);
     dem2d_shape_id shape;
-    assert_ok(dem2d_world_add_shape(s->world, disc, &shape));
+    assert_ok(dem2d_world_add_shape(s->base.world, disc, &shape));
     dem2d_shape_destroy(disc);
     for (int i = 0; i < columns * rows; i++) {
         dem2d_particle_desc grain = {0};
         dem2d_particle_id id;
-        grain.scale = 1, grain.shape = shape, grain.material = s->materials[0];
+        grain.scale = 1, grain.shape = shape, grain.material = s->base.material;
         grain.position = vec(1.99 * (i % columns), 1.99 * (i / columns) + 0.99);
-        assert_ok(dem2d_world_add_particle(s->world, &grain, &id));
+        assert_ok(dem2d_world_add_particle(s->base.world, &grain, &id));
     }
 }
 
@@ -606,10 +592,10 @@ static void test_chain_width(void **state) {
     (void)state;
     for (int columns = 2; columns <= 200; columns *= 10) {
         const dem2d_svg_desc desc = {.force_chains = true};
-        scene s;
+        full_scene s;
         make_rows(&s, columns, 2);
-        step(&s, 1);
-        const char *text = svg_text(s.world, desc), *at = text;
+        step(&s.base, 1);
+        const char *text = svg_text(s.base.world, desc), *at = text;
         const double radius = attribute(text, "r");
         double sum = 0;
         int lines = 0;
@@ -622,43 +608,43 @@ static void test_chain_width(void **state) {
         }
         assert_true(lines >= 3 * columns - 2);
         assert_near(sum / lines, fmin(800 / 400, radius / 4), 0.02L);
-        dem2d_world_destroy(s.world);
+        dem2d_world_destroy(s.base.world);
     }
 }
 
 /* One stray grain shrinks everything, unless a view is given: what is off it is not drawn. */
 static void test_view(void **state) {
     (void)state;
-    scene s;
+    full_scene s;
     dem2d_svg_desc desc = {0};
     make_rows(&s, 10, 1);
-    const char *text = svg_text(s.world, desc);
+    const char *text = svg_text(s.base.world, desc);
     const double radius = attribute(text, "r");
     dem2d_particle_desc stray = {0};
     dem2d_particle_id id;
     dem2d_particle_id all[16];
     dem2d_particle_info info;
     int count;
-    assert_ok(dem2d_world_particles(s.world, all, 16, &count));
-    assert_ok(dem2d_world_get_particle(s.world, all[0], &info));
-    stray.shape = info.shape, stray.material = s.materials[0], stray.scale = 1;
+    assert_ok(dem2d_world_particles(s.base.world, all, 16, &count));
+    assert_ok(dem2d_world_get_particle(s.base.world, all[0], &info));
+    stray.shape = info.shape, stray.material = s.base.material, stray.scale = 1;
     stray.position = vec(3000, 3000);
-    assert_ok(dem2d_world_add_particle(s.world, &stray, &id));
-    text = svg_text(s.world, desc);
+    assert_ok(dem2d_world_add_particle(s.base.world, &stray, &id));
+    text = svg_text(s.base.world, desc);
     assert_true(attribute(text, "r") < radius / 50);
     assert_int_equal(count_of(text, "<circle"), 11);
     desc.view.lower = vec(-1, 0), desc.view.upper = vec(19, 2);
-    text = svg_text(s.world, desc);
+    text = svg_text(s.base.world, desc);
     assert_int_equal(count_of(text, "<circle"), 10);
     assert_within(attribute(text, "r"), 800 / 20.0, 0.01);
     const dem2d_box bad[] = {
         {{0, 0}, {0, 1}}, {{0, 0}, {1, 0}}, {{1, 1}, {0, 0}}, {{0, 0}, {NAN, 1}}};
     for (int i = 0; i < COUNT_OF(bad); i++) {
         desc.view = bad[i];
-        assert_result(dem2d_world_write_svg(s.world, &desc, "build/none.svg"),
+        assert_result(dem2d_world_write_svg(s.base.world, &desc, "build/none.svg"),
                       i == 3 ? DEM2D_NOT_FINITE : DEM2D_OUT_OF_RANGE);
     }
-    dem2d_world_destroy(s.world);
+    dem2d_world_destroy(s.base.world);
 }
 
 /* Half-planes beside the grains are drawn; one far away is not. */
@@ -666,45 +652,46 @@ static void test_walls_beside(void **state) {
     (void)state;
     const double below[] = {0, 1, 6, 100};
     for (int i = 0; i < COUNT_OF(below); i++) {
-        scene s;
+        full_scene s;
         make_rows(&s, 10, 1);
         dem2d_wall_desc wall = {0};
         dem2d_wall_id id;
-        wall.material = s.materials[0], wall.normal = vec(0, 1), wall.point = vec(7, -below[i]);
-        assert_ok(dem2d_world_add_wall(s.world, &wall, &id));
+        wall.material = s.base.material, wall.normal = vec(0, 1), wall.point = vec(7, -below[i]);
+        assert_ok(dem2d_world_add_wall(s.base.world, &wall, &id));
         const dem2d_svg_desc desc = {0};
-        const int with = count_of(svg_text(s.world, desc), "<line ");
-        assert_ok(dem2d_world_remove_wall(s.world, id));
-        assert_int_equal(with - count_of(svg_text(s.world, desc), "<line "), below[i] <= 6);
-        dem2d_world_destroy(s.world);
+        const int with = count_of(svg_text(s.base.world, desc), "<line ");
+        assert_ok(dem2d_world_remove_wall(s.base.world, id));
+        assert_int_equal(with - count_of(svg_text(s.base.world, desc), "<line "), below[i] <= 6);
+        dem2d_world_destroy(s.base.world);
     }
 }
 
 static void test_motions_shown(void **state) {
     (void)state;
-    scene s;
+    full_scene s;
     dem2d_particle_id all[8];
     dem2d_particle_info info;
     int count;
     make_rows(&s, 4, 1);
-    assert_ok(dem2d_world_particles(s.world, all, 8, &count));
-    assert_ok(dem2d_world_get_particle(s.world, all[0], &info));
+    assert_ok(dem2d_world_particles(s.base.world, all, 8, &count));
+    assert_ok(dem2d_world_get_particle(s.base.world, all[0], &info));
     for (int motion = DEM2D_FIXED; motion <= DEM2D_DRIVEN; motion++) {
         dem2d_particle_desc grain = {0};
         dem2d_particle_id id;
-        grain.shape = info.shape, grain.material = s.materials[0], grain.scale = 1;
+        grain.shape = info.shape, grain.material = s.base.material, grain.scale = 1;
         grain.position = vec(3.0 * motion, 5), grain.motion = (dem2d_motion)motion;
-        assert_ok(dem2d_world_add_particle(s.world, &grain, &id));
+        assert_ok(dem2d_world_add_particle(s.base.world, &grain, &id));
     }
     const dem2d_svg_desc desc = {0};
-    const char *text = svg_text(s.world, desc);
+    const char *text = svg_text(s.base.world, desc);
     assert_int_equal(count_of(text, "<circle"), 6);
     assert_int_equal(count_of(text, "fill=\"#8c8c8c\""), 1);
     assert_int_equal(count_of(text, "fill=\"url(#dem2d-driven)\""), 1);
-    assert_ok(dem2d_world_write_svg(s.world, NULL, "build/test_writers_plain.svg")); /* all zero */
-    assert_string_equal(read_file("build/test_writers_plain.svg"), svg_text(s.world, desc));
+    assert_ok(
+        dem2d_world_write_svg(s.base.world, NULL, "build/test_writers_plain.svg")); /* all zero */
+    assert_string_equal(read_file("build/test_writers_plain.svg"), svg_text(s.base.world, desc));
     assert_int_equal(remove("build/test_writers_plain.svg"), 0);
-    dem2d_world_destroy(s.world);
+    dem2d_world_destroy(s.base.world);
 }
 
 /* --- time ----------------------------------------------------------------------------------------
@@ -715,35 +702,35 @@ static void test_time(void **state) {
     (void)state;
     const char *const path = "build/test_writers.snapshot";
     const double steps[] = {1e-5, 1e-6, 1e-6, 3e-5, 1e-5};
-    scene s;
+    full_scene s;
     dem2d_stats n;
     long double time = 0;
     double before = -1;
     make_scene(&s, NULL);
     for (int i = 0; i < COUNT_OF(steps); i++) {
-        assert_ok(dem2d_world_set_time_step(s.world, steps[i]));
+        assert_ok(dem2d_world_set_time_step(s.base.world, steps[i]));
         for (int k = 0; k < 3; k++) {
-            step(&s, 1000 + k);
+            step(&s.base, 1000 + k);
             time += (long double)steps[i] * (1000 + k);
-            assert_ok(dem2d_world_stats(s.world, &n));
+            assert_ok(dem2d_world_stats(s.base.world, &n));
             assert_near(n.time, time, 1e-15L);
             assert_true(n.time > before);
             before = n.time;
-            const char *row = strchr(text_of(put_csv, s.world), '\n') + 1;
+            const char *row = strchr(text_of(put_csv, s.base.world), '\n') + 1;
             assert_same_bits(strtod(strchr(row, ',') + 1, NULL), n.time);
         }
         dem2d_world *loaded = NULL;
-        const uint64_t hash = dem2d_world_hash(s.world);
-        assert_ok(dem2d_world_save(s.world, &(dem2d_save_desc){0}, path));
+        const uint64_t hash = dem2d_world_hash(s.base.world);
+        assert_ok(dem2d_world_save(s.base.world, &(dem2d_save_desc){0}, path));
         assert_ok(dem2d_world_load(NULL, path, &loaded));
         assert_true(dem2d_world_hash(loaded) == hash);
-        dem2d_world_destroy(s.world);
-        s.world = loaded;
-        assert_ok(dem2d_world_stats(s.world, &n));
+        dem2d_world_destroy(s.base.world);
+        s.base.world = loaded;
+        assert_ok(dem2d_world_stats(s.base.world, &n));
         assert_same_bits(n.time, before);
     }
     assert_int_equal(remove(path), 0);
-    dem2d_world_destroy(s.world);
+    dem2d_world_destroy(s.base.world);
 }
 
 static void test_csv_errors(void **state) {
@@ -752,7 +739,7 @@ static void test_csv_errors(void **state) {
     const char *names[2] = {"good", NULL};
     double values[2] = {1, 2};
     test_env env;
-    scene s;
+    full_scene s;
     dem2d_csv_desc desc = {0};
     test_env_init(&env);
     make_scene(&s, &env.env);
@@ -773,7 +760,7 @@ static void test_csv_errors(void **state) {
     check_refused(&s, &env, &desc, DEM2D_NOT_FINITE, 0, "values");
     values[0] = 1, values[1] = INFINITY;
     check_refused(&s, &env, &desc, DEM2D_NOT_FINITE, 1, "values");
-    dem2d_world_destroy(s.world);
+    dem2d_world_destroy(s.base.world);
     assert_clean(&env);
 }
 
@@ -865,31 +852,31 @@ static void check_cell(const char *text, const char *name, int cell, int cells, 
 static void test_vtp_particles(void **state) {
     (void)state;
     static char text[SINK_ROOM];
-    scene s;
+    full_scene s;
     dem2d_particle_id ids[GRAINS];
     dem2d_particle_info before[GRAINS];
     static dem2d_contact_info contacts[400];
     int count, open, of[GRAINS] = {0}, first = 0;
     make_scene(&s, NULL);
     fill_scene(&s, GRAINS);
-    step(&s, 900);
-    assert_ok(dem2d_world_particles(s.world, ids, GRAINS, &count));
+    step(&s.base, 900);
+    assert_ok(dem2d_world_particles(s.base.world, ids, GRAINS, &count));
     for (int i = 0; i < count; i++)
-        assert_ok(dem2d_world_get_particle(s.world, ids[i], &before[i]));
-    step(&s, 1);
-    assert_ok(dem2d_world_contacts(s.world, contacts, 400, &open));
+        assert_ok(dem2d_world_get_particle(s.base.world, ids[i], &before[i]));
+    step(&s.base, 1);
+    assert_ok(dem2d_world_contacts(s.base.world, contacts, 400, &open));
     for (int i = 0; i < open; i++)
         if (contacts[i].b.generation != 0) of[contacts[i].a.index]++, of[contacts[i].b.index]++;
-    strcpy(text, text_of(put_particles, s.world));
+    strcpy(text, text_of(put_particles, s.base.world));
     for (int i = 0; i < count; i++) {
         const dem2d_particle_info *p = &before[i];
-        const dem2d_shape *shape = dem2d_world_shape(s.world, p->shape);
+        const dem2d_shape *shape = dem2d_world_shape(s.base.world, p->shape);
         dem2d_particle_info now;
         dem2d_shape_info info;
         dem2d_stress stress;
-        assert_ok(dem2d_world_get_particle(s.world, ids[i], &now));
+        assert_ok(dem2d_world_get_particle(s.base.world, ids[i], &now));
         assert_ok(dem2d_shape_get(shape, &info));
-        assert_ok(dem2d_world_particle_stress(s.world, ids[i], &stress));
+        assert_ok(dem2d_world_particle_stress(s.base.world, ids[i], &stress));
         CHECK_CELL("id", ids[i].index);
         CHECK_CELL("type", info.type);
         CHECK_CELL("material", p->material.index);
@@ -916,26 +903,26 @@ static void test_vtp_particles(void **state) {
     }
     assert_int_equal(read_array(text, "connectivity", numbers, NUMBERS), first);
     for (int k = 0; k < first; k++) assert_true(numbers[k] == k);
-    dem2d_world_destroy(s.world);
+    dem2d_world_destroy(s.base.world);
 }
 
 static void test_vtp_contacts(void **state) {
     (void)state;
     static char text[SINK_ROOM];
     static dem2d_contact_info contacts[400];
-    scene s;
+    full_scene s;
     int count, two = 0, walls = 0, rolls = 0;
     const dem2d_pair_desc rough = {1e7, 1e7, 0.4, 0, 0.05};
     make_scene(&s, NULL);
     fill_scene(&s, GRAINS);
-    step(&s, 7900); /* rolling friction earlier would keep faces from meeting */
-    assert_ok(dem2d_world_set_pair(s.world, s.materials[0], s.materials[1], &rough));
+    step(&s.base, 7900); /* rolling friction earlier would keep faces from meeting */
+    assert_ok(dem2d_world_set_pair(s.base.world, s.base.material, s.other, &rough));
     for (int tries = 0; two == 0 && tries < 200; tries++) { /* until some meet */
-        step(&s, 100);
-        assert_ok(dem2d_world_contacts(s.world, contacts, 400, &count));
+        step(&s.base, 100);
+        assert_ok(dem2d_world_contacts(s.base.world, contacts, 400, &count));
         for (int i = 0; i < count; i++) two += contacts[i].points == 2;
     }
-    strcpy(text, text_of(put_contacts, s.world));
+    strcpy(text, text_of(put_contacts, s.base.world));
     for (int i = 0; i < count; i++) {
         const dem2d_contact_info *c = &contacts[i];
         const bool wall = c->b.generation == 0;
@@ -963,7 +950,7 @@ static void test_vtp_contacts(void **state) {
         walls += wall, rolls += c->moment != 0;
     }
     assert_true(count > 20 && two > 0 && walls > 0 && rolls > 0);
-    dem2d_world_destroy(s.world);
+    dem2d_world_destroy(s.base.world);
 }
 
 /* A disc of radius 1, so a box from -1.1 to 1.1, and walls that cross it or do not. */
@@ -975,28 +962,28 @@ static void test_vtp_walls(void **state) {
                                       {0.5, 1.1, 0.5, -1.1},
                                       {1.1, -1.1, -1.1, 1.1},
                                       {5, 1.1, 5, -1.1}};
-    scene s;
+    full_scene s;
     dem2d_particle_desc grain = {0};
     dem2d_particle_id id;
     enum { count = 5 };
     make_scene(&s, NULL);
-    grain.scale = 1, grain.shape = s.shapes[0], grain.material = s.materials[0];
+    grain.scale = 1, grain.shape = s.shapes[0], grain.material = s.base.material;
     grain.motion = DEM2D_DRIVEN;
-    assert_ok(dem2d_world_add_particle(s.world, &grain, &id));
-    const dem2d_wall_id gone = add_wall(&s, vec(0, 0), vec(1, 0)); /* leaves a gap among the ids */
+    assert_ok(dem2d_world_add_particle(s.base.world, &grain, &id));
+    const dem2d_wall_id gone = put_plane(&s, vec(0, 0), vec(1, 0)); /* leaves a gap among the ids */
     for (int i = 0; i < 4; i++)
-        s.walls[i] = add_wall(&s, vec(at[i][0], at[i][1]), vec(at[i][2], at[i][3]));
+        s.walls[i] = put_plane(&s, vec(at[i][0], at[i][1]), vec(at[i][2], at[i][3]));
     dem2d_wall_desc moving = {0};
-    moving.mode = DEM2D_WALL_MOVING, moving.material = s.materials[0], moving.normal = vec(0, -1);
+    moving.mode = DEM2D_WALL_MOVING, moving.material = s.base.material, moving.normal = vec(0, -1);
     moving.point = vec(0, 3), moving.velocity = vec(0.5, -2);
     dem2d_wall_id last;
-    assert_ok(dem2d_world_add_wall(s.world, &moving, &last));
-    assert_ok(dem2d_world_remove_wall(s.world, gone));
-    step(&s, 1);
-    const char *text = text_of(put_walls, s.world);
+    assert_ok(dem2d_world_add_wall(s.base.world, &moving, &last));
+    assert_ok(dem2d_world_remove_wall(s.base.world, gone));
+    step(&s.base, 1);
+    const char *text = text_of(put_walls, s.base.world);
     for (int i = 0; i < 4; i++) {
         dem2d_wall_info info;
-        assert_ok(dem2d_world_get_wall(s.world, s.walls[i], &info));
+        assert_ok(dem2d_world_get_wall(s.base.world, s.walls[i], &info));
         CHECK_CELL("id", s.walls[i].index);
         CHECK_CELL("mode", 0);
         CHECK_CELL("velocity", 0, 0, 0);
@@ -1012,23 +999,23 @@ static void test_vtp_walls(void **state) {
     CHECK_CELL("mode", DEM2D_WALL_MOVING);
     CHECK_CELL("velocity", 0.5, -2, 0);
     assert_true(read_array(text, "force", numbers, NUMBERS) > 0 && numbers[1] < -9e4);
-    dem2d_world_destroy(s.world);
+    dem2d_world_destroy(s.base.world);
 }
 
 /* Numbers that are not normal are written as 0. */
 static void test_vtp_tiny(void **state) {
     (void)state;
-    scene s;
+    full_scene s;
     dem2d_particle_desc grain = {0};
     dem2d_particle_id id;
     make_scene(&s, NULL);
-    grain.scale = 1, grain.shape = s.shapes[0], grain.material = s.materials[0];
+    grain.scale = 1, grain.shape = s.shapes[0], grain.material = s.base.material;
     grain.velocity = vec(1e-310, -DBL_MIN);
-    assert_ok(dem2d_world_add_particle(s.world, &grain, &id));
-    const char *text = text_of(put_particles, s.world);
+    assert_ok(dem2d_world_add_particle(s.base.world, &grain, &id));
+    const char *text = text_of(put_particles, s.base.world);
     const int i = 0, count = 1;
     CHECK_CELL("velocity", 0, -DBL_MIN, 0);
-    dem2d_world_destroy(s.world);
+    dem2d_world_destroy(s.base.world);
 }
 
 /* --- VTK's files, read by VTK ---------------------------------------------------------------- */
@@ -1118,20 +1105,20 @@ static void test_vtk_reads(void **state) {
     static const dem2d_vtp_part parts[3] = {DEM2D_VTP_PARTICLES, DEM2D_VTP_CONTACTS,
                                             DEM2D_VTP_WALLS};
     char files[600] = "";
-    scene s[2];
+    full_scene s[2];
     const char *python = find_python("vtkmodules.vtkIOXML");
     if (python == NULL) skip();
     for (int i = 0; i < 2; i++) {
         make_scene(&s[i], NULL);
         if (i == 1) fill_scene(&s[i], GRAINS);
-        step(&s[i], 900);
+        step(&s[i].base, 900);
         for (int k = 0; k < 3; k++) {
             char path[60];
             snprintf(path, sizeof path, "build/test_writers_%d_%d.vtp", i, k);
-            assert_ok(put_part(s[i].world, NULL, NULL, path, parts[k], 0));
+            assert_ok(put_part(s[i].base.world, NULL, NULL, path, parts[k], 0));
             strcat(strcat(files, " "), path);
         }
-        dem2d_world_destroy(s[i].world);
+        dem2d_world_destroy(s[i].base.world);
     }
     run_script(python, files);
     for (char *path = strtok(files, " "); path != NULL; path = strtok(NULL, " ")) remove(path);
@@ -1144,14 +1131,14 @@ static void test_pvd_names(void **state) {
                                          "test_writers \xc3\xa9.vtp"};
     static const double times[3] = {-1, 0.1, 1e9};
     char path[60];
-    scene s;
+    full_scene s;
     dem2d_pvd_desc desc = {0};
     const char *python = find_python("xml");
     if (python == NULL) skip();
     make_scene(&s, NULL);
     for (int i = 0; i < 3; i++) {
         snprintf(path, sizeof path, "build/%s", names[i]);
-        assert_ok(put_particles(s.world, NULL, NULL, path));
+        assert_ok(put_particles(s.base.world, NULL, NULL, path));
     }
     desc.count = 3, desc.files = names, desc.times = times;
     assert_ok(dem2d_pvd_write(NULL, &desc, "build/test_writers.pvd"));
@@ -1161,7 +1148,7 @@ static void test_pvd_names(void **state) {
         assert_int_equal(remove(path), 0);
     }
     assert_int_equal(remove("build/test_writers.pvd"), 0);
-    dem2d_world_destroy(s.world);
+    dem2d_world_destroy(s.base.world);
 }
 
 int main(void) {
