@@ -1867,7 +1867,8 @@ DEM2D_API dem2d_result dem2d_world_write_csv(const dem2d_world *world, const dem
 #define DEM2DI_VECTORS_END
 #endif
 
-/* Load memory into the cache that is needed soon; an address past the array's end does no harm. */
+/* Load memory into the cache that is needed soon; an
+ * address past the array's end does no harm. */
 #if defined(__GNUC__)
 #define DEM2DI_PREFETCH(array, ahead) \
     __builtin_prefetch((const void *)((uintptr_t)(array) + (ahead) * sizeof *(array)))
@@ -10328,41 +10329,46 @@ typedef struct dem2di_arms {
     double a_n, a_t, b_n, b_t; /* m */
 } dem2di_arms;
 
-/* A contact. While the two are apart, normal and feature are those of the last search: what they
-   were is no part of the results. */
-typedef struct dem2di_link {
+/* A contact as a force pass leaves it. While the two are apart there is no force, and the normal is
+   that of the last search: what it was is no part of the results. */
+typedef struct dem2di_contact {
     dem2d_vec normal; /* from A to B; 0 before the first search */
+    double depth;     /* m; below 0 apart; 0: overlap that does not count, see joints */
+    double force;     /* normal, N/m */
+    double shear;     /* on B along the tangent perp(normal), N/m: that of the tangential spring */
     dem2di_arms arms;
-    double depth;           /* m; below 0 apart; 0: overlap that does not count, see joints */
-    double force;           /* normal, N/m */
-    double shear;           /* on B along perp(normal), N/m: the tangential spring */
-    double budget;          /* separation bound: see dem2di_link_apart */
-    dem2di_feature feature; /* of two polygons, that carried it: tried first in the next step */
-} dem2di_link;
+} dem2di_contact;
 
-/* What a contact of two points has beside its link, which holds the sums, as its normal that of the
-   sum of the normal forces, and as its point their centre. All zero for a contact of one point. */
+/* What the next search of a pair starts from. */
+typedef struct dem2di_history {
+    dem2di_feature feature; /* of two polygons, that carried it: tried first in the next step */
+    double budget;          /* the pair is apart until both have travelled this far together */
+} dem2di_history;
+
+/* The points of a contact of two. The contact holds their sums, as its normal that of the sum of
+   the normal forces, and as its point their centre. All zero for a contact of one point. */
 typedef struct dem2di_ends {
     double weight[2], depth[2];
-    double offset[2]; /* along the tangent from the link's point */
+    double offset[2]; /* along the tangent from the contact's point */
     double shear[2];
     double energy; /* m2: that in the normal springs over kn */
     int corner[2]; /* as in dem2d_contact_point */
 } dem2di_ends;
 
-/* What the full law keeps beside a contact's link: dashpot, rolling, the caller's law. All zero for
-   a contact that is apart. */
+/* What the full law keeps of a contact: dashpot, rolling, the caller's law. All zero for one that
+   is apart. */
 typedef struct dem2di_extra {
     double viscous[2];       /* parts of the points' normal forces that are not the springs', N/m */
     double moment;           /* on B, N */
     double energy, state[2]; /* of the caller's law */
 } dem2di_extra;
 
-/* Velocities of a contact's A and B in the step that was made, half a step before its force. */
-typedef struct dem2di_twist {
-    dem2d_vec va, vb;
-    double wa, wb;
-} dem2di_twist;
+/* How the two of a contact moved against each other in the step that was made, half a step before
+   its force. */
+typedef struct dem2di_relative_motion {
+    dem2d_vec v;   /* of B's centre against A's */
+    double wa, wb; /* a wall's is 0 */
+} dem2di_relative_motion;
 
 /* A vector in the plane of a contact whose components along normal and tangent are given. */
 static inline dem2d_vec dem2di_from_frame(dem2d_vec normal, double n, double t) {
@@ -10370,52 +10376,55 @@ static inline dem2d_vec dem2di_from_frame(dem2d_vec normal, double n, double t) 
 }
 
 /* The contact point from A's centre. */
-static inline dem2d_vec dem2di_arm_a(const dem2di_link *link) {
-    return dem2di_from_frame(link->normal, link->arms.a_n, link->arms.a_t);
+static inline dem2d_vec dem2di_arm_a(const dem2di_contact *contact) {
+    return dem2di_from_frame(contact->normal, contact->arms.a_n, contact->arms.a_t);
 }
 
 /* The contact point from B's centre. */
-static inline dem2d_vec dem2di_arm_b(const dem2di_link *link) {
-    return dem2di_from_frame(link->normal, link->arms.b_n, link->arms.b_t);
+static inline dem2d_vec dem2di_arm_b(const dem2di_contact *contact) {
+    return dem2di_from_frame(contact->normal, contact->arms.b_n, contact->arms.b_t);
 }
 
 /* From A's centre to B's; to a wall: the contact point. */
-static inline dem2d_vec dem2di_branch_of(const dem2di_link *link, bool wall) {
-    const dem2di_arms *arms = &link->arms;
-    if (wall) return dem2di_arm_a(link);
-    return dem2di_from_frame(link->normal, arms->a_n - arms->b_n, arms->a_t - arms->b_t);
+static inline dem2d_vec dem2di_branch_of(const dem2di_contact *contact, bool wall) {
+    const dem2di_arms *arms = &contact->arms;
+    if (wall) return dem2di_arm_a(contact);
+    return dem2di_from_frame(contact->normal, arms->a_n - arms->b_n, arms->a_t - arms->b_t);
 }
 
 /* Velocity of B against A at the contact point, along the tangent. */
-static inline double dem2di_velocity_t(const dem2di_link *link, const dem2di_twist *twist) {
-    dem2d_vec v = dem2di_sub(twist->vb, twist->va);
-    return dem2di_cross(link->normal, v) -
-           (link->arms.a_n * twist->wa - link->arms.b_n * twist->wb);
+static inline double dem2di_velocity_t(const dem2di_contact *contact,
+                                       const dem2di_relative_motion *motion) {
+    const dem2di_arms *arms = &contact->arms;
+    return dem2di_cross(contact->normal, motion->v) -
+           (arms->a_n * motion->wa - arms->b_n * motion->wb);
 }
 
 /* The same along the normal: below 0 the two approach. */
-static inline double dem2di_velocity_n(const dem2di_link *link, const dem2di_twist *twist) {
-    dem2d_vec v = dem2di_sub(twist->vb, twist->va);
-    return dem2di_dot(link->normal, v) - (link->arms.b_t * twist->wb - link->arms.a_t * twist->wa);
+static inline double dem2di_velocity_n(const dem2di_contact *contact,
+                                       const dem2di_relative_motion *motion) {
+    const dem2di_arms *arms = &contact->arms;
+    return dem2di_dot(contact->normal, motion->v) -
+           (arms->b_t * motion->wb - arms->a_t * motion->wa);
 }
 
 /* Sliding velocity: mean over the step that was made, of what normal and arms were at its beginning
    and are at its end: those of the end alone leave an error of first order in the step. Of a new
    contact that of its end. One rule for all pairs: dem2di_batch_slip is the same for circles. */
-static double dem2di_slip(const dem2di_link *last, const dem2di_link *link,
-                          const dem2di_twist *twist) {
-    double slip = dem2di_velocity_t(link, twist);
+static double dem2di_slip(const dem2di_contact *last, const dem2di_contact *contact,
+                          const dem2di_relative_motion *motion) {
+    double slip = dem2di_velocity_t(contact, motion);
     if (!(last->depth > 0)) return slip;
-    return slip + (dem2di_velocity_t(last, twist) - slip) / 2;
+    return slip + (dem2di_velocity_t(last, motion) - slip) / 2;
 }
 
 /* [F] eq. 8-10 for a given normal force, with the tangential one held within both limits. The
    spring is a scalar along perp(normal), so that it turns with the contact. */
 static inline void dem2di_law_apply(const dem2d_pair_desc *law, double slip, double time_step,
-                                    double last_shear, dem2di_link *link) {
-    double limit = law->friction * link->force;
-    link->shear = last_shear - law->tangential_stiffness * slip * time_step;
-    link->shear = dem2di_max(-limit, dem2di_min(limit, link->shear));
+                                    double last_shear, dem2di_contact *contact) {
+    double limit = law->friction * contact->force;
+    contact->shear = last_shear - law->tangential_stiffness * slip * time_step;
+    contact->shear = dem2di_max(-limit, dem2di_min(limit, contact->shear));
 }
 
 /* Are there two? One of them may be without force: deep in a face it could only pull. */
@@ -10427,7 +10436,7 @@ static inline bool dem2di_ends_two(const dem2di_ends *ends) {
    the common part, whichever shape's corner that is by now; where one end's corner is now that of
    the other end, both have changed sides, as a grain tips over it. A spring of one point is shared
    out by the normal forces, and one point has the sum of two. */
-static void dem2di_ends_hand_on(const dem2di_link *last, const dem2di_ends *last_ends,
+static void dem2di_ends_hand_on(const dem2di_contact *last, const dem2di_ends *last_ends,
                                 const dem2di_ends *ends, const double force[2], double shear[2]) {
     if (!dem2di_ends_two(last_ends)) {
         double sum = force[0] + force[1]; /* 0 where dashpots leave nothing */
@@ -10447,29 +10456,29 @@ static void dem2di_ends_press(const dem2d_pair_desc *law, const dem2di_ends *end
     for (int i = 0; i < 2; i++) force[i] = law->normal_stiffness * ends->weight[i] * ends->depth[i];
 }
 
-/* The law for two points whose normal forces are known, both with the link's slip: it depends on
+/* The law for two points whose normal forces are known, both with the contact's slip: it depends on
    the height along the normal alone. */
 static void dem2di_law_apply_ends(const dem2d_pair_desc *law, double slip, double time_step,
-                                  const double force[2], const dem2di_link *last,
+                                  const double force[2], const dem2di_contact *last,
                                   const dem2di_ends *last_ends, dem2di_ends *ends,
-                                  dem2di_link *link) {
-    link->force = force[0] + force[1];
-    link->shear = 0;
+                                  dem2di_contact *contact) {
+    contact->force = force[0] + force[1];
+    contact->shear = 0;
     dem2di_ends_hand_on(last, last_ends, ends, force, ends->shear);
     for (int i = 0; i < 2; i++) {
         double limit = law->friction * force[i];
         double shear =
             ends->shear[i] - law->tangential_stiffness * ends->weight[i] * slip * time_step;
         ends->shear[i] = dem2di_max(-limit, dem2di_min(limit, shear));
-        link->shear += ends->shear[i];
+        contact->shear += ends->shear[i];
     }
 }
 
-/* Normal, point (from A's centre) and depths of a contact of two points into its link: those of the
-   normal springs' resultant, whose moment is theirs. The normals are nearly parallel: as springs
-   along the resultant both keep their parts of it. */
+/* Normal, point (from A's centre) and depths of a contact of two points into the contact: those of
+   the normal springs' resultant, whose moment is theirs. The normals are nearly parallel: as
+   springs along the resultant both keep their parts of it. */
 static dem2d_vec dem2di_ends_set(const dem2d_contact_point points[2], dem2di_ends *ends,
-                                 dem2di_link *link) {
+                                 dem2di_contact *contact) {
     dem2d_vec force[2], sum, u;
     double part[2], moment = 0;
     for (int i = 0; i < 2; i++) {
@@ -10477,13 +10486,13 @@ static dem2d_vec dem2di_ends_set(const dem2d_contact_point points[2], dem2di_end
         force[i] = dem2di_scale(points[i].normal, part[i]);
     }
     sum = dem2di_add(force[0], force[1]);
-    if (dem2di_unit(sum, &u)) link->normal = u;
-    double total = dem2di_dot(sum, link->normal), both = part[0] + part[1];
+    if (dem2di_unit(sum, &u)) contact->normal = u;
+    double total = dem2di_dot(sum, contact->normal), both = part[0] + part[1];
     dem2d_vec point = dem2di_along(points[0].position, part[1] / both,
                                    dem2di_sub(points[1].position, points[0].position));
     for (int i = 0; i < 2; i++)
         moment += dem2di_cross(dem2di_sub(points[i].position, point), force[i]);
-    dem2d_vec t = dem2di_perp(link->normal);
+    dem2d_vec t = dem2di_perp(contact->normal);
     point = dem2di_along(point, -moment / total, t);
     for (int i = 0; i < 2; i++) {
         ends->weight[i] = points[i].weight * (total / both);
@@ -10523,7 +10532,7 @@ static double dem2di_damped(double spring, double dashpot, double closing) {
    their new centre. */
 static void dem2di_ends_damp(const dem2d_pair_desc *law, const dem2di_meeting *meeting,
                              double force[2], double viscous[2], dem2di_ends *ends,
-                             dem2di_link *link) {
+                             dem2di_contact *contact) {
     double dashpot = dem2di_dashpot(law, meeting->mass);
     for (int i = 0; i < 2; i++) {
         double closing = meeting->closing + meeting->turning * ends->offset[i], spring = force[i];
@@ -10533,7 +10542,7 @@ static void dem2di_ends_damp(const dem2d_pair_desc *law, const dem2di_meeting *m
     double sum = force[0] + force[1];
     if (!(sum > 0)) return;
     double move = force[0] / sum * ends->offset[0] + force[1] / sum * ends->offset[1];
-    dem2di_arms_shift(&link->arms, move);
+    dem2di_arms_shift(&contact->arms, move);
     for (int i = 0; i < 2; i++) ends->offset[i] -= move;
 }
 
@@ -10579,9 +10588,20 @@ DEM2D_API dem2d_result dem2d_damping_ratio(double restitution, double *damping_r
  */
 
 /* Force on B. */
-static inline dem2d_vec dem2di_link_force(const dem2di_link *link) {
-    return dem2di_along(dem2di_scale(link->normal, link->force), link->shear,
-                        dem2di_perp(link->normal));
+static inline dem2d_vec dem2di_contact_force(const dem2di_contact *contact) {
+    return dem2di_along(dem2di_scale(contact->normal, contact->force), contact->shear,
+                        dem2di_perp(contact->normal));
+}
+
+/* Torque on A, and on B. */
+static inline double dem2di_torque_a(const dem2di_contact *contact, double moment) {
+    const dem2di_arms *arms = &contact->arms;
+    return -(arms->a_n * contact->shear - arms->a_t * contact->force) - moment;
+}
+
+static inline double dem2di_torque_b(const dem2di_contact *contact, double moment) {
+    const dem2di_arms *arms = &contact->arms;
+    return arms->b_n * contact->shear - arms->b_t * contact->force + moment;
 }
 
 /* Force and torque of contacts on a particle. */
@@ -10589,18 +10609,6 @@ typedef struct dem2di_load {
     dem2d_vec force;
     double torque;
 } dem2di_load;
-
-/* What a contact does to its partners A (0) and B (1); extra may be NULL. */
-static inline void dem2di_link_loads(const dem2di_link *link, const dem2di_extra *extra,
-                                     dem2di_load loads[2]) {
-    double moment = extra != NULL ? extra->moment : 0;
-    const dem2di_arms *arms = &link->arms;
-    dem2d_vec force = dem2di_link_force(link);
-    loads[0].force = dem2di_negate(force);
-    loads[0].torque = -(arms->a_n * link->shear - arms->a_t * link->force) - moment;
-    loads[1].force = force;
-    loads[1].torque = arms->b_n * link->shear - arms->b_t * link->force + moment;
-}
 
 /* Stiffness of one particle: the upper triangle of a symmetric matrix in x, y, angle. */
 typedef struct dem2di_stiffness {
@@ -10765,7 +10773,6 @@ typedef struct dem2di_wall {
     double skin;          /* how far it may move before the next time */
     dem2d_rot along;      /* of a segment: direction from point to end, */
     double extent;        /* and length */
-    int used_material;    /* at the last force pass */
     uint32_t generation;
     int users; /* walls that span to it */
     bool alive;
@@ -10791,21 +10798,26 @@ typedef struct dem2di_push {
     double force, rise, along;
 } dem2di_push;
 
-/* The listed contacts: of two circles, of two other particles, of particles and walls (in the order
-   of the wall, then of the particle's id). Each at the last force pass and in the one being made.
-   What the scene has no use for is not there. */
+/* Contacts in columns, one element for each pair of the list. */
+typedef struct dem2di_contacts {
+    double *normal_x, *normal_y, *depth, *force, *shear;
+    dem2di_arms *arms;       /* all but circles: of contact i at i - discs */
+    dem2di_history *history; /* likewise */
+    dem2di_ends *ends;       /* likewise, where contacts may have two points */
+    dem2di_extra *extras;    /* likewise, with the full law */
+} dem2di_contacts;
+
+/* The listed pairs: of two circles, of two other particles, of particles and walls (in the order of
+   the wall, then of the particle's id), and their contacts as the last force pass left them. */
 typedef struct dem2di_list {
-    dem2di_key *keys; /* count; a < 0 when the contact was forgotten */
-    bool *touched;    /* circles: may the two have touched at the last force pass? Until one is made
-                         with this list: see dem2di_touched */
-    int discs, pairs, count;            /* where the kinds end */
-    double *shear, *next_shear;         /* circles with friction: the tangential springs */
-    dem2di_link *links, *next_links;    /* all but circles: of contact i at i - discs */
-    dem2di_ends *ends, *next_ends;      /* likewise, where contacts may have two points */
-    dem2di_extra *extras, *next_extras; /* likewise, with the full law */
-    int *incident; /* 2 i for the A of contact i, 2 i + 1 for its B: those of each particle in the
-                      order of the partner's id, walls last; then 2 count up to a whole gather */
-    int *first;    /* of a slot's in incident; bodies + 1 */
+    dem2di_key *keys;         /* count; a < 0 when the contact was forgotten: it is apart */
+    int discs, pairs, count;  /* where the kinds end */
+    dem2di_contacts contacts; /* at the last force pass; a force pass writes the next over them */
+    dem2di_contacts last;     /* what they were before a step that looks back: in scratch */
+    int *adjacent; /* the contacts of each particle in the order of the partner's id, walls last:
+                      first those of which it is B, as A has the lower id, then as A */
+    int *first;    /* of a slot's in adjacent; bodies + 1 */
+    int *own;      /* of a slot's as A */
 } dem2di_list;
 
 /* What the contact passes count. */
@@ -10837,11 +10849,11 @@ typedef struct dem2di_plan {
     bool turns; /* some particle is no circle: rotations matter, and pairs are skipped by travel */
     bool one_law; /* all particles are of one material: */
     int material;
-    bool joints; /* two segments may meet */
-    bool full;   /* some law has a dashpot or rolling friction, or is the caller's: what the
-                    circles' batches do not know, so that all pairs have links and extras */
-    bool friction_again, full_again; /* it is there for what the last list had of it: see
-                                        dem2di_outlasts */
+    bool joints;        /* two segments may meet */
+    bool full;          /* some law has a dashpot or rolling friction, or is the caller's: what the
+                           circles' batches do not know, so that all pairs have links and extras */
+    bool full_again;    /* for one list more: what contacts had of it in the last force pass must
+                           outlast    a step that is refused */
     bool faces;         /* contacts may have two points: by the rule, and some particle has faces */
     bool heavy, damped; /* gravity, damping: as they are set at the step */
 } dem2di_plan;
@@ -10895,11 +10907,10 @@ typedef enum dem2di_group {
     DEM2DI_MADE,    /* of bodies, where some are redirected */
     DEM2DI_WALLS,
     DEM2DI_KEYS,
-    DEM2DI_SPRINGS,
-    DEM2DI_LINKS,
-    DEM2DI_ENDS,
-    DEM2DI_EXTRAS,
-    DEM2DI_INCIDENT,
+    DEM2DI_GENERAL, /* all but circles */
+    DEM2DI_ENDS,    /* of these, where plan.faces */
+    DEM2DI_EXTRAS,  /* where plan.full */
+    DEM2DI_ADJACENCY,
     DEM2DI_TALLIES,
     DEM2DI_SCRATCH, /* lines */
     DEM2DI_SHAPE,   /* one row: a shape itself; its columns by its count, its parts, ... */
@@ -10938,6 +10949,7 @@ struct dem2d_world {
     double creep;    /* part of a skin that the rounding of a position may use up in a step */
     double rounding; /* m, of a position */
     bool bounded;    /* no state can become infinite while the list lasts */
+    double softness; /* of the list: times the stiffness of a contact it bounds all eigenvalues */
     double spread;   /* mean distance in memory of two partners when last sorted */
     int64_t steps, rebuilds, slow_time_step, fast_motion, listed_at;
     int64_t timed_at; /* steps when the time step was last changed */
@@ -10948,7 +10960,7 @@ struct dem2d_world {
 
     dem2di_template *templates;
     dem2d_material_desc *materials;
-    dem2d_pair_desc *laws, *used_laws; /* laws_side squared: now, and at the last force pass */
+    dem2d_pair_desc *laws; /* laws_side squared */
     int template_count, material_count, laws_side;
 
     int body_count; /* slots in use, holes too */
@@ -10969,10 +10981,10 @@ struct dem2d_world {
     int wall_count;
 
     dem2di_list list;
-    double *load_x, *load_y, *load_turn; /* force and torque of contact i on its A at 2 i, on its B
-                                            at 2 i + 1, and 0 behind the last; in scratch */
-    dem2di_push *pushes;                 /* room for the contacts of a servo wall; in scratch */
-    char *scratch; /* what only a step or only the building of the list needs */
+    double *load_x, *load_y; /* force on the B of each contact, on A against it; in scratch, as: */
+    double *load_a, *load_b; /* torques on A and on B */
+    dem2di_push *pushes;     /* room for the contacts of a servo wall */
+    char *scratch;           /* what only a step or only the building of the list needs */
     dem2di_tally *tallies;
 
     int capacity[DEM2DI_GROUPS]; /* elements that the columns of a group have room for */
@@ -11028,13 +11040,6 @@ static const dem2di_field dem2di_wall_fields[] = {
     DEM2DI_ROW(dem2d_wall_desc, spans, DEM2DI_HANDLE, "- none; two walls, or both zero"),
 };
 
-static const dem2di_field dem2di_used_fields[] = {
-    DEM2DI_ROW(dem2d_pair_desc, normal_stiffness, DEM2DI_FROM_0, ""),
-    DEM2DI_ROW(dem2d_pair_desc, tangential_stiffness, DEM2DI_FROM_0, ""),
-    DEM2DI_ROW(dem2d_pair_desc, friction, DEM2DI_FROM_0, ""),
-    DEM2DI_ROW(dem2d_pair_desc, damping_ratio, DEM2DI_FROM_0, ""),
-    DEM2DI_ROW(dem2d_pair_desc, rolling_friction, DEM2DI_FROM_0, "")};
-
 /* --- columns ------------------------------------------------------------------------------------
    Each array of the world is a column: one line of dem2di_columns says what is done with it. Tables
    of fields say what numbers there are in the columns that are saved. */
@@ -11071,6 +11076,7 @@ static const dem2di_field dem2di_progress_fields[] = {
     DEM2DI_SAVED("skin_fixed", dem2d_world, skin_fixed, DEM2DI_SWITCH),
     DEM2DI_SAVED("scattered", dem2d_world, scattered, DEM2DI_SWITCH),
     DEM2DI_SAVED("bounded", dem2d_world, bounded, DEM2DI_SWITCH),
+    DEM2DI_SAVED("softness", dem2d_world, softness, DEM2DI_MAY_OVERFLOW),
     DEM2DI_SAVED("skin", dem2d_world, skin, DEM2DI_POSITIVE),
     DEM2DI_SAVED("interval", dem2d_world, interval, DEM2DI_FROM_0),
     DEM2DI_SAVED("spread", dem2d_world, spread, DEM2DI_FROM_0),
@@ -11105,7 +11111,6 @@ static const dem2di_field dem2di_plan_fields[] = {
     DEM2DI_SAVED("material", dem2d_world, plan.material, DEM2DI_WHOLE(0, DEM2DI_MATERIALS_MAX)),
     DEM2DI_SAVED("joints", dem2d_world, plan.joints, DEM2DI_SWITCH),
     DEM2DI_SAVED("full", dem2d_world, plan.full, DEM2DI_SWITCH),
-    DEM2DI_SAVED("friction_again", dem2d_world, plan.friction_again, DEM2DI_SWITCH),
     DEM2DI_SAVED("full_again", dem2d_world, plan.full_again, DEM2DI_SWITCH),
     DEM2DI_SAVED("faces", dem2d_world, plan.faces, DEM2DI_SWITCH)};
 
@@ -11166,9 +11171,7 @@ static const dem2di_field dem2di_wall_id_fields[] = {
 
 static const dem2di_field dem2di_wall_list_fields[] = {
     DEM2DI_SAVED("listed", dem2di_wall, listed, DEM2DI_VECTOR),
-    DEM2DI_SAVED("skin", dem2di_wall, skin, DEM2DI_FROM_0),
-    DEM2DI_SAVED("used_material", dem2di_wall, used_material,
-                 DEM2DI_WHOLE(0, DEM2DI_MATERIALS_MAX))};
+    DEM2DI_SAVED("skin", dem2di_wall, skin, DEM2DI_FROM_0)};
 
 static const dem2di_field dem2di_wall_state_fields[] = {
     DEM2DI_SAVED("point", dem2di_wall_state, point, DEM2DI_VECTOR),
@@ -11183,17 +11186,16 @@ static const dem2di_field dem2di_key_fields[] = {
     DEM2DI_SAVED("a", dem2di_key, a, DEM2DI_WHOLE(-1, 1 << 30)),
     DEM2DI_SAVED("b", dem2di_key, b, DEM2DI_WHOLE(0, 1 << 30))};
 
-static const dem2di_field dem2di_link_fields[] = {
-    DEM2DI_SAVED("normal", dem2di_link, normal, DEM2DI_VECTOR),
-    DEM2DI_SAVED("arms", dem2di_link, arms, DEM2DI_FINITE),
-    DEM2DI_SAVED("depth", dem2di_link, depth, DEM2DI_FINITE),
-    DEM2DI_SAVED("normal_force", dem2di_link, force, DEM2DI_FINITE),
-    DEM2DI_SAVED("shear", dem2di_link, shear, DEM2DI_FINITE)};
+static const dem2di_field dem2di_arms_fields[] = {
+    DEM2DI_SAVED("a_n", dem2di_arms, a_n, DEM2DI_FINITE),
+    DEM2DI_SAVED("a_t", dem2di_arms, a_t, DEM2DI_FINITE),
+    DEM2DI_SAVED("b_n", dem2di_arms, b_n, DEM2DI_FINITE),
+    DEM2DI_SAVED("b_t", dem2di_arms, b_t, DEM2DI_FINITE)};
 
-static const dem2di_field dem2di_start_fields[] = {
-    DEM2DI_SAVED("budget", dem2di_link, budget, DEM2DI_FINITE),
-    DEM2DI_SAVED("feature", dem2di_link, feature.own, DEM2DI_TAG),
-    DEM2DI_SAVED("corners", dem2di_link, feature.corner, DEM2DI_TAG)};
+static const dem2di_field dem2di_history_fields[] = {
+    DEM2DI_SAVED("budget", dem2di_history, budget, DEM2DI_FINITE),
+    DEM2DI_SAVED("feature", dem2di_history, feature.own, DEM2DI_TAG),
+    DEM2DI_SAVED("corners", dem2di_history, feature.corner, DEM2DI_TAG)};
 
 static const dem2di_field dem2di_ends_fields[] = {
     DEM2DI_SAVED("weights", dem2di_ends, weight, DEM2DI_FINITE),
@@ -11213,7 +11215,6 @@ static const dem2di_field dem2di_extra_fields[] = {
 static const dem2di_field dem2di_any_field[] = {DEM2DI_PLAIN("value", double, DEM2DI_ANY_NUMBER)};
 static const dem2di_field dem2di_finite_field[] = {DEM2DI_PLAIN("value", double, DEM2DI_FINITE)};
 static const dem2di_field dem2di_way_field[] = {DEM2DI_PLAIN("value", double, DEM2DI_FROM_0)};
-static const dem2di_field dem2di_bool_field[] = {DEM2DI_PLAIN("value", bool, DEM2DI_SWITCH)};
 
 /* A shape and its slot among the templates. */
 typedef struct dem2di_slot_shape {
@@ -11258,12 +11259,14 @@ static const dem2di_field dem2di_block_fields[] = {
     DEM2DI_SAVED("b", dem2di_block, b, DEM2DI_FINITE)};
 
 enum {
-    DEM2DI_MOVES = 1,  /* with the particles, when these are sorted in memory */
-    DEM2DI_SWAPS = 2,  /* with the column on the next line, which holds the next step's values */
-    DEM2DI_HASHED = 4, /* callers see it, or it decides what they will see */
-    DEM2DI_FIRST = 8,  /* of its group in a snapshot, which has it even if all is 0: no number of
-                          rows takes memory without as many bytes */
-    DEM2DI_SHARES = 16 /* its memory is that of another line, or of the world itself */
+    DEM2DI_MOVES = 1,   /* with the particles, when these are sorted in memory */
+    DEM2DI_SWAPS = 2,   /* with the column on the next line, which holds the next step's values */
+    DEM2DI_HASHED = 4,  /* callers see it, or it decides what they will see */
+    DEM2DI_FIRST = 8,   /* of its group in a snapshot, which has it even if all is 0: no number of
+                           rows takes memory without as many bytes */
+    DEM2DI_SHARES = 16, /* its memory is that of another line, or of the world itself */
+    DEM2DI_STORED =
+        32 /* of contacts: carried over from list to list, kept in steps that look back */
 };
 
 /* A column in an object: a world, or a shape. */
@@ -11300,7 +11303,6 @@ static const dem2di_column dem2di_columns[] = {
                   DEM2DI_ALL(dem2di_material_fields)),
     DEM2DI_COLUMN("laws", DEM2DI_LAWS, laws, DEM2DI_FIRST | DEM2DI_HASHED,
                   DEM2DI_ALL(dem2di_pair_fields)),
-    DEM2DI_COLUMN("used_laws", DEM2DI_LAWS, used_laws, 0, DEM2DI_ALL(dem2di_used_fields)),
     DEM2DI_COLUMN("ids", DEM2DI_NAMES, names, DEM2DI_FIRST | DEM2DI_HASHED,
                   DEM2DI_ALL(dem2di_name_fields)),
     DEM2DI_COLUMN("slots", DEM2DI_NAMES, names, DEM2DI_SHARES, DEM2DI_ALL(dem2di_slot_fields)),
@@ -11313,6 +11315,7 @@ static const dem2di_column dem2di_columns[] = {
     DEM2DI_COLUMN("wear", DEM2DI_BODIES, wear, 0, DEM2DI_ALL(dem2di_any_field)),
     DEM2DI_COLUMN(NULL, DEM2DI_BODIES, inverse, DEM2DI_MOVES, DEM2DI_NONE),
     DEM2DI_COLUMN(NULL, DEM2DI_BODIES, list.first, 0, DEM2DI_NONE),
+    DEM2DI_COLUMN(NULL, DEM2DI_BODIES, list.own, 0, DEM2DI_NONE),
     DEM2DI_COLUMN("travel", DEM2DI_TRAVELS, travel, DEM2DI_MOVES | DEM2DI_SWAPS,
                   DEM2DI_ALL(dem2di_way_field)),
     DEM2DI_COLUMN(NULL, DEM2DI_TRAVELS, next_travel, 0, DEM2DI_NONE),
@@ -11332,22 +11335,25 @@ static const dem2di_column dem2di_columns[] = {
     DEM2DI_COLUMN(NULL, DEM2DI_WALLS, wall_next, 0, DEM2DI_NONE),
     DEM2DI_COLUMN("pairs", DEM2DI_KEYS, list.keys, DEM2DI_FIRST | DEM2DI_HASHED,
                   DEM2DI_ALL(dem2di_key_fields)),
-    DEM2DI_COLUMN("touched", DEM2DI_KEYS, list.touched, 0, DEM2DI_ALL(dem2di_bool_field)),
-    DEM2DI_COLUMN("shear", DEM2DI_SPRINGS, list.shear, DEM2DI_SWAPS,
+    DEM2DI_COLUMN("normal_x", DEM2DI_KEYS, list.contacts.normal_x, DEM2DI_STORED | DEM2DI_HASHED,
                   DEM2DI_ALL(dem2di_finite_field)),
-    DEM2DI_COLUMN(NULL, DEM2DI_SPRINGS, list.next_shear, 0, DEM2DI_NONE),
-    DEM2DI_COLUMN("links", DEM2DI_LINKS, list.links, DEM2DI_SWAPS | DEM2DI_HASHED,
-                  DEM2DI_ALL(dem2di_link_fields)),
-    DEM2DI_COLUMN(NULL, DEM2DI_LINKS, list.next_links, 0, DEM2DI_NONE),
-    DEM2DI_COLUMN("searches", DEM2DI_LINKS, list.links, DEM2DI_SHARES,
-                  DEM2DI_ALL(dem2di_start_fields)),
-    DEM2DI_COLUMN("ends", DEM2DI_ENDS, list.ends, DEM2DI_SWAPS | DEM2DI_HASHED,
+    DEM2DI_COLUMN("normal_y", DEM2DI_KEYS, list.contacts.normal_y, DEM2DI_STORED | DEM2DI_HASHED,
+                  DEM2DI_ALL(dem2di_finite_field)),
+    DEM2DI_COLUMN("depth", DEM2DI_KEYS, list.contacts.depth, DEM2DI_STORED | DEM2DI_HASHED,
+                  DEM2DI_ALL(dem2di_finite_field)),
+    DEM2DI_COLUMN("normal_force", DEM2DI_KEYS, list.contacts.force, DEM2DI_STORED | DEM2DI_HASHED,
+                  DEM2DI_ALL(dem2di_finite_field)),
+    DEM2DI_COLUMN("shear_force", DEM2DI_KEYS, list.contacts.shear, DEM2DI_STORED | DEM2DI_HASHED,
+                  DEM2DI_ALL(dem2di_finite_field)),
+    DEM2DI_COLUMN("arms", DEM2DI_GENERAL, list.contacts.arms, DEM2DI_STORED | DEM2DI_HASHED,
+                  DEM2DI_ALL(dem2di_arms_fields)),
+    DEM2DI_COLUMN("searches", DEM2DI_GENERAL, list.contacts.history, DEM2DI_STORED,
+                  DEM2DI_ALL(dem2di_history_fields)),
+    DEM2DI_COLUMN("ends", DEM2DI_ENDS, list.contacts.ends, DEM2DI_STORED | DEM2DI_HASHED,
                   DEM2DI_ALL(dem2di_ends_fields)),
-    DEM2DI_COLUMN(NULL, DEM2DI_ENDS, list.next_ends, 0, DEM2DI_NONE),
-    DEM2DI_COLUMN("extras", DEM2DI_EXTRAS, list.extras, DEM2DI_SWAPS | DEM2DI_HASHED,
+    DEM2DI_COLUMN("extras", DEM2DI_EXTRAS, list.contacts.extras, DEM2DI_STORED | DEM2DI_HASHED,
                   DEM2DI_ALL(dem2di_extra_fields)),
-    DEM2DI_COLUMN(NULL, DEM2DI_EXTRAS, list.next_extras, 0, DEM2DI_NONE),
-    DEM2DI_COLUMN(NULL, DEM2DI_INCIDENT, list.incident, 0, DEM2DI_NONE),
+    DEM2DI_COLUMN(NULL, DEM2DI_ADJACENCY, list.adjacent, 0, DEM2DI_NONE),
     DEM2DI_COLUMN(NULL, DEM2DI_TALLIES, tallies, 0, DEM2DI_NONE),
     {NULL, DEM2DI_SCRATCH, offsetof(dem2d_world, scratch), DEM2DI_LINE, 0, DEM2DI_NONE},
     /* of each shape, what its support points come from: the rest follows with the same bits */
@@ -11414,11 +11420,11 @@ static void dem2di_columns_release(dem2d_world *world) {
     }
 }
 
-/* The next values become the present ones, in a group and all behind it. */
-static void dem2di_columns_swap(dem2d_world *world, dem2di_group first) {
-    for (const dem2di_column *column = dem2di_columns; column < dem2di_columns + DEM2DI_COLUMNS;
-         column++) {
-        if (!(column->treatment & DEM2DI_SWAPS) || column->group < first) continue;
+/* The next step's values become the present ones. */
+static void dem2di_columns_swap(dem2d_world *world) {
+    for (int k = 0; k < DEM2DI_COLUMNS; k++) {
+        const dem2di_column *column = &dem2di_columns[k];
+        if (!(column->treatment & DEM2DI_SWAPS)) continue;
         void *present = dem2di_column_get(world, column);
         dem2di_column_set(world, column, dem2di_column_get(world, column + 1));
         dem2di_column_set(world, column + 1, present);
@@ -11461,14 +11467,53 @@ static bool dem2di_reserve_bodies(dem2d_world *world, int count) {
 
 static bool dem2di_list_reserve(dem2d_world *world, const dem2di_plan *plan, int discs, int count) {
     dem2di_list *list = &world->list;
-    int others = count - discs;
-    /* the old ones are read once more */
-    if (list->count - list->discs > others) others = list->count - list->discs;
-    return dem2di_group_reserve(world, DEM2DI_KEYS, count) &&
-           dem2di_group_reserve(world, DEM2DI_SPRINGS, plan->friction ? discs : 0) &&
-           dem2di_group_reserve(world, DEM2DI_LINKS, others) &&
+    int others = count - discs, old = list->count - list->discs;
+    if (old > others) others = old; /* they are read once more */
+    return dem2di_group_reserve(world, DEM2DI_KEYS, count > list->count ? count : list->count) &&
+           dem2di_group_reserve(world, DEM2DI_GENERAL, others) &&
            dem2di_group_reserve(world, DEM2DI_ENDS, plan->faces ? others : 0) &&
            dem2di_group_reserve(world, DEM2DI_EXTRAS, plan->full ? others : 0);
+}
+
+/* The first of so many contacts that has an element in the columns of a group, or none has. */
+static int dem2di_contacts_begin(const dem2di_plan *plan, int discs, int count,
+                                 dem2di_group group) {
+    if (group == DEM2DI_KEYS) return 0;
+    if (group == DEM2DI_ENDS && !plan->faces) return count;
+    return group == DEM2DI_EXTRAS && !plan->full ? count : discs;
+}
+
+/* The column of list.last that is as this one of list.contacts. */
+static dem2di_column dem2di_column_last(const dem2di_column *column) {
+    dem2di_column last = *column;
+    last.at += offsetof(dem2d_world, list.last) - offsetof(dem2d_world, list.contacts);
+    return last;
+}
+
+/* Bytes of the largest column of so many contacts. */
+static size_t dem2di_contacts_largest(const dem2di_plan *plan, int discs, int count) {
+    size_t most = 0;
+    for (int k = 0; k < DEM2DI_COLUMNS; k++) {
+        const dem2di_column *column = &dem2di_columns[k];
+        int begin = dem2di_contacts_begin(plan, discs, count, column->group);
+        size_t bytes = (size_t)(count - begin) * column->size;
+        if ((column->treatment & DEM2DI_STORED) && bytes > most) most = bytes;
+    }
+    return most;
+}
+
+/* The contacts as they are into list.last, or (`back`) as they were from there. */
+static void dem2di_contacts_keep(dem2d_world *world, bool back) {
+    const dem2di_list *list = &world->list;
+    for (int k = 0; k < DEM2DI_COLUMNS; k++) {
+        const dem2di_column *column = &dem2di_columns[k];
+        if (!(column->treatment & DEM2DI_STORED)) continue;
+        int begin = dem2di_contacts_begin(&world->plan, list->discs, list->count, column->group);
+        size_t bytes = (size_t)(list->count - begin) * column->size;
+        dem2di_column last = dem2di_column_last(column);
+        void *now = dem2di_column_get(world, column), *then = dem2di_column_get(world, &last);
+        if (bytes > 0) memcpy(back ? now : then, back ? then : now, bytes);
+    }
 }
 
 static dem2d_result dem2di_out_of_memory(const dem2d_world *world, const char *what) {
@@ -11542,10 +11587,8 @@ DEM2D_API dem2d_result dem2d_world_create(const dem2d_world_desc *desc, dem2d_wo
     made->solver = desc->solver;
     made->faces = desc->faces;
     made->check_time_step = !desc->skip_time_step_check;
-    dem2di_plan capacities = made->plan;
-    capacities.friction = true;
     if (!dem2di_reserve_bodies(made, desc->particle_capacity) ||
-        !dem2di_list_reserve(made, &capacities, desc->pair_capacity, desc->pair_capacity)) {
+        !dem2di_list_reserve(made, &made->plan, desc->pair_capacity, desc->pair_capacity)) {
         result = dem2di_out_of_memory(made, "the capacities asked for");
         dem2d_world_destroy(made);
         return result;
@@ -11671,16 +11714,10 @@ static inline const dem2d_pair_desc *dem2di_law_of(const dem2d_world *world, int
 /* Room for the laws of one material more; those that are there keep their places. */
 static bool dem2di_widen_laws(dem2d_world *world) {
     int old = world->laws_side, wider = old + 1;
-    dem2d_pair_desc *tables[2];
     if (!dem2di_group_reserve(world, DEM2DI_LAWS, wider * wider)) return false;
-    tables[0] = world->laws;
-    tables[1] = world->used_laws;
     for (int row = old - 1; row >= 0; row--)
-        for (int k = 0; k < 2; k++)
-            memmove(tables[k] + row * wider, tables[k] + row * old, (size_t)old * sizeof **tables);
-    for (int i = 0; i <= old; i++) /* no force pass has known them */
-        memset(&world->used_laws[i * wider + old], 0, sizeof **tables),
-            memset(&world->used_laws[old * wider + i], 0, sizeof **tables);
+        memmove(world->laws + row * wider, world->laws + row * old,
+                (size_t)old * sizeof *world->laws);
     world->laws_side = wider;
     return true;
 }
@@ -11845,7 +11882,7 @@ DEM2D_API dem2d_result dem2d_world_add_particle(dem2d_world *world, const dem2d_
     state.radius = dem2di_shape_of(world, &body)->circumscribed * desc->scale;
     world->now[slot] = world->before[slot] = state;
 
-    world->list.first[slot + 1] = world->list.first[slot]; /* no contacts yet */
+    world->list.first[slot + 1] = world->list.own[slot] = world->list.first[slot]; /* none yet */
     world->body_count++;
     world->list_stale = world->check_due = true;
     world->ledger.edited = true;
@@ -11854,11 +11891,27 @@ DEM2D_API dem2d_result dem2d_world_add_particle(dem2d_world *world, const dem2d_
     return DEM2D_OK;
 }
 
+/* What contact i has beside it: nothing, until it is found or computed. */
+static inline void dem2di_clear_beside(const dem2d_world *world, int i) {
+    const dem2di_contacts *contacts = &world->list.contacts;
+    int at = i - world->list.discs;
+    if (world->plan.faces) memset(&contacts->ends[at], 0, sizeof *contacts->ends);
+    if (world->plan.full) memset(&contacts->extras[at], 0, sizeof *contacts->extras);
+}
+
+/* A contact ends: its pair is apart, and leaves with the next list. */
+static void dem2di_contact_forget(dem2d_world *world, int i) {
+    dem2di_list *list = &world->list;
+    list->keys[i].a = -1;
+    list->contacts.depth[i] = list->contacts.force[i] = list->contacts.shear[i] = 0;
+    if (i >= list->discs) dem2di_clear_beside(world, i);
+}
+
 /* Contacts of a particle are forgotten. */
 static void dem2di_forget(dem2d_world *world, int slot) {
-    const dem2di_list *list = &world->list;
+    dem2di_list *list = &world->list;
     for (int k = list->first[slot]; k < list->first[slot + 1]; k++)
-        if (list->incident[k] / 2 < list->count) list->keys[list->incident[k] / 2].a = -1;
+        dem2di_contact_forget(world, list->adjacent[k]);
     world->list_stale = true;
     world->ledger.edited = true;
 }
@@ -11866,21 +11919,22 @@ static void dem2di_forget(dem2d_world *world, int slot) {
 /* Contacts of a fixed particle with walls and with others that are fixed are forgotten: no list has
    them. */
 static void dem2di_forget_fixed(dem2d_world *world, int slot) {
-    const dem2di_list *list = &world->list;
+    dem2di_list *list = &world->list;
     for (int k = list->first[slot]; k < list->first[slot + 1]; k++) {
-        int contact = list->incident[k] / 2;
-        if (contact == list->count || list->keys[contact].a < 0) continue;
-        dem2di_key *key = &list->keys[contact];
+        int contact = list->adjacent[k];
+        const dem2di_key *key = &list->keys[contact];
+        if (key->a < 0) continue;
         if (contact >= list->pairs || (world->bodies[key->a].motion == DEM2D_FIXED &&
                                        world->bodies[key->b].motion == DEM2D_FIXED))
-            key->a = -1;
+            dem2di_contact_forget(world, contact);
     }
 }
 
 /* Contacts with a wall are forgotten. */
 static void dem2di_forget_wall(dem2d_world *world, int wall) {
-    for (int i = world->list.pairs; i < world->list.count; i++)
-        if (world->list.keys[i].b == wall) world->list.keys[i].a = -1;
+    dem2di_list *list = &world->list;
+    for (int i = list->pairs; i < list->count; i++)
+        if (list->keys[i].b == wall) dem2di_contact_forget(world, i);
     world->list_stale = true;
     world->ledger.edited = true;
 }
@@ -11957,110 +12011,81 @@ static double dem2di_reduced_inverse(const dem2d_world *world, int contact) {
     return contact >= world->list.pairs ? inverse : inverse + world->inverse[key->b].mass;
 }
 
-/* What holds at the last force pass, or (`next`) in the one that is being made. */
-static const dem2di_state *dem2di_states_at(const dem2d_world *world, bool next) {
-    return next ? world->now : world->before;
-}
-
 /* Velocities of a particle in the step that was made. */
 static dem2di_velocities dem2di_velocities_made(const dem2d_world *world, int slot) {
-    return world->bodies[slot].redirected ? world->made[slot]
-                                          : dem2di_velocities_of(&world->now[slot]);
+    return world->redirected && world->bodies[slot].redirected
+               ? world->made[slot]
+               : dem2di_velocities_of(&world->now[slot]);
 }
 
-static const dem2d_pair_desc *dem2di_law_at(const dem2d_world *world, int contact, bool next) {
-    if (next) return dem2di_law_of(world, contact);
-    const dem2di_key *key = &world->list.keys[contact];
-    int material = contact >= world->list.pairs ? world->walls[key->b].used_material
-                                                : world->bodies[key->b].material;
-    return &world->used_laws[world->bodies[key->a].material * world->laws_side + material];
-}
-
-/* The tangential spring of a contact then. */
-static double dem2di_spring_at(const dem2d_world *world, int contact, bool next) {
+/* Contact i in columns, those of the list or what they were before; false when it is apart. This is
+   the one way in which all but the kernels of circles read contacts. */
+static inline bool dem2di_contact_get(const dem2d_world *world, const dem2di_contacts *from, int i,
+                                      dem2di_contact *contact) {
     const dem2di_list *list = &world->list;
-    int at = contact - list->discs;
-    if (at >= 0) return (next ? list->next_links : list->links)[at].shear;
-    return world->plan.friction ? (next ? list->next_shear : list->shear)[contact] : 0;
-}
-
-/* May the two of a listed contact have touched at the last force pass? Circles that overlap in the
-   states of that pass did not, where one has come or was put there since, or both were fixed. They
-   are listed by a new list, with which no pass has been made when its step is refused. */
-static inline bool dem2di_touched(const dem2d_world *world, int contact) {
-    const dem2di_list *list = &world->list;
-    if (contact >= list->discs) return list->links[contact - list->discs].depth > 0;
-    return world->steps > world->listed_at || list->touched[contact];
-}
-
-/* The contact point of two circles. */
-static inline dem2di_arms dem2di_round_arms(const dem2di_round *round) {
-    dem2di_arms arms;
-    arms.a_n = round->arm_a;
-    arms.b_n = -round->arm_b;
-    arms.a_t = arms.b_t = 0;
-    return arms;
-}
-
-/* A listed contact then; false when it is apart. Of two circles only the tangential spring is kept,
-   the rest follows from the positions with the same bits. */
-static bool dem2di_link_at(const dem2d_world *world, int contact, bool next, dem2di_link *link) {
-    const dem2di_list *list = &world->list;
-    const dem2di_key *key = &list->keys[contact];
-    const dem2di_state *states = dem2di_states_at(world, next);
-    if (contact == list->count || key->a < 0) return false; /* 2 count fills up a gather */
-    if (contact >= list->discs) {
-        *link = (next ? list->next_links : list->links)[contact - list->discs];
-        return link->depth > 0;
+    const dem2di_key *key = &list->keys[i];
+    dem2di_arms *arms = &contact->arms;
+    contact->normal.x = from->normal_x[i];
+    contact->normal.y = from->normal_y[i];
+    contact->depth = from->depth[i];
+    contact->force = from->force[i];
+    contact->shear = from->shear[i];
+    arms->a_n = arms->a_t = arms->b_n = arms->b_t = 0;
+    if (i >= list->discs) {
+        *arms = from->arms[i - list->discs];
+    } else if (contact->depth > 0) {
+        arms->a_n = world->now[key->a].radius - contact->depth / 2;
+        arms->b_n = -(world->now[key->b].radius - contact->depth / 2);
     }
-    const dem2d_pair_desc *law = dem2di_law_at(world, contact, next);
-    const dem2di_state *a = &states[key->a], *b = &states[key->b];
-    dem2di_round round =
-        dem2di_round_make(dem2di_disc_line(a, b), a->radius, b->radius, law->normal_stiffness);
-    link->normal = round.normal;
-    link->arms = dem2di_round_arms(&round);
-    link->depth = round.depth;
-    link->force = round.force;
-    link->shear = dem2di_spring_at(world, contact, next);
-    link->budget = 0;
-    return round.depth > 0 && (next || dem2di_touched(world, contact));
+    return contact->depth > 0;
 }
 
-/* The second point of a contact, beside its link; NULL where no contact has two. */
-static const dem2di_ends *dem2di_ends_at(const dem2d_world *world, int contact, bool next) {
-    const dem2di_list *list = &world->list;
-    if (!world->plan.faces || contact < list->discs) return NULL;
-    const dem2di_ends *ends = &(next ? list->next_ends : list->ends)[contact - list->discs];
+/* A contact into the columns of the list. Between two circles the arms follow from the rest. */
+static inline void dem2di_contact_put(const dem2di_list *list, int i,
+                                      const dem2di_contact *contact) {
+    const dem2di_contacts *to = &list->contacts;
+    to->normal_x[i] = contact->normal.x;
+    to->normal_y[i] = contact->normal.y;
+    to->depth[i] = contact->depth;
+    to->force[i] = contact->force;
+    to->shear[i] = contact->shear;
+    if (i >= list->discs) to->arms[i - list->discs] = contact->arms;
+}
+
+/* The points of a contact that has two, else NULL. */
+static const dem2di_ends *dem2di_ends_of(const dem2d_world *world, const dem2di_contacts *from,
+                                         int i) {
+    if (!world->plan.faces || i < world->list.discs) return NULL;
+    const dem2di_ends *ends = &from->ends[i - world->list.discs];
     return dem2di_ends_two(ends) ? ends : NULL;
 }
 
 /* What the full law keeps of a contact; NULL without it. */
-static const dem2di_extra *dem2di_extra_at(const dem2d_world *world, int contact, bool next) {
-    const dem2di_list *list = &world->list;
-    if (!world->plan.full) return NULL;
-    return &(next ? list->next_extras : list->extras)[contact - list->discs];
+static const dem2di_extra *dem2di_extra_of(const dem2d_world *world, const dem2di_contacts *from,
+                                           int i) {
+    return world->plan.full ? &from->extras[i - world->list.discs] : NULL;
 }
 
-/* Energy in the springs of a contact that is closed. */
-static dem2di_stored dem2di_stored_in(const dem2d_world *world, int contact, bool next,
-                                      const dem2di_link *link) {
-    const dem2d_pair_desc *law = dem2di_law_at(world, contact, next);
-    const dem2di_ends *ends = dem2di_ends_at(world, contact, next);
-    const dem2di_extra *extra = dem2di_extra_at(world, contact, next);
-    double kn = law->normal_stiffness, kt = law->tangential_stiffness, spring = link->force;
+/* Energy in the springs of a contact that is closed, by the law that its materials have now. */
+static dem2di_stored dem2di_stored_in(const dem2d_world *world, const dem2di_contacts *from, int i,
+                                      const dem2di_contact *contact) {
+    const dem2d_pair_desc *law = dem2di_law_of(world, i);
+    const dem2di_ends *ends = dem2di_ends_of(world, from, i);
+    const dem2di_extra *extra = dem2di_extra_of(world, from, i);
+    double kn = law->normal_stiffness, kt = law->tangential_stiffness, spring = contact->force;
     dem2di_stored stored = {0, 0, 0};
     if (extra != NULL) {
         stored.normal = extra->energy;
         if (world->law != NULL) return stored;
-        if (extra->moment != 0) {
-            double kr = dem2di_rolling_stiffness(law, dem2di_reduced_radius(world, contact));
+        if (extra->moment != 0 && kt > 0) {
+            double kr = dem2di_rolling_stiffness(law, dem2di_reduced_radius(world, i));
             stored.rolling = extra->moment * (extra->moment / kr) / 2;
         }
         spring -= extra->viscous[0];
     }
     if (ends == NULL) {
-        stored.normal = spring * link->depth / 2;
-        if (kt > 0) stored.tangential = link->shear * (link->shear / kt) / 2;
+        stored.normal = spring * contact->depth / 2;
+        if (kt > 0) stored.tangential = contact->shear * (contact->shear / kt) / 2;
         return stored;
     }
     stored.normal = kn * ends->energy;
@@ -12080,17 +12105,19 @@ static void dem2di_stored_add(dem2di_stored *sum, dem2di_stored part, double fac
 /* Sum of the contact forces on a particle at the last force pass, in the order of the step. */
 static dem2di_load dem2di_load_of(const dem2d_world *world, int slot) {
     const dem2di_list *list = &world->list;
-    dem2di_load load = {{0, 0}, 0};
+    dem2di_load sum = {{0, 0}, 0};
     for (int k = list->first[slot]; k < list->first[slot + 1]; k++) {
-        int contact = list->incident[k] / 2, side = list->incident[k] & 1;
-        dem2di_link link;
-        if (!dem2di_link_at(world, contact, false, &link)) continue;
-        dem2di_load loads[2];
-        dem2di_link_loads(&link, dem2di_extra_at(world, contact, false), loads);
-        load.force = dem2di_add(load.force, loads[side].force);
-        load.torque += loads[side].torque;
+        int i = list->adjacent[k];
+        bool is_b = k < list->own[slot];
+        dem2di_contact contact;
+        if (!dem2di_contact_get(world, &list->contacts, i, &contact)) continue;
+        const dem2di_extra *extra = dem2di_extra_of(world, &list->contacts, i);
+        double moment = extra != NULL ? extra->moment : 0;
+        dem2d_vec force = dem2di_contact_force(&contact);
+        sum.force = dem2di_along(sum.force, is_b ? 1 : -1, force);
+        sum.torque += is_b ? dem2di_torque_b(&contact, moment) : dem2di_torque_a(&contact, moment);
     }
-    return load;
+    return sum;
 }
 
 DEM2D_API dem2d_result dem2d_world_get_particle(const dem2d_world *world, dem2d_particle_id id,
@@ -12494,80 +12521,68 @@ static bool dem2di_tallies_reserve(dem2d_world *world, int discs, int count) {
 
 /* --- the contacts of each particle ------------------------------------------------------------ */
 
-/* What the partner of an entry is sorted by: its id, walls behind. */
-static uint32_t dem2di_incident_rank(const dem2d_world *world, int entry) {
-    if (entry / 2 == world->list.count) return UINT32_MAX;
-    const dem2di_key *key = &world->list.keys[entry / 2];
-    if (entry / 2 >= world->list.pairs) return ((uint32_t)1 << 30) + (uint32_t)key->b;
-    return (uint32_t)world->bodies[entry & 1 ? key->a : key->b].index;
+/* What the contacts of a particle are sorted by: their partners' ids, walls behind. */
+static uint32_t dem2di_adjacency_rank(const dem2d_world *world, int slot, int contact) {
+    const dem2di_key *key = &world->list.keys[contact];
+    if (contact >= world->list.pairs) return ((uint32_t)1 << 30) + (uint32_t)key->b;
+    return (uint32_t)world->bodies[key->a == slot ? key->b : key->a].index;
 }
 
-/* Each particle's entries in order, by Shell's sort (Ciura's gaps): most have a handful, one that
+/* Each particle's contacts in order, by Shell's sort (Ciura's gaps): most have a handful, one that
    is a hundred times larger than its neighbours has hundreds. */
-static void dem2di_incident_task(void *context, int begin, int end) {
+static void dem2di_adjacency_sort_task(void *context, int begin, int end) {
     static const int gaps[] = {301, 132, 57, 23, 10, 4, 1};
     const dem2d_world *world = (const dem2d_world *)context;
+    const dem2di_list *list = &world->list;
     int last = dem2di_block_end((end - 1) * DEM2DI_BLOCK, DEM2DI_BLOCK, world->body_count);
     for (int slot = begin * DEM2DI_BLOCK; slot < last; slot++) {
-        int *run = world->list.incident + world->list.first[slot];
-        int count = world->list.first[slot + 1] - world->list.first[slot];
+        int *run = list->adjacent + list->first[slot];
+        int count = list->first[slot + 1] - list->first[slot], as_b = 0;
         for (int g = count > 10 ? 0 : 5; g < 7; g++) {
             for (int i = gaps[g]; i < count; i++) {
-                int entry = run[i], k = i;
-                uint32_t rank = dem2di_incident_rank(world, entry);
-                for (; k >= gaps[g] && dem2di_incident_rank(world, run[k - gaps[g]]) > rank;
+                int contact = run[i], k = i;
+                uint32_t rank = dem2di_adjacency_rank(world, slot, contact);
+                for (; k >= gaps[g] && dem2di_adjacency_rank(world, slot, run[k - gaps[g]]) > rank;
                      k -= gaps[g])
                     run[k] = run[k - gaps[g]];
-                run[k] = entry;
+                run[k] = contact;
             }
         }
+        while (as_b < count && list->keys[run[as_b]].a != slot) as_b++;
+        list->own[slot] = list->first[slot] + as_b;
     }
 }
 
-/* Contacts are gathered so many at once, without a branch: few particles have more. */
-#define DEM2DI_GATHER 6
-
-static int dem2di_whole_gathers(int entries) {
-    return dem2di_blocks(entries, DEM2DI_GATHER) * DEM2DI_GATHER;
-}
-
-/* Entries of each of `slots` particles, in whole gathers; returns the sum, INT_MAX if it is more.
- */
-static int dem2di_incident_count(const dem2di_key *keys, int pairs, int count, int *numbers,
-                                 int slots) {
-    int64_t sum = 0;
-    if (slots > 0) memset(numbers, 0, (size_t)slots * sizeof *numbers);
-    for (int i = 0; i < count; i++) {
-        if (keys[i].a < 0) continue;
-        numbers[keys[i].a]++;
-        if (i < pairs) numbers[keys[i].b]++;
-    }
-    for (int i = 0; i < slots; i++) sum += numbers[i] = dem2di_whole_gathers(numbers[i]);
-    return sum < INT_MAX ? (int)sum : INT_MAX;
-}
-
-static void dem2di_incident_fill_task(void *context, int begin, int end) {
+static void dem2di_adjacency_fill_task(void *context, int begin, int end) {
     dem2d_world *world = (dem2d_world *)context;
     dem2di_list *list = &world->list;
     int *first = list->first, *last = first + 1, slots = world->body_count;
     (void)begin;
     (void)end;
-    int sum = dem2di_incident_count(list->keys, list->pairs, list->count, last, slots);
-    (void)dem2di_starts(last, slots);
-    for (int k = 0; k < sum; k++) list->incident[k] = 2 * list->count;
+    memset(first, 0, ((size_t)slots + 1) * sizeof *first);
     for (int i = 0; i < list->count; i++) {
         if (list->keys[i].a < 0) continue;
-        list->incident[last[list->keys[i].a]++] = 2 * i;
-        if (i < list->pairs) list->incident[last[list->keys[i].b]++] = 2 * i + 1;
+        last[list->keys[i].a]++;
+        if (i < list->pairs) last[list->keys[i].b]++;
     }
-    first[0] = 0;
-    for (int i = 0; i < slots; i++) last[i] = dem2di_whole_gathers(last[i]);
+    (void)dem2di_starts(last, slots);
+    for (int i = 0; i < list->count; i++) {
+        if (list->keys[i].a < 0) continue;
+        list->adjacent[last[list->keys[i].a]++] = i;
+        if (i < list->pairs) list->adjacent[last[list->keys[i].b]++] = i;
+    }
 }
 
-static void dem2di_incident_make(dem2d_world *world) {
-    dem2di_run(world, DEM2D_PHASE_LIST, 1, dem2di_incident_fill_task, world);
+/* The contacts of each particle, for which there is room. */
+static void dem2di_adjacency_make(dem2d_world *world) {
+    dem2di_run(world, DEM2D_PHASE_LIST, 1, dem2di_adjacency_fill_task, world);
     dem2di_run(world, DEM2D_PHASE_LIST, dem2di_blocks(world->body_count, DEM2DI_BLOCK),
-               dem2di_incident_task, world);
+               dem2di_adjacency_sort_task, world);
+}
+
+/* Room for two entries of each pair and one of each contact with a wall. */
+static bool dem2di_adjacency_reserve(dem2d_world *world, int pairs, int count) {
+    return dem2di_group_reserve(world, DEM2DI_ADJACENCY, pairs + count);
 }
 
 /* --- particles in the order of space ---------------------------------------------------------- */
@@ -12633,7 +12648,7 @@ static bool dem2di_arrange(dem2d_world *world) {
     (void)dem2di_cut(&cutter, slots, dem2di_moved_size());
     if (!dem2di_scratch_reserve(world, cutter.used)) return false;
     dem2di_run(world, DEM2D_PHASE_LIST, 1, dem2di_arrange_task, world);
-    if (world->list.incident != NULL) dem2di_incident_make(world); /* there is no list at first */
+    if (world->list.adjacent != NULL) dem2di_adjacency_make(world); /* there is no list at first */
     return true;
 }
 
@@ -12681,9 +12696,11 @@ typedef struct dem2di_build {
     int *count[DEM2DI_KINDS]; /* of each particle's finds; then where they go */
     int total[DEM2DI_KINDS];
     dem2di_key *keys;              /* as in the list, */
-    bool *touched;                 /* too */
+    int *old;                      /* and its contact in the old list, or -1 */
     dem2di_order *touches, *spare; /* wall and id of particle; slot */
-    int incident;                  /* entries that the particles have together */
+    char *column;                  /* room for a column of contacts, where the grid was */
+    bool bounded, back; /* as in the world; whether the next step may look back on contacts */
+    double softness;
 } dem2di_build;
 
 /* Ends this near are a joint, of the shorter segment; and a contact point is at one, of the radius:
@@ -12732,12 +12749,6 @@ static bool dem2di_has_disc_kernel(const dem2d_world *world, const dem2di_plan *
     return world->solver == DEM2D_CERTIFIED && !plan->full;
 }
 
-/* Is a feature that the scene no longer needs there for one list more: what its contacts had of it
-   in the last force pass must outlast a step that is refused. `again`: it is there for that. */
-static bool dem2di_outlasts(const dem2d_world *world, bool needed, bool had, bool again) {
-    return !needed && had && !(again && world->steps > world->listed_at);
-}
-
 /* What the scene makes use of. */
 static dem2di_plan dem2di_plan_make(const dem2d_world *world) {
     dem2di_plan plan;
@@ -12767,10 +12778,8 @@ static dem2di_plan dem2di_plan_make(const dem2d_world *world) {
     plan.full = plan.full || world->law != NULL;
     plan.faces = plan.faces && world->law == NULL;
     const dem2di_plan *last = &world->plan;
-    plan.friction_again =
-        dem2di_outlasts(world, plan.friction, last->friction, last->friction_again);
-    plan.full_again = dem2di_outlasts(world, plan.full, last->full, last->full_again);
-    plan.friction = plan.friction || plan.friction_again;
+    plan.full_again =
+        !plan.full && last->full && !(last->full_again && world->steps > world->listed_at);
     plan.full = plan.full || plan.full_again;
     plan.turns = plan.turns || !dem2di_has_disc_kernel(world, &plan);
     plan.turns = plan.turns || (world->plan.turns && world->body_count > 0);
@@ -12792,12 +12801,10 @@ static double dem2di_skin_make(const dem2d_world *world, int slot) {
     const dem2di_state *now = &world->now[slot];
     double skin = dem2di_skin_of(world, now->radius, now->v);
     for (int k = list->first[slot]; k < list->first[slot + 1]; k++) {
-        int contact = list->incident[k] / 2;
-        dem2di_link link;
-        if (contact >= list->pairs || list->keys[contact].a < 0) continue;
+        int contact = list->adjacent[k];
+        if (contact >= list->pairs || !(list->contacts.depth[contact] > 0)) continue;
         double gap = dem2di_gap_now(world, contact);
-        if (gap > skin && dem2di_link_at(world, contact, false, &link))
-            skin = gap * (1 + DEM2DI_ROUNDING);
+        if (gap > skin) skin = gap * (1 + DEM2DI_ROUNDING);
     }
     return skin;
 }
@@ -12863,9 +12870,8 @@ static int dem2di_find_walls(const dem2d_world *world, const dem2di_disc *disc, 
     for (int j = 0; j < world->wall_count; j++)
         if (dem2di_wall_is_near(world, disc, j)) dem2di_find_add(world, slot, j, to, &count);
     for (int k = list->first[slot]; k < list->first[slot + 1]; k++) {
-        int contact = list->incident[k] / 2;
-        if (contact < list->pairs || contact == list->count || list->keys[contact].a < 0) continue;
-        if (!(list->links[contact - list->discs].depth > 0)) continue;
+        int contact = list->adjacent[k];
+        if (contact < list->pairs || !(list->contacts.depth[contact] > 0)) continue;
         if (!dem2di_wall_is_near(world, disc, list->keys[contact].b))
             dem2di_find_add(world, slot, list->keys[contact].b, to, &count);
     }
@@ -12888,9 +12894,8 @@ static void dem2di_count_task(void *context, int begin, int end) {
 /* The contact that two partners had in the old list, or -1. */
 static int dem2di_listed(const dem2d_world *world, const dem2di_key *key, bool wall) {
     const dem2di_list *list = &world->list;
-    for (int k = list->first[key->a]; k < list->first[key->a + 1]; k++) {
-        int contact = list->incident[k] / 2;
-        if (contact == list->count) break;
+    for (int k = list->own[key->a]; k < list->first[key->a + 1]; k++) {
+        int contact = list->adjacent[k];
         const dem2di_key *old = &list->keys[contact];
         if (old->a == key->a && old->b == key->b && (contact >= list->pairs) == wall)
             return contact;
@@ -12898,37 +12903,69 @@ static int dem2di_listed(const dem2d_world *world, const dem2di_key *key, bool w
     return -1;
 }
 
-/* What a contact remembers, from the old list to its new place. */
-static void dem2di_recall(const dem2di_build *build, int place) {
-    const dem2d_world *world = build->world;
+/* A column of contacts on its way from the old list to the new one. */
+typedef struct dem2di_carry {
+    const int *old; /* number in the old list, or -1 */
+    const char *from;
+    char *to;
+    size_t size;
+    int begin, old_begin, count; /* numbers of the first elements; of contacts in the new list */
+} dem2di_carry;
+
+static void dem2di_carry_task(void *context, int begin, int end) {
+    const dem2di_carry *carry = (const dem2di_carry *)context;
+    const size_t size = carry->size;
+    int items = carry->count - carry->begin;
+    int last = dem2di_block_end((end - 1) * DEM2DI_BLOCK, DEM2DI_BLOCK, items);
+    for (int i = begin * DEM2DI_BLOCK; i < last; i++) {
+        int old = carry->old[carry->begin + i];
+        char *to = carry->to + (size_t)i * size;
+        if (old >= carry->old_begin)
+            memcpy(to, carry->from + (size_t)(old - carry->old_begin) * size, size);
+        else
+            memset(to, 0, size);
+    }
+}
+
+/* The contacts of the old list to their places in the new one. Pairs that were not listed were
+   apart: all zero. */
+static void dem2di_carry_over(const dem2di_build *build, int discs, int count) {
+    dem2d_world *world = build->world;
     const dem2di_list *list = &world->list;
-    const dem2di_key *key = &build->keys[place];
-    int discs = build->total[DEM2DI_DISCS], pairs = discs + build->total[DEM2DI_OTHERS];
-    int old = dem2di_listed(world, key, place >= pairs), at = old - list->discs;
-    if (place < discs) {
-        build->touched[place] = old >= 0 && dem2di_touched(world, old);
-        if (build->plan.friction)
-            list->next_shear[place] = old >= 0 ? dem2di_spring_at(world, old, false) : 0;
-        return;
+    for (int k = 0; k < DEM2DI_COLUMNS; k++) {
+        const dem2di_column *column = &dem2di_columns[k];
+        if (!(column->treatment & DEM2DI_STORED)) continue;
+        dem2di_carry carry;
+        char *array = (char *)dem2di_column_get(world, column);
+        carry.old = build->old;
+        carry.from = array;
+        carry.to = build->column;
+        carry.size = column->size;
+        carry.count = count;
+        carry.begin = dem2di_contacts_begin(&build->plan, discs, count, column->group);
+        carry.old_begin =
+            dem2di_contacts_begin(&world->plan, list->discs, list->count, column->group);
+        int items = count - carry.begin;
+        dem2di_run(world, DEM2D_PHASE_LIST, dem2di_blocks(items, DEM2DI_BLOCK), dem2di_carry_task,
+                   &carry);
+        if (items > 0) memcpy(array, build->column, (size_t)items * column->size);
     }
-    dem2di_link *link = &list->next_links[place - discs];
-    memset(link, 0, sizeof *link);
-    if (old >= 0 && at < 0) { /* of circles, which are among the others from now on */
-        if (!dem2di_link_at(world, old, false, link)) memset(link, 0, sizeof *link);
+}
+
+/* What else changes for contacts that are not of two circles: separation bounds count from here,
+   and those that were of circles get their arms. */
+static void dem2di_carry_others(const dem2di_build *build, int discs, int pairs) {
+    const dem2d_world *world = build->world;
+    const dem2di_contacts *contacts = &world->list.contacts;
+    for (int i = discs; i < pairs; i++) {
+        const dem2di_key *key = &build->keys[i];
+        if (world->plan.turns)
+            contacts->history[i - discs].budget -= world->travel[key->a] + world->travel[key->b];
+        if (build->old[i] < 0 || build->old[i] >= world->list.discs) continue;
+        dem2di_arms *arms = &contacts->arms[i - discs];
+        arms->a_n = world->now[key->a].radius - contacts->depth[i] / 2;
+        arms->b_n = -(world->now[key->b].radius - contacts->depth[i] / 2);
     }
-    bool kept = old >= 0 && at >= 0;
-    if (kept) *link = list->links[at];
-    if (build->plan.full) {
-        dem2di_extra *extra = &list->next_extras[place - discs];
-        memset(extra, 0, sizeof *extra);
-        if (kept && world->plan.full) *extra = list->extras[at];
-    }
-    if (place < pairs && world->plan.turns) /* budgets count from here */
-        link->budget -= world->travel[key->a] + world->travel[key->b];
-    if (!build->plan.faces) return;
-    dem2di_ends *ends = &list->next_ends[place - discs];
-    memset(ends, 0, sizeof *ends);
-    if (kept && world->plan.faces) *ends = list->ends[at];
 }
 
 static void dem2di_fill_task(void *context, int begin, int end) {
@@ -12952,7 +12989,7 @@ static void dem2di_fill_task(void *context, int begin, int end) {
                     bool turned = bodies[a].index > bodies[b].index;
                     key->a = turned ? b : a;
                     key->b = turned ? a : b;
-                    dem2di_recall(build, (int)(key - build->keys));
+                    build->old[key - build->keys] = dem2di_listed(world, key, false);
                 }
             const int *walls = &build->count[DEM2DI_TOUCHES][i];
             if (*walls < (i + 1 < build->grid.count ? walls[1] : build->total[DEM2DI_TOUCHES]))
@@ -12973,10 +13010,8 @@ static void dem2di_touches_task(void *context, int begin, int end) {
     for (int i = 0; i < count; i++) {
         build->keys[pairs + i].a = build->touches[i].value;
         build->keys[pairs + i].b = (int)(build->touches[i].key >> 32);
-        dem2di_recall(build, pairs + i);
+        build->old[pairs + i] = dem2di_listed(build->world, &build->keys[pairs + i], true);
     }
-    build->incident = dem2di_incident_count(build->keys, pairs, pairs + count, build->grid.slot,
-                                            build->grid.count); /* the grid is done with */
 }
 
 /* |p'| <= sqrt(R^2 - p^2) and p is at least the inscribed radius; of a circle p' is 0. */
@@ -13000,8 +13035,8 @@ static void dem2di_travel_task(void *context, int begin, int end) {
    so no overlap exceeds the scene, and no force its stiffness times that. With `steps` steps, this
    is true of any sane scene; where it is not, each step is tried before it is taken. */
 #define DEM2DI_LIST_STEPS (1 << 20)
-static bool dem2di_bounded(dem2d_world *world) {
-    double far = 0, size = 0, speed = 0, spin = 0, light = 0, slender = 0, stiff = 0, wear = 0;
+static bool dem2di_bounded(const dem2d_world *world, const dem2di_plan *plan, int contacts) {
+    double far = 0, size = 0, heavy = 0, speed = 0, spin = 0, light = 0, slender = 0, stiff = 0;
     for (int i = 0; i < world->body_count; i++) {
         const dem2di_state *now = &world->now[i];
         far = dem2di_max(far, fabs(now->x.x) + fabs(now->x.y));
@@ -13009,64 +13044,173 @@ static bool dem2di_bounded(dem2d_world *world) {
         spin = dem2di_max(spin, fabs(now->w));
         size = dem2di_max(size, now->radius);
         light = dem2di_max(light, world->inverse[i].mass);
+        if (world->inverse[i].mass > 0) heavy = dem2di_max(heavy, 1 / world->inverse[i].mass);
         slender = dem2di_max(slender, world->inverse[i].inertia);
-        wear = dem2di_max(wear, world->wear[i]);
     }
-    world->rounding =
-        2 * DBL_EPSILON * (far + size); /* half an ulp of both coordinates, and more */
-    world->creep = world->rounding * sqrt(wear);
     for (int j = 0; j < world->wall_count; j++) {
-        dem2d_vec point = world->wall_now[j].point;
+        const dem2d_wall_desc *wall = &world->walls[j].desc;
+        dem2d_vec point = world->wall_now[j].point, v = dem2di_wall_velocity(world, j);
         far = dem2di_max(far, fabs(point.x) + fabs(point.y));
+        speed = dem2di_max(speed, fabs(v.x) + fabs(v.y) + wall->max_speed);
+        stiff = dem2di_max(stiff, fabs(wall->stress));
+        heavy = dem2di_max(heavy, wall->length);
     }
     for (int k = 0; k < world->laws_side * world->laws_side; k++) {
         const dem2d_pair_desc *law = &world->laws[k];
         stiff = dem2di_max(stiff, law->normal_stiffness * (1 + law->friction));
     }
-    double depth = 2 * (far + 2 * size), force = (world->list.count + 1.0) * stiff * depth;
+    double depth = 2 * (far + 2 * size), force = (contacts + 1.0) * stiff * depth;
     double time = DEM2DI_LIST_STEPS * world->time_step; /* damping at most doubles */
     speed += 2 * time * (fabs(world->gravity.x) + fabs(world->gravity.y) + force * light);
     spin += 2 * time * (force * 2 * size * slender);
-    return far + time * speed < 1e300 && spin * world->time_step < 1e50 && /* its cube is finite */
-           dem2di_has_disc_kernel(world, &world->plan);
+    return far + time * speed < 1e300 && force * heavy < 1e300 &&
+           spin * world->time_step < 1e50 && /* its cube is finite */
+           dem2di_has_disc_kernel(world, plan);
 }
 
-/* Of the loads on the partners of so many contacts, x, y and torque, and a 0 behind; then of the
-   pushes of those with walls. */
-static size_t dem2di_loads_bytes(const dem2d_world *world, size_t count, size_t walls) {
-    return 3 * (2 * count + 1) * sizeof *world->load_x + walls * sizeof *world->pushes;
+/* How far the rounding of a position moves a particle in a step. */
+static void dem2di_rounding_set(dem2d_world *world) {
+    double far = 0, size = 0, wear = 0;
+    for (int i = 0; i < world->body_count; i++) {
+        const dem2di_state *now = &world->now[i];
+        far = dem2di_max(far, fabs(now->x.x) + fabs(now->x.y));
+        size = dem2di_max(size, now->radius);
+        wear = dem2di_max(wear, world->wear[i]);
+    }
+    world->rounding =
+        2 * DBL_EPSILON * (far + size); /* half an ulp of both coordinates, and more */
+    world->creep = world->rounding * sqrt(wear);
 }
 
-/* No loads yet on the partners of the listed contacts, in scratch memory that has room. */
+/* No eigenvalue of a particle is above the sum of the traces of its contacts. Of two circles a
+   contact's is at most 2 (kn + kt) (1/m + R^2/I) with the greater radius, as the contact point may
+   lie outside of the smaller one; of a circle and a wall it is less. The greatest sum over kn + kt,
+   infinite with other shapes. */
+static double dem2di_softness_of(const dem2di_build *build, double *sums) {
+    const dem2d_world *world = build->world;
+    int pairs = build->total[DEM2DI_DISCS] + build->total[DEM2DI_OTHERS];
+    double most = 0;
+    if (build->total[DEM2DI_OTHERS] > 0 || build->plan.full || build->plan.turns) return HUGE_VAL;
+    for (int i = 0; i < world->body_count; i++) sums[i] = 0;
+    for (int i = 0; i < pairs + build->total[DEM2DI_TOUCHES]; i++) {
+        int partner[2];
+        partner[0] = build->keys[i].a;
+        partner[1] = i < pairs ? build->keys[i].b : partner[0];
+        double radius = dem2di_max(world->now[partner[0]].radius, world->now[partner[1]].radius);
+        for (int k = 0; k < (i < pairs ? 2 : 1); k++) {
+            const dem2di_body *body = &world->bodies[partner[k]];
+            sums[partner[k]] += 2 * (1 / dem2di_body_mass(world, body) +
+                                     radius * radius / dem2di_body_inertia(world, body));
+        }
+    }
+    for (int i = 0; i < world->body_count; i++) most = dem2di_max(most, sums[i]);
+    return most;
+}
+
+/* Scratch memory of a step with so many contacts, or its size where there is none yet: `back` if it
+   looks back on the last contacts. */
+static size_t dem2di_step_cut(dem2d_world *world, char *memory, int discs, int pairs, int count,
+                              const dem2di_plan *plan, bool back) {
+    dem2di_cutter cutter = {memory, 0};
+    double **loads[4];
+    loads[0] = &world->load_x;
+    loads[1] = &world->load_y;
+    loads[2] = &world->load_a;
+    loads[3] = &world->load_b;
+    for (int k = 0; k < 4; k++)
+        *loads[k] = (double *)dem2di_cut(&cutter, (size_t)count, sizeof(double));
+    world->pushes =
+        (dem2di_push *)dem2di_cut(&cutter, (size_t)(count - pairs), sizeof *world->pushes);
+    for (int k = 0; k < DEM2DI_COLUMNS && back; k++) {
+        const dem2di_column *column = &dem2di_columns[k];
+        if (!(column->treatment & DEM2DI_STORED)) continue;
+        int begin = dem2di_contacts_begin(plan, discs, count, column->group);
+        dem2di_column last = dem2di_column_last(column);
+        dem2di_column_set(world, &last, dem2di_cut(&cutter, (size_t)(count - begin), column->size));
+    }
+    return cutter.used;
+}
+
+/* No loads yet, in scratch memory that has room. */
 static void dem2di_loads_clear(dem2d_world *world) {
-    size_t loads = 2 * (size_t)world->list.count + 1;
-    world->load_x = (double *)(void *)world->scratch;
-    world->load_y = world->load_x + loads;
-    world->load_turn = world->load_y + loads;
-    world->pushes = (dem2di_push *)(void *)(world->load_turn + loads);
-    memset(world->load_x, 0, dem2di_loads_bytes(world, (size_t)world->list.count, 0));
+    const dem2di_list *list = &world->list;
+    (void)dem2di_step_cut(world, world->scratch, list->discs, list->pairs, list->count,
+                          &world->plan, false);
+    if (list->count > 0)
+        memset(world->load_x, 0, (size_t)((char *)world->pushes - (char *)world->load_x));
 }
 
-/* Scratch memory for the search, and then for what it found. */
+/* The contacts of the last force pass are kept while those of the next are written over them. */
+static bool dem2di_keep_last(dem2d_world *world) {
+    const dem2di_list *list = &world->list;
+    size_t bytes =
+        dem2di_step_cut(world, NULL, list->discs, list->pairs, list->count, &world->plan, true);
+    bool room = dem2di_scratch_reserve(world, bytes);
+    (void)dem2di_step_cut(world, world->scratch, list->discs, list->pairs, list->count,
+                          &world->plan, room);
+    if (room) dem2di_contacts_keep(world, false);
+    return room;
+}
+
+/* A check takes as long as 0.7 (circles) to 1.4 steps (Fourier series), measured: with this many
+   steps between two, less than 1 % of the time. */
+#define DEM2DI_CHECK_STEPS 160
+
+static bool dem2di_check_is_due(const dem2d_world *world) {
+    return world->check_due || world->steps % DEM2DI_CHECK_STEPS == 0;
+}
+
+/* kn + kt of any two materials. */
+static double dem2di_greatest_stiffness(const dem2d_world *world) {
+    double greatest = 0;
+    for (int a = 0; a < world->material_count; a++)
+        for (int b = 0; b < world->material_count; b++) {
+            const dem2d_pair_desc *law = dem2di_law(world, a, b);
+            greatest = dem2di_max(greatest, law->normal_stiffness + law->tangential_stiffness);
+        }
+    return greatest;
+}
+
+/* Is the time step below the limit and the safe bound whatever the forces are? */
+static bool dem2di_is_soft(const dem2d_world *world, double softness) {
+    double square = world->time_step * world->time_step;
+    return dem2di_greatest_stiffness(world) * softness * square <= 4;
+}
+
+/* May the next step look back on the contacts of the last force pass once those of its own are
+   there? The ledger, joints and a caller's law do, and a step that may be refused: for a time step
+   that some particle may not stand, or a state that may become infinite. */
+static bool dem2di_looks_back(const dem2d_world *world, const dem2di_plan *plan, bool bounded,
+                              double softness) {
+    bool soft = dem2di_is_soft(world, softness);
+    bool checked = world->check_time_step && dem2di_check_is_due(world);
+    return world->ledger.kept || plan->joints || world->law != NULL || !bounded ||
+           (checked && !soft);
+}
+
+/* Scratch memory for the search and for what it finds. Contacts on their way come over the grid. */
 static bool dem2di_build_cut(dem2di_build *build) {
     dem2d_world *world = build->world;
     size_t n = (size_t)build->grid.count, walls = (size_t)build->total[DEM2DI_TOUCHES];
-    size_t discs = (size_t)build->total[DEM2DI_DISCS], total = walls;
-    for (int kind = 0; kind < DEM2DI_TOUCHES; kind++) total += (size_t)build->total[kind];
+    int discs = build->total[DEM2DI_DISCS], pairs = discs + build->total[DEM2DI_OTHERS];
+    int count = pairs + build->total[DEM2DI_TOUCHES];
     for (int pass = 0; pass < 2; pass++) {
         dem2di_cutter cutter = {pass == 0 ? NULL : world->scratch, 0};
         dem2di_grid *grid = &build->grid;
+        build->column = cutter.memory;
         grid->discs = (dem2di_disc *)dem2di_cut(&cutter, n, sizeof *grid->discs);
         grid->slot = (int *)dem2di_cut(&cutter, n, sizeof *grid->slot);
         grid->sorted = (int *)dem2di_cut(&cutter, n, sizeof *grid->sorted);
         grid->heads = (int *)dem2di_cut(&cutter, (size_t)grid->table + 1, sizeof *grid->heads);
         for (int kind = 0; kind < DEM2DI_KINDS; kind++)
             build->count[kind] = (int *)dem2di_cut(&cutter, n, sizeof(int));
-        build->keys = (dem2di_key *)dem2di_cut(&cutter, total, sizeof *build->keys);
-        build->touched = (bool *)dem2di_cut(&cutter, discs, sizeof *build->touched);
+        size_t column = dem2di_contacts_largest(&build->plan, discs, count);
+        if (column > cutter.used) (void)dem2di_cut(&cutter, column - cutter.used, 1);
+        build->keys = (dem2di_key *)dem2di_cut(&cutter, (size_t)count, sizeof *build->keys);
+        build->old = (int *)dem2di_cut(&cutter, (size_t)count, sizeof *build->old);
         build->touches = (dem2di_order *)dem2di_cut(&cutter, walls, sizeof *build->touches);
         build->spare = (dem2di_order *)dem2di_cut(&cutter, walls, sizeof *build->spare);
-        size_t step = dem2di_loads_bytes(world, total, walls);
+        size_t step = dem2di_step_cut(world, NULL, discs, pairs, count, &build->plan, build->back);
         if (pass == 0 && !dem2di_scratch_reserve(world, cutter.used > step ? cutter.used : step))
             return false;
     }
@@ -13096,6 +13240,7 @@ static bool dem2di_build_search(dem2di_build *build) {
     if (!dem2di_build_cut(build)) return false;
     int discs = build->total[DEM2DI_DISCS];
     return dem2di_list_reserve(world, &build->plan, discs, (int)total) &&
+           dem2di_adjacency_reserve(world, discs + build->total[DEM2DI_OTHERS], (int)total) &&
            dem2di_tallies_reserve(world, discs, (int)total);
 }
 
@@ -13115,21 +13260,24 @@ static void dem2di_reorient(dem2d_world *world, bool turns) {
 static void dem2di_build_finish(dem2di_build *build) {
     dem2d_world *world = build->world;
     dem2di_list *list = &world->list;
-    list->discs = build->total[DEM2DI_DISCS];
-    list->pairs = list->discs + build->total[DEM2DI_OTHERS];
-    list->count = list->pairs + build->total[DEM2DI_TOUCHES];
-    if (list->count > 0) memcpy(list->keys, build->keys, (size_t)list->count * sizeof *list->keys);
-    if (list->discs > 0)
-        memcpy(list->touched, build->touched, (size_t)list->discs * sizeof *list->touched);
-    dem2di_loads_clear(world);
+    int discs = build->total[DEM2DI_DISCS], pairs = discs + build->total[DEM2DI_OTHERS];
+    int count = pairs + build->total[DEM2DI_TOUCHES];
+    dem2di_carry_over(build, discs, count);
+    dem2di_carry_others(build, discs, pairs);
+    list->discs = discs;
+    list->pairs = pairs;
+    list->count = count;
+    if (count > 0) memcpy(list->keys, build->keys, (size_t)count * sizeof *list->keys);
     if (world->plan.turns != build->plan.turns) dem2di_reorient(world, build->plan.turns);
     world->plan = build->plan;
-    dem2di_columns_swap(world, DEM2DI_KEYS);
-    dem2di_incident_make(world);
+    dem2di_loads_clear(world);
+    dem2di_adjacency_make(world);
     if (world->plan.turns)
         dem2di_run(world, DEM2D_PHASE_LIST, dem2di_blocks(world->body_count, DEM2DI_BLOCK),
                    dem2di_travel_task, world);
-    world->bounded = dem2di_bounded(world);
+    dem2di_rounding_set(world);
+    world->bounded = build->bounded;
+    world->softness = build->softness;
     for (int j = 0; j < world->wall_count; j++) world->walls[j].listed = world->wall_now[j].point;
     world->listed_at = world->steps;
     world->worn = 0;
@@ -13174,8 +13322,12 @@ static dem2d_result dem2di_build_list(dem2d_world *world) {
     int blocks = dem2di_blocks(world->body_count, DEM2DI_BLOCK);
     dem2di_run(world, DEM2D_PHASE_LIST, blocks, dem2di_fill_task, &build);
     dem2di_run(world, DEM2D_PHASE_LIST, 1, dem2di_touches_task, &build);
-    if (!dem2di_group_reserve(world, DEM2DI_INCIDENT, build.incident + 1))
-        return dem2di_list_failed(world, skin, interval);
+    build.bounded = dem2di_bounded(world, &build.plan,
+                                   build.total[DEM2DI_DISCS] + build.total[DEM2DI_OTHERS] +
+                                       build.total[DEM2DI_TOUCHES]);
+    build.softness = dem2di_softness_of(&build, (double *)(void *)world->scratch);
+    build.back = dem2di_looks_back(world, &build.plan, build.bounded, build.softness);
+    if (!dem2di_build_cut(&build)) return dem2di_list_failed(world, skin, interval);
     dem2di_build_finish(&build);
     dem2di_watch_spread(world, sorted);
     return DEM2D_OK;
@@ -13186,47 +13338,40 @@ static dem2d_result dem2di_build_list(dem2d_world *world) {
    uses: config, math, broad, law, motion, world
    ============================================================================================ */
 
-/* Velocities of the step that was made for those that have been given others since. */
-static void dem2di_twist_back(const dem2d_world *world, const dem2di_key *key, bool wall,
-                              dem2di_twist *twist) {
-    dem2di_velocities a = dem2di_velocities_made(world, key->a);
-    twist->va = a.v;
-    twist->wa = a.w;
-    if (wall) return; /* they have made the velocity of their state */
-    dem2di_velocities b = dem2di_velocities_made(world, key->b);
-    twist->vb = b.v;
-    twist->wb = b.w;
-}
-
-/* How the two of a contact have moved in the step that was made. */
-static inline dem2di_twist dem2di_twist_of(const dem2d_world *world, int contact) {
+/* How the two of a contact moved against each other in the step that was made: those who have been
+   given other velocities since, by what they had then. */
+static inline dem2di_relative_motion dem2di_motion_of(const dem2d_world *world, int contact) {
     const dem2di_key *key = &world->list.keys[contact];
-    const dem2di_state *a = &world->now[key->a];
-    bool wall = contact >= world->list.pairs;
-    dem2di_twist twist;
-    twist.va = a->v;
-    twist.wa = a->w;
-    twist.vb = wall ? world->wall_now[key->b].velocity : world->now[key->b].v;
-    twist.wb = wall ? 0 : world->now[key->b].w;
-    if (world->redirected) dem2di_twist_back(world, key, wall, &twist);
-    return twist;
+    dem2di_velocities a = dem2di_velocities_made(world, key->a), b;
+    if (contact >= world->list.pairs) {
+        b.v = world->wall_now[key->b].velocity;
+        b.w = 0;
+    } else {
+        b = dem2di_velocities_made(world, key->b);
+    }
+    dem2di_relative_motion motion;
+    motion.v = dem2di_sub(b.v, a.v);
+    motion.wa = a.w;
+    motion.wb = b.w;
+    return motion;
 }
 
 /* What the dashpots of a contact take in the step between the last force pass and this, by their
    forces at one of the two, which act for half of it: each at its own point, whose approach the
    velocities and the contact then give. After the last pass no spring relaxes by more than its
    depth: the force ends where it opens. */
-static double dem2di_book_dashpots(const dem2d_world *world, int contact, bool next,
-                                   const dem2di_link *link, double closing, double turning) {
-    const dem2di_extra *extra = dem2di_extra_at(world, contact, next);
-    const dem2di_ends *ends = dem2di_ends_at(world, contact, next);
+static double dem2di_book_dashpots(const dem2d_world *world, const dem2di_contacts *from, int i,
+                                   double depth, double closing, double turning) {
+    const dem2di_extra *extra = dem2di_extra_of(world, from, i);
+    const dem2di_ends *ends = dem2di_ends_of(world, from, i);
     double work = 0;
     if (extra == NULL) return 0;
     for (int k = 0; k < (ends != NULL ? 2 : 1); k++) {
         double offset = ends != NULL ? ends->offset[k] : 0;
-        double depth = ends != NULL ? ends->depth[k] : link->depth;
         double way = (closing + turning * offset) * world->made_step;
-        work += extra->viscous[k] * (next ? way : dem2di_max(-depth, way)) / 2;
+        if (ends != NULL) depth = ends->depth[k];
+        if (from == &world->list.last) way = dem2di_max(-depth, way);
+        work += extra->viscous[k] * way / 2;
     }
     return work;
 }
@@ -13235,28 +13380,31 @@ static double dem2di_book_dashpots(const dem2d_world *world, int contact, bool n
    they take is their mean times the way; where it opens or closes in between, the force of the one
    pass times the way by the contact's own geometry there. What sliding and rolling take is that
    less what the springs gained. */
-static void dem2di_book_contact(const dem2d_world *world, int contact, dem2di_ledger *ledger) {
-    dem2di_link link[2]; /* of the last pass, of this */
+static void dem2di_book_contact(const dem2d_world *world, int i, dem2di_ledger *ledger) {
+    const dem2di_contacts *pass[2]; /* the last, this */
     dem2di_stored gained = {0, 0, 0};
     bool closed[2];
     double slide = 0, shear = 0, moment = 0, force = 0, deeper = 0;
-    const dem2di_twist twist = dem2di_twist_of(world, contact);
-    const double turning = twist.wb - twist.wa;
+    const dem2di_relative_motion motion = dem2di_motion_of(world, i);
+    const double turning = motion.wb - motion.wa;
+    pass[0] = &world->list.last;
+    pass[1] = &world->list.contacts;
     for (int k = 0; k < 2; k++) {
-        closed[k] = dem2di_link_at(world, contact, k == 1, &link[k]);
+        dem2di_contact contact;
+        closed[k] = dem2di_contact_get(world, pass[k], i, &contact);
         if (!closed[k]) continue;
-        double closing = -dem2di_velocity_n(&link[k], &twist);
-        const dem2di_extra *extra = dem2di_extra_at(world, contact, k == 1);
-        dem2di_stored stored = dem2di_stored_in(world, contact, k == 1, &link[k]);
+        double closing = -dem2di_velocity_n(&contact, &motion);
+        const dem2di_extra *extra = dem2di_extra_of(world, pass[k], i);
+        dem2di_stored stored = dem2di_stored_in(world, pass[k], i, &contact);
         if (k == 1) dem2di_stored_add(&ledger->stored, stored, 1);
         dem2di_stored_add(&gained, stored, k == 1 ? 1 : -1);
-        slide += dem2di_velocity_t(&link[k], &twist) * world->made_step;
-        shear += link[k].shear / 2;
-        force += link[k].force / 2;
-        deeper += k == 1 ? link[k].depth : -link[k].depth;
+        slide += dem2di_velocity_t(&contact, &motion) * world->made_step;
+        shear += contact.shear / 2;
+        force += contact.force / 2;
+        deeper += k == 1 ? contact.depth : -contact.depth;
         if (extra != NULL) moment += extra->moment / 2;
         ledger->sum[DEM2DI_DASHED] +=
-            dem2di_book_dashpots(world, contact, k == 1, &link[k], closing, turning);
+            dem2di_book_dashpots(world, pass[k], i, contact.depth, closing, turning);
     }
     if (closed[0] && closed[1]) slide /= 2;
     double taken = -(shear * slide + moment * turning * world->made_step);
@@ -13271,11 +13419,8 @@ static void dem2di_book_contacts(dem2d_world *world) {
     for (int index = 0; index < world->name_count; index++) {
         int slot = world->names[index].slot;
         if (slot < 0) continue;
-        for (int k = list->first[slot]; k < list->first[slot + 1]; k++) {
-            int entry = list->incident[k];
-            if (entry % 2 == 0 && entry / 2 < list->count)
-                dem2di_book_contact(world, entry / 2, &world->ledger);
-        }
+        for (int k = list->own[slot]; k < list->first[slot + 1]; k++)
+            dem2di_book_contact(world, list->adjacent[k], &world->ledger);
     }
 }
 
@@ -13339,13 +13484,12 @@ static double dem2di_ledger_turnover(const dem2di_ledger *ledger, const dem2di_l
 typedef struct dem2di_batch {
     double dx[DEM2DI_BATCH], dy[DEM2DI_BATCH]; /* from A to B */
     double radius_a[DEM2DI_BATCH], radius_b[DEM2DI_BATCH];
-    double nx[DEM2DI_BATCH], ny[DEM2DI_BATCH], last[DEM2DI_BATCH]; /* normal, depth: a step ago */
-    double vx[DEM2DI_BATCH], vy[DEM2DI_BATCH];                     /* of B against A */
+    double vx[DEM2DI_BATCH], vy[DEM2DI_BATCH]; /* of B against A */
     double wa[DEM2DI_BATCH], wb[DEM2DI_BATCH];
-    double shear[DEM2DI_BATCH], depth[DEM2DI_BATCH];
-    double fx[DEM2DI_BATCH], fy[DEM2DI_BATCH]; /* on B */
-    double ta[DEM2DI_BATCH], tb[DEM2DI_BATCH];
     double kn[DEM2DI_BATCH], kt[DEM2DI_BATCH], mu[DEM2DI_BATCH];
+    double normal_x[DEM2DI_BATCH], normal_y[DEM2DI_BATCH]; /* the last contact, then the next */
+    double depth[DEM2DI_BATCH], force[DEM2DI_BATCH], shear[DEM2DI_BATCH];
+    double load_x[DEM2DI_BATCH], load_y[DEM2DI_BATCH], load_a[DEM2DI_BATCH], load_b[DEM2DI_BATCH];
 } dem2di_batch;
 
 static DEM2DI_INLINE void dem2di_batch_fetch(const dem2d_world *world, int first, int count,
@@ -13371,23 +13515,17 @@ static DEM2DI_INLINE void dem2di_batch_fetch(const dem2d_world *world, int first
         batch->vy[k] = b->v.y - a->v.y;
         batch->wa[k] = a->w;
         batch->wb[k] = b->w;
-        batch->shear[k] = world->list.shear[first + k];
-        a = &world->before[keys[k].a], b = &world->before[keys[k].b];
-        dem2di_round last = dem2di_round_make(dem2di_disc_line(a, b), a->radius, b->radius, 1);
-        batch->nx[k] = last.normal.x;
-        batch->ny[k] = last.normal.y;
-        batch->last[k] = dem2di_touched(world, first + k) ? last.depth : -1;
     }
 }
 
 /* Where somebody has been given other velocities since the step that was made: those of that. */
 static void dem2di_batch_made(const dem2d_world *world, int first, int count, dem2di_batch *batch) {
     for (int k = 0; k < count; k++) {
-        dem2di_twist twist = dem2di_twist_of(world, first + k);
-        batch->vx[k] = twist.vb.x - twist.va.x;
-        batch->vy[k] = twist.vb.y - twist.va.y;
-        batch->wa[k] = twist.wa;
-        batch->wb[k] = twist.wb;
+        dem2di_relative_motion motion = dem2di_motion_of(world, first + k);
+        batch->vx[k] = motion.v.x;
+        batch->vy[k] = motion.v.y;
+        batch->wa[k] = motion.wa;
+        batch->wb[k] = motion.wb;
     }
 }
 
@@ -13396,14 +13534,14 @@ DEM2DI_VECTORS_BEGIN
 static DEM2DI_INLINE double dem2di_batch_slip(const dem2di_batch *batch, int k,
                                               const dem2di_round *now) {
     double vx = batch->vx[k], vy = batch->vy[k], wa = batch->wa[k], wb = batch->wb[k];
-    double depth = batch->last[k], closed = depth > 0 ? 1 : 0; /* no branch: for vectors */
+    double depth = batch->depth[k], closed = depth > 0 ? 1 : 0; /* no branch: for vectors */
     double arm_a = batch->radius_a[k] - depth / 2, arm_b = batch->radius_b[k] - depth / 2;
     double slip = now->normal.x * vy - now->normal.y * vx - (now->arm_a * wa + now->arm_b * wb);
-    double before = batch->nx[k] * vy - batch->ny[k] * vx - (arm_a * wa + arm_b * wb);
+    double before = batch->normal_x[k] * vy - batch->normal_y[k] * vx - (arm_a * wa + arm_b * wb);
     return slip + (before - slip) * (closed / 2);
 }
 
-/* [F] eq. 8-10 for all of a batch. */
+/* [F] eq. 8-10 for all of a batch, the next contacts over the last. */
 static DEM2DI_INLINE void dem2di_batch_loop(dem2di_batch *batch, int count, double time_step,
                                             const dem2d_pair_desc *law, bool friction,
                                             bool one_law) {
@@ -13415,19 +13553,24 @@ static DEM2DI_INLINE void dem2di_batch_loop(dem2di_batch *batch, int count, doub
         d.x = batch->dx[k];
         d.y = batch->dy[k];
         dem2di_round r = dem2di_round_make(d, batch->radius_a[k], batch->radius_b[k], kn);
+        double x = r.normal.x * r.force, y = r.normal.y * r.force;
+        if (friction) {
+            double slip = dem2di_batch_slip(batch, k, &r);
+            double limit = mu * r.force, spring = batch->shear[k] - kt * slip * time_step;
+            spring = limit < spring ? limit : spring;
+            spring = -limit > spring ? -limit : spring;
+            x -= r.normal.y * spring;
+            y += r.normal.x * spring;
+            batch->shear[k] = spring;
+            batch->load_a[k] = -(r.arm_a * spring);
+            batch->load_b[k] = -(r.arm_b * spring);
+        }
+        batch->normal_x[k] = r.normal.x;
+        batch->normal_y[k] = r.normal.y;
         batch->depth[k] = r.depth;
-        batch->fx[k] = r.normal.x * r.force;
-        batch->fy[k] = r.normal.y * r.force;
-        if (!friction) continue;
-        double slip = dem2di_batch_slip(batch, k, &r);
-        double limit = mu * r.force, spring = batch->shear[k] - kt * slip * time_step;
-        spring = limit < spring ? limit : spring;
-        spring = -limit > spring ? -limit : spring;
-        batch->shear[k] = spring;
-        batch->fx[k] -= r.normal.y * spring;
-        batch->fy[k] += r.normal.x * spring;
-        batch->ta[k] = -(r.arm_a * spring);
-        batch->tb[k] = -(r.arm_b * spring);
+        batch->force[k] = r.force;
+        batch->load_x[k] = x;
+        batch->load_y[k] = y;
     }
 }
 
@@ -13445,34 +13588,47 @@ static void dem2di_batch_solve(dem2di_batch *batch, int count, double time_step,
 }
 DEM2DI_VECTORS_END
 
-/* Loads on A and B by turns. Returns how many are closed. */
-static DEM2DI_INLINE int dem2di_batch_put(const dem2d_world *world, int first, int count,
-                                          bool friction, bool spin, const dem2di_batch *batch) {
-    double *x = world->load_x + 2 * first, *y = world->load_y + 2 * first;
-    double *turn = world->load_turn + 2 * first;
-    int closed = 0;
-    for (int k = 0; k < count; k++) {
-        closed += batch->depth[k] > 0;
-        x[2 * k] = -batch->fx[k];
-        x[2 * k + 1] = batch->fx[k];
-        y[2 * k] = -batch->fy[k];
-        y[2 * k + 1] = batch->fy[k];
-        if (friction) world->list.next_shear[first + k] = batch->shear[k];
-        if (!spin) continue;
-        turn[2 * k] = friction ? batch->ta[k] : 0;
-        turn[2 * k + 1] = friction ? batch->tb[k] : 0;
+/* The contacts and loads of a batch from the columns (`out` is false) or into them. */
+static DEM2DI_INLINE void dem2di_batch_copy(const dem2d_world *world, int first, int count,
+                                            bool friction, bool out, dem2di_batch *batch) {
+    const dem2di_contacts *contacts = &world->list.contacts;
+    const size_t bytes = (size_t)count * sizeof(double);
+    if (!out) {
+        if (!friction) return;
+        memcpy(batch->normal_x, contacts->normal_x + first, bytes);
+        memcpy(batch->normal_y, contacts->normal_y + first, bytes);
+        memcpy(batch->depth, contacts->depth + first, bytes);
+        memcpy(batch->shear, contacts->shear + first, bytes);
+        return;
     }
-    return closed;
+    memcpy(contacts->normal_x + first, batch->normal_x, bytes);
+    memcpy(contacts->normal_y + first, batch->normal_y, bytes);
+    memcpy(contacts->depth + first, batch->depth, bytes);
+    memcpy(contacts->force + first, batch->force, bytes);
+    memcpy(world->load_x + first, batch->load_x, bytes);
+    memcpy(world->load_y + first, batch->load_y, bytes);
+    if (!friction) {
+        memset(contacts->shear + first, 0, bytes);
+        return;
+    }
+    memcpy(contacts->shear + first, batch->shear, bytes);
+    memcpy(world->load_a + first, batch->load_a, bytes);
+    memcpy(world->load_b + first, batch->load_b, bytes);
 }
 
+/* Returns how many are closed. */
 static DEM2DI_INLINE int dem2di_disc_batch(const dem2d_world *world, int first, int count,
-                                           bool friction, bool spin, bool one_law) {
+                                           bool friction, bool one_law) {
     dem2di_batch batch;
+    int closed = 0;
+    dem2di_batch_copy(world, first, count, friction, false, &batch);
     dem2di_batch_fetch(world, first, count, friction, !one_law, &batch);
     if (friction && world->redirected) dem2di_batch_made(world, first, count, &batch);
     dem2di_batch_solve(&batch, count, world->made_step,
                        dem2di_law(world, world->plan.material, world->plan.material), &world->plan);
-    return dem2di_batch_put(world, first, count, friction, spin, &batch);
+    dem2di_batch_copy(world, first, count, friction, true, &batch);
+    for (int k = 0; k < count; k++) closed += batch.depth[k] > 0;
+    return closed;
 }
 
 static void dem2di_disc_range(const dem2d_world *world, int begin, int end, dem2di_count *count) {
@@ -13481,22 +13637,16 @@ static void dem2di_disc_range(const dem2d_world *world, int begin, int end, dem2
     for (int first = begin; first < end; first += DEM2DI_BATCH) {
         int n = dem2di_block_end(first, DEM2DI_BATCH, end) - first;
         if (plan->friction && plan->one_law)
-            closed += dem2di_disc_batch(world, first, n, true, true, true);
+            closed += dem2di_disc_batch(world, first, n, true, true);
         else if (plan->friction)
-            closed += dem2di_disc_batch(world, first, n, true, true, false);
-        else if (plan->spin)
-            closed += dem2di_disc_batch(world, first, n, false, true, plan->one_law);
+            closed += dem2di_disc_batch(world, first, n, true, false);
+        else if (plan->one_law)
+            closed += dem2di_disc_batch(world, first, n, false, true);
         else
-            closed += dem2di_disc_batch(world, first, n, false, false, plan->one_law);
+            closed += dem2di_disc_batch(world, first, n, false, false);
     }
     count->collisions += closed;
     count->proofs[DEM2D_BY_FORM] += closed;
-}
-
-/* What a pair starts from in the next step. */
-static inline void dem2di_link_keep(const dem2di_link *last, dem2di_link *link) {
-    link->normal = last->normal;
-    link->feature = last->feature;
 }
 
 /* Part of a gap that proves nothing: nearer to each other than this (m), two shapes may be found in
@@ -13505,27 +13655,25 @@ static double dem2di_gap_unsure(const dem2d_world *world, double size) {
     return (dem2di_max(world->tolerance, DEM2DI_ROUNDING) + DEM2DI_ROUNDING) * size;
 }
 
-/* A pair is apart by a gap (m): its separation bound. Until the accumulated displacements of both
-   particles reach it, any search would find them apart. GJK and EPA take every pair anew, as in the
-   papers. */
-static void dem2di_link_apart(const dem2d_world *world, int a, int b, double gap, double size,
-                              dem2di_link *link) {
-    link->depth = -1;
-    link->budget = world->solver == DEM2D_GJK_EPA ? 0
-                                                  : world->travel[a] + world->travel[b] +
-                                                        (gap - dem2di_gap_unsure(world, size));
+/* Separation bound of a pair that is apart by a gap (m): until the accumulated displacements of
+   both particles reach it, any search would find them apart. GJK and EPA take every pair anew, as
+   in the papers. */
+static double dem2di_budget(const dem2d_world *world, int a, int b, double gap, double size) {
+    if (world->solver == DEM2D_GJK_EPA) return 0;
+    return world->travel[a] + world->travel[b] + (gap - dem2di_gap_unsure(world, size));
 }
 
 /* The search of one pair. A contact goes on from its own last normal and feature. Other pairs start
    from the line of centres, so that the result does not depend on when the pair was listed or
    collided before. Such a pair may first try what the last collision found, but only to prove a
    gap. */
-static void dem2di_pair_search(const dem2d_world *world, dem2di_pair *pair, const dem2di_link *last,
+static void dem2di_pair_search(const dem2d_world *world, dem2di_pair *pair,
+                               const dem2di_contact *last, const dem2di_feature *feature,
                                dem2di_search *search) {
     bool known = last->normal.x != 0 || last->normal.y != 0;
     pair->calls = 0;
     if (known && world->solver != DEM2D_GJK_EPA) {
-        dem2di_contact_solve(pair, world->solver, &last->feature, last->normal, world->tolerance,
+        dem2di_contact_solve(pair, world->solver, feature, last->normal, world->tolerance,
                              world->max_iterations, true, search);
         if (last->depth >= 0 || -search->upper > dem2di_gap_unsure(world, pair->size)) return;
     }
@@ -13533,55 +13681,56 @@ static void dem2di_pair_search(const dem2d_world *world, dem2di_pair *pair, cons
                          world->max_iterations, true, search);
 }
 
-/* A look at two shapes: the contact's normal, depth and points, or their gap. Returns the number of
-   points that carry the contact. */
-static int dem2di_shapes_look(const dem2d_world *world, dem2di_pair *pair, const dem2di_link *last,
-                              dem2di_link *link, dem2d_contact_point points[2], double *gap,
+/* A look at two shapes from the contact's normal and history on: its normal, depth and points, or
+   their gap. Returns the number of points that carry the contact. */
+static int dem2di_shapes_look(const dem2d_world *world, dem2di_pair *pair,
+                              const dem2di_contact *last, dem2di_history *history,
+                              dem2di_contact *contact, dem2d_contact_point points[2], double *gap,
                               dem2di_count *count) {
     dem2di_search search;
     count->collisions++;
-    dem2di_pair_search(world, pair, last, &search);
+    dem2di_pair_search(world, pair, last, &history->feature, &search);
     count->calls += pair->calls;
-    link->normal.x = search.normal.x; /* not as one: it has just been stored in two */
-    link->normal.y = search.normal.y;
-    link->feature = search.feature;
+    contact->normal.x = search.normal.x; /* not as one: it has just been stored in two */
+    contact->normal.y = search.normal.y;
+    history->feature = search.feature;
     if (!(search.upper > 0)) {
         count->separations++;
         *gap = -search.upper;
         return 0;
     }
     count->proofs[search.proof]++;
-    link->depth = search.upper;
+    contact->depth = search.upper;
     if (world->plan.faces) return dem2di_pair_points(pair, &search, points);
     points[0].position = dem2di_scale(dem2di_add(search.a, dem2di_add(search.b, pair->d)), 0.5);
     return 1;
 }
 
 /* Two circles that overlap, among the others for the full law. */
-static int dem2di_round_geometry(const dem2di_state *a, const dem2di_state *b, dem2di_link *link,
-                                 dem2d_contact_point points[2], dem2di_count *count) {
+static int dem2di_round_geometry(const dem2di_state *a, const dem2di_state *b,
+                                 dem2di_contact *contact, dem2d_contact_point points[2],
+                                 dem2di_count *count) {
     dem2di_round round = dem2di_round_make(dem2di_disc_line(a, b), a->radius, b->radius, 1);
-    link->normal = round.normal;
-    link->depth = round.depth;
+    contact->normal = round.normal;
+    contact->depth = round.depth;
     points[0].position = dem2di_vec(0, 0); /* what circles have follows from the depth */
     count->collisions++;
     count->proofs[DEM2D_BY_FORM]++;
     return round.depth > 0;
 }
 
-/* Geometry of one pair at the present positions; depth <= 0 when apart. Returns the number of
-   points that carry the contact. */
-static int dem2di_pair_geometry(const dem2d_world *world, int a, int b, const dem2di_link *last,
-                                dem2di_link *link, dem2d_contact_point points[2],
-                                dem2di_count *count) {
+/* Geometry of one pair at the present positions. Returns the number of points that carry the
+   contact, 0 when it is apart. */
+static int dem2di_pair_geometry(const dem2d_world *world, int a, int b, const dem2di_contact *last,
+                                dem2di_history *history, dem2di_contact *contact,
+                                dem2d_contact_point points[2], dem2di_count *count) {
     const dem2di_body *body_a = &world->bodies[a], *body_b = &world->bodies[b];
     const dem2di_state *state_a = &world->now[a], *state_b = &world->now[b];
     dem2d_vec d = dem2di_centre_line(state_a->x, state_b->x);
     double reach = state_a->radius + state_b->radius, distance = dem2di_length(d);
-    dem2di_link_keep(last, link);
-    link->budget = 0;
+    history->budget = 0;
     if (distance >= reach) {
-        dem2di_link_apart(world, a, b, distance - reach, distance + reach, link);
+        history->budget = dem2di_budget(world, a, b, distance - reach, distance + reach);
         return 0;
     }
     dem2di_pair pair;
@@ -13589,7 +13738,7 @@ static int dem2di_pair_geometry(const dem2d_world *world, int a, int b, const de
     pair.b = dem2di_shape_of(world, body_b);
     if (pair.a->type == DEM2D_CIRCLE && pair.b->type == DEM2D_CIRCLE &&
         world->solver != DEM2D_GJK_EPA)
-        return dem2di_round_geometry(state_a, state_b, link, points, count);
+        return dem2di_round_geometry(state_a, state_b, contact, points, count);
     pair.ra = state_a->q;
     pair.rb = state_b->q;
     pair.scale_a = body_a->scale;
@@ -13598,57 +13747,69 @@ static int dem2di_pair_geometry(const dem2d_world *world, int a, int b, const de
     pair.distance = distance;
     pair.size = reach + distance;
     double gap;
-    int found = dem2di_shapes_look(world, &pair, last, link, points, &gap, count);
-    if (found == 0) dem2di_link_apart(world, a, b, gap, pair.size, link);
+    int found = dem2di_shapes_look(world, &pair, last, history, contact, points, &gap, count);
+    if (found == 0) history->budget = dem2di_budget(world, a, b, gap, pair.size);
     return found;
 }
 
-/* Force of contact i, whose geometry is known, from its springs before and its slip. `from` is
-   where its springs are: its place among those that are not of circles, but for one that has come
-   across a joint. */
-static inline void dem2di_link_load(const dem2d_world *world, int i, int from,
-                                    const dem2d_pair_desc *law, bool two) {
-    const dem2di_list *list = &world->list;
-    int at = i - list->discs;
-    dem2di_link *link = &list->next_links[at];
+/* What a contact was in the last force pass; its shear force, points and law state may be those of
+   another one that it took over from, across a joint of segments. */
+typedef struct dem2di_last {
+    dem2di_contact contact;
+    dem2di_ends ends;   /* where contacts may have two points */
+    dem2di_extra extra; /* with the full law */
+} dem2di_last;
+
+static inline void dem2di_last_get(const dem2d_world *world, const dem2di_contacts *from, int i,
+                                   dem2di_last *last) {
+    (void)dem2di_contact_get(world, from, i, &last->contact);
+    if (world->plan.faces) last->ends = from->ends[i - world->list.discs];
+    if (world->plan.full) last->extra = from->extras[i - world->list.discs];
+}
+
+/* Forces of springs and friction. */
+static inline void dem2di_spring_force(const dem2d_world *world, int i, const dem2di_last *last,
+                                       bool two, dem2di_contact *contact) {
+    const dem2d_pair_desc *law = dem2di_law_of(world, i);
     double slip = 0;
     if (law->friction > 0) {
-        dem2di_twist twist = dem2di_twist_of(world, i);
-        slip = dem2di_slip(&list->links[from], link, &twist);
+        dem2di_relative_motion motion = dem2di_motion_of(world, i);
+        slip = dem2di_slip(&last->contact, contact, &motion);
     }
     if (two) {
+        dem2di_ends *ends = &world->list.contacts.ends[i - world->list.discs];
         double force[2];
-        dem2di_ends_press(law, &list->next_ends[at], force);
-        dem2di_law_apply_ends(law, slip, world->made_step, force, &list->links[from],
-                              &list->ends[from], &list->next_ends[at], link);
+        dem2di_ends_press(law, ends, force);
+        dem2di_law_apply_ends(law, slip, world->made_step, force, &last->contact, &last->ends, ends,
+                              contact);
         return;
     }
-    link->force = law->normal_stiffness * link->depth;
-    dem2di_law_apply(law, slip, world->made_step, list->links[from].shear, link);
+    contact->force = law->normal_stiffness * contact->depth;
+    dem2di_law_apply(law, slip, world->made_step, last->contact.shear, contact);
 }
 
 /* How the two of contact i meet. */
-static dem2di_meeting dem2di_meeting_make(const dem2d_world *world, int i, int from) {
-    const dem2di_list *list = &world->list;
-    const dem2di_link *link = &list->next_links[i - list->discs];
+static dem2di_meeting dem2di_meeting_make(const dem2d_world *world, int i,
+                                          const dem2di_contact *last,
+                                          const dem2di_contact *contact) {
     double inverse = dem2di_reduced_inverse(world, i);
-    dem2di_twist twist = dem2di_twist_of(world, i);
+    dem2di_relative_motion motion = dem2di_motion_of(world, i);
     dem2di_meeting meeting;
-    meeting.turning = twist.wb - twist.wa;
-    meeting.closing = -dem2di_velocity_n(link, &twist);
+    meeting.turning = motion.wb - motion.wa;
+    meeting.closing = -dem2di_velocity_n(contact, &motion);
     meeting.slip = 0;
     if (dem2di_law_of(world, i)->friction > 0 || world->law != NULL)
-        meeting.slip = dem2di_slip(&list->links[from], link, &twist);
+        meeting.slip = dem2di_slip(last, contact, &motion);
     meeting.mass = inverse > 0 ? 1 / inverse : 0;
     return meeting;
 }
 
 /* What the caller's law says of contact i at a depth. */
-static void dem2di_ask_law(const dem2d_world *world, int i, int from, const dem2di_meeting *meeting,
-                           double depth, dem2d_law_output *output) {
+static void dem2di_ask_law(const dem2d_world *world, int i, const dem2di_last *last,
+                           const dem2di_meeting *meeting, dem2d_vec normal, double depth,
+                           dem2d_law_output *output) {
     const dem2di_list *list = &world->list;
     const dem2di_key *key = &list->keys[i];
-    const dem2di_extra *last = &list->extras[from];
     dem2d_law_input input;
     memset(&input, 0, sizeof input);
     memset(output, 0, sizeof *output);
@@ -13658,7 +13819,7 @@ static void dem2di_ask_law(const dem2d_world *world, int i, int from, const dem2
         input.b = dem2di_particle_id(world, key->b);
     else
         input.wall = dem2di_wall_id(world, key->b);
-    input.normal = list->next_links[i - list->discs].normal;
+    input.normal = normal;
     input.time_step = world->made_step;
     input.depth = depth;
     input.closing = meeting->closing;
@@ -13666,150 +13827,126 @@ static void dem2di_ask_law(const dem2d_world *world, int i, int from, const dem2
     input.turning = meeting->turning;
     input.mass = meeting->mass;
     input.radius = dem2di_reduced_radius(world, i);
-    input.tangential_force = list->links[from].shear;
-    input.moment = last->moment;
-    memcpy(input.state, last->state, sizeof input.state);
-    memcpy(output->state, last->state, sizeof output->state);
+    input.tangential_force = last->contact.shear;
+    input.moment = last->extra.moment;
+    memcpy(input.state, last->extra.state, sizeof input.state);
+    memcpy(output->state, last->extra.state, sizeof output->state);
     world->law(world->law_user, &input, output);
 }
 
-/* The caller's law for contact i. */
-static void dem2di_call_law(const dem2d_world *world, int i, int from,
-                            const dem2di_meeting *meeting) {
-    int at = i - world->list.discs;
-    dem2di_link *link = &world->list.next_links[at];
-    dem2di_extra *extra = &world->list.next_extras[at];
-    dem2d_law_output output;
-    dem2di_ask_law(world, i, from, meeting, link->depth, &output);
-    link->force = output.normal_force;
-    link->shear = output.tangential_force;
-    extra->moment = output.moment;
-    extra->energy = output.energy;
-    memcpy(extra->state, output.state, sizeof extra->state);
-}
-
 /* The full law: dashpot and rolling as well, or the caller's. Two points may get another centre. */
-static void dem2di_full_load(const dem2d_world *world, int i, int from, bool two) {
+static void dem2di_full_force(const dem2d_world *world, int i, const dem2di_last *last, bool two,
+                              dem2di_contact *contact) {
     const dem2di_list *list = &world->list;
     const dem2d_pair_desc *law = dem2di_law_of(world, i);
-    int at = i - list->discs;
-    dem2di_link *link = &list->next_links[at];
-    dem2di_extra *extra = &list->next_extras[at];
     const double dt = world->made_step;
-    dem2di_meeting meeting = dem2di_meeting_make(world, i, from);
+    dem2di_extra *extra = &list->contacts.extras[i - list->discs];
+    dem2di_meeting meeting = dem2di_meeting_make(world, i, &last->contact, contact);
     if (world->law != NULL) {
-        dem2di_call_law(world, i, from, &meeting);
+        dem2d_law_output output;
+        dem2di_ask_law(world, i, last, &meeting, contact->normal, contact->depth, &output);
+        contact->force = output.normal_force;
+        contact->shear = output.tangential_force;
+        extra->moment = output.moment;
+        extra->energy = output.energy;
+        memcpy(extra->state, output.state, sizeof extra->state);
         return;
     }
     if (two) {
+        dem2di_ends *ends = &list->contacts.ends[i - list->discs];
         double force[2];
-        dem2di_ends_press(law, &list->next_ends[at], force);
-        dem2di_ends_damp(law, &meeting, force, extra->viscous, &list->next_ends[at], link);
-        dem2di_law_apply_ends(law, meeting.slip, dt, force, &list->links[from], &list->ends[from],
-                              &list->next_ends[at], link);
+        dem2di_ends_press(law, ends, force);
+        dem2di_ends_damp(law, &meeting, force, extra->viscous, ends, contact);
+        dem2di_law_apply_ends(law, meeting.slip, dt, force, &last->contact, &last->ends, ends,
+                              contact);
     } else {
-        double spring = law->normal_stiffness * link->depth;
-        link->force = dem2di_damped(spring, dem2di_dashpot(law, meeting.mass), meeting.closing);
-        dem2di_law_apply(law, meeting.slip, dt, list->links[from].shear, link);
-        extra->viscous[0] = link->force - spring;
+        double spring = law->normal_stiffness * contact->depth;
+        contact->force = dem2di_damped(spring, dem2di_dashpot(law, meeting.mass), meeting.closing);
+        dem2di_law_apply(law, meeting.slip, dt, last->contact.shear, contact);
+        extra->viscous[0] = contact->force - spring;
     }
     if (law->rolling_friction > 0)
         extra->moment = dem2di_rolling(law, dem2di_reduced_radius(world, i), meeting.turning, dt,
-                                       link->force, list->extras[from].moment);
+                                       contact->force, last->extra.moment);
 }
 
-/* Points of contact i into its link, and beside it when there are two; B's centre is at d. A circle
-   has its points on the line of the normal: on its own side of the middle of an overlap, and on a
-   wall at the foot. */
-static inline void dem2di_link_place(const dem2d_world *world, int i, int count,
-                                     const dem2d_contact_point points[2], dem2d_vec d) {
+/* Force of contact i, whose geometry is known. */
+static inline void dem2di_force(const dem2d_world *world, int i, const dem2di_last *last, bool two,
+                                dem2di_contact *contact, dem2di_count *count) {
+    double moment = 0;
+    if (world->plan.full) {
+        dem2di_full_force(world, i, last, two, contact);
+        moment = world->list.contacts.extras[i - world->list.discs].moment;
+    } else {
+        dem2di_spring_force(world, i, last, two, contact);
+    }
+    dem2d_vec force = dem2di_contact_force(contact);
+    world->load_x[i] = force.x;
+    world->load_y[i] = force.y;
+    world->load_a[i] = dem2di_torque_a(contact, moment);
+    world->load_b[i] = dem2di_torque_b(contact, moment);
+    double sum = force.x + force.y + world->load_a[i] + world->load_b[i];
+    count->unsound += !dem2di_finite(sum);
+}
+
+/* Where contact i has its points, beside it when there are two; B's centre is at d. A circle has
+   its point on the line of the normal: at the middle of an overlap, and on a wall at the foot. */
+static inline void dem2di_contact_place(const dem2d_world *world, int i, int count,
+                                        const dem2d_contact_point points[2], dem2d_vec d,
+                                        dem2di_contact *contact) {
     const dem2di_list *list = &world->list;
     const dem2di_key *key = &list->keys[i];
     bool wall = i >= list->pairs;
-    dem2di_link *link = &list->next_links[i - list->discs];
-    dem2di_arms *arms = &link->arms;
-    dem2d_vec point = count == 2 ? dem2di_ends_set(points, &list->next_ends[i - list->discs], link)
-                                 : points[0].position;
+    dem2di_arms *arms = &contact->arms;
+    dem2d_vec point = points[0].position;
+    if (count == 2) point = dem2di_ends_set(points, &list->contacts.ends[i - list->discs], contact);
     dem2d_vec from_b = dem2di_sub(point, d);
-    arms->a_n = dem2di_dot(link->normal, point);
-    arms->a_t = dem2di_cross(link->normal, point);
-    arms->b_n = wall ? 0 : dem2di_dot(link->normal, from_b);
-    arms->b_t = wall ? 0 : dem2di_cross(link->normal, from_b);
+    arms->a_n = dem2di_dot(contact->normal, point);
+    arms->a_t = dem2di_cross(contact->normal, point);
+    arms->b_n = wall ? 0 : dem2di_dot(contact->normal, from_b);
+    arms->b_t = wall ? 0 : dem2di_cross(contact->normal, from_b);
     if (dem2di_is_circle(world, key->a)) {
-        arms->a_n = world->now[key->a].radius - (wall ? link->depth : link->depth / 2);
+        arms->a_n = world->now[key->a].radius - (wall ? contact->depth : contact->depth / 2);
         arms->a_t = 0;
     }
     if (!wall && dem2di_is_circle(world, key->b)) {
-        arms->b_n = -(world->now[key->b].radius - link->depth / 2);
+        arms->b_n = -(world->now[key->b].radius - contact->depth / 2);
         arms->b_t = 0;
     }
 }
 
-static inline void dem2di_load_set(const dem2d_world *world, int at, dem2di_load load) {
-    world->load_x[at] = load.force.x;
-    world->load_y[at] = load.force.y;
-    world->load_turn[at] = load.torque;
-}
-
-/* Nothing acts. */
-static void dem2di_no_loads(const dem2d_world *world, int i) {
-    dem2di_load none = {{0, 0}, 0};
-    dem2di_load_set(world, 2 * i, none);
-    dem2di_load_set(world, 2 * i + 1, none);
-}
-
-static inline void dem2di_set_loads(const dem2d_world *world, int i, dem2di_count *count) {
-    dem2di_load loads[2];
-    dem2di_link_loads(&world->list.next_links[i - world->list.discs],
-                      dem2di_extra_at(world, i, true), loads);
-    dem2di_load_set(world, 2 * i, loads[0]);
-    dem2di_load_set(world, 2 * i + 1, loads[1]);
-    double sum = loads[1].force.x + loads[1].force.y + loads[0].torque + loads[1].torque;
-    count->unsound += !dem2di_finite(sum);
-}
-
-/* What a contact has beside its link. */
-static inline void dem2di_clear_beside(const dem2d_world *world, int at) {
-    const dem2di_list *list = &world->list;
-    if (world->plan.faces) memset(&list->next_ends[at], 0, sizeof *list->next_ends);
-    if (world->plan.full) memset(&list->next_extras[at], 0, sizeof *list->next_extras);
+/* A contact before it is looked at: apart, with the normal of the last look. */
+static inline void dem2di_contact_open(const dem2d_world *world, int i, const dem2di_contact *last,
+                                       dem2di_contact *contact) {
+    memset(contact, 0, sizeof *contact);
+    contact->normal = last->normal;
+    contact->depth = -1;
+    world->load_x[i] = world->load_y[i] = world->load_a[i] = world->load_b[i] = 0;
+    dem2di_clear_beside(world, i);
 }
 
 /* Geometry and force of one listed pair that is not of two circles. */
 static void dem2di_pair_look(const dem2d_world *world, int i, dem2di_count *count) {
     const dem2di_list *list = &world->list;
-    int a = list->keys[i].a, b = list->keys[i].b, at = i - list->discs;
-    const dem2di_link *last = &list->links[at];
-    dem2di_link *link = &list->next_links[at];
+    int a = list->keys[i].a, b = list->keys[i].b;
+    dem2di_history *history = &list->contacts.history[i - list->discs];
+    if (world->travel[a] + world->travel[b] < history->budget) return; /* surely still apart */
+    dem2di_last last;
+    dem2di_contact contact;
     dem2d_contact_point points[2];
-    if (world->travel[a] + world->travel[b] < last->budget) { /* surely still apart */
-        dem2di_link_keep(last, link);
-        link->budget = last->budget;
-        link->depth = -1;
-        link->shear = 0;
-        dem2di_clear_beside(world, at);
-        return;
+    dem2di_last_get(world, &list->contacts, i, &last);
+    dem2di_contact_open(world, i, &last.contact, &contact);
+    int found = dem2di_pair_geometry(world, a, b, &last.contact, history, &contact, points, count);
+    if (found > 0) {
+        dem2d_vec d = dem2di_centre_line(world->now[a].x, world->now[b].x);
+        dem2di_contact_place(world, i, found, points, d, &contact);
+        dem2di_force(world, i, &last, found == 2, &contact, count);
     }
-    link->force = link->shear = 0;
-    dem2di_clear_beside(world, at);
-    int found = dem2di_pair_geometry(world, a, b, last, link, points, count);
-    if (!(link->depth > 0)) {
-        dem2di_no_loads(world, i);
-        return;
-    }
-    const dem2di_state *sa = &world->now[a], *sb = &world->now[b];
-    const dem2d_pair_desc *law = dem2di_law_of(world, i);
-    dem2d_vec d = dem2di_centre_line(sa->x, sb->x);
-    dem2di_link_place(world, i, found, points, d);
-    if (world->plan.full)
-        dem2di_full_load(world, i, at, found == 2);
-    else
-        dem2di_link_load(world, i, at, law, found == 2);
-    dem2di_set_loads(world, i, count);
+    dem2di_contact_put(list, i, &contact);
 }
 
 /* A particle at a half-plane: one support call, none for a circle. Returns the number of points. */
-static int dem2di_plane_geometry(const dem2d_world *world, int a, int wall, dem2di_link *link,
+static int dem2di_plane_geometry(const dem2d_world *world, int a, int wall, dem2di_contact *contact,
                                  dem2d_contact_point points[2], dem2di_count *count) {
     const dem2di_body *body = &world->bodies[a];
     const dem2d_shape *shape = dem2di_shape_of(world, body);
@@ -13817,38 +13954,37 @@ static int dem2di_plane_geometry(const dem2d_world *world, int a, int wall, dem2
     dem2d_vec point = world->wall_now[wall].point;
     dem2d_vec u = dem2di_negate(world->walls[wall].desc.normal);
     dem2d_vec support = dem2di_scale(u, state->radius);
-    link->normal.x = u.x;
-    link->normal.y = u.y;
+    contact->normal.x = u.x;
+    contact->normal.y = u.y;
     double surface = dem2di_dot(dem2di_sub(point, state->x), u);
-    link->depth = state->radius - surface;
-    if (!(link->depth > 0)) return 0;
+    contact->depth = state->radius - surface;
+    if (!(contact->depth > 0)) return 0;
     if (shape->type != DEM2D_CIRCLE) {
         dem2d_pose pose = dem2di_pose_of(world, world->now, a);
         dem2d_vec own = dem2di_support(shape, dem2di_turn_back(pose.rotation, u), NULL);
         support = dem2di_at_pose(&pose, own);
-        link->depth = dem2di_wall_depth(&pose, point, u, support);
+        contact->depth = dem2di_wall_depth(&pose, point, u, support);
         count->calls++;
-        if (!(link->depth > 0)) return 0;
+        if (!(contact->depth > 0)) return 0;
     }
     if (world->plan.faces && shape->flat)
-        return dem2di_wall_points(shape, state->q, body->scale, u, surface, support, link->depth,
+        return dem2di_wall_points(shape, state->q, body->scale, u, surface, support, contact->depth,
                                   points);
-    points[0].position.x = support.x - link->depth * u.x;
-    points[0].position.y = support.y - link->depth * u.y;
+    points[0].position.x = support.x - contact->depth * u.x;
+    points[0].position.y = support.y - contact->depth * u.y;
     return 1;
 }
 
 /* A particle at a segment: a pair, of which only what is near the particle counts, so that the
    search is as exact as for its neighbours. Points are on the segment. */
 static int dem2di_segment_geometry(const dem2d_world *world, int a, int wall,
-                                   const dem2di_link *last, dem2di_link *link,
-                                   dem2d_contact_point points[2], dem2di_count *count) {
+                                   const dem2di_contact *last, dem2di_history *history,
+                                   dem2di_contact *contact, dem2d_contact_point points[2],
+                                   dem2di_count *count) {
     const dem2di_wall *w = &world->walls[wall];
     const dem2di_body *body = &world->bodies[a];
     const dem2di_state *state = &world->now[a];
     const dem2d_rot none = {1, 0};
-    dem2di_link_keep(last, link);
-    link->depth = -1;
     if (!(dem2di_wall_distance(world, wall, state->x) < state->radius)) return 0;
     dem2d_vec along = dem2di_vec(w->along.c, w->along.s);
     dem2d_vec start = dem2di_sub(world->wall_now[wall].point, state->x);
@@ -13864,47 +14000,44 @@ static int dem2di_segment_geometry(const dem2d_world *world, int a, int wall,
     pair.d = dem2di_along(start, from + (to - from) / 2, along);
     pair.distance = dem2di_length(pair.d);
     pair.size = state->radius + pair.scale_b / 2 + pair.distance;
-    int found = dem2di_shapes_look(world, &pair, last, link, points, &gap, count);
+    int found = dem2di_shapes_look(world, &pair, last, history, contact, points, &gap, count);
     for (int k = 0; k < found; k++) {
-        double depth = found == 2 ? points[k].depth : link->depth;
-        points[k].position = dem2di_along(points[k].position, -depth / 2, link->normal);
-        points[k].normal = link->normal; /* joints go by it */
+        double depth = found == 2 ? points[k].depth : contact->depth;
+        points[k].position = dem2di_along(points[k].position, -depth / 2, contact->normal);
+        points[k].normal = contact->normal; /* joints go by it */
     }
     return found;
 }
 
 /* Force of a contact with a wall whose geometry is known. */
-static void dem2di_touch_force(const dem2d_world *world, int i, int from, dem2di_count *count) {
-    const dem2di_list *list = &world->list;
-    dem2di_link *link = &list->next_links[i - list->discs];
-    const dem2d_pair_desc *law = dem2di_law_of(world, i);
-    bool two = dem2di_ends_at(world, i, true) != NULL;
+static void dem2di_touch_force(const dem2d_world *world, int i, const dem2di_last *last,
+                               dem2di_contact *contact, dem2di_count *count) {
+    bool two = dem2di_ends_of(world, &world->list.contacts, i) != NULL;
     if (world->faces == DEM2D_ONE_POINT) /* [P] fig. 4b: from the foot point to the middle */
-        link->arms.a_n += link->depth / 2;
-    if (world->plan.full)
-        dem2di_full_load(world, i, from, two);
-    else
-        dem2di_link_load(world, i, from, law, two);
-    dem2di_set_loads(world, i, count);
+        contact->arms.a_n += contact->depth / 2;
+    dem2di_force(world, i, last, two, contact, count);
 }
 
 /* The same as for a pair, for a particle and a wall. Where segments are joined, forces come after
    all of the geometry. */
 static void dem2di_touch_look(const dem2d_world *world, int i, dem2di_count *count) {
     const dem2di_list *list = &world->list;
-    int a = list->keys[i].a, j = list->keys[i].b, at = i - list->discs;
-    const dem2di_link *last = &list->links[at];
-    dem2di_link *link = &list->next_links[at];
+    int a = list->keys[i].a, j = list->keys[i].b;
     bool segment = world->walls[j].desc.segment;
+    dem2di_history *history = &list->contacts.history[i - list->discs];
+    dem2di_last last;
+    dem2di_contact contact;
     dem2d_contact_point points[2];
-    link->shear = 0;
-    dem2di_clear_beside(world, at);
-    if (last->depth > 0) dem2di_no_loads(world, i);
-    int found = segment ? dem2di_segment_geometry(world, a, j, last, link, points, count)
-                        : dem2di_plane_geometry(world, a, j, link, points, count);
-    if (found == 0) return;
-    dem2di_link_place(world, i, found, points, dem2di_vec(0, 0));
-    if (!segment || !world->plan.joints) dem2di_touch_force(world, i, at, count);
+    dem2di_last_get(world, &list->contacts, i, &last);
+    dem2di_contact_open(world, i, &last.contact, &contact);
+    int found = segment ? dem2di_segment_geometry(world, a, j, &last.contact, history, &contact,
+                                                  points, count)
+                        : dem2di_plane_geometry(world, a, j, &contact, points, count);
+    if (found > 0) {
+        dem2di_contact_place(world, i, found, points, dem2di_vec(0, 0), &contact);
+        if (!segment || !world->plan.joints) dem2di_touch_force(world, i, &last, &contact, count);
+    }
+    dem2di_contact_put(list, i, &contact);
 }
 
 /* --- joints of segments: of two contacts at the same place one is left -------------------------
@@ -13916,39 +14049,39 @@ static void dem2di_touch_look(const dem2d_world *world, int i, dem2di_count *cou
 /* Which end of its segment a contact is at, or -1: along the side. */
 static int dem2di_segment_corner(const dem2d_world *world, int contact) {
     dem2d_rot along = world->walls[world->list.keys[contact].b].along;
-    dem2d_vec u = world->list.next_links[contact - world->list.discs].normal;
-    double sine = u.x * along.c + u.y * along.s;
+    const dem2di_contacts *contacts = &world->list.contacts;
+    double sine = contacts->normal_x[contact] * along.c + contacts->normal_y[contact] * along.s;
     return fabs(sine) <= DEM2DI_CORNER ? -1 : sine < 0;
 }
 
 /* Which point of a contact is at a place, or -1. */
-static int dem2di_point_near(const dem2d_world *world, int contact, dem2d_vec place) {
-    const dem2di_link *link = &world->list.next_links[contact - world->list.discs];
-    const dem2di_ends *ends = dem2di_ends_at(world, contact, true);
-    const dem2di_state *a = &world->now[world->list.keys[contact].a];
-    dem2d_vec from = dem2di_sub(place, dem2di_add(a->x, dem2di_arm_a(link)));
+static int dem2di_point_near(const dem2d_world *world, int i, dem2d_vec place) {
+    const dem2di_list *list = &world->list;
+    const dem2di_ends *ends = dem2di_ends_of(world, &list->contacts, i);
+    const dem2di_state *a = &world->now[list->keys[i].a];
+    dem2di_contact contact;
+    (void)dem2di_contact_get(world, &list->contacts, i, &contact);
+    dem2d_vec from = dem2di_sub(place, dem2di_add(a->x, dem2di_arm_a(&contact)));
     for (int k = 0; k < (ends != NULL ? 2 : 1); k++) {
         double offset = ends != NULL ? ends->offset[k] : 0;
-        dem2d_vec left = dem2di_along(from, -offset, dem2di_perp(link->normal));
+        dem2d_vec left = dem2di_along(from, -offset, dem2di_perp(contact.normal));
         if (dem2di_length(left) <= DEM2DI_JOINT * a->radius) return k;
     }
     return -1;
 }
 
-static bool dem2di_segment_touched(const dem2d_world *world, int contact, bool next) {
+static bool dem2di_segment_touched(const dem2d_world *world, const dem2di_contacts *from, int i) {
     const dem2di_list *list = &world->list;
-    return contact >= list->pairs && contact < list->count &&
-           world->walls[list->keys[contact].b].desc.segment &&
-           (next ? list->next_links : list->links)[contact - list->discs].depth > 0;
+    return i >= list->pairs && world->walls[list->keys[i].b].desc.segment && from->depth[i] > 0;
 }
 
 /* A contact of two points keeps the other one. */
-static void dem2di_drop_point(const dem2d_world *world, int contact, int point) {
+static void dem2di_drop_point(const dem2d_world *world, int i, int point) {
     const dem2di_list *list = &world->list;
-    dem2di_link *link = &list->next_links[contact - list->discs];
-    dem2di_ends *ends = &list->next_ends[contact - list->discs];
-    link->depth = ends->depth[1 - point];
-    dem2di_arms_shift(&link->arms, ends->offset[1 - point]);
+    const dem2di_contacts *contacts = &list->contacts;
+    dem2di_ends *ends = &contacts->ends[i - list->discs];
+    contacts->depth[i] = ends->depth[1 - point];
+    dem2di_arms_shift(&contacts->arms[i - list->discs], ends->offset[1 - point]);
     memset(ends, 0, sizeof *ends);
 }
 
@@ -13958,16 +14091,14 @@ static void dem2di_drop_point(const dem2d_world *world, int contact, int point) 
 static void dem2di_joint_yield(const dem2d_world *world, int a, int b) {
     const dem2di_list *list = &world->list;
     const int contact[2] = {a, b}, wall[2] = {list->keys[a].b, list->keys[b].b};
-    dem2di_link *link[2];
     int which[2], near[2];
     bool two[2], ends[2], side[2];
     dem2d_vec at;
     if (!dem2di_segments_meet(world, wall[0], wall[1], 0, which, &at)) return;
     for (int k = 0; k < 2; k++) {
         int corner = dem2di_segment_corner(world, contact[k]);
-        link[k] = &list->next_links[contact[k] - list->discs];
         near[k] = dem2di_point_near(world, contact[k], at);
-        two[k] = dem2di_ends_at(world, contact[k], true) != NULL;
+        two[k] = dem2di_ends_of(world, &list->contacts, contact[k]) != NULL;
         ends[k] = corner == which[k];
         side[k] = corner < 0;
     }
@@ -13975,9 +14106,9 @@ static void dem2di_joint_yield(const dem2d_world *world, int a, int b) {
     bool flat = fabs(one.c * other.s - one.s * other.c) <= DEM2DI_CORNER;
     bool both = side[0] && side[1] && near[0] >= 0 && near[1] >= 0;
     if (ends[0] || ends[1])
-        link[ends[1] ? 1 : 0]->depth = 0;
+        list->contacts.depth[contact[ends[1] ? 1 : 0]] = 0;
     else if (both && !two[0] && !two[1])
-        link[1]->depth = 0;
+        list->contacts.depth[b] = 0;
     for (int k = 0; k < 2; k++)
         if (side[k] && two[k] && near[k] >= 0 && (flat || (k == 1 && both)))
             dem2di_drop_point(world, contact[k], near[k]);
@@ -13987,17 +14118,17 @@ static void dem2di_joint_yield(const dem2d_world *world, int a, int b) {
 static int dem2di_joint_source(const dem2d_world *world, int contact) {
     const dem2di_list *list = &world->list;
     const dem2di_key *key = &list->keys[contact];
-    int own = contact - list->discs, which[2];
+    int which[2];
     dem2d_vec at;
-    if (list->links[own].depth > 0) return own;
-    for (int k = list->first[key->a]; k < list->first[key->a + 1]; k++) {
-        int other = list->incident[k] / 2;
-        if (dem2di_segment_touched(world, other, false) &&
-            !dem2di_segment_touched(world, other, true) &&
+    if (list->last.depth[contact] > 0) return contact;
+    for (int k = list->own[key->a]; k < list->first[key->a + 1]; k++) {
+        int other = list->adjacent[k];
+        if (dem2di_segment_touched(world, &list->last, other) &&
+            !dem2di_segment_touched(world, &list->contacts, other) &&
             dem2di_segments_meet(world, key->b, list->keys[other].b, 0, which, &at))
-            return other - list->discs;
+            return other;
     }
-    return own;
+    return contact;
 }
 
 /* All contacts with segments, one after the other: few of any scene's. */
@@ -14005,21 +14136,25 @@ static void dem2di_settle_joints(const dem2d_world *world, dem2di_count *count) 
     const dem2di_list *list = &world->list;
     for (int i = list->pairs; i < list->count; i++) {
         int a = list->keys[i].a;
-        if (!dem2di_segment_touched(world, i, true)) continue;
-        for (int k = list->first[a]; k < list->first[a + 1]; k++) {
-            int other = list->incident[k] / 2;
-            if (other > i && dem2di_segment_touched(world, i, true) &&
-                dem2di_segment_touched(world, other, true))
+        if (!dem2di_segment_touched(world, &list->contacts, i)) continue;
+        for (int k = list->own[a]; k < list->first[a + 1]; k++) {
+            int other = list->adjacent[k];
+            if (other > i && dem2di_segment_touched(world, &list->contacts, i) &&
+                dem2di_segment_touched(world, &list->contacts, other))
                 dem2di_joint_yield(world, i, other);
         }
     }
     for (int i = list->pairs; i < list->count; i++) {
-        if (!dem2di_segment_touched(world, i, true)) {
-            if (world->walls[list->keys[i].b].desc.segment)
-                dem2di_clear_beside(world, i - list->discs);
+        dem2di_contact contact;
+        dem2di_last last;
+        if (!world->walls[list->keys[i].b].desc.segment) continue;
+        if (!dem2di_contact_get(world, &list->contacts, i, &contact)) {
+            dem2di_clear_beside(world, i);
             continue;
         }
-        dem2di_touch_force(world, i, dem2di_joint_source(world, i), count);
+        dem2di_last_get(world, &list->last, dem2di_joint_source(world, i), &last);
+        dem2di_touch_force(world, i, &last, &contact, count);
+        dem2di_contact_put(list, i, &contact);
     }
 }
 
@@ -14055,7 +14190,7 @@ static void dem2di_count_add(dem2di_count *sum, const dem2di_count *part) {
     for (int k = 0; k < DEM2D_PROOF_COUNT; k++) sum->proofs[k] += part->proofs[k];
 }
 
-/* Geometry and forces of all contacts, into what is next of the list. */
+/* Geometry and forces of all contacts, over those of the last pass. */
 static void dem2di_contact_pass(dem2d_world *world, dem2di_count *count) {
     const dem2di_list *list = &world->list;
     int blocks = dem2di_contact_blocks(list->discs, list->count);
@@ -14077,29 +14212,30 @@ static void dem2di_wall_sums(dem2d_world *world) {
         world->wall_next[j].force = dem2di_vec(0, 0);
     }
     for (int i = list->pairs; i < list->count; i++) {
-        if (!(list->next_links[i - list->discs].depth > 0)) continue;
+        dem2di_contact contact;
+        if (!dem2di_contact_get(world, &list->contacts, i, &contact)) continue;
         dem2di_wall_state *wall = &world->wall_next[list->keys[i].b];
-        wall->force.x += world->load_x[2 * i + 1];
-        wall->force.y += world->load_y[2 * i + 1];
+        wall->force = dem2di_add(wall->force, dem2di_contact_force(&contact));
     }
 }
 
-/* One after the other, in the order of the partners' ids: contacts that are apart add nothing, so
-   that it does not matter which of them are listed. */
-static DEM2DI_INLINE double dem2di_gather_six(double sum, const double *from, const int *entry) {
-    sum = sum + from[entry[0]] + from[entry[1]] + from[entry[2]];
-    return sum + from[entry[3]] + from[entry[4]] + from[entry[5]];
-}
-
-/* Sum of the contact forces on a particle. */
+/* Sum of the contact forces on a particle, one after the other in the order of the partners' ids:
+   contacts that are apart add nothing, so that it does not matter which of them are listed. */
 static DEM2DI_INLINE dem2di_load dem2di_gather(const dem2d_world *world, int slot, bool spin) {
-    const int *entry = world->list.incident + world->list.first[slot];
-    const int *end = world->list.incident + world->list.first[slot + 1];
+    const dem2di_list *list = &world->list;
+    const int *entry = list->adjacent + list->first[slot], *own = list->adjacent + list->own[slot];
+    const int *end = list->adjacent + list->first[slot + 1];
+    const double *x = world->load_x, *y = world->load_y;
     dem2di_load sum = {{0, 0}, 0};
-    for (; entry < end; entry += DEM2DI_GATHER) {
-        sum.force.x = dem2di_gather_six(sum.force.x, world->load_x, entry);
-        sum.force.y = dem2di_gather_six(sum.force.y, world->load_y, entry);
-        if (spin) sum.torque = dem2di_gather_six(sum.torque, world->load_turn, entry);
+    for (; entry < own; entry++) { /* of which it is B */
+        sum.force.x += x[*entry];
+        sum.force.y += y[*entry];
+        if (spin) sum.torque += world->load_b[*entry];
+    }
+    for (; entry < end; entry++) {
+        sum.force.x -= x[*entry];
+        sum.force.y -= y[*entry];
+        if (spin) sum.torque += world->load_a[*entry];
     }
     return sum;
 }
@@ -14177,31 +14313,31 @@ static double dem2di_servo_forgets(const dem2di_backing *backing, double time_st
 
 /* A caller's law is asked how its force rises with the speed: for a contact that closes a little
    faster and is as much deeper. `elastic` is k dt. */
-static void dem2di_push_ask(const dem2d_world *world, int contact, double elastic,
-                            double *impedance, double *spring) {
-    int from = contact - world->list.discs;
-    const dem2di_link *link = &world->list.next_links[from];
-    dem2di_meeting meeting = dem2di_meeting_make(world, contact, from);
-    double closing = meeting.closing, deeper = link->depth / 16, faster = deeper / world->time_step;
+static void dem2di_push_ask(const dem2d_world *world, int i, const dem2di_contact *contact,
+                            double elastic, double *impedance, double *spring) {
+    dem2di_last last;
+    dem2di_last_get(world, &world->list.last, i, &last);
+    dem2di_meeting meeting = dem2di_meeting_make(world, i, &last.contact, contact);
+    double closing = meeting.closing, deeper = contact->depth / 16;
+    double faster = deeper / world->time_step;
     dem2d_law_output output;
     meeting.closing += faster;
-    dem2di_ask_law(world, contact, from, &meeting, link->depth + deeper, &output);
-    *impedance = dem2di_max((output.normal_force - link->force) / faster, *impedance);
-    *spring = link->force - (*impedance - elastic) * closing;
+    dem2di_ask_law(world, i, &last, &meeting, contact->normal, contact->depth + deeper, &output);
+    *impedance = dem2di_max((output.normal_force - contact->force) / faster, *impedance);
+    *spring = contact->force - (*impedance - elastic) * closing;
 }
 
 /* A contact of a servo wall in the next pass; what it adds to the wall's backing. */
-static dem2di_push dem2di_push_make(const dem2d_world *world, int contact, dem2d_vec normal,
-                                    dem2di_backing *backing) {
+static dem2di_push dem2di_push_make(const dem2d_world *world, int i, const dem2di_contact *contact,
+                                    dem2d_vec normal, dem2di_backing *backing) {
     const dem2di_list *list = &world->list;
-    const dem2di_link *link = &list->next_links[contact - list->discs];
-    const dem2d_pair_desc *law = dem2di_law_of(world, contact);
-    const dem2di_ends *ends = dem2di_ends_at(world, contact, true);
-    const dem2di_extra *extra = dem2di_extra_at(world, contact, true);
-    int a = list->keys[contact].a;
+    const dem2d_pair_desc *law = dem2di_law_of(world, i);
+    const dem2di_ends *ends = dem2di_ends_of(world, &list->contacts, i);
+    const dem2di_extra *extra = dem2di_extra_of(world, &list->contacts, i);
+    int a = list->keys[i].a;
     double inverse = world->inverse[a].mass, mass = inverse > 0 ? 1 / inverse : 0;
-    double weight = 1, spring = link->force;
-    dem2di_arms arms = link->arms;
+    double weight = 1, spring = contact->force;
+    dem2di_arms arms = contact->arms;
     if (ends != NULL) { /* their springs act at the centre of the weights */
         weight = dem2di_ends_weight(ends);
         double offset = ends->weight[0] * ends->offset[0] + ends->weight[1] * ends->offset[1];
@@ -14211,11 +14347,11 @@ static dem2di_push dem2di_push_make(const dem2d_world *world, int contact, dem2d
     double elastic = stiffness * world->time_step;
     double impedance = elastic + weight * dem2di_dashpot(law, mass);
     if (extra != NULL) spring -= extra->viscous[0] + extra->viscous[1];
-    if (world->law != NULL) dem2di_push_ask(world, contact, elastic, &impedance, &spring);
+    if (world->law != NULL) dem2di_push_ask(world, i, contact, elastic, &impedance, &spring);
     dem2di_state next = dem2di_foresee(world, a);
-    double leaves = dem2di_dot(link->normal, next.v) - arms.a_t * next.w;
+    double leaves = dem2di_dot(contact->normal, next.v) - arms.a_t * next.w;
     dem2di_push push;
-    push.along = -dem2di_dot(link->normal, normal);
+    push.along = -dem2di_dot(contact->normal, normal);
     push.force = spring + impedance * leaves;
     push.rise = impedance * push.along;
     backing->stiffness += stiffness;
@@ -14306,9 +14442,11 @@ static double dem2di_servo_speed(dem2d_world *world, int j, int begin, int end) 
     double target = desc->stress * dem2di_wall_length(world, world->wall_now, j);
     dem2di_backing backing = {0, 0, 0};
     int count = 0;
-    for (int i = begin; i < end; i++)
-        if (list->next_links[i - list->discs].depth > 0)
-            world->pushes[count++] = dem2di_push_make(world, i, desc->normal, &backing);
+    for (int i = begin; i < end; i++) {
+        dem2di_contact contact;
+        if (!dem2di_contact_get(world, &list->contacts, i, &contact)) continue;
+        world->pushes[count++] = dem2di_push_make(world, i, &contact, desc->normal, &backing);
+    }
     if (count == 0) return dem2di_servo_alone(wall, target, top, dt);
     double resistance = dem2di_servo_resistance(&backing, dt);
     double guess = dem2di_dot(wall->velocity, desc->normal);
@@ -14451,15 +14589,14 @@ static void dem2di_stiffness_point(double kn, double kt, dem2d_vec normal, doubl
 }
 
 /* The greatest c/kn of the dashpots on a particle, s. */
-static double dem2di_dashpot_lag(const dem2d_world *world, int slot, bool next) {
+static double dem2di_dashpot_lag(const dem2d_world *world, int slot) {
     const dem2di_list *list = &world->list;
     double lag = 0;
     if (!world->plan.full || world->law != NULL) return 0;
     for (int k = list->first[slot]; k < list->first[slot + 1]; k++) {
-        int i = list->incident[k] / 2;
-        dem2di_link link;
-        if (!dem2di_link_at(world, i, next, &link)) continue;
-        const dem2d_pair_desc *law = dem2di_law_at(world, i, next);
+        int i = list->adjacent[k];
+        if (!(list->contacts.depth[i] > 0)) continue;
+        const dem2d_pair_desc *law = dem2di_law_of(world, i);
         double inverse = dem2di_reduced_inverse(world, i);
         if (!(inverse > 0)) continue;
         lag = dem2di_max(lag, dem2di_dashpot(law, 1 / inverse) / law->normal_stiffness);
@@ -14505,58 +14642,57 @@ static double dem2di_contact_height(const dem2d_world *world, int slot, const de
    that twice its own part bounds it. For the limit with the curvatures at a contact of one point;
    for the safe bound with the greatest, as grains come to rest on their flattest parts, and as the
    ends of straight arcs are curved. Zero for circles and corners. */
-static double dem2di_rocking(const dem2d_world *world, int contact, int side, bool next,
-                             const dem2di_link *link, bool greatest) {
+static double dem2di_rocking(const dem2d_world *world, const dem2di_state *states, int i, int side,
+                             const dem2di_contact *contact, bool greatest) {
     const dem2di_list *list = &world->list;
-    if (contact < list->discs) return 0;
-    const dem2di_key *key = &list->keys[contact];
-    const dem2di_state *states = dem2di_states_at(world, next);
+    if (i < list->discs) return 0;
+    const dem2di_key *key = &list->keys[i];
     int slot = side ? key->b : key->a, other = side ? key->a : key->b;
     const dem2d_shape *shape = dem2di_shape_of(world, &world->bodies[slot]);
     double rho, other_rho;
     if (shape->type != DEM2D_CUSTOM && !(shape->rho_max > shape->inscribed)) return 0;
-    dem2d_vec u = side ? dem2di_negate(link->normal) : link->normal;
+    dem2d_vec u = side ? dem2di_negate(contact->normal) : contact->normal;
     double height = dem2di_contact_height(world, slot, &states[slot], u, greatest, &rho);
     double p = rho - height;
     if (!(p > 0)) return 0;
-    if (contact >= list->pairs) return link->force * p;
+    if (i >= list->pairs) return contact->force * p;
     (void)dem2di_contact_height(world, other, &states[other], dem2di_negate(u), greatest,
                                 &other_rho);
-    double e = other_rho + height - link->depth;
-    return e > 0 ? link->force * (p * (e / (p + e))) : 0;
+    double e = other_rho + height - contact->depth;
+    return e > 0 ? contact->force * (p * (e / (p + e))) : 0;
 }
 
 /* Stiffness of the contacts of a particle for the limit (bound 0) or for the safe bound (1), which
    counts those between two free particles twice. A contact that slides does not resist, and may not
    when it rolls, or by the caller's law: it counts for the safe bound only. */
-static dem2di_stiffness dem2di_stiffness_sum(const dem2d_world *world, int slot, bool next,
-                                             int bound) {
+static dem2di_stiffness dem2di_stiffness_sum(const dem2d_world *world, const dem2di_state *states,
+                                             int slot, int bound) {
     const dem2di_list *list = &world->list;
     dem2di_stiffness sum = {0, 0, 0, 0, 0, 0};
     for (int k = list->first[slot]; k < list->first[slot + 1]; k++) {
-        int i = list->incident[k] / 2, side = list->incident[k] & 1;
-        dem2di_link link;
-        if (!dem2di_link_at(world, i, next, &link)) continue;
+        int i = list->adjacent[k], side = k < list->own[slot];
+        dem2di_contact contact;
+        if (!dem2di_contact_get(world, &list->contacts, i, &contact)) continue;
         const dem2di_key *key = &list->keys[i];
-        const dem2d_pair_desc *law = dem2di_law_at(world, i, next);
-        const dem2di_ends *ends = dem2di_ends_at(world, i, next);
+        const dem2d_pair_desc *law = dem2di_law_of(world, i);
+        const dem2di_ends *ends = dem2di_ends_of(world, &list->contacts, i);
         bool shared = i < list->pairs && world->bodies[key->a].motion == DEM2D_FREE &&
                       world->bodies[key->b].motion == DEM2D_FREE;
-        bool sticks = world->law == NULL && fabs(link.shear) < law->friction * link.force;
+        bool sticks = world->law == NULL && fabs(contact.shear) < law->friction * contact.force;
         bool rubs = law->friction > 0 || world->law != NULL;
         double f = bound == 1 && shared ? 2 : 1, kn = f * law->normal_stiffness;
         double slide = sticks || (bound == 1 && rubs) ? f * law->tangential_stiffness : 0;
-        double arm_n = side ? link.arms.b_n : link.arms.a_n;
-        double arm_t = side ? link.arms.b_t : link.arms.a_t;
+        double arm_n = side ? contact.arms.b_n : contact.arms.a_n;
+        double arm_t = side ? contact.arms.b_t : contact.arms.a_t;
         if (bound == 1 && law->rolling_friction > 0)
             sum.rr += f * dem2di_rolling_stiffness(law, dem2di_reduced_radius(world, i));
         if (ends == NULL || bound == 1)
             sum.rr += f * (bound == 1 ? DEM2DI_ROCKING_SPARE : 1) *
-                      dem2di_rocking(world, i, side, next, &link, bound == 1);
+                      dem2di_rocking(world, states, i, side, &contact, bound == 1);
         for (int p = 0; p < (ends != NULL ? 2 : 1); p++) {
             double w = ends != NULL ? ends->weight[p] : 1;
             double at = ends != NULL ? arm_t + ends->offset[p] : arm_t;
-            dem2di_stiffness_point(w * kn, w * slide, link.normal, arm_n, at, &sum);
+            dem2di_stiffness_point(w * kn, w * slide, contact.normal, arm_n, at, &sum);
         }
     }
     return sum;
@@ -14574,55 +14710,22 @@ static void dem2di_stiffest_meet(const dem2d_world *world, dem2di_stiffest *so_f
     so_far->at[bound] = slot;
 }
 
-/* kn + kt of any two materials. */
-static double dem2di_greatest_stiffness(const dem2d_world *world) {
-    double greatest = 0;
-    for (int a = 0; a < world->material_count; a++)
-        for (int b = 0; b < world->material_count; b++) {
-            const dem2d_pair_desc *law = dem2di_law(world, a, b);
-            greatest = dem2di_max(greatest, law->normal_stiffness + law->tangential_stiffness);
-        }
-    return greatest;
-}
-
-/* No eigenvalue of a particle is above the sum of the traces of its contacts. Of two circles a
-   contact's is at most 2 (kn + kt) (1/m + R^2/I) with the greater radius, as the contact point may
-   lie outside of the smaller one. */
-static bool dem2di_surely_soft(const dem2d_world *world, int slot, double stiffness,
-                               double enough) {
-    const dem2di_list *list = &world->list;
-    double radius = world->now[slot].radius;
-    int contacts = 0;
-    for (int k = list->first[slot]; k < list->first[slot + 1]; k++) {
-        int contact = list->incident[k] / 2;
-        if (contact == list->count) break;
-        if (contact >= list->discs) return false;
-        const dem2di_key *key = &list->keys[contact];
-        radius = dem2di_max(radius, world->now[key->a == slot ? key->b : key->a].radius);
-        contacts++;
-    }
-    const dem2di_inverse *inverse = &world->inverse[slot];
-    return contacts * 2 * stiffness * (inverse->mass + radius * radius * inverse->inertia) <=
-           enough;
-}
-
-/* Over free particles; with `loose` those without a contact count for the safe bound as if they had
-   one with their own kind. Eigenvalues below `enough` need not be known: their sum bounds them, and
-   that of the safe bound the one of the limit. */
-static void dem2di_stiffest_range(const dem2d_world *world, int begin, int end, bool next,
-                                  bool loose, double enough, dem2di_stiffest *stiffest) {
+/* Over free particles, which were in these states at the force pass; with `loose` those without a
+   contact count for the safe bound as if they had one with their own kind. Eigenvalues below
+   `enough` need not be known: their sum bounds them, and that of the safe bound the one of the
+   limit. */
+static void dem2di_stiffest_range(const dem2d_world *world, const dem2di_state *states, int begin,
+                                  int end, bool loose, double enough, dem2di_stiffest *stiffest) {
     stiffest->value[0] = stiffest->value[1] = 0;
     stiffest->at[0] = stiffest->at[1] = -1;
-    double stiffness = enough > 0 ? dem2di_greatest_stiffness(world) : 0;
     for (int i = begin; i < end; i++) {
         const dem2di_body *body = &world->bodies[i];
         if (body->shape_index < 0 || body->motion != DEM2D_FREE) continue;
-        if (enough > 0 && dem2di_surely_soft(world, i, stiffness, enough)) continue;
         double mass = dem2di_body_mass(world, body), inertia = dem2di_body_inertia(world, body);
-        double lag = dem2di_dashpot_lag(world, i, next);
+        double lag = dem2di_dashpot_lag(world, i);
         bool touched = false;
         for (int bound = 1; bound >= 0; bound--) {
-            const dem2di_stiffness k = dem2di_stiffness_sum(world, i, next, bound);
+            const dem2di_stiffness k = dem2di_stiffness_sum(world, states, i, bound);
             double value = (k.xx + k.yy) / mass + k.rr / inertia;
             touched = touched || k.xx + k.yy > 0;
             if (touched && (value > enough || lag > 0))
@@ -14644,14 +14747,6 @@ static void dem2di_stiffest_range(const dem2d_world *world, int begin, int end, 
    Made in the first step, in the next step after an edit that can matter, and in every so many
    steps. It does not depend on when the list is rebuilt. */
 
-/* A check takes as long as 0.7 (circles) to 1.4 steps (Fourier series), measured: with this many
-   steps between two, less than 1 % of the time. */
-#define DEM2DI_CHECK_STEPS 160
-
-static bool dem2di_check_is_due(const dem2d_world *world) {
-    return world->check_due || world->steps % DEM2DI_CHECK_STEPS == 0;
-}
-
 /* The one of lower id of two slots; -1 is none. */
 static int dem2di_first_of(const dem2d_world *world, int one, int other) {
     if (one < 0 || other < 0) return one < 0 ? other : one;
@@ -14667,8 +14762,8 @@ static void dem2di_check_task(void *context, int begin, int end) {
         for (int i = first; i < last; i++)
             if (dem2di_outruns(world, i)) fast = dem2di_first_of(world, fast, i);
         world->tallies[block].fast = fast;
-        if (world->check_time_step)
-            dem2di_stiffest_range(world, first, last, true, false, enough,
+        if (world->check_time_step && !dem2di_is_soft(world, world->softness))
+            dem2di_stiffest_range(world, world->now, first, last, false, enough,
                                   &world->tallies[block].stiffest);
     }
 }
@@ -14716,7 +14811,8 @@ static dem2d_result dem2di_check_step(dem2d_world *world, bool *slow, bool *fast
     dem2di_run(world, DEM2D_PHASE_LIST, dem2di_blocks(world->body_count, DEM2DI_BLOCK),
                dem2di_check_task, world);
     *fast = dem2di_check_motions(world);
-    return world->check_time_step ? dem2di_check_stiffness(world, slow) : DEM2D_OK;
+    if (!world->check_time_step || dem2di_is_soft(world, world->softness)) return DEM2D_OK;
+    return dem2di_check_stiffness(world, slow);
 }
 
 DEM2D_API dem2d_result dem2d_world_time_step_bounds(const dem2d_world *world, double *safe,
@@ -14724,7 +14820,7 @@ DEM2D_API dem2d_result dem2d_world_time_step_bounds(const dem2d_world *world, do
                                                     dem2d_particle_id *limit_particle) {
     if (world == NULL || safe == NULL || limit == NULL) return DEM2D_NULL_ARGUMENT;
     dem2di_stiffest all;
-    dem2di_stiffest_range(world, 0, world->body_count, false, true, 0, &all);
+    dem2di_stiffest_range(world, world->before, 0, world->body_count, true, 0, &all);
     *safe = all.value[1] > 0 ? 2 / sqrt(all.value[1]) : HUGE_VAL;
     *limit = all.value[0] > 0 ? 2 / sqrt(all.value[0]) : HUGE_VAL;
     if (limit_particle == NULL) return DEM2D_OK;
@@ -14746,38 +14842,14 @@ static void dem2di_made(dem2d_world *world) {
 
 /* Everything new becomes the present; the present becomes the state of the last force pass. */
 static void dem2di_commit(dem2d_world *world) {
-    dem2di_columns_swap(world, DEM2DI_TEMPLATES);
+    dem2di_columns_swap(world);
     dem2di_made(world);
     world->steps++;
 }
 
-/* The laws of this force pass, for the queries. */
-static void dem2di_use_laws(dem2d_world *world) {
-    size_t side = (size_t)world->laws_side;
-    if (side > 0) memcpy(world->used_laws, world->laws, side * side * sizeof *world->laws);
-    for (int j = 0; j < world->wall_count; j++)
-        world->walls[j].used_material = (int)world->walls[j].desc.material.index;
-}
-
-/* The straight road: candidate pairs, contacts, walls, sums and motion; then commit. All results go
-   to arrays beside the present ones, and what can fail does so before the motion, which comes over
-   the states of the last force pass: a failure only has to return. */
-static dem2d_result dem2di_step(dem2d_world *world) {
-    dem2di_count count = world->count;
-    bool slow = false, fast = false, listed = world->list_stale;
-    if (listed) {
-        dem2d_result result = dem2di_build_list(world);
-        if (result != DEM2D_OK) return result;
-    }
-    world->list_stale = listed; /* should the step fail, the next try begins with a list as well */
-    dem2di_contact_pass(world, &count);
-    if (dem2di_check_is_due(world)) {
-        dem2d_result result = dem2di_check_step(world, &slow, &fast);
-        if (result != DEM2D_OK) return result;
-    }
-    dem2di_wall_sums(world);
-    bool worn = dem2di_wall_pass(world);
-    int slot = world->bounded && count.unsound == 0 ? -1 : dem2di_unsound(world);
+/* Would the step give a particle or a wall a state that is not finite? */
+static dem2d_result dem2di_check_next(const dem2d_world *world, const dem2di_count *count) {
+    int slot = world->bounded && count->unsound == 0 ? -1 : dem2di_unsound(world);
     if (slot >= 0)
         return dem2di_fail(&world->env, DEM2D_STATE, world->bodies[slot].index,
                            "particle %d would get a state that is not finite",
@@ -14787,16 +14859,44 @@ static dem2d_result dem2di_step(dem2d_world *world) {
                                        dem2di_finite(world->wall_next[j].drift)))
             return dem2di_fail(&world->env, DEM2D_STATE, j,
                                "wall %d would get a place or a speed that is not finite", j);
+    return DEM2D_OK;
+}
+
+/* The straight road: candidate pairs, contacts, walls, sums and motion; then commit. What can fail
+   does so before the motion, which comes over the states of the last force pass: only the contacts
+   have to be put back. */
+static dem2d_result dem2di_step(dem2d_world *world) {
+    dem2di_count count = world->count;
+    dem2d_result result = DEM2D_OK;
+    bool slow = false, fast = false, worn = false, listed = world->list_stale;
+    if (listed) {
+        result = dem2di_build_list(world);
+        if (result != DEM2D_OK) return result;
+    }
+    world->list_stale = listed; /* should the step fail, the next try begins with a list as well */
+    bool due = dem2di_check_is_due(world);
+    bool back = dem2di_looks_back(world, &world->plan, world->bounded, world->softness);
+    if (back && !dem2di_keep_last(world)) return dem2di_out_of_memory(world, "contacts");
+    dem2di_contact_pass(world, &count);
+    if (due) result = dem2di_check_step(world, &slow, &fast);
+    if (result == DEM2D_OK) {
+        dem2di_wall_sums(world);
+        worn = dem2di_wall_pass(world);
+        result = dem2di_check_next(world, &count);
+    }
+    if (result != DEM2D_OK) {
+        if (back) dem2di_contacts_keep(world, true);
+        return result;
+    }
     const dem2di_ledger ledger = world->ledger;
     if (ledger.kept) dem2di_book_contacts(world); /* nothing fails from here on */
     double path = dem2di_motion_pass(world);
     if (ledger.kept) dem2di_book_motion(world, &ledger);
     worn = worn || path > 1 - DEM2DI_LIST_STEPS * DBL_EPSILON ||
            world->steps - world->listed_at >= DEM2DI_LIST_STEPS;
-    if (listed) dem2di_use_laws(world);
     world->worn = path;
     world->list_worn = worn;
-    world->list_stale = worn || world->plan.friction_again || world->plan.full_again;
+    world->list_stale = worn || world->plan.full_again;
     world->rebuilds += listed;
     world->count = count;
     world->slow_time_step += slow;
@@ -14827,8 +14927,8 @@ DEM2D_API dem2d_result dem2d_world_step(dem2d_world *world, int count, int *done
 typedef struct dem2di_tour {
     bool walls;
     int index, entry; /* where it goes on */
-    int contact;      /* where it is, and the contact there */
-    dem2di_link link;
+    int number;       /* where it is, and the contact there */
+    dem2di_contact contact;
     dem2d_vec branch; /* from A's centre to B's; to a wall: the contact point */
 } dem2di_tour;
 
@@ -14837,13 +14937,12 @@ static bool dem2di_tour_next(const dem2d_world *world, dem2di_tour *walk) {
     for (; walk->index < world->name_count; walk->index++, walk->entry = 0) {
         int slot = world->names[walk->index].slot;
         if (slot < 0) continue;
-        while (walk->entry < list->first[slot + 1] - list->first[slot]) {
-            int entry = list->incident[list->first[slot] + walk->entry++];
-            int contact = entry / 2;
-            if (entry % 2 != 0 || (contact >= list->pairs) != walk->walls) continue;
-            if (!dem2di_link_at(world, contact, false, &walk->link)) continue;
-            walk->contact = contact;
-            walk->branch = dem2di_branch_of(&walk->link, walk->walls);
+        while (list->own[slot] + walk->entry < list->first[slot + 1]) {
+            int i = list->adjacent[list->own[slot] + walk->entry++];
+            if ((i >= list->pairs) != walk->walls) continue;
+            if (!dem2di_contact_get(world, &list->contacts, i, &walk->contact)) continue;
+            walk->number = i;
+            walk->branch = dem2di_branch_of(&walk->contact, walk->walls);
             return true;
         }
     }
@@ -14859,8 +14958,7 @@ static dem2di_tour dem2di_tour_start(bool walls) {
 
 static int dem2di_open_contacts(const dem2d_world *world, int begin, int end) {
     int open = 0;
-    dem2di_link link;
-    for (int i = begin; i < end; i++) open += dem2di_link_at(world, i, false, &link);
+    for (int i = begin; i < end; i++) open += world->list.contacts.depth[i] > 0;
     return open;
 }
 
@@ -14904,8 +15002,8 @@ DEM2D_API dem2d_result dem2d_world_particles(const dem2d_world *world, dem2d_par
 }
 
 static dem2d_contact_info dem2di_contact_of(const dem2d_world *world, const dem2di_tour *walk) {
-    const dem2di_key *key = &world->list.keys[walk->contact];
-    const dem2di_link *link = &walk->link;
+    const dem2di_key *key = &world->list.keys[walk->number];
+    const dem2di_contact *contact = &walk->contact;
     dem2d_contact_info info;
     memset(&info, 0, sizeof info);
     info.a = dem2di_particle_id(world, key->a);
@@ -14913,14 +15011,14 @@ static dem2d_contact_info dem2di_contact_of(const dem2d_world *world, const dem2
         info.wall = dem2di_wall_id(world, key->b);
     else
         info.b = dem2di_particle_id(world, key->b);
-    info.normal = link->normal;
-    info.point = dem2di_add(world->before[key->a].x, dem2di_arm_a(link));
+    info.normal = contact->normal;
+    info.point = dem2di_add(world->before[key->a].x, dem2di_arm_a(contact));
     info.branch = walk->branch;
-    info.points = dem2di_ends_at(world, walk->contact, false) != NULL ? 2 : 1;
-    info.depth = link->depth;
-    info.normal_force = link->force;
-    info.tangential_force = link->shear;
-    const dem2di_extra *extra = dem2di_extra_at(world, walk->contact, false);
+    info.points = dem2di_ends_of(world, &world->list.contacts, walk->number) != NULL ? 2 : 1;
+    info.depth = contact->depth;
+    info.normal_force = contact->force;
+    info.tangential_force = contact->shear;
+    const dem2di_extra *extra = dem2di_extra_of(world, &world->list.contacts, walk->number);
     info.moment = extra != NULL ? extra->moment : 0;
     return info;
 }
@@ -14945,7 +15043,8 @@ DEM2D_API dem2d_result dem2d_world_contacts(const dem2d_world *world, dem2d_cont
 static void dem2di_spring_energy(const dem2d_world *world, bool walls, dem2d_energy *energy) {
     dem2di_tour walk = dem2di_tour_start(walls);
     while (dem2di_tour_next(world, &walk)) {
-        dem2di_stored part = dem2di_stored_in(world, walk.contact, false, &walk.link);
+        dem2di_stored part =
+            dem2di_stored_in(world, &world->list.contacts, walk.number, &walk.contact);
         energy->normal += part.normal;
         energy->tangential += part.tangential;
         energy->rolling += part.rolling;
@@ -15018,7 +15117,7 @@ DEM2D_API dem2d_result dem2d_world_stress(const dem2d_world *world, double area,
     for (int wall = 0; wall < 2; wall++) {
         dem2di_tour walk = dem2di_tour_start(wall == 1);
         while (dem2di_tour_next(world, &walk))
-            dem2di_stress_add(&sum, walk.branch, dem2di_link_force(&walk.link));
+            dem2di_stress_add(&sum, walk.branch, dem2di_contact_force(&walk.contact));
     }
     *stress = dem2di_stress_over(&sum, area);
     return DEM2D_OK;
@@ -15033,14 +15132,13 @@ static dem2d_stress dem2di_particle_stress(const dem2d_world *world, int slot) {
     const dem2di_list *list = &world->list;
     dem2d_stress sum = {0, 0, 0, 0};
     for (int k = list->first[slot]; k < list->first[slot + 1]; k++) {
-        int contact = list->incident[k] / 2, side = list->incident[k] & 1;
-        dem2di_link link;
-        if (!dem2di_link_at(world, contact, false, &link)) continue;
-        dem2d_vec force = dem2di_link_force(&link);
-        if (side == 0)
-            dem2di_stress_add(&sum, dem2di_arm_a(&link), force);
+        dem2di_contact contact;
+        if (!dem2di_contact_get(world, &list->contacts, list->adjacent[k], &contact)) continue;
+        dem2d_vec force = dem2di_contact_force(&contact);
+        if (k < list->own[slot])
+            dem2di_stress_add(&sum, dem2di_negate(dem2di_arm_b(&contact)), force);
         else
-            dem2di_stress_add(&sum, dem2di_negate(dem2di_arm_b(&link)), force);
+            dem2di_stress_add(&sum, dem2di_arm_a(&contact), force);
     }
     return dem2di_stress_over(&sum, dem2di_body_area(world, &world->bodies[slot]));
 }
@@ -15079,7 +15177,7 @@ static int dem2di_contacts_of(const dem2d_world *world, int slot) {
     const dem2di_list *list = &world->list;
     int open = 0;
     for (int k = list->first[slot]; k < list->first[slot + 1]; k++) {
-        int contact = list->incident[k] / 2;
+        int contact = list->adjacent[k];
         if (contact < list->pairs) open += dem2di_open_contacts(world, contact, contact + 1);
     }
     return open;
@@ -15103,10 +15201,10 @@ DEM2D_API dem2d_result dem2d_world_packing(const dem2d_world *world, dem2d_packi
     for (int wall = 0; wall < 2; wall++) {
         dem2di_tour walk = dem2di_tour_start(wall == 1);
         while (dem2di_tour_next(world, &walk)) {
-            const dem2di_key *key = &world->list.keys[walk.contact];
+            const dem2di_key *key = &world->list.keys[walk.number];
             double radius = dem2di_equivalent(world, key->a);
             if (!wall) radius = dem2di_min(radius, dem2di_equivalent(world, key->b));
-            double relative = walk.link.depth / radius;
+            double relative = walk.contact.depth / radius;
             greatest = dem2di_max(greatest, relative);
             if (wall) continue;
             overlap += relative;
@@ -15249,19 +15347,19 @@ static dem2di_fabric_sums dem2di_fabric_sum(const dem2d_world *world, dem2d_anis
     dem2di_tour walk = dem2di_tour_start(false);
     memset(&sums, 0, sizeof sums);
     for (; dem2di_tour_next(world, &walk); sums.count++) {
-        const dem2di_link *link = &walk.link;
-        dem2d_vec n = link->normal;
+        const dem2di_contact *contact = &walk.contact;
+        dem2d_vec n = contact->normal;
         double weight = 1 + density.coefficient * dem2di_cos_twice(n, axis);
         double length = dem2di_dot(walk.branch, n);
         weight = dem2di_max(weight, DEM2DI_DENSITY_LEAST);
         sums.branch += length;
-        sums.force += link->force;
+        sums.force += contact->force;
         dem2di_tensor_add(&sums.normals, 1, n, n);
         dem2di_tensor_add(&sums.branches, length / weight, n, n);
         dem2di_tensor_add(&sums.branch_tangents, dem2di_cross(n, walk.branch) / weight, n,
                           dem2di_perp(n));
-        dem2di_tensor_add(&sums.normal_forces, link->force / weight, n, n);
-        dem2di_tensor_add(&sums.tangential_forces, link->shear / weight, n, dem2di_perp(n));
+        dem2di_tensor_add(&sums.normal_forces, contact->force / weight, n, n);
+        dem2di_tensor_add(&sums.tangential_forces, contact->shear / weight, n, dem2di_perp(n));
     }
     return sums;
 }
@@ -15347,16 +15445,16 @@ static void dem2di_bin_orientation(const dem2d_world *world, int bins, dem2d_rot
 
 /* What a contact adds to its two bins. */
 static double dem2di_binned(const dem2di_tour *walk, dem2d_histogram kind) {
-    if (kind == DEM2D_HISTOGRAM_BRANCH) return dem2di_dot(walk->branch, walk->link.normal);
-    if (kind == DEM2D_HISTOGRAM_NORMAL_FORCE) return walk->link.force;
-    return walk->link.shear;
+    if (kind == DEM2D_HISTOGRAM_BRANCH) return dem2di_dot(walk->branch, walk->contact.normal);
+    if (kind == DEM2D_HISTOGRAM_NORMAL_FORCE) return walk->contact.force;
+    return walk->contact.shear;
 }
 
 static void dem2di_bin_contacts(const dem2d_world *world, dem2d_histogram kind, int bins,
                                 int *counts, double *sums) {
     dem2di_tour walk = dem2di_tour_start(false);
     while (dem2di_tour_next(world, &walk)) {
-        dem2d_vec along = kind == DEM2D_HISTOGRAM_ALONG_BRANCH ? walk.branch : walk.link.normal;
+        dem2d_vec along = kind == DEM2D_HISTOGRAM_ALONG_BRANCH ? walk.branch : walk.contact.normal;
         const dem2d_vec ways[2] = {along, dem2di_negate(along)};
         for (int i = 0; i < 2; i++) {
             int bin = dem2di_bin(ways[i], 2 * DEM2DI_PI, bins);
@@ -15417,7 +15515,7 @@ static double dem2di_mean_contact_force(const dem2d_world *world) {
     for (int wall = 0; wall < 2; wall++) {
         dem2di_tour walk = dem2di_tour_start(wall == 1);
         for (; dem2di_tour_next(world, &walk); count++)
-            sum += dem2di_length(dem2di_link_force(&walk.link));
+            sum += dem2di_length(dem2di_contact_force(&walk.contact));
     }
     return count > 0 ? sum / count : 0;
 }
@@ -15537,7 +15635,7 @@ static dem2d_result dem2di_writer_close(const dem2d_env *env, const char *path,
 
 /* ============================================================================================
    >>snapshot  State hash, snapshots: both follow the tables of columns and fields
-   uses: config, memory, fields, support, shapes, broad, law, motion, world, list, measures, output
+   uses: config, memory, fields, support, shapes, broad, motion, world, list, measures, output
    ============================================================================================ */
 
 /* To save, load, check and hash one number more, give it a line in the table of fields of its
@@ -15667,8 +15765,7 @@ static int dem2di_rows(const void *object, const dem2di_column *column) {
     rows[DEM2DI_MADE] = w->redirected ? w->body_count : 0;
     rows[DEM2DI_WALLS] = w->wall_count;
     rows[DEM2DI_KEYS] = w->list.count;
-    rows[DEM2DI_SPRINGS] = w->plan.friction ? w->list.discs : 0;
-    rows[DEM2DI_LINKS] = others;
+    rows[DEM2DI_GENERAL] = others;
     rows[DEM2DI_ENDS] = w->plan.faces ? others : 0;
     rows[DEM2DI_EXTRAS] = w->plan.full ? others : 0;
     return rows[column->group];
@@ -15701,10 +15798,10 @@ static void *dem2di_rows_start(const void *object, const dem2di_column *column) 
 
 /* A row in which all that has no meaning is 0. */
 typedef union dem2di_row {
-    dem2di_link link;
     dem2di_velocities made;
     dem2di_state state;
     dem2di_key key;
+    double number;
 } dem2di_row;
 
 /* Row i of what is saved: in the column, or made of it. */
@@ -15715,23 +15812,6 @@ static const void *dem2di_saved_row(const void *object, const dem2di_column *col
     const char *start = (const char *)dem2di_column_get(object, column);
     if (column->group == DEM2DI_MADE && !w->bodies[i].redirected) {
         memset(&made->made, 0, sizeof made->made);
-        return made;
-    }
-    if (column->fields == dem2di_bool_field && i >= w->list.discs) {
-        memset(made, 0, sizeof *made);
-        return made;
-    }
-    if (column->group == DEM2DI_LINKS) { /* of contacts that are apart: what the next search uses */
-        int contact = w->list.discs + i;
-        bool plane = contact >= w->list.pairs && w->list.keys[contact].a >= 0 &&
-                     !w->walls[w->list.keys[contact].b].desc.segment;
-        made->link = w->list.links[i];
-        if (!(made->link.depth > 0)) {
-            memset(&made->link.arms, 0, sizeof made->link.arms);
-            made->link.force = made->link.shear = 0;
-        }
-        if (contact >= w->list.pairs) made->link.budget = 0;
-        if (plane) memset(&made->link.feature, 0, sizeof made->link.feature);
         return made;
     }
     return start + (size_t)i * column->size;
@@ -15793,15 +15873,21 @@ static const void *dem2di_hashed_row(const dem2d_world *w, const dem2di_column *
     return made;
 }
 
-/* Row of a column of contacts for an open one of the last force pass, by ids. */
+/* Row of a column of contacts for a closed one of the last force pass, by ids; NULL: it has none.
+ */
 static const void *dem2di_contact_row(const dem2d_world *w, const dem2di_column *column,
                                       const dem2di_tour *walk, dem2di_row *made) {
-    const dem2di_key *key = &w->list.keys[walk->contact];
-    if (column->group == DEM2DI_ENDS) return dem2di_ends_at(w, walk->contact, false);
-    if (column->group == DEM2DI_EXTRAS) return dem2di_extra_at(w, walk->contact, false);
-    if (column->group == DEM2DI_LINKS) {
-        made->link = walk->link;
-        if (made->link.shear == 0) made->link.shear = 0; /* not -0: springs may be there or not */
+    const dem2di_list *list = &w->list;
+    const dem2di_key *key = &list->keys[walk->number];
+    if (column->fields == dem2di_arms_fields) return &walk->contact.arms; /* circles have none */
+    if (column->treatment & DEM2DI_STORED) {
+        int begin = dem2di_contacts_begin(&w->plan, list->discs, list->count, column->group);
+        const char *start = (const char *)dem2di_column_get(w, column);
+        if (walk->number < begin) return NULL;
+        const char *row = start + (size_t)(walk->number - begin) * column->size;
+        if (column->fields != dem2di_finite_field) return row;
+        memcpy(&made->number, row, sizeof made->number);
+        made->number += 0; /* not -0: a spring may have been there or not */
         return made;
     }
     made->key.a = w->bodies[key->a].index;
@@ -16260,7 +16346,7 @@ static void dem2di_finish_body(dem2di_loader *loader, int slot) {
     dem2d_world *w = loader->world;
     const dem2di_body *body = &w->bodies[slot];
     for (int next = 0; next < 2; next++) {
-        dem2d_rot q = dem2di_states_at(w, next == 1)[slot].q;
+        dem2d_rot q = (next == 1 ? w->now : w->before)[slot].q;
         double off = w->plan.turns ? q.c * q.c + q.s * q.s - 1 : q.c / 2147483648.0;
         dem2di_load_expect(loader, fabs(off) < (w->plan.turns ? 1e-9 : 1), "no rotation");
     }
@@ -16310,7 +16396,6 @@ static void dem2di_finish_walls(dem2di_loader *loader) {
     for (int j = 0; j < w->wall_count && dem2di_load_good(loader); j++) {
         dem2di_wall *wall = &w->walls[j];
         wall->span[0] = wall->span[1] = -1;
-        dem2di_load_expect(loader, wall->used_material < w->material_count, "used_material");
         if (!wall->alive || !dem2di_load_good(loader)) continue;
         dem2d_vec n = wall->desc.normal;
         dem2di_load_check(loader, dem2di_check_wall(w, &wall->desc));
@@ -16330,7 +16415,7 @@ static void dem2di_finish_walls(dem2di_loader *loader) {
 /* A contact is of two that live, in the kind it is listed in; a forgotten one may be anything. */
 static bool dem2di_key_sound(const dem2d_world *w, int contact) {
     const dem2di_key *key = &w->list.keys[contact];
-    if (key->a < 0) return w->list_stale;
+    if (key->a < 0) return w->list_stale && !(w->list.contacts.depth[contact] > 0);
     if (key->a >= w->body_count || w->bodies[key->a].shape_index < 0) return false;
     if (contact >= w->list.pairs) return key->b < w->wall_count && w->walls[key->b].alive;
     if (key->b >= w->body_count || w->bodies[key->b].shape_index < 0) return false;
@@ -16346,7 +16431,7 @@ static bool dem2di_key_sound(const dem2d_world *w, int contact) {
 static bool dem2di_plan_holds(const dem2d_world *w) {
     const dem2di_plan *plan = &w->plan;
     if (w->list_stale || w->body_count == 0) return true;
-    if (w->holes > 0 || plan->friction_again || plan->full_again) return false;
+    if (w->holes > 0 || plan->full_again) return false;
     dem2di_plan need = dem2di_plan_make(w);
     return plan->friction >= need.friction && plan->spin >= need.spin &&
            plan->turns >= need.turns && plan->faces >= need.faces && plan->full == need.full &&
@@ -16362,15 +16447,12 @@ static void dem2di_finish_list(dem2di_loader *loader) {
     if (!dem2di_load_good(loader)) return;
     dem2di_load_expect(loader, dem2di_plan_holds(w), "the plan is of another scene");
     if (!dem2di_load_good(loader)) return;
-    int entries =
-        dem2di_incident_count(list->keys, list->pairs, list->count, list->first + 1, w->body_count);
-    size_t loads = dem2di_loads_bytes(w, (size_t)list->count, (size_t)(list->count - list->pairs));
-    dem2di_load_room(loader, entries < INT_MAX &&
-                                 dem2di_group_reserve(w, DEM2DI_INCIDENT, entries + 1) &&
+    size_t step = dem2di_step_cut(w, NULL, list->discs, list->pairs, list->count, &w->plan, false);
+    dem2di_load_room(loader, dem2di_adjacency_reserve(w, list->pairs, list->count) &&
                                  dem2di_tallies_reserve(w, list->discs, list->count) &&
-                                 dem2di_scratch_reserve(w, loads));
+                                 dem2di_scratch_reserve(w, step));
     if (!dem2di_load_good(loader)) return;
-    dem2di_incident_make(w);
+    dem2di_adjacency_make(w);
     dem2di_loads_clear(w);
 }
 
@@ -16767,7 +16849,7 @@ static void dem2di_draw_walls(const dem2d_world *world, const dem2di_view *view,
 /* Radius in pixels of the smaller particle of a contact. */
 static double dem2di_drawn_radius(const dem2d_world *world, const dem2di_view *view,
                                   const dem2di_tour *walk) {
-    const dem2di_key *key = &world->list.keys[walk->contact];
+    const dem2di_key *key = &world->list.keys[walk->number];
     double radius = dem2di_equivalent(world, key->a);
     if (!walk->walls) radius = dem2di_min(radius, dem2di_equivalent(world, key->b));
     return radius * view->factor;
@@ -16782,7 +16864,7 @@ static void dem2di_draw_chains(const dem2d_world *world, const dem2di_view *view
     int open = 0;
     dem2di_tour walk = dem2di_tour_start(false);
     for (; dem2di_tour_next(world, &walk); open++) {
-        sum += walk.link.force;
+        sum += walk.contact.force;
         radii += dem2di_drawn_radius(world, view, &walk);
     }
     double usual = open > 0 ? dem2di_min(view->width / 400, radii / open / 4) : 0;
@@ -16792,14 +16874,14 @@ static void dem2di_draw_chains(const dem2d_world *world, const dem2di_view *view
     for (int wall = 0; wall < 2; wall++) {
         walk = dem2di_tour_start(wall == 1);
         while (dem2di_tour_next(world, &walk)) {
-            const dem2di_key *key = &world->list.keys[walk.contact];
+            const dem2di_key *key = &world->list.keys[walk.number];
             dem2d_vec start = world->before[key->a].x, end = dem2di_add(start, walk.branch);
             double most = dem2di_drawn_radius(world, view, &walk);
             if (dem2di_off_view(world, view, key->a) &&
                 (walk.walls || dem2di_off_view(world, view, key->b)))
                 continue;
             dem2di_draw_line(dem2di_pixel(view, start), dem2di_pixel(view, end),
-                             dem2di_min(walk.link.force * unit, most), writer);
+                             dem2di_min(walk.contact.force * unit, most), writer);
         }
     }
     dem2di_print(writer, "</g>\n");
@@ -17000,7 +17082,7 @@ static void dem2di_particle_numbers(const dem2d_world *world, int slot, double *
 static void dem2di_contact_numbers(const dem2d_world *world, const dem2di_tour *walk,
                                    double *numbers) {
     dem2d_contact_info info = dem2di_contact_of(world, walk);
-    dem2d_vec force = dem2di_link_force(&walk->link);
+    dem2d_vec force = dem2di_contact_force(&walk->contact);
     const double all[] = {(double)info.a.index,
                           walk->walls ? -1 : (double)info.b.index,
                           walk->walls ? (double)info.wall.index : -1,
@@ -17066,7 +17148,7 @@ static void dem2di_item_put_points(const dem2d_world *world, const dem2di_item *
         return;
     }
     if (item->part == DEM2D_VTP_CONTACTS) {
-        ends[0] = world->before[world->list.keys[item->walk.contact].a].x;
+        ends[0] = world->before[world->list.keys[item->walk.number].a].x;
         ends[1] = dem2di_add(ends[0], item->walk.branch);
     } else {
         (void)dem2di_wall_line(world, item->slot, &item->box, ends);

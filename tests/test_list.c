@@ -71,8 +71,7 @@ static int count_missed(const dem2d_world *world) {
             dem2di_key key = {b, a};
             if (world->bodies[a].index < world->bodies[b].index) key.a = a, key.b = b;
             const int listed = dem2di_listed(world, &key, false);
-            dem2di_link link;
-            missed += listed < 0 || !dem2di_link_at(world, listed, false, &link);
+            missed += listed < 0 || !(world->list.contacts.depth[listed] > 0);
         }
     return missed;
 }
@@ -235,10 +234,10 @@ static void test_refused_law(void **state) {
         ids[1] = add(&s, 0, 1, 1.5, 1.3, -0.3);
         assert_ok(dem2d_world_step(s.world, 50, NULL));
         if (refused) {
-            const view before = look(s.world, ids);
+            assert_ok(dem2d_world_set_pair(s.world, s.material, s.material, &stiff));
+            const view before = look(s.world, ids); /* energies go by the new law, forces stay */
             assert_int_equal(before.count, 1);
             assert_true(before.contacts[0].tangential_force != 0);
-            assert_ok(dem2d_world_set_pair(s.world, s.material, s.material, &stiff));
             for (int tries = 0; tries < 3; tries++) {
                 assert_result(dem2d_world_step(s.world, 1, NULL), DEM2D_TIME_STEP);
                 const view after = look(s.world, ids);
