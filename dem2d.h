@@ -16317,9 +16317,10 @@ static void dem2di_check_settings(dem2di_loader *loader) {
                        "material of the plan");
     if (!dem2di_load_good(loader) || !w->has_law) return;
     if (desc->law == NULL || desc->law_tag != w->law_tag) {
-        const char *which = desc->law == NULL ? "law: none is given" : "law_tag is another";
-        loader->result = dem2di_fail(loader->env, DEM2D_NULL_ARGUMENT, -1,
-                                     "%s: the world's has tag %d", which, w->law_tag);
+        const char *what = desc->law == NULL ? "law is NULL: law_tag" : "law_tag";
+        loader->result =
+            dem2di_fail(loader->env, DEM2D_NULL_ARGUMENT, -1, "%s = %d, the world's is %d", what,
+                        desc->law_tag, w->law_tag);
         return;
     }
     w->law = desc->law;

@@ -1,246 +1,59 @@
 /* api_calls.h - every public function that returns a result, as a table: how it is called with good
-   arguments, and what each argument and each field of its desc may be. Tests walk the table; a new
-   function needs a wrapper, a table of its arguments and a row at the end, a new desc or field a
-   row in the desc's table. Include it after testing.h and fingerprint.h. */
+   arguments, and what each argument may be. Tests walk the table; a new function needs a row at the
+   end. Include it after testing.h and fingerprint.h. */
 #ifndef API_CALLS_H
 #define API_CALLS_H
 
+#include <float.h>
 #include <limits.h>
 
 /* --- what an argument or field may be -------------------------------------------------------- */
 
 typedef enum kind {
-    POINTER,      /* not NULL */
-    OPTIONAL,     /* a pointer, or NULL */
-    FINITE,       /* a double */
-    POSITIVE,     /* a finite double above 0 */
-    NOT_NEGATIVE, /* a finite double, at least 0 */
-    FRACTION,     /* in [0, 1) */
-    PORTION,      /* in (0, 1] */
-    INSIDE,       /* 0 or inside (0, 1) */
-    ANGLE,        /* at most 2^30 */
-    SIZE,         /* above 0 and with a mass; 0 is ZERO_AREA */
-    LEADING,      /* a0 of a series: as SIZE, and negative is ZERO_AREA too */
-    UNREAD,       /* a double of any value, NaN too */
-    VECTOR,       /* finite */
-    DIRECTION,    /* finite, not 0 */
-    UPPER,        /* finite, above the box's lower corner */
-    ELSEWHERE,    /* finite, not the wall's point */
-    POSE,         /* finite, rotation not 0, scale above 0 */
-    INTEGER,      /* from low to high, else `result` */
-    INTEGER_OR_0, /* 0, or from low to high, else `result` */
-    ENUM,         /* from 0 to high, else OUT_OF_RANGE */
-    SHAPE_ID,     /* of the world */
+    POINTER,   /* not NULL */
+    OPTIONAL,  /* a pointer, or NULL */
+    NUMBER,    /* a finite double from low to high */
+    SIZE,      /* above 0 and with a mass; 0 is ZERO_AREA */
+    LEADING,   /* a0 of a series: as SIZE, and negative is ZERO_AREA too */
+    UNREAD,    /* a double of any value, NaN too */
+    VECTOR,    /* finite */
+    DIRECTION, /* finite, not 0 */
+    UPPER,     /* finite, above the box's lower corner */
+    ELSEWHERE, /* finite, not the wall's point */
+    POSE,      /* finite, rotation not 0, scale above 0 */
+    INTEGER,   /* an int or an enum from low to high, else `result` */
+    SHAPE_ID,  /* of the world */
     MATERIAL_ID,
     PARTICLE_ID,
     WALL_ID,
-    SPAN_ID,     /* of a wall; generation 0 in both: none */
-    FILE_NAME,   /* not NULL, no control bytes */
-    COLUMN,      /* not NULL, no comma, quote or line end */
-    ANY_POINTER, /* nothing is wrong with any value of these */
-    ANY_INT,
-    ANY_BOOL,
-    ANY_SEED
+    SPAN_ID,   /* of a wall; generation 0 in both: none */
+    FILE_NAME, /* not NULL, no control bytes */
+    COLUMN,    /* not NULL, no comma, quote or line end */
+    ANYTHING   /* nothing is wrong with any value */
 } kind;
 
 typedef struct row {
     const char *name; /* as the log says it */
     size_t offset;    /* in the desc, or in args */
     kind kind;
-    dem2d_result result; /* of INTEGER, INTEGER_OR_0 */
-    int low, high;
+    dem2d_result result; /* of INTEGER */
+    double low, high;
+    bool above, below, or_0; /* low and high are wrong; 0 is right */
 } row;
 
-/* A desc: its rows hold all its fields in their order. */
-typedef struct desc_table {
-    const char *name;
-    size_t size;
-    const row *rows;
-    int count;
-} desc_table;
+/* Kinds of numbers. */
+#define FINITE NUMBER, .low = -DBL_MAX, .high = DBL_MAX
+#define POSITIVE NUMBER, .high = DBL_MAX, .above = true
+#define NOT_NEGATIVE NUMBER, .high = DBL_MAX
+#define FRACTION NUMBER, .high = 1, .below = true
+#define PORTION NUMBER, .high = 1, .above = true
+#define ANGLE NUMBER, .low = -0x1p30, .high = 0x1p30
 
-#define FIELD(type, field, kind) \
-    { #field, offsetof(dem2d_##type, field), kind, DEM2D_OK, 0, 0 }
-#define FIELD_INT(type, field, kind, low, high) \
-    { #field, offsetof(dem2d_##type, field), kind, DEM2D_OUT_OF_RANGE, low, high }
-#define FIELD_ENUM(type, field, count) FIELD_INT(type, field, ENUM, 0, (int)(count)-1)
-#define COUNT_MOST (1 << 30) /* of a count in a desc */
-#define LAW_TAG 5            /* of the world that is loaded */
+enum { LAW_TAG = 5 }; /* of the world that is loaded */
 
-static const row custom_rows[] = {
-    FIELD(custom_desc, support, POINTER),
-    FIELD(custom_desc, user, ANY_POINTER),
-    FIELD(custom_desc, rho_min, NOT_NEGATIVE),
-    FIELD(custom_desc, inscribed, NOT_NEGATIVE),
-    FIELD(custom_desc, mass.area, NOT_NEGATIVE),
-    FIELD(custom_desc, mass.centroid, VECTOR),
-    FIELD(custom_desc, mass.polar_moment, POSITIVE),
-    FIELD_INT(custom_desc, outline_points, INTEGER_OR_0, 3, INT_MAX),
-    FIELD(custom_desc, tag, ANY_INT),
-};
-static const row reduction_rows[] = {
-    FIELD_ENUM(reduction_desc, test, DEM2D_NO_TEST + 1),
-    FIELD(reduction_desc, factor, INSIDE),
-    FIELD(reduction_desc, tolerance, NOT_NEGATIVE),
-};
-static const row image_rows[] = {
-    FIELD(image_desc, pixels, POINTER),
-    FIELD(image_desc, pixels16, ANY_POINTER), /* NULL: pixels are there */
-    FIELD_INT(image_desc, width, INTEGER, 1, 1 << 15),
-    FIELD_INT(image_desc, height, INTEGER, 1, 1 << 15),
-    FIELD_INT(image_desc, stride, INTEGER_OR_0, 8, INT_MAX), /* the picture is 8 by 8 */
-    FIELD_INT(image_desc, crop_left, INTEGER, 0, 7),
-    FIELD_INT(image_desc, crop_top, INTEGER, 0, 7),
-    FIELD_INT(image_desc, crop_width, INTEGER, 0, 8),
-    FIELD_INT(image_desc, crop_height, INTEGER, 0, 8),
-    FIELD(image_desc, labels, ANY_BOOL),
-    FIELD_INT(image_desc, threshold, INTEGER, 0, 255),
-    FIELD(image_desc, ignore_frame, ANY_BOOL),
-    FIELD(image_desc, bright, ANY_BOOL),
-    FIELD_INT(image_desc, min_pixels, INTEGER, 0, INT_MAX),
-    FIELD_INT(image_desc, max_pixels, INTEGER, 0, INT_MAX),
-    FIELD(image_desc, keep_border, ANY_BOOL),
-    FIELD(image_desc, scale, POSITIVE),
-};
-/* Of an FS: the least order is 1, as coverage is 0; methods up to CONSTRAINED. */
-static const row fit_rows[] = {
-    FIELD_INT(fit_desc, count, INTEGER, 1, 1024),
-    FIELD(fit_desc, coverage, NOT_NEGATIVE),
-    FIELD_ENUM(fit_desc, model, DEM2D_CUSTOM),
-    FIELD_ENUM(fit_desc, method, DEM2D_FIT_CONSTRAINED + 1),
-    FIELD_ENUM(fit_desc, scale, DEM2D_SCALE_NONE + 1),
-    FIELD(fit_desc, min_radius, FRACTION),
-    FIELD(fit_desc, corners, ANY_BOOL),
-    FIELD(fit_desc, max_radius, NOT_NEGATIVE),
-    FIELD(fit_desc, unbounded, ANY_BOOL),
-    FIELD(fit_desc, seed, ANY_SEED),
-    FIELD_INT(fit_desc, birds, INTEGER_OR_0, 2, 256),
-    FIELD_INT(fit_desc, moves, INTEGER, 0, 100000),
-    FIELD_INT(fit_desc, pixels, INTEGER_OR_0, 8, 4096),
-};
-static const row virtual_rows[] = {
-    FIELD(virtual_desc, radius, POSITIVE),        FIELD(virtual_desc, elongation, NOT_NEGATIVE),
-    FIELD(virtual_desc, roundness, NOT_NEGATIVE), FIELD(virtual_desc, roughness, NOT_NEGATIVE),
-    FIELD(virtual_desc, spectrum, ANY_POINTER),   FIELD(virtual_desc, min_radius, FRACTION),
-    FIELD(virtual_desc, seed, ANY_SEED),
-};
-static const row contact_rows[] = {
-    FIELD(contact_desc, tolerance, NOT_NEGATIVE),
-    FIELD_INT(contact_desc, max_iterations, INTEGER, 0, INT_MAX),
-    FIELD(contact_desc, start, VECTOR),
-    FIELD_ENUM(contact_desc, solver, DEM2D_SOLVER_COUNT),
-    FIELD(contact_desc, skip_points, ANY_BOOL),
-};
-static const row world_rows[] = {
-    FIELD(world_desc, time_step, POSITIVE),
-    FIELD(world_desc, gravity, VECTOR),
-    FIELD(world_desc, local_damping, FRACTION),
-    FIELD(world_desc, global_damping, NOT_NEGATIVE),
-    FIELD(world_desc, skin, NOT_NEGATIVE),
-    FIELD(world_desc, contact_tolerance, NOT_NEGATIVE),
-    FIELD_INT(world_desc, max_iterations, INTEGER, 0, COUNT_MOST),
-    FIELD_ENUM(world_desc, solver, DEM2D_SOLVER_COUNT),
-    FIELD_ENUM(world_desc, faces, DEM2D_FACE_RULE_COUNT),
-    FIELD_INT(world_desc, particle_capacity, INTEGER, 0, COUNT_MOST),
-    FIELD_INT(world_desc, pair_capacity, INTEGER, 0, COUNT_MOST),
-    FIELD(world_desc, skip_time_step_check, ANY_BOOL),
-    FIELD(world_desc, ledger, ANY_BOOL),
-    FIELD(world_desc, law, ANY_POINTER),
-    FIELD(world_desc, law_user, ANY_POINTER),
-    FIELD(world_desc, law_tag, ANY_INT),
-    FIELD(world_desc, parallel_for, ANY_POINTER),
-    FIELD(world_desc, parallel_user, ANY_POINTER),
-    FIELD(world_desc, env, OPTIONAL),
-};
-static const row material_rows[] = {
-    FIELD(material_desc, density, POSITIVE),
-    FIELD(material_desc, normal_stiffness, POSITIVE),
-    FIELD(material_desc, tangential_stiffness, NOT_NEGATIVE),
-    FIELD(material_desc, friction, NOT_NEGATIVE),
-    FIELD(material_desc, damping_ratio, NOT_NEGATIVE),
-    FIELD(material_desc, rolling_friction, NOT_NEGATIVE),
-};
-static const row pair_rows[] = {
-    FIELD(pair_desc, normal_stiffness, POSITIVE),
-    FIELD(pair_desc, tangential_stiffness, NOT_NEGATIVE),
-    FIELD(pair_desc, friction, NOT_NEGATIVE),
-    FIELD(pair_desc, damping_ratio, NOT_NEGATIVE),
-    FIELD(pair_desc, rolling_friction, NOT_NEGATIVE),
-};
-static const row particle_rows[] = {
-    FIELD(particle_desc, scale, POSITIVE),
-    FIELD(particle_desc, shape, SHAPE_ID),
-    FIELD(particle_desc, material, MATERIAL_ID),
-    FIELD_ENUM(particle_desc, motion, DEM2D_DRIVEN + 1),
-    FIELD(particle_desc, position, VECTOR),
-    FIELD(particle_desc, angle, ANGLE),
-    FIELD(particle_desc, velocity, VECTOR),
-    FIELD(particle_desc, angular_velocity, FINITE),
-};
-/* Of a servo wall without spans: a half-plane, a segment. */
-#define WALL_ROWS(length_kind, normal_kind, end_kind)                                         \
-    FIELD(wall_desc, length, length_kind), FIELD_ENUM(wall_desc, mode, DEM2D_WALL_SERVO + 1), \
-        FIELD(wall_desc, material, MATERIAL_ID), FIELD(wall_desc, point, VECTOR),             \
-        FIELD(wall_desc, normal, normal_kind), FIELD(wall_desc, segment, ANY_BOOL),           \
-        FIELD(wall_desc, end, end_kind), FIELD(wall_desc, velocity, VECTOR),                  \
-        FIELD(wall_desc, stress, FINITE), FIELD(wall_desc, max_speed, POSITIVE),              \
-        FIELD(wall_desc, spans[0], SPAN_ID), FIELD(wall_desc, spans[1], SPAN_ID)
-static const row wall_rows[] = {WALL_ROWS(POSITIVE, DIRECTION, VECTOR)};
-static const row segment_rows[] = {WALL_ROWS(NOT_NEGATIVE, VECTOR, ELSEWHERE)};
-static const row save_rows[] = {
-    FIELD(save_desc, write, POINTER), /* there is no path, as below */
-    FIELD(save_desc, user, ANY_POINTER),
-};
-/* Of a world with a custom shape and a law; a law with another tag is none. */
-static const row load_rows[] = {
-    FIELD(load_desc, read, POINTER),
-    FIELD(load_desc, user, ANY_POINTER),
-    FIELD(load_desc, parallel_for, ANY_POINTER),
-    FIELD(load_desc, parallel_user, ANY_POINTER),
-    FIELD(load_desc, custom, POINTER),
-    FIELD(load_desc, custom_user, ANY_POINTER),
-    FIELD(load_desc, law, POINTER),
-    FIELD(load_desc, law_user, ANY_POINTER),
-    {"law_tag", offsetof(dem2d_load_desc, law_tag), INTEGER, DEM2D_NULL_ARGUMENT, LAW_TAG, LAW_TAG},
-    FIELD(load_desc, env, OPTIONAL),
-};
-static const row svg_rows[] = {
-    FIELD(svg_desc, width, NOT_NEGATIVE),
-    FIELD_INT(svg_desc, outline_points, INTEGER_OR_0, 3, INT_MAX),
-    FIELD(svg_desc, force_chains, ANY_BOOL),
-    FIELD(svg_desc, view.lower, VECTOR),
-    FIELD(svg_desc, view.upper, VECTOR),
-    FIELD(svg_desc, write, POINTER), /* there is no path */
-    FIELD(svg_desc, user, ANY_POINTER),
-};
-
-static const row vtp_rows[] = {
-    FIELD_INT(vtp_desc, outline_points, INTEGER_OR_0, 3, INT_MAX),
-    FIELD_ENUM(vtp_desc, part, DEM2D_VTP_PART_COUNT),
-    FIELD(vtp_desc, write, POINTER),
-    FIELD(vtp_desc, user, ANY_POINTER),
-};
-/* Arrays of NAMED; what is in them is among the arguments. */
-static const row pvd_rows[] = {
-    FIELD_INT(pvd_desc, count, INTEGER, 0, COUNT_MOST),
-    FIELD(pvd_desc, times, POINTER),
-    FIELD(pvd_desc, files, POINTER),
-    FIELD(pvd_desc, write, POINTER),
-    FIELD(pvd_desc, user, ANY_POINTER),
-};
-static const row csv_rows[] = {
-    FIELD_INT(csv_desc, count, INTEGER, 0, COUNT_MOST),
-    FIELD(csv_desc, names, POINTER),
-    FIELD(csv_desc, values, POINTER),
-    FIELD(csv_desc, append, ANY_BOOL),
-    FIELD(csv_desc, write, POINTER),
-    FIELD(csv_desc, user, ANY_POINTER),
-};
-
-#define DESC(name) \
-    { "dem2d_" #name "_desc", sizeof(dem2d_##name##_desc), name##_rows, COUNT_OF(name##_rows) }
-
+/* Descs: their fields are in the tables of dem2d.h. */
 enum {
+    NO_DESC = -1,
     CUSTOM,
     REDUCTION,
     IMAGE,
@@ -260,27 +73,6 @@ enum {
     CSV,
     SEGMENT, /* dem2d_wall_desc once more */
     DESCS
-};
-
-static const desc_table descs[DESCS] = {
-    DESC(custom),
-    DESC(reduction),
-    DESC(image),
-    DESC(fit),
-    DESC(virtual),
-    DESC(contact),
-    DESC(world),
-    DESC(material),
-    DESC(pair),
-    DESC(particle),
-    DESC(wall),
-    DESC(save),
-    DESC(load),
-    DESC(svg),
-    DESC(vtp),
-    DESC(pvd),
-    DESC(csv),
-    {"dem2d_wall_desc", sizeof(dem2d_wall_desc), segment_rows, COUNT_OF(segment_rows)},
 };
 
 /* --- a world to call them on ----------------------------------------------------------------- */
@@ -725,102 +517,6 @@ static void with_load(args *a, fixture *f) { /* two round grains in contact, by 
     a->d.load.law = soft_law, a->d.load.law_tag = LAW_TAG, a->d.load.env = &f->env.env;
 }
 
-/* --- calls ----------------------------------------------------------------------------------- */
-
-/* SHAPES, OUTLINES, ...: args in the places of the function. */
-#define CALL(name, ...)                        \
-    static dem2d_result call_##name(args *v) { \
-        return dem2d_##name(__VA_ARGS__);      \
-    }
-
-CALL(shape_create_circle, v->env, v->x, v->out)
-CALL(shape_create_ellipse, v->env, v->x, v->y, v->out)
-CALL(shape_create_polygon, v->env, v->points, v->count, v->x, v->out)
-CALL(shape_create_bezier, v->env, v->points, v->count, v->out)
-CALL(shape_create_fourier, v->env, v->a, v->b, v->count, v->out)
-CALL(shape_create_custom, v->env, v->desc, v->out)
-CALL(shape_get, v->shape, v->out)
-CALL(shape_support, v->shape, v->pose, v->direction, v->out)
-CALL(shape_aabb, v->shape, v->pose, v->out)
-CALL(shape_outline, v->shape, v->pose, v->count, v->out)
-CALL(polygon_mass, v->points, v->count, v->out)
-CALL(shape_mass, v->shape, v->out)
-CALL(shape_mass_interpolated, v->shape, v->count, v->out)
-CALL(image_threshold, v->desc, v->out)
-CALL(image_outlines, v->env, v->desc, v->out)
-CALL(outline_set_get, v->set, v->count, v->out)
-CALL(outline_measure, v->env, v->points, v->count, v->out)
-CALL(outline_compare, v->env, v->points, v->count, v->others, v->number, v->out)
-CALL(polygon_hull, v->env, v->points, v->count, v->out, v->second)
-CALL(fourier_fit, v->env, v->points, v->count, 4, v->number, v->out, v->second)
-CALL(fourier_convexity, v->a, v->b, v->count, v->out)
-CALL(fourier_reduce, v->a, v->b, v->count, v->desc, v->out)
-CALL(bezier_fit, v->env, v->points, v->count, v->number, v->out)
-CALL(outline_fit, v->env, v->points, v->count, v->desc, v->out, v->second)
-CALL(radial_compare, v->env, v->points, v->count, v->number, v->out)
-CALL(fourier_virtual, v->desc, v->count, v->out, v->second)
-CALL(shape_contains, v->shape, v->pose, v->vector, v->out)
-CALL(pair_overlap, v->shape, v->pose, v->other, v->pose_b, v->desc, v->out)
-CALL(pair_distance, v->shape, v->pose, v->other, v->pose_b, v->desc, v->out)
-CALL(pair_contact, v->shape, v->pose, v->other, v->pose_b, v->desc, v->out)
-CALL(wall_contact, v->shape, v->pose, v->vector, v->direction, v->out)
-CALL(world_create, v->desc, v->out)
-CALL(world_add_shape, v->world, v->shape, v->out)
-CALL(world_remove_shape, v->world, v->shape_id)
-CALL(world_add_material, v->world, v->desc, v->out)
-CALL(world_set_pair, v->world, v->material, v->material_b, v->desc)
-CALL(world_add_particle, v->world, v->desc, v->out)
-CALL(world_remove_particle, v->world, v->particle)
-CALL(world_get_particle, v->world, v->particle, v->out)
-CALL(world_move_particle, v->world, v->particle, v->vector, v->x)
-CALL(world_drive_particle, v->world, v->particle, v->motion, v->vector, v->x)
-CALL(world_add_wall, v->world, v->desc, v->out)
-CALL(world_set_wall, v->world, v->wall, v->desc)
-CALL(world_remove_wall, v->world, v->wall)
-CALL(world_get_wall, v->world, v->wall, v->out)
-CALL(world_set_gravity, v->world, v->vector)
-CALL(world_set_damping, v->world, v->x, v->y)
-CALL(world_set_time_step, v->world, v->x)
-CALL(world_time_step_bounds, v->world, v->out, v->second, v->third)
-CALL(world_step, v->world, v->count, v->third)
-CALL(world_stats, v->world, v->out)
-CALL(world_particles, v->world, v->out, v->count, v->second)
-CALL(world_contacts, v->world, v->out, v->count, v->second)
-CALL(world_energy, v->world, v->out)
-CALL(world_stress, v->world, v->x, v->out)
-CALL(world_packing, v->world, v->out)
-CALL(world_porosity, v->world, v->region, v->out)
-CALL(world_ledger, v->world, v->out)
-CALL(world_particle_stress, v->world, v->particle, v->out)
-CALL(stress_principal, v->desc, v->out)
-CALL(world_fabric, v->world, v->out)
-CALL(world_histogram, v->world, (dem2d_histogram)v->number, v->count, v->out)
-CALL(world_equilibrium, v->world, v->out)
-CALL(world_inertial_number, v->world, v->x, v->y, v->out)
-CALL(world_save, v->world, v->desc, NULL)
-CALL(world_write_svg, v->world, v->desc, NULL)
-CALL(world_write_vtp, v->world, v->desc, NULL)
-CALL(world_write_csv, v->world, v->desc, NULL)
-CALL(pvd_write, v->env, v->desc, NULL)
-CALL(shape_axis, v->shape, v->out, v->second)
-CALL(damping_ratio, v->x, v->out)
-
-static dem2d_result call_world_load(args *v) {
-    v->snapshot->next = 0;
-    return dem2d_world_load(v->desc, NULL, v->out);
-}
-
-static dem2d_result call_fourier_fit_order(args *v) { /* its order is number, samples 0 */
-    return dem2d_fourier_fit(v->env, v->points, v->count, v->number, 0, v->out, v->second);
-}
-
-static dem2d_result call_world_add_segment(args *v) {
-    return dem2d_world_add_wall(v->world, v->desc, v->out);
-}
-static dem2d_result call_world_set_segment(args *v) {
-    return dem2d_world_set_wall(v->world, v->wall, v->desc);
-}
-
 /* What a call made, when it went well. */
 static void free_shape(args *v) {
     dem2d_shape_destroy(*(dem2d_shape **)v->out);
@@ -832,10 +528,12 @@ static void free_world(args *v) {
     dem2d_world_destroy(*(dem2d_world **)v->out);
 }
 
-#define ARG(member, name, kind) \
-    { name, offsetof(args, member), kind, DEM2D_OK, 0, 0 }
-#define ARG_INT(member, name, kind, low, high, result) \
-    { name, offsetof(args, member), kind, DEM2D_##result, low, high }
+/* --- the functions --------------------------------------------------------------------------- */
+
+#define ARG(member, text, ...) \
+    { .name = text, .offset = offsetof(args, member), .kind = __VA_ARGS__ }
+#define ARG_INT(member, text, least, most, ...) \
+    ARG(member, text, INTEGER, .low = least, .high = most, .result = DEM2D_##__VA_ARGS__)
 #define POINTS(member, name) \
     ARG(member[0], name, VECTOR), ARG(member[3], name, VECTOR), ARG(member[4], name, VECTOR)
 #define OUT ARG(out, "out", POINTER)
@@ -843,253 +541,235 @@ static void free_world(args *v) {
 #define IN_WORLD ARG(world, "world", POINTER)
 #define ENV ARG(env, "env", OPTIONAL)
 #define THE_DESC ARG(desc, "desc", POINTER)
-#define THREE_POINTS                                                                               \
-    ARG(points, "points", POINTER), ARG_INT(count, "points", INTEGER, 3, INT_MAX, TOO_FEW_POINTS), \
+#define THREE_POINTS                                                                      \
+    ARG(points, "points", POINTER), ARG_INT(count, "points", 3, INT_MAX, TOO_FEW_POINTS), \
         POINTS(p, "points[")
 #define SERIES                                                                     \
     ARG(a, "a", POINTER), ARG(b, "b", POINTER), ARG(series_a[0], "a[0]", LEADING), \
         ARG(series_a[2], "a[2]", FINITE), ARG(series_b[3], "b[3]", FINITE),        \
-        ARG(series_b[0], "b[0]", UNREAD),                                          \
-        ARG_INT(count, "order", INTEGER, 0, 1 << 20, OUT_OF_RANGE)
+        ARG(series_b[0], "b[0]", UNREAD), ARG_INT(count, "order", 0, 1 << 20, OUT_OF_RANGE)
 #define PAIR_ARGS                                                                \
     ARG(shape, "a", POINTER), ARG(other, "b", POINTER), ARG(pose, "pose", POSE), \
         ARG(pose_b, "pose", POSE), ARG(desc, "desc", OPTIONAL), OUT
 
-static const row rows_shape_create_circle[] = {ENV, ARG(x, "radius", SIZE), OUT};
-static const row rows_shape_create_ellipse[] = {ENV, ARG(x, "a", SIZE), ARG(y, "b", SIZE), OUT};
-static const row rows_shape_create_polygon[] = {ENV, THREE_POINTS, ARG(x, "rounding", NOT_NEGATIVE),
-                                                OUT};
-static const row rows_shape_create_bezier[] = {
-    ENV, ARG(points, "control", POINTER),
-    ARG_INT(count, "arcs", INTEGER, 2, INT_MAX, TOO_FEW_POINTS), POINTS(p, "control["), OUT};
-static const row rows_shape_create_fourier[] = {ENV, SERIES, OUT};
-static const row rows_shape_create_custom[] = {ENV, THE_DESC, OUT};
-static const row rows_shape_get[] = {ARG(shape, "shape", POINTER), OUT};
-static const row rows_shape_support[] = {ARG(shape, "shape", POINTER), ARG(pose, "pose", POSE),
-                                         ARG(direction, "direction", DIRECTION), OUT};
-static const row rows_shape_aabb[] = {ARG(shape, "shape", POINTER), ARG(pose, "pose", POSE), OUT};
-static const row rows_shape_outline[] = {
-    ARG(shape, "shape", POINTER), ARG(pose, "pose", POSE),
-    ARG_INT(count, "count", INTEGER, 3, INT_MAX, TOO_FEW_POINTS), OUT};
-static const row rows_polygon_mass[] = {THREE_POINTS, OUT};
-static const row rows_shape_mass[] = {ARG(shape, "shape", POINTER), OUT};
-static const row rows_shape_mass_interpolated[] = {
-    ARG(shape, "shape", POINTER), ARG_INT(count, "count", INTEGER, 3, INT_MAX, TOO_FEW_POINTS),
-    OUT};
-static const row rows_image_threshold[] = {
-    THE_DESC,
-    ARG(d.image.pixels, "pixels", POINTER),
-    ARG_INT(d.image.width, "width", INTEGER, 1, 1 << 15, OUT_OF_RANGE),
-    ARG_INT(d.image.height, "height", INTEGER, 1, 1 << 15, OUT_OF_RANGE),
-    ARG_INT(d.image.stride, "stride", INTEGER_OR_0, 8, INT_MAX, OUT_OF_RANGE),
-    ARG_INT(d.image.crop_left, "crop_left", INTEGER, 0, 7, OUT_OF_RANGE),
-    ARG_INT(d.image.crop_top, "crop_top", INTEGER, 0, 7, OUT_OF_RANGE),
-    ARG_INT(d.image.crop_width, "crop_width", INTEGER, 0, 8, OUT_OF_RANGE),
-    ARG_INT(d.image.crop_height, "crop_height", INTEGER, 0, 8, OUT_OF_RANGE),
-    ARG(d.image.scale, "scale", UNREAD),
-    OUT};
-static const row rows_image_outlines[] = {ENV, THE_DESC, OUT};
-static const row rows_outline_set_get[] = {
-    ARG(set, "set", POINTER), ARG_INT(count, "outline", INTEGER, 0, 0, OUT_OF_RANGE), OUT};
-static const row rows_outline_measure[] = {ENV, THREE_POINTS, OUT};
-static const row rows_outline_compare[] = {
-    ENV,
-    ARG(points, "reference", POINTER),
-    ARG_INT(count, "reference", INTEGER, 3, INT_MAX, TOO_FEW_POINTS),
-    POINTS(p, "reference["),
-    ARG(others, "other", POINTER),
-    ARG_INT(number, "other", INTEGER, 3, INT_MAX, TOO_FEW_POINTS),
-    POINTS(q, "other["),
-    OUT};
-static const row rows_polygon_hull[] = {ENV, THREE_POINTS, OUT, SECOND};
-static const row rows_fourier_fit[] = {
-    ENV, THREE_POINTS, ARG_INT(number, "samples", INTEGER_OR_0, 9, INT_MAX, OUT_OF_RANGE), OUT,
-    SECOND};
-static const row rows_fourier_fit_order[] = {
-    ENV, THREE_POINTS, ARG_INT(number, "order", INTEGER, 0, 1 << 20, OUT_OF_RANGE), OUT, SECOND};
-static const row rows_fourier_convexity[] = {SERIES, OUT};
-static const row rows_fourier_reduce[] = {SERIES, THE_DESC, ARG(out, "reductions", OPTIONAL)};
-static const row rows_bezier_fit[] = {
-    ENV, THREE_POINTS, ARG_INT(number, "arcs", INTEGER, 3, 1 << 20, OUT_OF_RANGE), OUT};
-static const row rows_outline_fit[] = {ENV, THREE_POINTS, THE_DESC, OUT,
-                                       ARG(second, "report", OPTIONAL)};
-static const row rows_radial_compare[] = {
-    ENV, THREE_POINTS, ARG_INT(number, "order", INTEGER, 0, 719, OUT_OF_RANGE), OUT};
-static const row rows_fourier_virtual[] = {
-    THE_DESC, ARG_INT(count, "order", INTEGER, 0, 1 << 20, OUT_OF_RANGE), OUT, SECOND};
-static const row rows_shape_contains[] = {ARG(shape, "shape", POINTER), ARG(pose, "pose", POSE),
-                                          ARG(vector, "point", VECTOR), OUT};
-static const row rows_pair_overlap[] = {PAIR_ARGS};
-static const row rows_pair_distance[] = {PAIR_ARGS};
-static const row rows_pair_contact[] = {PAIR_ARGS};
-static const row rows_wall_contact[] = {ARG(shape, "shape", POINTER), ARG(pose, "pose", POSE),
-                                        ARG(vector, "point", VECTOR),
-                                        ARG(direction, "wall_normal", DIRECTION), OUT};
-static const row rows_world_create[] = {THE_DESC, OUT};
-static const row rows_world_add_shape[] = {IN_WORLD, ARG(shape, "shape", POINTER), OUT};
-static const row rows_world_remove_shape[] = {IN_WORLD, ARG(shape_id, "shape", SHAPE_ID)};
-static const row rows_world_add_material[] = {IN_WORLD, THE_DESC, OUT};
-static const row rows_world_set_pair[] = {IN_WORLD, ARG(material, "material", MATERIAL_ID),
-                                          ARG(material_b, "material", MATERIAL_ID), THE_DESC};
-static const row rows_world_add_particle[] = {IN_WORLD, THE_DESC, OUT};
-static const row rows_world_remove_particle[] = {IN_WORLD, ARG(particle, "particle", PARTICLE_ID)};
-static const row rows_world_get_particle[] = {IN_WORLD, ARG(particle, "particle", PARTICLE_ID),
-                                              OUT};
-static const row rows_world_move_particle[] = {IN_WORLD, ARG(particle, "particle", PARTICLE_ID),
-                                               ARG(vector, "position", VECTOR),
-                                               ARG(x, "angle", ANGLE)};
-static const row rows_world_drive_particle[] = {IN_WORLD, ARG(particle, "particle", PARTICLE_ID),
-                                                ARG_INT(motion, "motion", ENUM, 0, 2, OUT_OF_RANGE),
-                                                ARG(vector, "velocity", VECTOR),
-                                                ARG(x, "angular_velocity", FINITE)};
-static const row rows_world_add_wall[] = {IN_WORLD, THE_DESC, OUT};
-static const row rows_world_set_wall[] = {IN_WORLD, ARG(wall, "wall", WALL_ID), THE_DESC};
-static const row rows_world_remove_wall[] = {IN_WORLD, ARG(wall, "wall", WALL_ID)};
-static const row rows_world_get_wall[] = {IN_WORLD, ARG(wall, "wall", WALL_ID), OUT};
-static const row rows_world_set_gravity[] = {IN_WORLD, ARG(vector, "gravity", VECTOR)};
-static const row rows_world_set_damping[] = {IN_WORLD, ARG(x, "local_damping", FRACTION),
-                                             ARG(y, "global_damping", NOT_NEGATIVE)};
-static const row rows_world_set_time_step[] = {IN_WORLD, ARG(x, "time_step", POSITIVE)};
-static const row rows_world_time_step_bounds[] = {IN_WORLD, OUT, SECOND,
-                                                  ARG(third, "limit_particle", OPTIONAL)};
-static const row rows_world_step[] = {IN_WORLD,
-                                      ARG_INT(count, "count", INTEGER, 0, INT_MAX, OUT_OF_RANGE),
-                                      ARG(third, "done", OPTIONAL)};
-static const row rows_world_stats[] = {IN_WORLD, OUT};
-static const row rows_world_particles[] = {
-    IN_WORLD, OUT, ARG_INT(count, "capacity", INTEGER, 0, INT_MAX, OUT_OF_RANGE), SECOND};
-static const row rows_world_contacts[] = {
-    IN_WORLD, OUT, ARG_INT(count, "capacity", INTEGER, 0, INT_MAX, OUT_OF_RANGE), SECOND};
-static const row rows_world_energy[] = {IN_WORLD, OUT};
-static const row rows_world_stress[] = {IN_WORLD, ARG(x, "area", POSITIVE), OUT};
-static const row rows_world_packing[] = {IN_WORLD, OUT};
-static const row rows_world_porosity[] = {IN_WORLD, ARG(region, "region", POINTER),
-                                          ARG(box.lower, "region", VECTOR),
-                                          ARG(box.upper, "region", UPPER), OUT};
-static const row rows_world_ledger[] = {IN_WORLD, OUT};
-static const row rows_world_particle_stress[] = {IN_WORLD, ARG(particle, "particle", PARTICLE_ID),
-                                                 OUT};
-static const row rows_stress_principal[] = {
-    ARG(desc, "stress", POINTER),   ARG(d.stress.xx, "xx", FINITE), ARG(d.stress.xy, "xy", FINITE),
-    ARG(d.stress.yx, "yx", FINITE), ARG(d.stress.yy, "yy", FINITE), OUT};
-static const row rows_world_fabric[] = {IN_WORLD, OUT};
-static const row rows_world_histogram[] = {
-    IN_WORLD, ARG_INT(number, "kind", ENUM, 0, DEM2D_HISTOGRAM_COUNT - 1, OUT_OF_RANGE),
-    ARG_INT(count, "bins", INTEGER, 1, INT_MAX, OUT_OF_RANGE), OUT};
-static const row rows_world_equilibrium[] = {IN_WORLD, OUT};
-static const row rows_world_inertial_number[] = {IN_WORLD, ARG(x, "strain_rate", FINITE),
-                                                 ARG(y, "pressure", POSITIVE), OUT};
-static const row rows_world_save[] = {IN_WORLD, THE_DESC};
-static const row rows_world_load[] = {THE_DESC, OUT};
-static const row rows_world_write_svg[] = {IN_WORLD, THE_DESC};
-static const row rows_world_write_vtp[] = {IN_WORLD, THE_DESC};
 #define NAMES(kind, text, numbers)                                                                 \
     ARG(names[0], text, kind), ARG(names[NAMED - 1], text, kind), ARG(values[0], numbers, FINITE), \
         ARG(values[NAMED - 1], numbers, FINITE)
-static const row rows_world_write_csv[] = {IN_WORLD, THE_DESC, NAMES(COLUMN, "names", "values")};
-static const row rows_pvd_write[] = {ENV, THE_DESC, NAMES(FILE_NAME, "files", "times")};
-static const row rows_shape_axis[] = {ARG(shape, "shape", POINTER), OUT, SECOND};
-static const row rows_damping_ratio[] = {ARG(x, "restitution", PORTION), OUT};
-static const row rows_world_add_segment[] = {IN_WORLD, THE_DESC, OUT};
-static const row rows_world_set_segment[] = {IN_WORLD, ARG(wall, "wall", WALL_ID), THE_DESC};
-
-/* --- the table ------------------------------------------------------------------------------- */
 
 typedef struct function {
     const char *name; /* without dem2d_ */
     dem2d_result (*call)(args *v);
-    const row *rows;
-    int count;
-    int desc;                             /* its desc, or -1 */
+    int desc;                             /* its desc, or NO_DESC */
     void (*prepare)(args *v, fixture *f); /* beyond args_make */
     void (*release)(args *v);             /* of what it made, or NULL */
     bool logs;                            /* has an environment and names what is wrong */
+    const row *rows;                      /* its arguments */
+    int count;
 } function;
 
-#define ROW(name, desc, prepare, release, logs) \
-    { #name, call_##name, rows_##name, COUNT_OF(rows_##name), desc, prepare, release, logs }
-#define PLAIN(name) ROW(name, -1, with_nothing, NULL, false)
-#define LOGS(name) ROW(name, -1, with_nothing, NULL, true)
-#define MAKES(name, desc, prepare, release) ROW(name, desc, prepare, release, true)
-#define DESCRIBED(name, desc, prepare) ROW(name, desc, prepare, NULL, true)
-#define SILENT(name, desc, prepare) ROW(name, desc, prepare, NULL, false)
+/* desc, prepare, release, logs */
+#define PLAIN NO_DESC, with_nothing, NULL, false
+#define LOGS NO_DESC, with_nothing, NULL, true
+#define MAKES(desc, prepare, release) desc, prepare, release, true
+#define DESCRIBED(desc, prepare) desc, prepare, NULL, true
+#define SILENT(desc, prepare) desc, prepare, NULL, false
 
-static const function functions[] = {
-    MAKES(shape_create_circle, -1, with_nothing, free_shape),
-    MAKES(shape_create_ellipse, -1, with_nothing, free_shape),
-    MAKES(shape_create_polygon, -1, with_nothing, free_shape),
-    MAKES(shape_create_bezier, -1, with_control, free_shape),
-    MAKES(shape_create_fourier, -1, with_nothing, free_shape),
-    MAKES(shape_create_custom, CUSTOM, with_custom, free_shape),
-    PLAIN(shape_get),
-    PLAIN(shape_support),
-    PLAIN(shape_aabb),
-    PLAIN(shape_outline),
-    PLAIN(polygon_mass),
-    PLAIN(shape_mass),
-    PLAIN(shape_mass_interpolated),
-    SILENT(image_threshold, -1, with_image),
-    MAKES(image_outlines, IMAGE, with_image, free_set),
-    DESCRIBED(outline_set_get, -1, with_first),
-    LOGS(outline_measure),
-    LOGS(outline_compare),
-    LOGS(polygon_hull),
-    DESCRIBED(fourier_fit, -1, with_samples),
-    LOGS(fourier_fit_order),
-    PLAIN(fourier_convexity),
-    SILENT(fourier_reduce, REDUCTION, with_nothing),
-    LOGS(bezier_fit),
-    MAKES(outline_fit, FIT, with_fit, free_shape),
-    LOGS(radial_compare),
-    SILENT(fourier_virtual, VIRTUAL, with_virtual),
-    PLAIN(shape_contains),
-    SILENT(pair_overlap, CONTACT, with_nothing),
-    SILENT(pair_distance, CONTACT, with_nothing),
-    SILENT(pair_contact, CONTACT, with_nothing),
-    PLAIN(wall_contact),
-    MAKES(world_create, WORLD, with_world, free_world),
-    LOGS(world_add_shape),
-    LOGS(world_remove_shape),
-    DESCRIBED(world_add_material, MATERIAL, with_material),
-    DESCRIBED(world_set_pair, PAIR, with_pair),
-    DESCRIBED(world_add_particle, PARTICLE, with_particle),
-    LOGS(world_remove_particle),
-    LOGS(world_get_particle),
-    LOGS(world_move_particle),
-    LOGS(world_drive_particle),
-    DESCRIBED(world_add_wall, WALL, with_wall),
-    DESCRIBED(world_set_wall, WALL, with_wall),
-    LOGS(world_remove_wall),
-    LOGS(world_get_wall),
-    LOGS(world_set_gravity),
-    LOGS(world_set_damping),
-    LOGS(world_set_time_step),
-    LOGS(world_time_step_bounds),
-    LOGS(world_step),
-    LOGS(world_stats),
-    LOGS(world_particles),
-    LOGS(world_contacts),
-    LOGS(world_energy),
-    LOGS(world_stress),
-    LOGS(world_packing),
-    LOGS(world_porosity),
-    LOGS(world_ledger),
-    LOGS(world_particle_stress),
-    SILENT(stress_principal, -1, with_stress),
-    LOGS(world_fabric),
-    LOGS(world_histogram),
-    LOGS(world_equilibrium),
-    LOGS(world_inertial_number),
-    DESCRIBED(world_save, SAVE, with_save),
-    MAKES(world_load, LOAD, with_load, free_world),
-    DESCRIBED(world_write_svg, SVG, with_svg),
-    DESCRIBED(world_write_vtp, VTP, with_vtp),
-    DESCRIBED(world_write_csv, CSV, with_csv),
-    DESCRIBED(pvd_write, PVD, with_pvd),
-    PLAIN(shape_axis),
-    PLAIN(damping_ratio),
-    DESCRIBED(world_add_segment, SEGMENT, with_segment),
-    DESCRIBED(world_set_segment, SEGMENT, with_segment),
-};
+/* One row for each: F(name, call, one of those above, arguments...). */
+/* clang-format off */
+#define FUNCTIONS(F) \
+    F(shape_create_circle, dem2d_shape_create_circle(v->env, v->x, v->out),                       \
+      MAKES(NO_DESC, with_nothing, free_shape), ENV, ARG(x, "radius", SIZE), OUT)                 \
+    F(shape_create_ellipse, dem2d_shape_create_ellipse(v->env, v->x, v->y, v->out),               \
+      MAKES(NO_DESC, with_nothing, free_shape), ENV, ARG(x, "a", SIZE), ARG(y, "b", SIZE), OUT)   \
+    F(shape_create_polygon,                                                                       \
+      dem2d_shape_create_polygon(v->env, v->points, v->count, v->x, v->out),                      \
+      MAKES(NO_DESC, with_nothing, free_shape), ENV, THREE_POINTS,                                \
+      ARG(x, "rounding", NOT_NEGATIVE), OUT)                                                      \
+    F(shape_create_bezier, dem2d_shape_create_bezier(v->env, v->points, v->count, v->out),        \
+      MAKES(NO_DESC, with_control, free_shape), ENV, ARG(points, "control", POINTER),             \
+      ARG_INT(count, "arcs", 2, INT_MAX, TOO_FEW_POINTS), POINTS(p, "control["), OUT)             \
+    F(shape_create_fourier, dem2d_shape_create_fourier(v->env, v->a, v->b, v->count, v->out),     \
+      MAKES(NO_DESC, with_nothing, free_shape), ENV, SERIES, OUT)                                 \
+    F(shape_create_custom, dem2d_shape_create_custom(v->env, v->desc, v->out),                    \
+      MAKES(CUSTOM, with_custom, free_shape), ENV, THE_DESC, OUT)                                 \
+    F(shape_get, dem2d_shape_get(v->shape, v->out), PLAIN, ARG(shape, "shape", POINTER), OUT)     \
+    F(shape_support, dem2d_shape_support(v->shape, v->pose, v->direction, v->out),                \
+      PLAIN, ARG(shape, "shape", POINTER), ARG(pose, "pose", POSE),                               \
+      ARG(direction, "direction", DIRECTION), OUT)                                                \
+    F(shape_aabb, dem2d_shape_aabb(v->shape, v->pose, v->out),                                    \
+      PLAIN, ARG(shape, "shape", POINTER), ARG(pose, "pose", POSE), OUT)                          \
+    F(shape_outline, dem2d_shape_outline(v->shape, v->pose, v->count, v->out),                    \
+      PLAIN, ARG(shape, "shape", POINTER), ARG(pose, "pose", POSE),                               \
+      ARG_INT(count, "count", 3, INT_MAX, TOO_FEW_POINTS), OUT)                                   \
+    F(polygon_mass, dem2d_polygon_mass(v->points, v->count, v->out), PLAIN, THREE_POINTS, OUT)    \
+    F(shape_mass, dem2d_shape_mass(v->shape, v->out), PLAIN, ARG(shape, "shape", POINTER), OUT)   \
+    F(shape_mass_interpolated, dem2d_shape_mass_interpolated(v->shape, v->count, v->out),         \
+      PLAIN, ARG(shape, "shape", POINTER), ARG_INT(count, "count", 3, INT_MAX, TOO_FEW_POINTS),   \
+      OUT)                                                                                        \
+    F(image_threshold, dem2d_image_threshold(v->desc, v->out),                                    \
+      SILENT(NO_DESC, with_image), THE_DESC, ARG(d.image.pixels, "pixels", POINTER),              \
+      ARG_INT(d.image.width, "width", 1, 1 << 15, OUT_OF_RANGE),                                  \
+      ARG_INT(d.image.height, "height", 1, 1 << 15, OUT_OF_RANGE),                                \
+      ARG_INT(d.image.stride, "stride", 8, INT_MAX, OUT_OF_RANGE, .or_0 = true),                  \
+      ARG_INT(d.image.crop_left, "crop_left", 0, 7, OUT_OF_RANGE),                                \
+      ARG_INT(d.image.crop_top, "crop_top", 0, 7, OUT_OF_RANGE),                                  \
+      ARG_INT(d.image.crop_width, "crop_width", 0, 8, OUT_OF_RANGE),                              \
+      ARG_INT(d.image.crop_height, "crop_height", 0, 8, OUT_OF_RANGE),                            \
+      ARG(d.image.scale, "scale", UNREAD), OUT)                                                   \
+    F(image_outlines, dem2d_image_outlines(v->env, v->desc, v->out),                              \
+      MAKES(IMAGE, with_image, free_set), ENV, THE_DESC, OUT)                                     \
+    F(outline_set_get, dem2d_outline_set_get(v->set, v->count, v->out),                           \
+      DESCRIBED(NO_DESC, with_first), ARG(set, "set", POINTER),                                   \
+      ARG_INT(count, "outline", 0, 0, OUT_OF_RANGE), OUT)                                         \
+    F(outline_measure, dem2d_outline_measure(v->env, v->points, v->count, v->out),                \
+      LOGS, ENV, THREE_POINTS, OUT)                                                               \
+    F(outline_compare,                                                                            \
+      dem2d_outline_compare(v->env, v->points, v->count, v->others, v->number, v->out),           \
+      LOGS, ENV, ARG(points, "reference", POINTER),                                               \
+      ARG_INT(count, "reference", 3, INT_MAX, TOO_FEW_POINTS), POINTS(p, "reference["),           \
+      ARG(others, "other", POINTER), ARG_INT(number, "other", 3, INT_MAX, TOO_FEW_POINTS),        \
+      POINTS(q, "other["), OUT)                                                                   \
+    F(polygon_hull, dem2d_polygon_hull(v->env, v->points, v->count, v->out, v->second),           \
+      LOGS, ENV, THREE_POINTS, OUT, SECOND)                                                       \
+    F(fourier_fit,                                                                                \
+      dem2d_fourier_fit(v->env, v->points, v->count, 4, v->number, v->out, v->second),            \
+      DESCRIBED(NO_DESC, with_samples), ENV, THREE_POINTS,                                        \
+      ARG_INT(number, "samples", 9, INT_MAX, OUT_OF_RANGE, .or_0 = true), OUT, SECOND)            \
+    F(fourier_fit_order,                                                                          \
+      dem2d_fourier_fit(v->env, v->points, v->count, v->number, 0, v->out, v->second),            \
+      LOGS, ENV, THREE_POINTS, ARG_INT(number, "order", 0, 1 << 20, OUT_OF_RANGE), OUT, SECOND)   \
+    F(fourier_convexity, dem2d_fourier_convexity(v->a, v->b, v->count, v->out),                   \
+      PLAIN, SERIES, OUT)                                                                         \
+    F(fourier_reduce, dem2d_fourier_reduce(v->a, v->b, v->count, v->desc, v->out),                \
+      SILENT(REDUCTION, with_nothing), SERIES, THE_DESC, ARG(out, "reductions", OPTIONAL))        \
+    F(bezier_fit, dem2d_bezier_fit(v->env, v->points, v->count, v->number, v->out),               \
+      LOGS, ENV, THREE_POINTS, ARG_INT(number, "arcs", 3, 1 << 20, OUT_OF_RANGE), OUT)            \
+    F(outline_fit, dem2d_outline_fit(v->env, v->points, v->count, v->desc, v->out, v->second),    \
+      MAKES(FIT, with_fit, free_shape), ENV, THREE_POINTS, THE_DESC, OUT,                         \
+      ARG(second, "report", OPTIONAL))                                                            \
+    F(radial_compare, dem2d_radial_compare(v->env, v->points, v->count, v->number, v->out),       \
+      LOGS, ENV, THREE_POINTS, ARG_INT(number, "order", 0, 719, OUT_OF_RANGE), OUT)               \
+    F(fourier_virtual, dem2d_fourier_virtual(v->desc, v->count, v->out, v->second),               \
+      SILENT(VIRTUAL, with_virtual), THE_DESC, ARG_INT(count, "order", 0, 1 << 20, OUT_OF_RANGE), \
+      OUT, SECOND)                                                                                \
+    F(shape_contains, dem2d_shape_contains(v->shape, v->pose, v->vector, v->out),                 \
+      PLAIN, ARG(shape, "shape", POINTER), ARG(pose, "pose", POSE), ARG(vector, "point", VECTOR), \
+      OUT)                                                                                        \
+    F(pair_overlap, dem2d_pair_overlap(v->shape, v->pose, v->other, v->pose_b, v->desc, v->out),  \
+      SILENT(CONTACT, with_nothing), PAIR_ARGS)                                                   \
+    F(pair_distance,                                                                              \
+      dem2d_pair_distance(v->shape, v->pose, v->other, v->pose_b, v->desc, v->out),               \
+      SILENT(CONTACT, with_nothing), PAIR_ARGS)                                                   \
+    F(pair_contact, dem2d_pair_contact(v->shape, v->pose, v->other, v->pose_b, v->desc, v->out),  \
+      SILENT(CONTACT, with_nothing), PAIR_ARGS)                                                   \
+    F(wall_contact, dem2d_wall_contact(v->shape, v->pose, v->vector, v->direction, v->out),       \
+      PLAIN, ARG(shape, "shape", POINTER), ARG(pose, "pose", POSE), ARG(vector, "point", VECTOR), \
+      ARG(direction, "wall_normal", DIRECTION), OUT)                                              \
+    F(world_create, dem2d_world_create(v->desc, v->out),                                          \
+      MAKES(WORLD, with_world, free_world), THE_DESC, OUT)                                        \
+    F(world_add_shape, dem2d_world_add_shape(v->world, v->shape, v->out),                         \
+      LOGS, IN_WORLD, ARG(shape, "shape", POINTER), OUT)                                          \
+    F(world_remove_shape, dem2d_world_remove_shape(v->world, v->shape_id),                        \
+      LOGS, IN_WORLD, ARG(shape_id, "shape", SHAPE_ID))                                           \
+    F(world_add_material, dem2d_world_add_material(v->world, v->desc, v->out),                    \
+      DESCRIBED(MATERIAL, with_material), IN_WORLD, THE_DESC, OUT)                                \
+    F(world_set_pair, dem2d_world_set_pair(v->world, v->material, v->material_b, v->desc),        \
+      DESCRIBED(PAIR, with_pair), IN_WORLD, ARG(material, "material", MATERIAL_ID),               \
+      ARG(material_b, "material", MATERIAL_ID), THE_DESC)                                         \
+    F(world_add_particle, dem2d_world_add_particle(v->world, v->desc, v->out),                    \
+      DESCRIBED(PARTICLE, with_particle), IN_WORLD, THE_DESC, OUT)                                \
+    F(world_remove_particle, dem2d_world_remove_particle(v->world, v->particle),                  \
+      LOGS, IN_WORLD, ARG(particle, "particle", PARTICLE_ID))                                     \
+    F(world_get_particle, dem2d_world_get_particle(v->world, v->particle, v->out),                \
+      LOGS, IN_WORLD, ARG(particle, "particle", PARTICLE_ID), OUT)                                \
+    F(world_move_particle, dem2d_world_move_particle(v->world, v->particle, v->vector, v->x),     \
+      LOGS, IN_WORLD, ARG(particle, "particle", PARTICLE_ID), ARG(vector, "position", VECTOR),    \
+      ARG(x, "angle", ANGLE))                                                                     \
+    F(world_drive_particle,                                                                       \
+      dem2d_world_drive_particle(v->world, v->particle, v->motion, v->vector, v->x),              \
+      LOGS, IN_WORLD, ARG(particle, "particle", PARTICLE_ID),                                     \
+      ARG_INT(motion, "motion", 0, 2, OUT_OF_RANGE), ARG(vector, "velocity", VECTOR),             \
+      ARG(x, "angular_velocity", FINITE))                                                         \
+    F(world_add_wall, dem2d_world_add_wall(v->world, v->desc, v->out),                            \
+      DESCRIBED(WALL, with_wall), IN_WORLD, THE_DESC, OUT)                                        \
+    F(world_set_wall, dem2d_world_set_wall(v->world, v->wall, v->desc),                           \
+      DESCRIBED(WALL, with_wall), IN_WORLD, ARG(wall, "wall", WALL_ID), THE_DESC)                 \
+    F(world_remove_wall, dem2d_world_remove_wall(v->world, v->wall),                              \
+      LOGS, IN_WORLD, ARG(wall, "wall", WALL_ID))                                                 \
+    F(world_get_wall, dem2d_world_get_wall(v->world, v->wall, v->out),                            \
+      LOGS, IN_WORLD, ARG(wall, "wall", WALL_ID), OUT)                                            \
+    F(world_set_gravity, dem2d_world_set_gravity(v->world, v->vector),                            \
+      LOGS, IN_WORLD, ARG(vector, "gravity", VECTOR))                                             \
+    F(world_set_damping, dem2d_world_set_damping(v->world, v->x, v->y),                           \
+      LOGS, IN_WORLD, ARG(x, "local_damping", FRACTION), ARG(y, "global_damping", NOT_NEGATIVE))  \
+    F(world_set_time_step, dem2d_world_set_time_step(v->world, v->x),                             \
+      LOGS, IN_WORLD, ARG(x, "time_step", POSITIVE))                                              \
+    F(world_time_step_bounds,                                                                     \
+      dem2d_world_time_step_bounds(v->world, v->out, v->second, v->third),                        \
+      LOGS, IN_WORLD, OUT, SECOND, ARG(third, "limit_particle", OPTIONAL))                        \
+    F(world_step, dem2d_world_step(v->world, v->count, v->third),                                 \
+      LOGS, IN_WORLD, ARG_INT(count, "count", 0, INT_MAX, OUT_OF_RANGE),                          \
+      ARG(third, "done", OPTIONAL))                                                               \
+    F(world_stats, dem2d_world_stats(v->world, v->out), LOGS, IN_WORLD, OUT)                      \
+    F(world_particles, dem2d_world_particles(v->world, v->out, v->count, v->second),              \
+      LOGS, IN_WORLD, OUT, ARG_INT(count, "capacity", 0, INT_MAX, OUT_OF_RANGE), SECOND)          \
+    F(world_contacts, dem2d_world_contacts(v->world, v->out, v->count, v->second),                \
+      LOGS, IN_WORLD, OUT, ARG_INT(count, "capacity", 0, INT_MAX, OUT_OF_RANGE), SECOND)          \
+    F(world_energy, dem2d_world_energy(v->world, v->out), LOGS, IN_WORLD, OUT)                    \
+    F(world_stress, dem2d_world_stress(v->world, v->x, v->out),                                   \
+      LOGS, IN_WORLD, ARG(x, "area", POSITIVE), OUT)                                              \
+    F(world_packing, dem2d_world_packing(v->world, v->out), LOGS, IN_WORLD, OUT)                  \
+    F(world_porosity, dem2d_world_porosity(v->world, v->region, v->out),                          \
+      LOGS, IN_WORLD, ARG(region, "region", POINTER), ARG(box.lower, "region", VECTOR),           \
+      ARG(box.upper, "region", UPPER), OUT)                                                       \
+    F(world_ledger, dem2d_world_ledger(v->world, v->out), LOGS, IN_WORLD, OUT)                    \
+    F(world_particle_stress, dem2d_world_particle_stress(v->world, v->particle, v->out),          \
+      LOGS, IN_WORLD, ARG(particle, "particle", PARTICLE_ID), OUT)                                \
+    F(stress_principal, dem2d_stress_principal(v->desc, v->out),                                  \
+      SILENT(NO_DESC, with_stress), ARG(desc, "stress", POINTER), ARG(d.stress.xx, "xx", FINITE), \
+      ARG(d.stress.xy, "xy", FINITE), ARG(d.stress.yx, "yx", FINITE),                             \
+      ARG(d.stress.yy, "yy", FINITE), OUT)                                                        \
+    F(world_fabric, dem2d_world_fabric(v->world, v->out), LOGS, IN_WORLD, OUT)                    \
+    F(world_histogram,                                                                            \
+      dem2d_world_histogram(v->world, (dem2d_histogram)v->number, v->count, v->out),              \
+      LOGS, IN_WORLD, ARG_INT(number, "kind", 0, DEM2D_HISTOGRAM_COUNT - 1, OUT_OF_RANGE),        \
+      ARG_INT(count, "bins", 1, INT_MAX, OUT_OF_RANGE), OUT)                                      \
+    F(world_equilibrium, dem2d_world_equilibrium(v->world, v->out), LOGS, IN_WORLD, OUT)          \
+    F(world_inertial_number, dem2d_world_inertial_number(v->world, v->x, v->y, v->out),           \
+      LOGS, IN_WORLD, ARG(x, "strain_rate", FINITE), ARG(y, "pressure", POSITIVE), OUT)           \
+    F(world_save, dem2d_world_save(v->world, v->desc, NULL),                                      \
+      DESCRIBED(SAVE, with_save), IN_WORLD, THE_DESC)                                             \
+    F(world_load, (v->snapshot->next = 0, dem2d_world_load(v->desc, NULL, v->out)),               \
+      MAKES(LOAD, with_load, free_world), THE_DESC, OUT)                                          \
+    F(world_write_svg, dem2d_world_write_svg(v->world, v->desc, NULL),                            \
+      DESCRIBED(SVG, with_svg), IN_WORLD, THE_DESC)                                               \
+    F(world_write_vtp, dem2d_world_write_vtp(v->world, v->desc, NULL),                            \
+      DESCRIBED(VTP, with_vtp), IN_WORLD, THE_DESC)                                               \
+    F(world_write_csv, dem2d_world_write_csv(v->world, v->desc, NULL),                            \
+      DESCRIBED(CSV, with_csv), IN_WORLD, THE_DESC, NAMES(COLUMN, "names", "values"))             \
+    F(pvd_write, dem2d_pvd_write(v->env, v->desc, NULL),                                          \
+      DESCRIBED(PVD, with_pvd), ENV, THE_DESC, NAMES(FILE_NAME, "files", "times"))                \
+    F(shape_axis, dem2d_shape_axis(v->shape, v->out, v->second),                                  \
+      PLAIN, ARG(shape, "shape", POINTER), OUT, SECOND)                                           \
+    F(damping_ratio, dem2d_damping_ratio(v->x, v->out),                                           \
+      PLAIN, ARG(x, "restitution", PORTION), OUT)                                                 \
+    F(world_add_segment, dem2d_world_add_wall(v->world, v->desc, v->out),                         \
+      DESCRIBED(SEGMENT, with_segment), IN_WORLD, THE_DESC, OUT)                                  \
+    F(world_set_segment, dem2d_world_set_wall(v->world, v->wall, v->desc),                        \
+      DESCRIBED(SEGMENT, with_segment), IN_WORLD, ARG(wall, "wall", WALL_ID), THE_DESC)
+/* clang-format on */
+
+#define FUNCTION_CALL(name, expression, ...)   \
+    static dem2d_result call_##name(args *v) { \
+        return expression;                     \
+    }
+FUNCTIONS(FUNCTION_CALL)
+
+#define FUNCTION_ROWS(name, expression, how, ...) static const row rows_##name[] = {__VA_ARGS__};
+FUNCTIONS(FUNCTION_ROWS)
+
+#define FUNCTION_ROW(name, expression, how, ...) \
+    {#name, call_##name, how, rows_##name, COUNT_OF(rows_##name)},
+static const function functions[] = {FUNCTIONS(FUNCTION_ROW)};
 
 #endif
