@@ -22,7 +22,10 @@
 #define _POSIX_C_SOURCE 200809L
 #define DEM2D_IMPLEMENTATION
 #include "dem2d.h"
-#include "common.h"
+#include "grains.h"
+#include "statistics.h"
+
+#include <float.h>
 
 static const char usage[] =
     "usage: biaxial [options]\n"
@@ -91,10 +94,8 @@ enum {
     FACES,
     PAPERS,
     GRAINS,
-    CROP,
-    LABELS,
-    IGNORE_FRAME,
-    MIN_COVERAGE,
+    SEARCH, // SEARCH_OPTIONS of them
+    MIN_COVERAGE = SEARCH + SEARCH_OPTIONS,
     OUT,
     PAIRS,
     LEDGER,
@@ -102,11 +103,10 @@ enum {
     OPTIONS
 };
 static const char *const option_names[OPTIONS] = {
-    "--quick",        "--particles=",    "--seed=",         "--shapes=", "--damping=",
-    "--restitution=", "--stiffness=",    "--wall-friction", "--gravity", "--solver=",
-    "--faces=",       "--papers",        "--grains=",       "--crop=",   "--labels",
-    "--ignore-frame", "--min-coverage=", "--out=",          "--pairs",   "--ledger",
-    "--vtk"};
+    "--quick",        "--particles=", "--seed=",         "--shapes=",  "--damping=",
+    "--restitution=", "--stiffness=", "--wall-friction", "--gravity",  "--solver=",
+    "--faces=",       "--papers",     "--grains=",       SEARCH_NAMES, "--min-coverage=",
+    "--out=",         "--pairs",      "--ledger",        "--vtk"};
 
 static options parse_options(int count, char **arguments) {
     static const char *const dampings[] = {"local", "global"};
@@ -136,9 +136,7 @@ static options parse_options(int count, char **arguments) {
         if (which == FACES) o.faces = parse_name(name, value, rules, 2);
         if (which == PAPERS) o.papers = true;
         if (which == GRAINS) o.grains = value;
-        if (which == CROP) parse_crop(value, &o.search);
-        if (which == LABELS) o.search.labels = true;
-        if (which == IGNORE_FRAME) o.search.ignore_frame = true;
+        if (which >= SEARCH && which < MIN_COVERAGE) take_search(which - SEARCH, value, &o.search);
         if (which == MIN_COVERAGE) o.min_coverage = parse_real(name, value, 0, 1);
         if (which == OUT) o.out = value;
         if (which == PAIRS) o.pairs = true;
@@ -432,21 +430,88 @@ static void write_series(const job *j) {
     }
 }
 
-/* ---- what GJK and EPA do with the pairs of a state ---- */
+/* ---- pairs whose bounding circles overlap ---- */
+
+typedef struct near_pair {
+    int a, b; // places in the list of grains, a < b
+} near_pair;
+
+typedef struct neighbours {
+    dem2d_particle_info *grains; // in the order of their ids
+    near_pair *pairs;            // in the order of b, then a
+    int count;                   // of the pairs
+} neighbours;
+
+/* A grain's place and the left end of its bounding circle. */
+typedef struct left_end {
+    double x;
+    int place;
+} left_end;
+
+static int compare_ends(const void *a, const void *b) {
+    const left_end *p = a, *q = b;
+    return p->x != q->x ? (p->x > q->x) - (p->x < q->x) : p->place - q->place;
+}
+
+static int compare_pairs(const void *a, const void *b) {
+    const near_pair *p = a, *q = b;
+    return p->b != q->b ? p->b - q->b : p->a - q->a;
+}
+
+static bool circles_overlap(const dem2d_particle_info *a, const dem2d_particle_info *b) {
+    const double dx = b->pose.position.x - a->pose.position.x;
+    const double dy = b->pose.position.y - a->pose.position.y, reach = a->radius + b->radius;
+    return dx * dx + dy * dy < reach * reach;
+}
+
+/* A sweep along x: each grain meets those whose left end is before its right end. */
+static neighbours find_neighbours(const dem2d_world *world, int particles) {
+    neighbours n = {NULL, NULL, 0};
+    int count;
+    dem2d_particle_id *ids = get_memory(NULL, (size_t)particles, sizeof *ids);
+    left_end *ends = get_memory(NULL, (size_t)particles, sizeof *ends);
+    n.grains = get_memory(NULL, (size_t)particles, sizeof *n.grains);
+    must(dem2d_world_particles(world, ids, particles, &count), "particles");
+    for (int i = 0; i < count; i++) {
+        must(dem2d_world_get_particle(world, ids[i], &n.grains[i]), "particle");
+        ends[i].x = n.grains[i].pose.position.x - n.grains[i].radius;
+        ends[i].place = i;
+    }
+    qsort(ends, (size_t)count, sizeof *ends, compare_ends);
+    for (int i = 0; i < count; i++)
+        for (int k = i + 1; k < count; k++) {
+            const int p = ends[i].place, q = ends[k].place;
+            if (ends[k].x > n.grains[p].pose.position.x + n.grains[p].radius) break;
+            if (!circles_overlap(&n.grains[p], &n.grains[q])) continue;
+            if ((n.count & (n.count - 1)) == 0) // at powers of 2: room for twice as many
+                n.pairs = get_memory(n.pairs, 2 * (size_t)n.count + 1, sizeof *n.pairs);
+            n.pairs[n.count].a = p < q ? p : q;
+            n.pairs[n.count++].b = p < q ? q : p;
+        }
+    if (n.count > 0) qsort(n.pairs, (size_t)n.count, sizeof *n.pairs, compare_pairs);
+    free(ids);
+    free(ends);
+    return n;
+}
+
+static void free_neighbours(neighbours *n) {
+    free(n->grains);
+    free(n->pairs);
+}
 
 enum { RESIDUALS = 30 };
 
-/* A row of a pair whose bounding circles overlap: kinds, whether it is in contact, support calls of
-   GJK from the line of centres; then the size that tolerances are relative to (m) and, of two in
-   contact, the residual of EPA (m, as the papers define it) after 1, 2, .. iterations. Cells are
-   empty until GJK has found its simplex in as many iterations, and once EPA has ended. */
+/* What GJK and EPA do with a pair whose bounding circles overlap, in a row: kinds, whether it is in
+   contact, support calls of GJK from the line of centres; then the size that tolerances are
+   relative to (m) and, of two in contact, the residual of EPA (m, as the papers define it) after 1,
+   2, .. iterations. Cells are empty until GJK has found its simplex in as many iterations, and once
+   EPA has ended. */
 static void write_pair(FILE *file, const dem2d_world *world, const dem2d_particle_info *a,
                        const dem2d_particle_info *b) {
     const dem2d_shape *one = dem2d_world_shape(world, a->shape);
     const dem2d_shape *other = dem2d_world_shape(world, b->shape);
     const double dx = b->pose.position.x - a->pose.position.x;
     const double dy = b->pose.position.y - a->pose.position.y, reach = a->radius + b->radius;
-    if (dx * dx + dy * dy >= reach * reach) return;
     dem2d_shape_info info[2];
     dem2d_contact gjk, epa;
     must(dem2d_shape_get(one, &info[0]), "shape");
@@ -471,51 +536,31 @@ static void write_pair(FILE *file, const dem2d_world *world, const dem2d_particl
 }
 
 static void write_pairs(const job *j) {
-    const int room = j->plan.particles;
-    dem2d_particle_id *ids = get_memory(NULL, (size_t)room, sizeof *ids);
-    dem2d_particle_info *grains = get_memory(NULL, (size_t)room, sizeof *grains);
-    int count;
+    neighbours n = find_neighbours(j->world, j->plan.particles);
     draft d;
     draft_open(&d);
     fputs("a,b,contact,calls,size", d.file);
     for (int k = 1; k <= RESIDUALS; k++) fprintf(d.file, ",residual_%d", k);
     fputc('\n', d.file);
-    must(dem2d_world_particles(j->world, ids, room, &count), "particles");
-    for (int i = 0; i < count; i++) {
-        must(dem2d_world_get_particle(j->world, ids[i], &grains[i]), "particle");
-        for (int k = 0; k < i; k++) write_pair(d.file, j->world, &grains[k], &grains[i]);
-    }
+    for (int i = 0; i < n.count; i++)
+        write_pair(d.file, j->world, &n.grains[n.pairs[i].a], &n.grains[n.pairs[i].b]);
     write_out(j, "pairs.csv", &d);
-    free(ids);
-    free(grains);
+    free_neighbours(&n);
 }
 
 /* ---- steps, and what is watched meanwhile ---- */
 
-/* Pairs whose bounding circles overlap and that do not touch: those a step might have to look at
-   in vain. Every WATCH steps and in small scenes, as it takes the square of their number. */
-enum { WATCH = 500, WATCHED = 2000 };
+/* Pairs whose bounding circles overlap and that do not touch, every WATCH steps: those a step might
+   have to collide in vain. */
+enum { WATCH = 500 };
 
 static void watch_near_pairs(job *j) {
     dem2d_stats stats;
-    int count;
+    neighbours n = find_neighbours(j->world, j->plan.particles);
     must(dem2d_world_stats(j->world, &stats), "stats");
-    dem2d_particle_id *ids = get_memory(NULL, (size_t)stats.particles, sizeof *ids);
-    dem2d_particle_info *grains = get_memory(NULL, (size_t)stats.particles, sizeof *grains);
-    must(dem2d_world_particles(j->world, ids, stats.particles, &count), "particles");
-    for (int i = 0; i < count; i++) {
-        must(dem2d_world_get_particle(j->world, ids[i], &grains[i]), "particle");
-        for (int k = 0; k < i; k++) {
-            const double dx = grains[i].pose.position.x - grains[k].pose.position.x;
-            const double dy = grains[i].pose.position.y - grains[k].pose.position.y;
-            const double reach = grains[i].radius + grains[k].radius;
-            j->near_pairs += dx * dx + dy * dy < reach * reach;
-        }
-    }
-    j->near_pairs -= stats.contacts;
+    j->near_pairs += n.count - stats.contacts;
     j->near_samples++;
-    free(ids);
-    free(grains);
+    free_neighbours(&n);
 }
 
 /* Whether to go on. */
@@ -526,7 +571,7 @@ static bool take_steps(job *j, int count) {
     snprintf(what, sizeof what, "%s, step %d", stage_names[j->stage], j->steps + done + 1);
     must(result, what);
     j->steps += count;
-    if (j->steps % WATCH == 0 && j->plan.particles <= WATCHED) watch_near_pairs(j);
+    if (j->steps % WATCH == 0) watch_near_pairs(j);
     if (j->options->vtk && j->steps % j->plan.frame == 0) write_frame(j);
     progress_show(&j->progress, stage_names[j->stage], j->steps);
     return !stop_asked;

@@ -20,7 +20,9 @@
 #define _POSIX_C_SOURCE 200809L
 #define DEM2D_IMPLEMENTATION
 #include "dem2d.h"
-#include "common.h"
+#include "grains.h"
+#include "statistics.h"
+#include "svg.h"
 
 static const char usage[] =
     "usage: figures DIR [options]\n"

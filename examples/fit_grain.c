@@ -11,7 +11,8 @@
 #define _POSIX_C_SOURCE 200809L
 #define DEM2D_IMPLEMENTATION
 #include "dem2d.h"
-#include "common.h"
+#include "grains.h"
+#include "svg.h"
 
 static const char usage[] =
     "usage: fit_grain FILE [options]\n"
@@ -56,10 +57,10 @@ enum {
     MIN_RADIUS,
     MAX_RADIUS,
     SCALE,
-    CROP,
-    LABELS,
-    IGNORE_FRAME,
-    THRESHOLD,
+    SEARCH, // SEARCH_OPTIONS of them; these and the rest up to SCALE_LENGTH are for images
+    LABELS = SEARCH + SEARCH_LABELS,
+    IGNORE_FRAME = SEARCH + SEARCH_IGNORE_FRAME,
+    THRESHOLD = SEARCH + SEARCH_OPTIONS,
     BRIGHT,
     MIN_PIXELS,
     SCALE_LENGTH,
@@ -68,10 +69,9 @@ enum {
     OPTIONS
 };
 static const char *const option_names[OPTIONS] = {
-    "--model=",        "--order=",       "--segments=",   "--vertices=", "--coverage=",
-    "--method=",       "--min-radius=",  "--max-radius=", "--scale=",    "--crop=",
-    "--labels",        "--ignore-frame", "--threshold=",  "--bright",    "--min-pixels=",
-    "--scale-length=", "--outline=",     "--svg="};
+    "--model=",      "--order=",        "--segments=", "--vertices=", "--coverage=",  "--method=",
+    "--min-radius=", "--max-radius=",   "--scale=",    SEARCH_NAMES,  "--threshold=", "--bright",
+    "--min-pixels=", "--scale-length=", "--outline=",  "--svg="};
 
 typedef struct options {
     const char *file;
@@ -143,18 +143,17 @@ static void take_fit(options *o) {
         fit->scale = (dem2d_fit_scale)parse_name("--scale", given[SCALE], scales, 3);
 }
 
-static void take_search(options *o) {
+static void take_image(options *o) {
     const char *const *given = o->given;
     dem2d_image_desc *search = &o->search;
     *search = default_search();
     search->bright = given[BRIGHT] != NULL;
-    search->labels = given[LABELS] != NULL;
-    search->ignore_frame = given[IGNORE_FRAME] != NULL;
+    for (int i = 0; i < SEARCH_OPTIONS; i++)
+        if (given[SEARCH + i] != NULL) take_search(i, given[SEARCH + i], search);
     refuse(o, THRESHOLD, search->labels || search->ignore_frame,
            "and --labels or --ignore-frame exclude each other");
     refuse(o, IGNORE_FRAME, search->labels, "and --labels exclude each other");
     refuse(o, BRIGHT, search->labels, "and --labels exclude each other");
-    if (given[CROP] != NULL) parse_crop(given[CROP], search);
     if (given[THRESHOLD] != NULL)
         search->threshold = (int)parse_integer("--threshold", given[THRESHOLD], 1, 65535);
     if (given[MIN_PIXELS] != NULL)
@@ -178,7 +177,7 @@ static options parse_options(int count, char **arguments) {
     }
     if (o.file == NULL) fail(STATUS_BAD_INPUT, "no FILE (try --help)");
     take_fit(&o);
-    take_search(&o);
+    take_image(&o);
     return o;
 }
 
@@ -188,7 +187,7 @@ static outline_list load(const options *o) {
     if (kind == FILE_OTHER)
         fail(STATUS_BAD_INPUT, "%s: neither PBM, PGM nor CSV whose first line names x and y",
              o->file);
-    for (int option = CROP; option <= SCALE_LENGTH; option++)
+    for (int option = SEARCH; option <= SCALE_LENGTH; option++)
         refuse(o, option, kind != FILE_IMAGE, "is for images");
     if (list.count == 0) fail(STATUS_BAD_INPUT, "%s: no grain found", o->file);
     return list;

@@ -11,7 +11,7 @@
 #define _POSIX_C_SOURCE 200809L
 #define DEM2D_IMPLEMENTATION
 #include "dem2d.h"
-#include "common.h"
+#include "falling.h"
 
 /* The dem2d_parallel_fn; `user` is the number of threads. Static: each thread then finds in its
    cache what it left there in the last step. */

@@ -12,7 +12,7 @@
 #define _POSIX_C_SOURCE 200809L
 #define DEM2D_IMPLEMENTATION
 #include "dem2d.h"
-#include "common.h"
+#include "falling.h"
 
 #include <pthread.h>
 #include <sched.h>

@@ -7,7 +7,7 @@
 #define _POSIX_C_SOURCE 200809L
 #define DEM2D_IMPLEMENTATION
 #include "dem2d.h"
-#include "../examples/common.h"
+#include "../examples/readers.h"
 
 int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size);
 

@@ -2,8 +2,10 @@
  */
 #define _POSIX_C_SOURCE 200809L
 #include "dem2d.h"
-#include "../examples/common.h" /* first: its fail() is a function, cmocka's a macro */
+#include "../examples/grains.h" /* first: its fail() is a function, cmocka's a macro */
 #include "testing.h"
+
+#include <float.h>
 
 #include <sys/wait.h>
 

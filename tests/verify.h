@@ -3,7 +3,8 @@
 #ifndef VERIFY_H
 #define VERIFY_H
 
-#include "../examples/common.h"
+#include "../examples/grains.h"
+#include "../examples/statistics.h"
 #include "world_scene.h"
 
 #include <float.h>
