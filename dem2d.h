@@ -10902,9 +10902,10 @@ typedef enum dem2di_group {
     DEM2DI_MATERIALS,
     DEM2DI_LAWS, /* laws_side squared */
     DEM2DI_NAMES,
-    DEM2DI_BODIES,  /* and one more */
+    DEM2DI_BODIES,
     DEM2DI_TRAVELS, /* of bodies, where plan.turns */
     DEM2DI_MADE,    /* of bodies, where some are redirected */
+    DEM2DI_STARTS,  /* of the contacts of bodies, and the end of the last */
     DEM2DI_WALLS,
     DEM2DI_KEYS,
     DEM2DI_GENERAL, /* all but circles */
@@ -11262,8 +11263,8 @@ enum {
     DEM2DI_MOVES = 1,   /* with the particles, when these are sorted in memory */
     DEM2DI_SWAPS = 2,   /* with the column on the next line, which holds the next step's values */
     DEM2DI_HASHED = 4,  /* callers see it, or it decides what they will see */
-    DEM2DI_FIRST = 8,   /* of its group in a snapshot, which has it even if all is 0: no number of
-                           rows takes memory without as many bytes */
+    DEM2DI_FIRST = 8,   /* of its group in a snapshot, even if all is 0: no number of rows takes
+                           memory without as many bytes */
     DEM2DI_SHARES = 16, /* its memory is that of another line, or of the world itself */
     DEM2DI_STORED =
         32 /* of contacts: carried over from list to list, kept in steps that look back */
@@ -11314,7 +11315,6 @@ static const dem2di_column dem2di_columns[] = {
                   DEM2DI_ALL(dem2di_state_fields)),
     DEM2DI_COLUMN("wear", DEM2DI_BODIES, wear, 0, DEM2DI_ALL(dem2di_any_field)),
     DEM2DI_COLUMN(NULL, DEM2DI_BODIES, inverse, DEM2DI_MOVES, DEM2DI_NONE),
-    DEM2DI_COLUMN(NULL, DEM2DI_BODIES, list.first, 0, DEM2DI_NONE),
     DEM2DI_COLUMN(NULL, DEM2DI_BODIES, list.own, 0, DEM2DI_NONE),
     DEM2DI_COLUMN("travel", DEM2DI_TRAVELS, travel, DEM2DI_MOVES | DEM2DI_SWAPS,
                   DEM2DI_ALL(dem2di_way_field)),
@@ -11322,6 +11322,7 @@ static const dem2di_column dem2di_columns[] = {
     DEM2DI_COLUMN(NULL, DEM2DI_TRAVELS, lever, DEM2DI_MOVES, DEM2DI_NONE),
     DEM2DI_COLUMN("made", DEM2DI_MADE, made, DEM2DI_MOVES | DEM2DI_HASHED,
                   DEM2DI_ALL(dem2di_velocity_fields)),
+    DEM2DI_COLUMN(NULL, DEM2DI_STARTS, list.first, 0, DEM2DI_NONE),
     DEM2DI_COLUMN("wall_ids", DEM2DI_WALLS, walls, DEM2DI_FIRST | DEM2DI_HASHED,
                   DEM2DI_ALL(dem2di_wall_id_fields)),
     DEM2DI_COLUMN("walls", DEM2DI_WALLS, walls, DEM2DI_SHARES | DEM2DI_HASHED,
@@ -11456,10 +11457,23 @@ static void dem2di_columns_move(dem2d_world *world, const int *to, int slots, in
     }
 }
 
-/* Room for particles, in all columns of particles that are in use: list.first ends with the end of
-   the last one. */
+/* A new row has no past: all of it is 0, in all columns from one group to another that are in use.
+ */
+static void dem2di_row_clear(dem2d_world *world, dem2di_group first, dem2di_group last, int row) {
+    for (int k = 0; k < DEM2DI_COLUMNS; k++) {
+        const dem2di_column *column = &dem2di_columns[k];
+        if (column->group < first || column->group > last || (column->treatment & DEM2DI_SHARES))
+            continue;
+        if (row >= world->capacity[column->group]) continue;
+        char *array = (char *)dem2di_column_get(world, column);
+        memset(array + (size_t)row * column->size, 0, column->size);
+    }
+}
+
+/* Room for particles, in all columns of particles that are in use. */
 static bool dem2di_reserve_bodies(dem2d_world *world, int count) {
-    return dem2di_group_reserve(world, DEM2DI_BODIES, count + 1) &&
+    return dem2di_group_reserve(world, DEM2DI_BODIES, count) &&
+           dem2di_group_reserve(world, DEM2DI_STARTS, count + 1) &&
            dem2di_group_reserve(world, DEM2DI_NAMES, count) &&
            (!world->plan.turns || dem2di_group_reserve(world, DEM2DI_TRAVELS, count)) &&
            (!world->redirected || dem2di_group_reserve(world, DEM2DI_MADE, count));
@@ -11856,11 +11870,11 @@ DEM2D_API dem2d_result dem2d_world_add_particle(dem2d_world *world, const dem2d_
     dem2d_result result = dem2di_check_particle(world, desc);
     if (result != DEM2D_OK) return result;
     dem2di_body body;
+    memset(&body, 0, sizeof body);
     body.scale = desc->scale;
     body.shape_index = (int)desc->shape.index;
     body.material = (uint16_t)desc->material.index;
     body.motion = (uint8_t)desc->motion;
-    body.redirected = false;
     double mass = dem2di_body_mass(world, &body), inertia = dem2di_body_inertia(world, &body);
     if (!(mass > 0 && inertia > 0 && dem2di_finite(mass) && dem2di_finite(inertia)))
         return dem2di_fail(&world->env, DEM2D_OUT_OF_RANGE, -1, "scale = %g gives mass %g",
@@ -11869,6 +11883,7 @@ DEM2D_API dem2d_result dem2d_world_add_particle(dem2d_world *world, const dem2d_
     if (slot == 1 << 30)
         return dem2di_fail(&world->env, DEM2D_OUT_OF_RANGE, -1, "more than %d particles", slot);
     if (!dem2di_reserve_bodies(world, slot + 1)) return dem2di_out_of_memory(world, "a particle");
+    dem2di_row_clear(world, DEM2DI_BODIES, DEM2DI_MADE, slot);
     body.index = dem2di_name_take(world);
     world->names[body.index].slot = slot;
     world->bodies[slot] = body;
@@ -12313,11 +12328,10 @@ DEM2D_API dem2d_result dem2d_world_add_wall(dem2d_world *world, const dem2d_wall
         return dem2di_out_of_memory(world, "a wall");
     if (!dem2di_line_make(world, desc)) return DEM2D_OUT_OF_MEMORY;
     dem2di_wall *wall = &world->walls[slot];
+    uint32_t generation = wall->generation + 1;
+    dem2di_row_clear(world, DEM2DI_WALLS, DEM2DI_WALLS, slot);
     wall->alive = true;
-    wall->generation++;
-    wall->users = 0;
-    wall->skin = 0;
-    memset(&world->wall_now[slot], 0, sizeof *world->wall_now);
+    wall->generation = generation;
     if (desc->mode == DEM2D_WALL_MOVING) world->wall_now[slot].velocity = desc->velocity;
     dem2di_wall_place(world, slot, desc);
     world->check_due = true;
@@ -15650,9 +15664,9 @@ static dem2d_result dem2di_writer_close(const dem2d_env *env, const char *path,
        name, number of rows, number of fields;
        of each field the name, and how many numbers it has, plus 256 if they are doubles;
        row by row the numbers.
-   Columns that are 0 all over are left out. A name that is not known here is an error that tells
-   it: a later version has written it, and its state must not be lost in silence. The number of the
-   version changes only when these rules do. */
+   Columns and fields that are 0 all over are left out. A name that is not known here is an error
+   that tells it: a later version has written it, and its state must not be lost in silence. The
+   number of the version changes only when these rules do. */
 #define DEM2DI_SNAPSHOT_MARK 0x0A0D64326D65648Du /* 8D "dem2d" 0D 0A */
 #define DEM2DI_SNAPSHOT_VERSION 4u
 #define DEM2DI_SNAPSHOT_HEAD 24 /* bytes: mark, version, size */
@@ -15976,37 +15990,46 @@ static void dem2di_put_name(dem2di_saver *saver, const char *name) {
     for (int k = 0; k < DEM2DI_NAME_WORDS; k++) dem2di_put_word(saver, dem2di_name_word(name, k));
 }
 
-/* All numbers of a column, to a saver or (NULL) not. Returns whether any is not 0. */
-static bool dem2di_put_rows(dem2di_saver *saver, const void *object, const dem2di_column *column) {
-    uint64_t bits = 0;
+/* Which fields of a column have a number that is not 0: bits. */
+static uint64_t dem2di_fields_used(const void *object, const dem2di_column *column) {
+    uint64_t used = (column->treatment & DEM2DI_FIRST) != 0; /* one tells how many rows there are */
+    dem2di_row made;
     for (int i = 0; i < dem2di_rows(object, column); i++) {
-        dem2di_row made;
         const void *row = dem2di_saved_row(object, column, i, &made);
         for (int f = 0; f < column->count; f++)
-            for (int k = 0; k < dem2di_numbers_of(&column->fields[f]); k++) {
-                uint64_t number = dem2di_number_get(&column->fields[f], row, k);
-                bits |= number;
-                if (saver != NULL) dem2di_put_word(saver, number);
-            }
+            for (int k = 0; k < dem2di_numbers_of(&column->fields[f]) && !(used >> f & 1); k++)
+                if (dem2di_number_get(&column->fields[f], row, k) != 0) used |= (uint64_t)1 << f;
     }
-    return bits != 0;
+    return used;
+}
+
+static void dem2di_put_rows(dem2di_saver *saver, const void *object, const dem2di_column *column,
+                            uint64_t used) {
+    dem2di_row made;
+    for (int i = 0; i < dem2di_rows(object, column); i++) {
+        const void *row = dem2di_saved_row(object, column, i, &made);
+        for (int f = 0; f < column->count; f++)
+            for (int k = 0; k < dem2di_numbers_of(&column->fields[f]) && (used >> f & 1); k++)
+                dem2di_put_word(saver, dem2di_number_get(&column->fields[f], row, k));
+    }
 }
 
 static void dem2di_put_column(void *context, const void *object, const dem2di_column *column) {
     dem2di_saver *saver = (dem2di_saver *)context;
     int rows = dem2di_rows(object, column);
-    bool always = (column->treatment & DEM2DI_FIRST) != 0;
-    if (column->name == NULL || rows == 0) return;
-    if (!always && !dem2di_put_rows(NULL, object, column)) return;
+    uint64_t used = column->name != NULL ? dem2di_fields_used(object, column) : 0, fields = 0;
+    if (rows == 0 || used == 0) return;
+    for (int f = 0; f < column->count; f++) fields += used >> f & 1;
     dem2di_put_name(saver, column->name);
     dem2di_put_word(saver, (uint64_t)rows);
-    dem2di_put_word(saver, (uint64_t)column->count);
+    dem2di_put_word(saver, fields);
     for (int f = 0; f < column->count; f++) {
+        if (!(used >> f & 1)) continue;
         uint64_t doubles = dem2di_is_real(&column->fields[f]) ? 256 : 0;
         dem2di_put_name(saver, column->fields[f].name);
         dem2di_put_word(saver, (uint64_t)dem2di_numbers_of(&column->fields[f]) + doubles);
     }
-    (void)dem2di_put_rows(saver, object, column);
+    dem2di_put_rows(saver, object, column, used);
 }
 
 /* To where the saver writes, which is closed. */
@@ -16168,10 +16191,8 @@ static void dem2di_load_zeros(dem2di_loader *loader, const dem2di_column *column
 
 static void dem2di_load_reserve(dem2di_loader *loader, const dem2di_column *column, int rows) {
     if (column->group == DEM2DI_WORLD || column->group >= DEM2DI_SHAPE) return;
-    if (!dem2di_load_good(loader)) return;
-    int more = column->group == DEM2DI_BODIES; /* the end of the last particle's contacts */
-    dem2di_load_room(loader,
-                     dem2di_group_reserve(loader->world, (dem2di_group)column->group, rows + more));
+    if (dem2di_load_good(loader))
+        dem2di_load_room(loader, dem2di_group_reserve(loader->world, column->group, rows));
 }
 
 static void dem2di_take_rows(dem2di_loader *loader, const dem2di_record *record) {
@@ -16318,9 +16339,8 @@ static void dem2di_check_settings(dem2di_loader *loader) {
     if (!dem2di_load_good(loader) || !w->has_law) return;
     if (desc->law == NULL || desc->law_tag != w->law_tag) {
         const char *what = desc->law == NULL ? "law is NULL: law_tag" : "law_tag";
-        loader->result =
-            dem2di_fail(loader->env, DEM2D_NULL_ARGUMENT, -1, "%s = %d, the world's is %d", what,
-                        desc->law_tag, w->law_tag);
+        loader->result = dem2di_fail(loader->env, DEM2D_NULL_ARGUMENT, -1,
+                                     "%s = %d, the world's is %d", what, desc->law_tag, w->law_tag);
         return;
     }
     w->law = desc->law;
