@@ -8720,37 +8720,16 @@ static bool dem2di_edge_last(const dem2di_pair *pair, const dem2di_core core[2],
    support evaluations it needs for polygons of 64 corners. */
 #define DEM2DI_MANY_EDGES 24
 
-/* Least overlap or greatest gap. If the cores overlap, the least support value is at an edge's
-   normal: walk to both sides of the start until the reached corners exclude the rest of the cone.
-   With `beside` the better of the next two edges is known to be the one. False if there are too
-   many edges, as for large polygons that are not round. */
-static bool dem2di_edges_solve(dem2di_pair *pair, const dem2di_feature *last, dem2d_vec u,
-                               bool beside, dem2di_search *search) {
-    dem2di_core core[2];
-    dem2di_walk walk[2];
+/* Overlapping cores: the least support value is at an edge's normal. Walk to both sides of the
+   start until the reached corners exclude the rest of the cone. With `beside` the better of the
+   next two edges is known to be the one. False if there are too many edges, as for large polygons
+   that are not round. */
+static inline bool dem2di_cores_overlap(const dem2di_pair *pair, const dem2di_core core[2],
+                                        dem2di_walk walk[2], bool beside, dem2di_search *search) {
     dem2di_passed_edge edge[2]; /* the best, and the last passed */
-    int best = 0;
     dem2d_vec end[2], n[2];
+    int best = 0;
     bool cone = false;
-    dem2di_cores_set(pair, core);
-    pair->calls++;
-    search->proof = DEM2D_BY_FORM;
-    if (dem2di_edge_last(pair, core, last, search)) return true;
-    /* from a start behind, both sides would seem to be past the cone */
-    if (!(dem2di_dot(u, pair->d) > 0)) u = dem2di_centres(pair);
-    int k[2] = {0, 0};
-    dem2d_vec v[2];
-    for (int i = 0; i < 2; i++) {
-        const dem2d_shape *shape = i == 0 ? pair->a : pair->b;
-        v[i] = dem2di_turn_back(core[i].q, dem2di_scale(u, core[i].sign));
-        if (core[i].count > 1) k[i] = dem2di_polygon_corner(shape, v[i]);
-    }
-    if (!beside && dem2di_edge_warm(pair, core, k, v, search)) return true;
-    for (int i = 0; i < 2; i++) dem2di_walk_set(pair, core, k[0], k[1], i > 0 ? 1 : -1, &walk[i]);
-    if (dem2di_dot(walk[0].w, u) < 0) {
-        dem2di_cores_apart(pair, core, k[0], k[1], u, search);
-        return true;
-    }
     edge[0].h = HUGE_VAL;
     int all = core[0].count + core[1].count;
     for (int i = 0; i <= DEM2DI_MANY_EDGES; i++) {
@@ -8782,6 +8761,35 @@ static bool dem2di_edges_solve(dem2di_pair *pair, const dem2di_feature *last, de
         if (i == 0) cone = dem2di_cone(pair, depth, end);
     }
     return false;
+}
+
+/* Least overlap or greatest gap of two shapes with cores: try the feature of the last step, then
+   the start u, then walk along the boundary of A minus B. See dem2di_cores_overlap for `beside` and
+   the result. */
+static bool dem2di_edges_solve(dem2di_pair *pair, const dem2di_feature *last, dem2d_vec u,
+                               bool beside, dem2di_search *search) {
+    dem2di_core core[2];
+    dem2di_walk walk[2];
+    dem2di_cores_set(pair, core);
+    pair->calls++;
+    search->proof = DEM2D_BY_FORM;
+    if (dem2di_edge_last(pair, core, last, search)) return true;
+    /* from a start behind, both sides would seem to be past the cone */
+    if (!(dem2di_dot(u, pair->d) > 0)) u = dem2di_centres(pair);
+    int k[2] = {0, 0};
+    dem2d_vec v[2];
+    for (int i = 0; i < 2; i++) {
+        const dem2d_shape *shape = i == 0 ? pair->a : pair->b;
+        v[i] = dem2di_turn_back(core[i].q, dem2di_scale(u, core[i].sign));
+        if (core[i].count > 1) k[i] = dem2di_polygon_corner(shape, v[i]);
+    }
+    if (!beside && dem2di_edge_warm(pair, core, k, v, search)) return true;
+    for (int i = 0; i < 2; i++) dem2di_walk_set(pair, core, k[0], k[1], i > 0 ? 1 : -1, &walk[i]);
+    if (dem2di_dot(walk[0].w, u) < 0) {
+        dem2di_cores_apart(pair, core, k[0], k[1], u, search);
+        return true;
+    }
+    return dem2di_cores_overlap(pair, core, walk, beside, search);
 }
 
 /* ============================================================================================
@@ -8999,6 +9007,7 @@ typedef struct dem2di_bracket {
     dem2d_vec end[2];
     dem2di_vertex at[2];
     bool known, evaluated[2], chord;
+    double turned[2]; /* tangents of the last two Newton steps */
 } dem2di_bracket;
 
 /* Make the last evaluation an end of the bracket; false if it is outside of the bracket. */
@@ -9146,6 +9155,28 @@ static inline bool dem2di_step_smooth(const dem2di_pair *pair, double angle, dou
     return !eval->no_step || dem2di_stationary_close(pair, angle, bend, eval);
 }
 
+/* The next direction of a descent after step i: Newton's step, or a direction inside the bracket.
+   False if there is none. */
+static inline bool dem2di_descend_next(const dem2di_pair *pair, const dem2di_eval *eval,
+                                       double bend, int i, dem2di_bracket *bracket, dem2d_vec *u) {
+    double slope = fabs(eval->slope[0]);
+    bool bends = dem2di_curves_up(pair, bend);
+    /* small steps need no bracket, unless there are many */
+    bool near = bends && slope < 0.2 * bend && i < 4;
+    bool outside = (bracket->known || !near) && !dem2di_bracket_cut(pair, eval, bracket);
+    /* where rho has no bound Newton's steps may oscillate: each two have to halve the step */
+    double turn = bends ? slope / bend : HUGE_VAL;
+    bool slow = bracket->known && bracket->evaluated[0] && bracket->evaluated[1] &&
+                turn > 0.5 * bracket->turned[0];
+    bool newton = bends && !outside && !slow;
+    bracket->turned[0] = bracket->turned[1];
+    bracket->turned[1] = turn;
+    bracket->chord = false;
+    if (newton) *u = dem2di_newton(eval, bend);
+    if (newton && !(bracket->known && !dem2di_bracket_holds(bracket, *u))) return true;
+    return dem2di_bracket_next(bracket, slow, u);
+}
+
 /* Descend from a direction to a local minimum of h by Newton's steps inside a bracket. With
    `detect` it stops at the first separating direction. False if `cap` evaluations do not
    suffice. */
@@ -9153,9 +9184,9 @@ static bool dem2di_descend(dem2di_pair *pair, dem2d_vec u, double angle, int cap
                            dem2di_eval *eval, dem2di_search *search) {
     dem2di_bracket bracket;
     bool edges = pair->a->flat || pair->b->flat;
-    double turned[2] = {HUGE_VAL, HUGE_VAL}; /* tangents of the last two Newton steps */
     dem2di_member member[2];
     bracket.known = bracket.evaluated[0] = bracket.evaluated[1] = bracket.chord = false;
+    bracket.turned[0] = bracket.turned[1] = HUGE_VAL;
     if (edges) {
         for (int i = 0; i < 2; i++) member[i] = dem2di_member_of(pair, i);
         dem2di_eval_first(pair, member, u, eval);
@@ -9170,30 +9201,16 @@ static bool dem2di_descend(dem2di_pair *pair, dem2d_vec u, double angle, int cap
             search->normal.y = eval->u.y;
         }
         if (detect && eval->h < -DEM2DI_ROUNDING * pair->size) return true;
-        bool rest = dem2di_stationary(pair, &bracket, angle, eval);
-        double bend = eval->rho[0] + eval->rho[1] - eval->h, slope = eval->slope[0];
-        if (rest) {
+        bool stationary = dem2di_stationary(pair, &bracket, angle, eval);
+        double bend = eval->rho[0] + eval->rho[1] - eval->h;
+        if (stationary) {
             eval->no_step = dem2di_edges_unknown(pair->a) || dem2di_edges_unknown(pair->b);
             if (eval->edge) return true;
             if (edges ? dem2di_step_known(pair, member, &bracket, angle, bend, eval)
                       : dem2di_step_smooth(pair, angle, bend, eval))
                 return true;
         }
-        bool bends = dem2di_curves_up(pair, bend);
-        /* small steps need no bracket, unless there are many */
-        bool near = bends && fabs(slope) < 0.2 * bend && i < 4;
-        bool outside = (bracket.known || !near) && !dem2di_bracket_cut(pair, eval, &bracket);
-        /* where rho has no bound Newton's steps may oscillate: each two have to halve the step */
-        double turn = bends ? fabs(slope) / bend : HUGE_VAL;
-        bool slow =
-            bracket.known && bracket.evaluated[0] && bracket.evaluated[1] && turn > 0.5 * turned[0];
-        bool newton = bends && !outside && !slow;
-        turned[0] = turned[1];
-        turned[1] = turn;
-        bracket.chord = false;
-        if (newton) u = dem2di_newton(eval, bend);
-        if (!newton || (bracket.known && !dem2di_bracket_holds(&bracket, u)))
-            if (!dem2di_bracket_next(&bracket, slow, &u)) return false;
+        if (!dem2di_descend_next(pair, eval, bend, i, &bracket, &u)) return false;
         if (edges)
             dem2di_eval_towards(pair, member, u, eval);
         else
