@@ -3676,9 +3676,9 @@ static dem2d_vec *dem2di_chain_side(const dem2di_chain *chain, int arc, bool las
 }
 
 /* Tiny arcs between two arcs become a corner: the two meet in the middle of the chord. */
-static void dem2di_chain_corner(dem2di_chain *chain, int before, int after, dem2d_vec way,
+static void dem2di_chain_corner(dem2di_chain *chain, int before, int after, dem2d_vec chord,
                                 double length) {
-    dem2d_vec half = dem2di_scale(way, 0.5), *end = dem2di_chain_side(chain, before, true);
+    dem2d_vec half = dem2di_scale(chord, 0.5), *end = dem2di_chain_side(chain, before, true);
     *end = dem2di_add(*end, half);
     end = dem2di_chain_side(chain, after, false);
     *end = dem2di_add(*end, half);
@@ -3691,13 +3691,13 @@ static void dem2di_chain_corner(dem2di_chain *chain, int before, int after, dem2
 static bool dem2di_chain_set(dem2di_chain *chain, const dem2di_arc *arcs, int count) {
     int first = 0, kept = 0;
     double length = 0; /* of the tiny arcs after the last that was kept */
-    dem2d_vec way = dem2di_vec(0, 0);
+    dem2d_vec chord = dem2di_vec(0, 0);
     while (first < count && dem2di_arc_length(&arcs[first]) <= chain->limits.tiny) first++;
     for (int i = 0; i < count && first < count; i++) {
         const dem2di_arc *arc = &arcs[(first + i) % count];
         double own = dem2di_arc_length(arc);
         if (own <= chain->limits.tiny) {
-            way = dem2di_add(way, dem2di_arc_chord(arc));
+            chord = dem2di_add(chord, dem2di_arc_chord(arc));
             length += own;
             continue;
         }
@@ -3707,14 +3707,14 @@ static bool dem2di_chain_set(dem2di_chain *chain, const dem2di_arc *arcs, int co
         chain->d[3 * kept + 2] = arc->d2;
         chain->tied[3 * kept] = chain->tied[3 * kept + 1] = false;
         chain->tied[3 * kept + 2] = true;
-        if (length > 0) dem2di_chain_corner(chain, kept - 1, kept, way, length);
-        way = dem2di_vec(0, 0);
+        if (length > 0) dem2di_chain_corner(chain, kept - 1, kept, chord, length);
+        chord = dem2di_vec(0, 0);
         length = 0;
         kept++;
     }
     if (kept < 2) return false;
     chain->count = 3 * kept;
-    if (length > 0) dem2di_chain_corner(chain, kept - 1, 0, way, length);
+    if (length > 0) dem2di_chain_corner(chain, kept - 1, 0, chord, length);
     return true;
 }
 
@@ -3886,11 +3886,11 @@ static int dem2di_arc_parts(dem2di_chain *chain, const dem2di_arc *arc, dem2di_a
     for (int i = 0; i < 2; i++) { /* a tiny part becomes a corner */
         double length = dem2di_arc_length(&part[i]);
         if (length > chain->limits.tiny) continue;
-        dem2d_vec way = dem2di_arc_chord(&part[i]);
+        dem2d_vec chord = dem2di_arc_chord(&part[i]);
         dem2d_vec *beside = i == 0 ? &part[1].d0 : &part[0].d2;
-        *beside = dem2di_add(*beside, way);
+        *beside = dem2di_add(*beside, chord);
         if (i == 0) part[1].start = part[0].start;
-        if (i == 1) part[1].start = dem2di_add(part[1].start, way);
+        if (i == 1) part[1].start = dem2di_add(part[1].start, chord);
         part[i].d0 = part[i].d1 = part[i].d2 = dem2di_vec(0, 0);
         chain->parted = dem2di_max(chain->parted, length);
     }
@@ -3927,8 +3927,8 @@ static int dem2di_chain_parts(dem2di_chain *chain, dem2di_arc *part) {
         bool straight = tied[3 * k] && tied[3 * k + 1];
         if (straight && goes_on) {
             dem2di_arc *last = &part[count - 1];
-            dem2d_vec way = dem2di_add(dem2di_scale(last->d0, 3), dem2di_arc_chord(&arc));
-            last->d0 = last->d1 = last->d2 = dem2di_scale(way, 1.0 / 3);
+            dem2d_vec chord = dem2di_add(dem2di_scale(last->d0, 3), dem2di_arc_chord(&arc));
+            last->d0 = last->d1 = last->d2 = dem2di_scale(chord, 1.0 / 3);
         } else if (straight) {
             arc.d0 = arc.d1 = arc.d2 = dem2di_scale(dem2di_arc_chord(&arc), 1.0 / 3);
             part[count++] = arc;
@@ -4366,13 +4366,13 @@ static dem2d_vec dem2di_posed_given(const dem2d_shape *shape, const dem2d_pose *
    support point. */
 static dem2d_vec dem2di_given_point(const dem2d_shape *shape, dem2d_vec u, dem2d_vec point) {
     double place = dem2di_cross(u, point), at[2];
-    dem2d_vec end[2], s[2], way, v;
+    dem2d_vec end[2], s[2], v;
     int beyond = 0;
     if (!dem2di_deviates(shape)) return point;
     for (double angle = 4 * DEM2DI_SMOOTH; angle < 1; angle *= 8) {
         for (int i = 0; i < 2; i++) {
-            way = dem2di_along(u, i == 0 ? -angle : angle, dem2di_perp(u));
-            end[i] = dem2di_unit(way, &v) ? v : u;
+            dem2d_vec turned = dem2di_along(u, i == 0 ? -angle : angle, dem2di_perp(u));
+            end[i] = dem2di_unit(turned, &v) ? v : u;
             s[i] = dem2di_given_support(shape, end[i], NULL);
             at[i] = dem2di_cross(u, s[i]);
         }
@@ -4383,11 +4383,11 @@ static dem2d_vec dem2di_given_point(const dem2d_shape *shape, dem2d_vec u, dem2d
     /* 60 halvings reach rounding errors */
     for (int i = 0; i < 60 && dem2di_cross(end[0], end[1]) > 2 * DBL_EPSILON; i++) {
         if (!dem2di_unit(dem2di_add(end[0], end[1]), &v)) break;
-        way = dem2di_given_support(shape, v, NULL);
-        int side = dem2di_cross(u, way) >= place;
+        dem2d_vec middle = dem2di_given_support(shape, v, NULL);
+        int side = dem2di_cross(u, middle) >= place;
         end[side] = v;
-        s[side] = way;
-        at[side] = dem2di_cross(u, way);
+        s[side] = middle;
+        at[side] = dem2di_cross(u, middle);
     }
     double t = at[1] > at[0] ? (place - at[0]) / (at[1] - at[0]) : 0;
     return dem2di_along(s[0], t, dem2di_sub(s[1], s[0]));
@@ -6227,9 +6227,9 @@ static double dem2di_side_groups_farthest(const dem2di_side_groups *grouped,
     for (int i = 0; i < count; i++) {
         dem2d_vec p = corners[i].a;
         double square = dem2di_side_square(&grouped->sides[k], p);
-        for (int way = 0; way < 2; way++)
+        for (int sense = 0; sense < 2; sense++)
             for (;;) {
-                int next = way == 0 ? (k + 1 < n ? k + 1 : 0) : (k > 0 ? k - 1 : n - 1);
+                int next = sense == 0 ? (k + 1 < n ? k + 1 : 0) : (k > 0 ? k - 1 : n - 1);
                 double found = dem2di_side_square(&grouped->sides[next], p);
                 if (!(found < square)) break;
                 square = found;
@@ -6522,23 +6522,23 @@ static dem2d_vec dem2di_edge_normal(const dem2di_outline *outline, int from) {
 /* Distribute curved arcs over the turns between straight edges, which are sorted along the hull:
    one each, further ones where an arc turns most. False if an arc would turn by more than a third
    of a full turn, which three arcs without straight edges do. */
-static bool dem2di_distribute_arcs(const dem2di_outline *outline, dem2di_straight *sides, int count,
+static bool dem2di_distribute_arcs(const dem2di_outline *outline, dem2di_straight *edges, int count,
                                    int arcs) {
     for (int j = 0; j < count; j++) {
-        dem2d_vec from = dem2di_edge_normal(outline, sides[j].edge);
-        dem2d_vec to = dem2di_edge_normal(outline, sides[(j + 1) % count].edge);
-        sides[j].turn = count > 1 ? dem2di_angle(from, to) : 2 * DEM2DI_PI;
-        if (sides[j].turn < 0) sides[j].turn += 2 * DEM2DI_PI;
-        sides[j].arcs = 1;
+        dem2d_vec from = dem2di_edge_normal(outline, edges[j].edge);
+        dem2d_vec to = dem2di_edge_normal(outline, edges[(j + 1) % count].edge);
+        edges[j].turn = count > 1 ? dem2di_angle(from, to) : 2 * DEM2DI_PI;
+        if (edges[j].turn < 0) edges[j].turn += 2 * DEM2DI_PI;
+        edges[j].arcs = 1;
     }
     for (int i = count; i <= arcs; i++) {
         int most = 0;
         for (int j = 1; j < count; j++)
-            if (sides[j].turn * sides[most].arcs > sides[most].turn * sides[j].arcs) most = j;
-        if (i == arcs) return sides[most].turn <= 2.1 * sides[most].arcs; /* just above 2 pi/3 */
-        sides[most].arcs++;
+            if (edges[j].turn * edges[most].arcs > edges[most].turn * edges[j].arcs) most = j;
+        if (i == arcs) return edges[most].turn <= 2.1 * edges[most].arcs; /* just above 2 pi/3 */
+        edges[most].arcs++;
     }
-    return false; /* more sides than arcs */
+    return false; /* more edges than arcs */
 }
 
 /* Greatest length that rounding a corner cuts off its edges: a twentieth of the size. */
@@ -7153,7 +7153,7 @@ static void dem2di_plan_fit(dem2di_bezier_plan *plan) {
 /* Edges of the hull that may become straight arcs, the longest first, at most `room` >= 1 of them:
    those not shorter than a fifth of the size. Along a shorter edge, an arc with the greatest radius
    loses less than 1e-5 of the grain's area, L^3/(12 rho). Returns their number. */
-static int dem2di_find_sides(const dem2di_outline *outline, dem2di_straight *sides, int room) {
+static int dem2di_straight_find(const dem2di_outline *outline, dem2di_straight *sides, int room) {
     int count = 0;
     for (int k = 0; k < outline->hull_count; k++) {
         double length = dem2di_length(dem2di_hull_edge(outline, k));
@@ -7171,7 +7171,7 @@ static int dem2di_find_sides(const dem2di_outline *outline, dem2di_straight *sid
 }
 
 /* The first `count` edges found, sorted along the hull. */
-static void dem2di_sort_sides(const dem2di_straight *found, int count, dem2di_straight *sides) {
+static void dem2di_straight_sort(const dem2di_straight *found, int count, dem2di_straight *sides) {
     for (int i = 0; i < count; i++) {
         int j = i;
         for (; j > 0 && sides[j - 1].edge > found[i].edge; j--) sides[j] = sides[j - 1];
@@ -7190,9 +7190,10 @@ static bool dem2di_plan_better(const dem2di_bezier_plan *a, const dem2di_bezier_
 static void dem2di_plan_search(dem2di_bezier_plan *plan, dem2di_bezier_plan *spare,
                                dem2di_straight *found, dem2di_straight *sides) {
     int room = plan->arcs - 3, count = 0;
-    if (plan->rho_max < HUGE_VAL && room > 0) count = dem2di_find_sides(plan->outline, found, room);
+    if (plan->rho_max < HUGE_VAL && room > 0)
+        count = dem2di_straight_find(plan->outline, found, room);
     for (int straight = 0; straight <= count; straight++) {
-        dem2di_sort_sides(found, straight, sides);
+        dem2di_straight_sort(found, straight, sides);
         if (straight > 0 &&
             !dem2di_distribute_arcs(plan->outline, sides, straight, plan->arcs - straight))
             continue;
@@ -7437,8 +7438,8 @@ static void dem2di_nearest_solve(dem2di_nearest_series *s) {
             dem2di_nearest_equal(s, s->held, x);
             for (int i = 0; i < n; i++)
                 if (s->held[i] && x[i] <= 0) {
-                    double way = s->multiplier[i] - x[i];
-                    step = dem2di_min(step, way > 0 ? s->multiplier[i] / way : 0);
+                    double change = s->multiplier[i] - x[i];
+                    step = dem2di_min(step, change > 0 ? s->multiplier[i] / change : 0);
                 }
             for (int i = 0; i < n; i++) {
                 if (!s->held[i]) continue;
@@ -8994,9 +8995,9 @@ static void dem2di_leave_edge(const dem2di_pair *pair, int side, dem2di_eval *ev
     eval->edge = false;
     for (int i = 0; i < 2; i++) {
         const dem2d_shape *shape = i == 0 ? pair->a : pair->b;
-        bool met = eval->part[i][0] != eval->part[i][1]; /* the edge is this shape's */
+        bool own_edge = eval->part[i][0] != eval->part[i][1]; /* the edge is this shape's */
         eval->part[i][0] = eval->part[i][1] = eval->part[i][side];
-        if (!met || shape->type != DEM2D_BEZIER) continue;
+        if (!own_edge || shape->type != DEM2D_BEZIER) continue;
         double scale = i == 0 ? pair->scale_a : pair->scale_b;
         eval->rho[i] = scale * dem2di_arc_rho(&shape->arcs[eval->part[i][0]], side == 0 ? 1 : 0);
     }
@@ -9355,8 +9356,8 @@ typedef struct dem2di_probe {
     double h, slope;
 } dem2di_probe;
 
-static bool dem2di_probe_at(dem2di_pair *pair, dem2d_vec way, int turn, dem2di_probe *f) {
-    if (!dem2di_unit(way, &f->u)) return false;
+static bool dem2di_probe_at(dem2di_pair *pair, dem2d_vec direction, int turn, dem2di_probe *f) {
+    if (!dem2di_unit(direction, &f->u)) return false;
     dem2di_minkowski(pair, f->u, NULL, &f->v);
     f->h = dem2di_dot(f->v.w, f->u);
     f->slope = turn * dem2di_cross(f->u, f->v.w);
@@ -9378,8 +9379,8 @@ static void dem2di_branch_bisect(dem2di_pair *pair, dem2di_search *search) {
     far = near;
     bool between = false;
     for (double angle = 4 * DBL_EPSILON; angle < 1 && !between; angle *= 8) {
-        dem2d_vec way = dem2di_along(near.u, turn * angle, dem2di_perp(near.u));
-        if (!dem2di_probe_at(pair, way, turn, &far)) return;
+        dem2d_vec direction = dem2di_along(near.u, turn * angle, dem2di_perp(near.u));
+        if (!dem2di_probe_at(pair, direction, turn, &far)) return;
         between = far.slope >= 0 || far.h > near.h + rounding;
         if (!between) near = far;
     }
@@ -9573,19 +9574,19 @@ static inline int dem2di_face_find(const dem2d_shape *shape, dem2d_vec v, int co
 static void dem2di_face_set(const dem2d_shape *shape, double scale, dem2d_vec v, int found,
                             dem2di_face *face) {
     dem2d_vec from = dem2di_edge_end(shape, found, false);
-    dem2d_vec way = dem2di_sub(dem2di_edge_end(shape, found, true), from), support;
+    dem2d_vec along = dem2di_sub(dem2di_edge_end(shape, found, true), from), support;
     if (shape->type == DEM2D_POLYGON)
-        support = dem2di_along(from, dem2di_dot(v, way) > 0, way);
+        support = dem2di_along(from, dem2di_dot(v, along) > 0, along);
     else
         support = dem2di_arc_support(&shape->arcs[dem2di_sector_find(shape, v)], v, NULL);
-    double x0 = dem2di_cross(v, from), width = dem2di_cross(v, way);
-    face->rise = dem2di_dot(v, way) / width;
+    double x0 = dem2di_cross(v, from), width = dem2di_cross(v, along);
+    face->rise = dem2di_dot(v, along) / width;
     face->x0 = x0 * scale;
     face->x1 = (x0 + width) * scale;
     face->near = dem2di_cross(v, support) * scale;
     face->top = (dem2di_dot(v, support) + shape->rounding) * scale;
     face->height = (dem2di_dot(v, from) - face->rise * x0) * scale;
-    face->square = dem2di_dot(way, way) * (scale * scale);
+    face->square = dem2di_dot(along, along) * (scale * scale);
     face->rounding = shape->rounding * scale;
     face->endless = false;
     /* a corner between two faces has the number of the face before it */
@@ -9652,8 +9653,8 @@ static bool dem2di_second_place(const dem2di_face *a, const dem2di_face *b, doub
     double apart = dem2di_face_height(b, xb) - dem2di_face_height(a, xa);
     end->base = b->endless || side * ((xb - xa) + apart * (a->rise + b->rise) / 2) > 0;
     end->x = end->base ? xa : xb;
-    double way = side * (end->x - from);
-    if (!(way > 0) || -tilt * way > DEM2DI_ROUNDING * size) return false;
+    double length = side * (end->x - from);
+    if (!(length > 0) || -tilt * length > DEM2DI_ROUNDING * size) return false;
     end->rise = end->base ? b->rise : a->rise;
     double on_a = dem2di_face_height(a, end->x), gap = dem2di_face_height(b, end->x) - on_a;
     double radii = a->rounding + b->rounding, square = 1 + end->rise * end->rise;
@@ -9668,7 +9669,7 @@ static bool dem2di_second_place(const dem2di_face *a, const dem2di_face *b, doub
     dem2di_second_deep(a, b, side, end);
     end->level = a->top - depth / 2;
     double lean = side * (end->base ? -gap : gap) * end->rise;
-    end->width = way * end->slope + lean / end->slope;
+    end->width = length * end->slope + lean / end->slope;
     return end->depth > 0 && end->width > 0;
 }
 
@@ -9916,8 +9917,8 @@ static void dem2di_report_given(const dem2di_pair *pair, const dem2di_search *se
         dem2d_vec v = dem2di_member_direction(&m, search->normal),
                   old = i == 0 ? search->a : search->b;
         old = dem2di_scale(dem2di_turn_back(m.q, old), 1 / m.scale);
-        dem2d_vec way = dem2di_sub(dem2di_given_point(m.shape, v, old), old);
-        *witness = dem2di_along(*witness, m.scale, dem2di_turn(m.q, way));
+        dem2d_vec shift = dem2di_sub(dem2di_given_point(m.shape, v, old), old);
+        *witness = dem2di_along(*witness, m.scale, dem2di_turn(m.q, shift));
     }
 }
 
@@ -16927,7 +16928,7 @@ static void dem2di_draw_chains(const dem2d_world *world, const dem2di_view *view
 
 /* The greatest of 1, 2 and 5 times a power of ten that is not above a length; 0 if the length is
    not a normal number. */
-static double dem2di_round_length(double length) {
+static double dem2di_bar_length(double length) {
     double unit = 1;
     if (!(length >= DBL_MIN && length <= DBL_MAX)) return 0;
     while (unit > length) unit /= 10;
@@ -16937,7 +16938,7 @@ static double dem2di_round_length(double length) {
 
 /* Draw the scale bar below the scene: a line between two ticks, and its length. */
 static void dem2di_draw_scale(const dem2di_view *view, dem2di_writer *writer) {
-    double metres = dem2di_round_length(0.3 * view->width / view->factor);
+    double metres = dem2di_bar_length(0.3 * view->width / view->factor);
     double tick = view->strip / 8, y = view->height + view->strip / 2, line = view->width / 400;
     dem2d_vec left = dem2di_vec(view->width / 20, y);
     dem2d_vec right = dem2di_vec(left.x + metres * view->factor, y), up = dem2di_vec(0, tick);
