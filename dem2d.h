@@ -9173,8 +9173,10 @@ static inline bool dem2di_descend_next(const dem2di_pair *pair, const dem2di_eva
     bracket->turned[0] = bracket->turned[1];
     bracket->turned[1] = turn;
     bracket->chord = false;
-    if (newton) *u = dem2di_newton(eval, bend);
-    if (newton && !(bracket->known && !dem2di_bracket_holds(bracket, *u))) return true;
+    if (newton) {
+        *u = dem2di_newton(eval, bend);
+        if (!bracket->known || dem2di_bracket_holds(bracket, *u)) return true;
+    }
     return dem2di_bracket_next(bracket, slow, u);
 }
 
