@@ -1,17 +1,11 @@
-/* bench_beds.h - what the benchmarks of the world share: templates of five models, and grains of them
-   laid in rows. Circles of equal area have diameters uniform in 0.04 to 0.06 m. Define BENCH_NAME,
-   for messages, and include dem2d.h before it. */
+/* bench_beds.h - what the benchmarks of the world share: templates of five models, and grains of
+   them laid in rows. Circles of equal area have diameters uniform in 0.04 to 0.06 m. Define
+   BENCH_NAME, for messages, and include dem2d.h before it. */
 #ifndef BENCH_BEDS_H
 #define BENCH_BEDS_H
 
-#include <math.h>
-#include <stdarg.h>
-#include <stdio.h>
-#include <stdlib.h>
-#include <string.h>
+#include "bench.h"
 
-#define COUNT_OF(array) ((int)(sizeof(array) / sizeof((array)[0])))
-#define PI 3.14159265358979323846
 #define TIME_STEP 1e-4 /* s */
 #define GRAVITY 9.8    /* m/s2 */
 #define DENSITY 2700   /* kg/m2 */
@@ -26,32 +20,12 @@
 enum { CIRCLE, ELLIPSE, POLYGON, BEZIER, FS, MODELS };
 enum { DISCS, POLYGONS, ELLIPSES, BEZIERS, FOURIERS, MIXED, SCENES };
 
-static void fail(const char *format, ...) {
-    va_list arguments;
-    va_start(arguments, format);
-    fprintf(stderr, BENCH_NAME ": ");
-    vfprintf(stderr, format, arguments);
-    fprintf(stderr, "\n");
-    va_end(arguments);
-    exit(2);
-}
-
-static void check(dem2d_result result, const char *what) {
-    if (result != DEM2D_OK) fail("%s: %s", what, dem2d_result_text(result));
-}
-
-static void *get_memory(size_t count, size_t size) {
-    void *memory = calloc(count + 1, size);
-    if (!memory) fail("out of memory");
-    return memory;
-}
-
-static uint64_t random_state;
+static uint64_t bed_state;
 
 /* Uniform in [lower, upper): Knuth's congruential generator, high bits. */
-static double uniform(double lower, double upper) {
-    random_state = random_state * 6364136223846793005u + 1442695040888963407u;
-    return lower + (upper - lower) * ((double)(random_state >> 11) * 0x1p-53);
+static double bed_uniform(double lower, double upper) {
+    bed_state = bed_state * 6364136223846793005u + 1442695040888963407u;
+    return lower + (upper - lower) * ((double)(bed_state >> 11) * 0x1p-53);
 }
 
 /* --- templates -------------------------------------------------------------------------------- */
@@ -61,33 +35,33 @@ static double uniform(double lower, double upper) {
 /* Template i of model m is at k = m * TEMPLATES + i, its mirror image (y to -y) at k + KINDS. */
 static dem2d_shape *templates[2 * KINDS];
 
-static void make_polygon(dem2d_shape **shape) {
-    const int count = 4 + (int)uniform(0, MOST_CORNERS - 3);
-    const double stretch = sqrt(uniform(1, 1.4)), turn = uniform(0, 2 * PI);
+static void draw_polygon(dem2d_shape **shape) {
+    const int count = 4 + (int)bed_uniform(0, MOST_CORNERS - 3);
+    const double stretch = sqrt(bed_uniform(1, 1.4)), turn = bed_uniform(0, 2 * PI);
     dem2d_vec points[MOST_CORNERS];
     for (int i = 0; i < count; i++) {
-        const double angle = 2 * PI * (i + uniform(-0.25, 0.25)) / count + turn;
+        const double angle = 2 * PI * (i + bed_uniform(-0.25, 0.25)) / count + turn;
         points[i].x = cos(angle) * stretch, points[i].y = sin(angle) / stretch;
     }
-    check(dem2d_shape_create_polygon(NULL, points, count, 0, &shape[0]), "polygon");
+    expect_ok(dem2d_shape_create_polygon(NULL, points, count, 0, &shape[0]), "polygon");
     for (int i = 0; i < count; i++) points[i].y = -points[i].y;
-    check(dem2d_shape_create_polygon(NULL, points, count, 0, &shape[KINDS]), "polygon");
+    expect_ok(dem2d_shape_create_polygon(NULL, points, count, 0, &shape[KINDS]), "polygon");
 }
 
 /* Coefficients of a smooth random grain. */
 static void draw_series(int order, double roughness, double *a, double *b) {
     dem2d_virtual_desc desc = {0};
-    desc.radius = 1, desc.seed = (uint64_t)uniform(0, 1e9);
-    desc.elongation = uniform(0.02, 0.08), desc.roundness = 0.02, desc.roughness = roughness;
-    check(dem2d_fourier_virtual(&desc, order, a, b), "virtual grain");
+    desc.radius = 1, desc.seed = (uint64_t)bed_uniform(0, 1e9);
+    desc.elongation = bed_uniform(0.02, 0.08), desc.roundness = 0.02, desc.roughness = roughness;
+    expect_ok(dem2d_fourier_virtual(&desc, order, a, b), "virtual grain");
 }
 
-static void make_series(dem2d_shape **shape) {
+static void draw_fourier(dem2d_shape **shape) {
     double a[ORDER + 1], b[ORDER + 1];
     draw_series(ORDER, 0.002, a, b);
-    check(dem2d_shape_create_fourier(NULL, a, b, ORDER, &shape[0]), "series");
+    expect_ok(dem2d_shape_create_fourier(NULL, a, b, ORDER, &shape[0]), "series");
     for (int n = 0; n <= ORDER; n++) b[n] = -b[n];
-    check(dem2d_shape_create_fourier(NULL, a, b, ORDER, &shape[KINDS]), "series");
+    expect_ok(dem2d_shape_create_fourier(NULL, a, b, ORDER, &shape[KINDS]), "series");
 }
 
 static void make_bezier(dem2d_shape **shape) {
@@ -95,34 +69,34 @@ static void make_bezier(dem2d_shape **shape) {
     dem2d_vec outline[OUTLINE], control[3 * ARCS];
     dem2d_shape *grain;
     draw_series(ORDER, 0.002, a, b);
-    check(dem2d_shape_create_fourier(NULL, a, b, ORDER, &grain), "series");
-    check(dem2d_shape_outline(grain, dem2d_pose_make(0, 0, 0, 1), OUTLINE, outline), "outline");
-    check(dem2d_bezier_fit(NULL, outline, OUTLINE, ARCS, control), "polybezier");
-    check(dem2d_shape_create_bezier(NULL, control, ARCS, &shape[0]), "polybezier");
+    expect_ok(dem2d_shape_create_fourier(NULL, a, b, ORDER, &grain), "series");
+    expect_ok(dem2d_shape_outline(grain, dem2d_pose_make(0, 0, 0, 1), OUTLINE, outline), "outline");
+    expect_ok(dem2d_bezier_fit(NULL, outline, OUTLINE, ARCS, control), "polybezier");
+    expect_ok(dem2d_shape_create_bezier(NULL, control, ARCS, &shape[0]), "polybezier");
     for (int i = 0; i < 3 * ARCS; i++) control[i].y = -control[i].y;
-    check(dem2d_shape_create_bezier(NULL, control, ARCS, &shape[KINDS]), "polybezier");
+    expect_ok(dem2d_shape_create_bezier(NULL, control, ARCS, &shape[KINDS]), "polybezier");
     dem2d_shape_destroy(grain);
 }
 
 static void make_templates(void) {
     for (int i = 0; i < TEMPLATES; i++) {
-        const double root = sqrt(uniform(1, 2.5));
+        const double root = sqrt(bed_uniform(1, 2.5));
         dem2d_shape **t = templates + i;
         for (int mirror = 0; mirror <= KINDS; mirror += KINDS) {
             dem2d_shape **ellipse = t + mirror + ELLIPSE * TEMPLATES;
-            check(dem2d_shape_create_circle(NULL, 1, t + mirror), "circle");
-            check(dem2d_shape_create_ellipse(NULL, root, 1 / root, ellipse), "ellipse");
+            expect_ok(dem2d_shape_create_circle(NULL, 1, t + mirror), "circle");
+            expect_ok(dem2d_shape_create_ellipse(NULL, root, 1 / root, ellipse), "ellipse");
         }
-        make_polygon(t + POLYGON * TEMPLATES);
+        draw_polygon(t + POLYGON * TEMPLATES);
         make_bezier(t + BEZIER * TEMPLATES);
-        make_series(t + FS * TEMPLATES);
+        draw_fourier(t + FS * TEMPLATES);
     }
 }
 
 static int random_template(int scene) {
     static const int only[MIXED] = {CIRCLE, POLYGON, ELLIPSE, BEZIER, FS};
-    const int model = scene == MIXED ? (int)uniform(0, MODELS) : only[scene];
-    return model == CIRCLE ? 0 : model * TEMPLATES + (int)uniform(0, TEMPLATES);
+    const int model = scene == MIXED ? (int)bed_uniform(0, MODELS) : only[scene];
+    return model == CIRCLE ? 0 : model * TEMPLATES + (int)bed_uniform(0, TEMPLATES);
 }
 
 /* --- beds ------------------------------------------------------------------------------------- */
@@ -148,16 +122,16 @@ static bed make_bed(int count) {
 
 static double bounding_radius(const bed *b, const grain *g) {
     dem2d_shape_info info;
-    check(dem2d_shape_get(b->shapes[g->shape], &info), "template");
+    expect_ok(dem2d_shape_get(b->shapes[g->shape], &info), "template");
     return info.circumscribed * g->scale;
 }
 
 static grain random_grain(const bed *b, int template) {
     dem2d_shape_info info;
     grain g = {template, 0, 0, 0, 0};
-    check(dem2d_shape_get(b->shapes[template], &info), "template");
-    g.scale = 0.5 * uniform(0.04, 0.06) / info.equivalent;
-    g.angle = uniform(-PI, PI);
+    expect_ok(dem2d_shape_get(b->shapes[template], &info), "template");
+    g.scale = 0.5 * bed_uniform(0.04, 0.06) / info.equivalent;
+    g.angle = bed_uniform(-PI, PI);
     return g;
 }
 
@@ -166,7 +140,7 @@ static void lay_rows(bed *b) {
     double x = b->left, row = b->bottom, height = 0;
     for (int i = 0; i < b->count; i++) {
         grain *g = &b->grains[i];
-        const double room = bounding_radius(b, g) * uniform(1.01, 1.1);
+        const double room = bounding_radius(b, g) * bed_uniform(1.01, 1.1);
         if (x + 2 * room > b->right) x = b->left, row += height, height = 0;
         g->x = x + room, g->y = row + room;
         x += 2 * room, height = fmax(height, 2 * room);
@@ -176,7 +150,7 @@ static void lay_rows(bed *b) {
 /* Grains of a scene, drawn by a seed, in rows `width` wide. */
 static bed draw_bed(int scene, int count, uint64_t seed, double width) {
     bed b = make_bed(count);
-    random_state = seed;
+    bed_state = seed;
     b.right = width;
     for (int i = 0; i < count; i++) b.grains[i] = random_grain(&b, random_template(scene));
     lay_rows(&b);
@@ -192,10 +166,10 @@ static void add_bed(dem2d_world *world, const bed *b, dem2d_material_id material
         dem2d_shape_id *shape = &shapes[g->shape];
         dem2d_particle_desc desc = {0};
         if (shape->generation == 0)
-            check(dem2d_world_add_shape(world, b->shapes[g->shape], shape), "shape");
+            expect_ok(dem2d_world_add_shape(world, b->shapes[g->shape], shape), "shape");
         desc.shape = *shape, desc.material = material, desc.scale = g->scale;
         desc.position.x = g->x, desc.position.y = g->y, desc.angle = g->angle;
-        check(dem2d_world_add_particle(world, &desc, &ids[i]), "particle");
+        expect_ok(dem2d_world_add_particle(world, &desc, &ids[i]), "particle");
     }
     free(shapes);
 }

@@ -13,6 +13,8 @@
 #define _POSIX_C_SOURCE 200809L
 #define DEM2D_IMPLEMENTATION
 #include "dem2d.h"
+#define BENCH_NAME "bench_contact"
+#include "bench.h"
 
 #ifdef WITH_CCD
 #include <ccd/ccd.h>
@@ -26,8 +28,6 @@
 #include <time.h>
 #include <unistd.h>
 
-#define COUNT_OF(array) ((int)(sizeof(array) / sizeof((array)[0])))
-#define PI 3.14159265358979323846
 #define EPS 2.220446049250313e-16
 #define TEMPLATES 24 /* of each type */
 #define ORDER 8
@@ -46,27 +46,6 @@ static const char *const set_names[SETS] = {"circle", "ellipse", "polygon", "rou
                                             "bezier", "FS",      "ellipse2"};
 static const char *const class_names[CLASSES] = {"overlap", "gap", "apart"};
 static const double class_range[CLASSES][2] = {{1e-5, 1e-1}, {1e-5, 1e-1}, {1e-1, 1}}; /* of R */
-
-static void check(dem2d_result result, const char *what) {
-    if (result == DEM2D_OK) return;
-    fprintf(stderr, "bench_contact: %s: %s\n", what, dem2d_result_text(result));
-    exit(2);
-}
-
-static uint64_t random_state = 1;
-
-/* splitmix64 */
-static uint64_t random_bits(void) {
-    uint64_t z = (random_state += 0x9e3779b97f4a7c15u);
-    z = (z ^ (z >> 30)) * 0xbf58476d1ce4e5b9u;
-    z = (z ^ (z >> 27)) * 0x94d049bb133111ebu;
-    return z ^ (z >> 31);
-}
-
-/* Uniform in [lower, upper). */
-static double uniform(double lower, double upper) {
-    return lower + (upper - lower) * ((double)(random_bits() >> 11) * 0x1p-53);
-}
 
 static double log_uniform(double lower, double upper) {
     return exp(uniform(log(lower), log(upper)));
@@ -95,7 +74,7 @@ typedef struct model {
 /* The parts that plain double code reads. */
 static void finish(model *m) {
     const int points = m->type == BEZIER ? 3 * m->count : m->type == FS ? 0 : m->count;
-    check(dem2d_shape_get(m->shape, &m->info), "shape");
+    expect_ok(dem2d_shape_get(m->shape, &m->info), "shape");
     for (int i = 0; i < points; i++) {
         m->local[i].x = m->points[i].x - m->info.offset.x;
         m->local[i].y = m->points[i].y - m->info.offset.y;
@@ -111,30 +90,31 @@ static void finish(model *m) {
     }
 }
 
-static void make_ellipse(model *m, int type, double aspect) {
+static void model_ellipse(model *m, int type, double aspect) {
     m->type = type, m->half[0] = 1, m->half[1] = 1 / aspect;
-    check(type == CIRCLE ? dem2d_shape_create_circle(NULL, 1, &m->shape)
-                         : dem2d_shape_create_ellipse(NULL, 1, m->half[1], &m->shape),
-          "ellipse");
+    expect_ok(type == CIRCLE ? dem2d_shape_create_circle(NULL, 1, &m->shape)
+                             : dem2d_shape_create_ellipse(NULL, 1, m->half[1], &m->shape),
+              "ellipse");
 }
 
 /* Corners on an ellipse, convex whatever their angles; rounding is a part of the inner radius. */
-static void make_polygon(model *m, int count, double aspect, double rounding) {
+static void model_polygon(model *m, int count, double aspect, double rounding) {
     m->type = rounding > 0 ? ROUNDED : POLYGON, m->count = count;
     for (int k = 0; k < count; k++) {
         const double t = 2 * PI * (k + uniform(-0.3, 0.3)) / count;
         m->points[k].x = cos(t), m->points[k].y = sin(t) / aspect;
     }
     m->rounding = rounding / aspect;
-    check(dem2d_shape_create_polygon(NULL, m->points, count, m->rounding, &m->shape), "polygon");
+    expect_ok(dem2d_shape_create_polygon(NULL, m->points, count, m->rounding, &m->shape),
+              "polygon");
 }
 
 static void virtual_grain(int order, double *a, double *b) {
     dem2d_virtual_desc desc = {0};
-    desc.radius = 1, desc.seed = random_bits();
+    desc.radius = 1, desc.seed = random_bits(&random_state);
     desc.elongation = uniform(0, 0.4);
     desc.roundness = uniform(0, 0.1), desc.roughness = uniform(0, 0.02);
-    check(dem2d_fourier_virtual(&desc, order, a, b), "virtual grain");
+    expect_ok(dem2d_fourier_virtual(&desc, order, a, b), "virtual grain");
 }
 
 static void ellipse_outline(dem2d_vec *points, int count, double aspect) {
@@ -152,13 +132,13 @@ static void make_fourier(model *m, int order, int index) {
         virtual_grain(order, m->a, m->b);
     } else {
         ellipse_outline(outline, COUNT_OF(outline), log_uniform(1, 10));
-        check(dem2d_fourier_fit(NULL, outline, COUNT_OF(outline), order, 0, m->a, m->b), "fit");
+        expect_ok(dem2d_fourier_fit(NULL, outline, COUNT_OF(outline), order, 0, m->a, m->b), "fit");
         for (int n = 1; n <= order; n++) {
             m->a[n] *= 1 - n / (order + 1.0);
             m->b[n] *= 1 - n / (order + 1.0);
         }
     }
-    check(dem2d_shape_create_fourier(NULL, m->a, m->b, order, &m->shape), "Fourier series");
+    expect_ok(dem2d_shape_create_fourier(NULL, m->a, m->b, order, &m->shape), "Fourier series");
 }
 
 static void make_bezier(model *m, int index) {
@@ -168,28 +148,29 @@ static void make_bezier(model *m, int index) {
         double a[ORDER + 1], b[ORDER + 1];
         dem2d_shape *grain;
         virtual_grain(ORDER, a, b);
-        check(dem2d_shape_create_fourier(NULL, a, b, ORDER, &grain), "Fourier series");
-        check(dem2d_shape_outline(grain, dem2d_pose_make(0, 0, 0, 1), COUNT_OF(outline), outline),
-              "outline");
+        expect_ok(dem2d_shape_create_fourier(NULL, a, b, ORDER, &grain), "Fourier series");
+        expect_ok(
+            dem2d_shape_outline(grain, dem2d_pose_make(0, 0, 0, 1), COUNT_OF(outline), outline),
+            "outline");
         dem2d_shape_destroy(grain);
     } else {
         ellipse_outline(outline, COUNT_OF(outline), log_uniform(1, 10));
     }
-    check(dem2d_bezier_fit(NULL, outline, COUNT_OF(outline), ARCS, m->points), "Bezier fit");
-    check(dem2d_shape_create_bezier(NULL, m->points, ARCS, &m->shape), "polybezier");
+    expect_ok(dem2d_bezier_fit(NULL, outline, COUNT_OF(outline), ARCS, m->points), "Bezier fit");
+    expect_ok(dem2d_shape_create_bezier(NULL, m->points, ARCS, &m->shape), "polybezier");
 }
 
 static void make_model(model *m, int set, int index) {
     const double drawn = log_uniform(1, 10);
     const double aspect = set == CIRCLE ? 1 : set == ELLIPSE_2 ? 2 : drawn;
     if (set == POLYGON || set == ROUNDED)
-        make_polygon(m, CORNERS, aspect, set == ROUNDED ? uniform(0.05, 0.3) : 0);
+        model_polygon(m, CORNERS, aspect, set == ROUNDED ? uniform(0.05, 0.3) : 0);
     else if (set == BEZIER)
         make_bezier(m, index);
     else if (set == FS)
         make_fourier(m, ORDER, index);
     else
-        make_ellipse(m, set == CIRCLE ? CIRCLE : ELLIPSE, aspect);
+        model_ellipse(m, set == CIRCLE ? CIRCLE : ELLIPSE, aspect);
     finish(m);
 }
 
@@ -615,22 +596,6 @@ typedef struct row {
     int wrong, failed; /* failed: libccd's own word, or unresolved */
 } row;
 
-static double now(void) {
-    struct timespec t;
-    clock_gettime(CLOCK_MONOTONIC, &t);
-    return (double)t.tv_sec + 1e-9 * (double)t.tv_nsec;
-}
-
-static int by_value(const void *a, const void *b) {
-    const double x = *(const double *)a, y = *(const double *)b;
-    return (x > y) - (x < y);
-}
-
-static double median(double *values, int count) {
-    qsort(values, (size_t)count, sizeof *values, by_value);
-    return (values[(count - 1) / 2] + values[count / 2]) / 2;
-}
-
 static dem2d_contact_desc method_desc(const method *m) {
     dem2d_contact_desc desc = {0};
     desc.skip_points = true; /* depth and normal, as libccd gives them */
@@ -696,13 +661,13 @@ static void judge_all(const query *q, int count, int repeats, const method *m, r
     for (int i = 0; i < count; i++) {
         dem2d_contact contact;
         if (m->kind == WARM) desc.start = q[i].start;
-        check((m->kind == YES_NO ? dem2d_pair_overlap : dem2d_pair_contact)(
-                  q[i].a->shape, q[i].pose_a, q[i].b->shape, q[i].pose_b, &desc, &contact),
-              "contact");
+        expect_ok((m->kind == YES_NO ? dem2d_pair_overlap : dem2d_pair_contact)(
+                      q[i].a->shape, q[i].pose_a, q[i].b->shape, q[i].pose_b, &desc, &contact),
+                  "contact");
         judge(&q[i], m, &contact, r, &errors[i]);
     }
     r->calls /= count;
-    r->middle = median(errors, count), r->most = errors[count - 1];
+    r->middle = middle_of(errors, count), r->most = errors[count - 1];
 }
 
 /* --- libccd ----------------------------------------------------------------------------------- */
@@ -767,7 +732,7 @@ static void judge_ccd(const query *q, int count, int repeats, const method *m, i
         if (overlap && group == OVERLAP)
             errors[answered++] = (double)fabsl(depth - q[i].depth) / q[i].size;
     }
-    if (answered > 0) r->middle = median(errors, answered), r->most = errors[answered - 1];
+    if (answered > 0) r->middle = middle_of(errors, answered), r->most = errors[answered - 1];
 }
 
 static double ask_all_ccd(const query *q, int count, const method *m, int group) {
@@ -783,7 +748,7 @@ static double ask_all_ccd(const query *q, int count, const method *m, int group)
 static volatile double sink;
 
 static double time_all(const query *q, int count, const method *m, int group) {
-    const double begin = now();
+    const double begin = seconds();
 #ifdef WITH_CCD
     if (m->kind == LIBCCD)
         sink = ask_all_ccd(q, count, m, group);
@@ -791,7 +756,7 @@ static double time_all(const query *q, int count, const method *m, int group) {
 #endif
         sink = ask_all(q, count, m);
     (void)group;
-    return 1e9 * (now() - begin) / count;
+    return 1e9 * (seconds() - begin) / count;
 }
 
 /* Times of all methods that have a row, in turn: what else the machine does hits all of them. */
@@ -801,7 +766,7 @@ static void time_rows(const query *q, int group, row rows[]) {
         for (int m = 0; m < METHODS; m++)
             if (k < rows[m].repeats) times[m][k] = time_all(q, rows[m].count, &methods[m], group);
     for (int m = 0; m < METHODS; m++)
-        if (rows[m].repeats > 0) rows[m].ns = median(times[m], rows[m].repeats);
+        if (rows[m].repeats > 0) rows[m].ns = middle_of(times[m], rows[m].repeats);
 }
 
 /* --- output ----------------------------------------------------------------------------------- */
@@ -832,13 +797,6 @@ static const char *pair_name(int pair) {
     pair_sets(pair, &a, &b);
     snprintf(name, sizeof name, "%s-%s", set_names[a], set_names[b]);
     return name;
-}
-
-static FILE *create(const char *path) {
-    FILE *file = fopen(path, "w");
-    if (file) return file;
-    fprintf(stderr, "bench_contact: can't write %s\n", path);
-    exit(2);
 }
 
 static void print_head(FILE *csv) {
@@ -1176,7 +1134,7 @@ static int run_sizes(int type, const int *sizes, int count, const plan *p, FILE 
             if (type == FS)
                 make_fourier(&list[i], sizes[k], i);
             else
-                make_polygon(&list[i], sizes[k], 1, 0);
+                model_polygon(&list[i], sizes[k], 1, 0);
             finish(&list[i]);
         }
         make_queries(list, list, SOME, p->size_poses, OVERLAP, shallow);
@@ -1193,17 +1151,6 @@ static int run_sizes(int type, const int *sizes, int count, const plan *p, FILE 
     printf("slope of log time against log size: warm %.2f, cold %.2f\n\n",
            log_slope(sizes, ns[0], count), log_slope(sizes, ns[1], count));
     return wrong;
-}
-
-/* A folder and those above it; there already, usually. */
-static void make_folder(const char *path) {
-    char part[4096];
-    if (strlen(path) >= sizeof part) return;
-    for (size_t i = 1; i <= strlen(path); i++) {
-        if (path[i] != '/' && path[i] != 0) continue;
-        memcpy(part, path, i), part[i] = 0;
-        mkdir(part, 0777);
-    }
 }
 
 int main(int argc, char **argv) {
@@ -1223,11 +1170,7 @@ int main(int argc, char **argv) {
         return 2;
     }
     if (!folder) folder = "build/bench_contact";
-    make_folder(folder);
-    if (chdir(folder) != 0) {
-        fprintf(stderr, "bench_contact: no folder %s\n", folder);
-        return 2;
-    }
+    enter_folder(folder);
     for (int i = 0; i < SCAN; i++)
         scan[i] =
             (point){cosl(2 * (long double)PI * i / SCAN), sinl(2 * (long double)PI * i / SCAN)};

@@ -11,6 +11,9 @@
 #define _POSIX_C_SOURCE 200809L
 #define DEM2D_IMPLEMENTATION
 #include "dem2d.h"
+#define BENCH_NAME "bench_faces"
+#include "bench.h"
+#include "world_scene.h"
 
 #include <math.h>
 #include <stdio.h>
@@ -18,7 +21,6 @@
 #include <string.h>
 #include <time.h>
 
-#define PI 3.14159265358979323846
 #define KN 1e7
 #define DENSITY 2000.0
 #define GRAINS 64
@@ -35,28 +37,6 @@ static const char *const kind_names[KINDS] = {"sharp polygons", "rounded polygon
                                               "Fourier series"};
 static const char *const rule_names[DEM2D_FACE_RULE_COUNT] = {"two points", "one point"};
 
-static void check(dem2d_result result, const char *what) {
-    if (result == DEM2D_OK) return;
-    fprintf(stderr, "bench_faces: %s: %s\n", what, dem2d_result_text(result));
-    exit(1);
-}
-
-static uint64_t random_state;
-
-/* Uniform in [lower, upper): splitmix64. */
-static double uniform(double lower, double upper) {
-    uint64_t z = (random_state += 0x9e3779b97f4a7c15u);
-    z = (z ^ (z >> 30)) * 0xbf58476d1ce4e5b9u;
-    z = (z ^ (z >> 27)) * 0x94d049bb133111ebu;
-    return lower + (upper - lower) * ((double)((z ^ (z >> 31)) >> 11) * 0x1p-53);
-}
-
-static double seconds(void) {
-    struct timespec now;
-    clock_gettime(CLOCK_MONOTONIC, &now);
-    return (double)now.tv_sec + 1e-9 * (double)now.tv_nsec;
-}
-
 /* What a run gives; energies in parts of the energy of the motion. */
 typedef struct outcome {
     double drift;  /* at the end; of some runs the root of the mean square */
@@ -66,146 +46,103 @@ typedef struct outcome {
     int64_t steps; /* taken */
 } outcome;
 
-static double energy_of(const dem2d_world *world) {
-    dem2d_energy e;
-    check(dem2d_world_energy(world, &e), "energy");
+/* Of motion, springs and height. */
+static double energy_in(const scene *s) {
+    const dem2d_energy e = energy_of(s);
     return e.translational + e.rotational + e.normal + e.tangential + e.potential;
 }
 
-static dem2d_world *make_world(dem2d_face_rule rule, double time_step, double gravity,
-                               dem2d_material_id *material) {
+static scene make_scene(dem2d_face_rule rule, double time_step, double gravity) {
     const dem2d_material_desc stone = {DENSITY, KN, 0, 0, 0, 0};
     dem2d_world_desc desc = {0};
-    dem2d_world *world;
     desc.time_step = time_step, desc.gravity.y = -gravity, desc.faces = rule;
-    check(dem2d_world_create(&desc, &world), "world");
-    check(dem2d_world_add_material(world, &stone, material), "material");
-    return world;
-}
-
-static void add_wall(dem2d_world *world, dem2d_material_id material, double x, double y, double nx,
-                     double ny) {
-    dem2d_wall_desc desc = {0};
-    dem2d_wall_id id;
-    desc.material = material;
-    desc.point.x = x, desc.point.y = y, desc.normal.x = nx, desc.normal.y = ny;
-    check(dem2d_world_add_wall(world, &desc, &id), "wall");
+    return open_scene(&desc, &stone);
 }
 
 /* --- a rocking box -------------------------------------------------------------------------- */
 
 /* 1 m wide and high, released at 3 degrees on one corner. */
 static outcome rock(dem2d_face_rule rule, double time) {
-    const dem2d_vec corners[4] = {{0, 0}, {1, 0}, {1, 1}, {0, 1}};
-    const double tilt = 3 * PI / 180, gravity = 9.81, dt = 1e-4;
-    dem2d_particle_desc desc = {0};
-    dem2d_particle_id id;
-    dem2d_material_id material;
-    dem2d_shape *box;
+    const double tilt = 3 * PI / 180, gravity = 9.81, dt = 1e-4,
+                 height = (cos(tilt) + sin(tilt)) / 2;
     outcome o = {0, 0, 0, 0, 0};
-    dem2d_world *world = make_world(rule, dt, gravity, &material);
-    add_wall(world, material, 0, 0, 0, 1);
-    check(dem2d_shape_create_polygon(NULL, corners, 4, 0, &box), "box");
-    check(dem2d_world_add_shape(world, box, &desc.shape), "box");
-    dem2d_shape_destroy(box);
-    desc.scale = 1, desc.material = material, desc.angle = tilt;
-    desc.position.y = (cos(tilt) + sin(tilt)) / 2;
-    check(dem2d_world_add_particle(world, &desc, &id), "particle");
-    check(dem2d_world_step(world, 1, NULL), "step");
-    const double first = energy_of(world);
-    const double lifted = DENSITY * gravity * (desc.position.y - 0.5);
+    const scene s = make_scene(rule, dt, gravity);
+    add_floor(&s);
+    add_shape(&s, make_box(1, 1), DEM2D_FREE, vec(0, height), tilt, vec(0, 0), 0);
+    step(&s, 1);
+    const double first = energy_in(&s), lifted = DENSITY * gravity * (height - 0.5);
     const double start = seconds();
     const int looks = (int)(time / (10 * dt));
     for (int i = 0; i < looks; i++) {
-        check(dem2d_world_step(world, 10, NULL), "step");
-        o.drift = (energy_of(world) - first) / lifted;
+        step(&s, 10);
+        o.drift = (energy_in(&s) - first) / lifted;
         o.worst = fmax(o.worst, fabs(o.drift));
     }
     o.steps = 10 * (int64_t)looks;
     o.ns = (seconds() - start) / (double)o.steps * 1e9;
-    dem2d_world_destroy(world);
+    close_scene(&s);
     return o;
 }
 
 /* --- templates ------------------------------------------------------------------------------ */
 
-/* 4 to 7 corners on a circle at uneven angles: convex whatever they are. */
-static dem2d_shape *polygon(int index, double rounding) {
-    const int sides = 4 + index % 4;
-    dem2d_vec points[7];
-    dem2d_shape *shape;
-    for (int k = 0; k < sides; k++) {
-        const double t = 2 * PI * (k + uniform(-0.25, 0.25)) / sides;
-        points[k].x = cos(t), points[k].y = sin(t);
-    }
-    check(dem2d_shape_create_polygon(NULL, points, sides, rounding, &shape), "polygon");
-    return shape;
-}
-
 static dem2d_shape *make_template(int kind, int index) {
-    dem2d_shape *shape;
-    if (kind == POLYGONS) return polygon(index, 0);
-    if (kind == ROUNDED) return polygon(index, 0.15);
-    if (kind == ELLIPSES) {
-        check(dem2d_shape_create_ellipse(NULL, 1 + (index + 0.5) / TEMPLATES, 1, &shape),
-              "ellipse");
-        return shape;
-    }
+    const int sides = 4 + index % 4; /* corners on a circle at uneven angles */
     double a[ORDER + 1], b[ORDER + 1];
     dem2d_virtual_desc desc = {0};
+    dem2d_vec points[7];
+    if (kind == ELLIPSES) return make_ellipse(1 + (index + 0.5) / TEMPLATES, 1);
     desc.radius = 1, desc.elongation = 0.1, desc.roundness = 0.04, desc.roughness = 0.01;
     desc.seed = (uint64_t)index;
-    check(dem2d_fourier_virtual(&desc, ORDER, a, b), "virtual grain");
-    check(dem2d_shape_create_fourier(NULL, a, b, ORDER, &shape), "Fourier series");
-    return shape;
+    expect_ok(dem2d_fourier_virtual(&desc, ORDER, a, b), "virtual grain");
+    if (kind == SERIES) return make_series(a, b, ORDER);
+    for (int k = 0; k < sides; k++) {
+        const double t = 2 * PI * (k + uniform(-0.25, 0.25)) / sides;
+        points[k] = vec(cos(t), sin(t));
+    }
+    return make_polygon(points, sides, kind == ROUNDED ? 0.15 : 0);
 }
 
 /* --- a gas ---------------------------------------------------------------------------------- */
 
 /* Grains of equal area on a lattice that fills the box; velocities of one size. */
-static dem2d_world *make_gas(dem2d_face_rule rule, int kind, int run) {
+static scene make_gas(dem2d_face_rule rule, int kind, int run) {
     const double area = PI * RADIUS * RADIUS, half_mass = DENSITY * area / 2;
     const double side = sqrt(GRAINS * area / FRACTION), cell = side / SIDE;
     const double contact_time = PI * sqrt(half_mass / KN);
     /* relative speed v gives an overlap of v sqrt(m / k) */
     const double speed = 1e-3 * RADIUS / sqrt(half_mass / KN) / sqrt(2);
-    dem2d_material_id material;
     dem2d_shape_id ids[TEMPLATES];
     double scale[TEMPLATES];
-    dem2d_world *world = make_world(rule, contact_time / 200, 0, &material);
+    const scene s = make_scene(rule, contact_time / 200, 0);
     random_state = 1 + (uint64_t)run;
-    add_wall(world, material, 0, 0, 1, 0), add_wall(world, material, side, 0, -1, 0);
-    add_wall(world, material, 0, 0, 0, 1), add_wall(world, material, 0, side, 0, -1);
+    add_plane(&s, 0, 0, 1, 0), add_plane(&s, side, 0, -1, 0);
+    add_plane(&s, 0, 0, 0, 1), add_plane(&s, 0, side, 0, -1);
     for (int i = 0; i < TEMPLATES; i++) {
         dem2d_shape *shape = make_template(kind, i);
         dem2d_shape_info info;
-        check(dem2d_shape_get(shape, &info), "shape");
-        check(dem2d_world_add_shape(world, shape, &ids[i]), "shape");
-        dem2d_shape_destroy(shape);
+        expect_ok(dem2d_shape_get(shape, &info), "shape");
+        ids[i] = give_shape(&s, shape);
         scale[i] = RADIUS / info.equivalent;
     }
     for (int i = 0; i < GRAINS; i++) {
         const double way = uniform(0, 2 * PI);
-        dem2d_particle_desc grain = {0};
-        dem2d_particle_id id;
-        grain.shape = ids[i % TEMPLATES], grain.scale = scale[i % TEMPLATES];
-        grain.material = material, grain.angle = uniform(0, 2 * PI);
-        grain.position.x = (i % SIDE + 0.5) * cell, grain.position.y = (i / SIDE + 0.5) * cell;
-        grain.velocity.x = speed * cos(way), grain.velocity.y = speed * sin(way);
+        dem2d_particle_desc grain =
+            grain_desc(&s, ids[i % TEMPLATES], scale[i % TEMPLATES],
+                       vec((i % SIDE + 0.5) * cell, (i / SIDE + 0.5) * cell));
+        grain.angle = uniform(0, 2 * PI);
+        grain.velocity = vec(speed * cos(way), speed * sin(way));
         grain.angular_velocity = uniform(-1, 1) * speed / RADIUS;
-        check(dem2d_world_add_particle(world, &grain, &id), "particle");
+        add_grain(&s, &grain);
     }
-    return world;
+    return s;
 }
 
 /* Steps until no contact is open; false when that takes too long. */
-static bool wait_for_free_flight(dem2d_world *world, int64_t *steps) {
-    for (int i = 0; i < 200000; i++) {
-        int open;
-        check(dem2d_world_contacts(world, NULL, 0, &open), "contacts");
-        if (open == 0) return true;
-        check(dem2d_world_step(world, 1, NULL), "step");
-        ++*steps;
+static bool wait_for_free_flight(const scene *s, int64_t *steps) {
+    for (int i = 0; i < 200000; i++, ++*steps) {
+        if (contacts_of(s, NULL, 0) == 0) return true;
+        step(s, 1);
     }
     return false;
 }
@@ -214,31 +151,27 @@ static outcome fly(dem2d_face_rule rule, int kind, int run, int steps) {
     const int chunk = 1000;
     outcome o = {0, 0, 0, 0, 0};
     int open_looks = 0;
-    dem2d_world *world = make_gas(rule, kind, run);
+    const scene s = make_gas(rule, kind, run);
     double spent = 0, first = 0;
     for (bool started = false; o.steps < steps || !started; started = true) {
-        dem2d_packing packing;
         const double start = seconds();
-        check(dem2d_world_step(world, started ? chunk : 1, NULL), "step");
+        step(&s, started ? chunk : 1);
         spent += seconds() - start;
         o.steps += started ? chunk : 1;
-        check(dem2d_world_packing(world, &packing), "packing");
-        if (packing.max_overlap > 0) o.deep += packing.max_overlap, open_looks++;
+        const double deepest = packing_of(&s).max_overlap;
+        if (deepest > 0) o.deep += deepest, open_looks++;
         const double resumed = seconds();
-        if (!wait_for_free_flight(world, &o.steps)) {
-            fprintf(stderr, "bench_faces: %s, %s: always a contact\n", kind_names[kind],
-                    rule_names[rule]);
-            exit(1);
-        }
+        if (!wait_for_free_flight(&s, &o.steps))
+            bench_fail("%s, %s: always a contact", kind_names[kind], rule_names[rule]);
         spent += seconds() - resumed;
-        const double now = energy_of(world);
+        const double now = energy_in(&s);
         if (!started) first = now;
         o.drift = now / first - 1;
         o.worst = fmax(o.worst, fabs(o.drift));
     }
     if (open_looks > 0) o.deep /= open_looks;
     o.ns = spent / ((double)o.steps * GRAINS) * 1e9;
-    dem2d_world_destroy(world);
+    close_scene(&s);
     return o;
 }
 

@@ -8,6 +8,8 @@
 #define _POSIX_C_SOURCE 200809L
 #define DEM2D_IMPLEMENTATION
 #include "dem2d.h"
+#define BENCH_NAME "bench_fit"
+#include "bench.h"
 
 #include <dirent.h>
 #include <math.h>
@@ -17,7 +19,6 @@
 #include <sys/stat.h>
 #include <time.h>
 
-#define COUNT_OF(array) ((int)(sizeof(array) / sizeof((array)[0])))
 #define PATH_ROOM 4096
 #define MADE 12 /* outlines, when none are given */
 
@@ -68,12 +69,12 @@ typedef struct grains {
 
 static void *need(void *memory) {
     if (memory) return memory;
-    fprintf(stderr, "bench_fit: out of memory\n");
-    exit(2);
+    bench_fail("out of memory");
+    return NULL;
 }
 
 /* Takes the points. */
-static void add_grain(grains *all, const char *name, size_t length, dem2d_vec *points, int count) {
+static void list_grain(grains *all, const char *name, size_t length, dem2d_vec *points, int count) {
     if (all->count == all->room) {
         all->room = 2 * all->room + 16;
         all->list = need(realloc(all->list, (size_t)all->room * sizeof *all->list));
@@ -101,7 +102,7 @@ static void read_grain(grains *all, const char *path, const char *name) {
     }
     if (file) fclose(file);
     if (count >= 3) {
-        add_grain(all, name, strlen(name) - 4, points, count);
+        list_grain(all, name, strlen(name) - 4, points, count);
         return;
     }
     free(points);
@@ -153,16 +154,6 @@ static int mark_core(grains *all) {
     return marked;
 }
 
-static uint64_t random_state = 1;
-
-/* Uniform in [lower, upper): splitmix64. */
-static double uniform(double lower, double upper) {
-    uint64_t z = (random_state += 0x9e3779b97f4a7c15u);
-    z = (z ^ (z >> 30)) * 0xbf58476d1ce4e5b9u;
-    z = (z ^ (z >> 27)) * 0x94d049bb133111ebu;
-    return lower + (upper - lower) * ((double)((z ^ (z >> 31)) >> 11) * 0x1p-53);
-}
-
 /* Angular grains with worn corners and a rough face: about one polygon's distance, waves on it. */
 static void make_grains(grains *all) {
     for (int i = 0; i < MADE; i++) {
@@ -183,31 +174,25 @@ static void make_grains(grains *all) {
             points[j].x = 1.3 * r * cos(t), points[j].y = r * sin(t);
         }
         snprintf(name, sizeof name, "made_%02d", i);
-        add_grain(all, name, strlen(name), points, count);
+        list_grain(all, name, strlen(name), points, count);
     }
 }
 
 /* --- measuring ------------------------------------------------------------------------------ */
 
-static double now(void) {
-    struct timespec t;
-    clock_gettime(CLOCK_MONOTONIC, &t);
-    return (double)t.tv_sec + 1e-9 * (double)t.tv_nsec;
-}
-
 /* One fit; its time, and its coverage. */
 static dem2d_result run_once(const grain *g, const method *m, int count, double *coverage,
-                             double *seconds) {
+                             double *spent) {
     dem2d_fit_desc desc = m->desc;
     dem2d_fit_report report = {0};
     dem2d_difference difference = {0};
     dem2d_shape *shape = NULL;
     desc.count = count, desc.seed = 1;
-    const double start = now();
+    const double start = seconds();
     const dem2d_result result =
         m->radial ? dem2d_radial_compare(NULL, g->points, g->count, count, &difference)
                   : dem2d_outline_fit(NULL, g->points, g->count, &desc, &shape, &report);
-    *seconds = now() - start;
+    *spent = seconds() - start;
     *coverage = m->radial ? difference.coverage : report.coverage;
     dem2d_shape_destroy(shape);
     return result;
@@ -248,13 +233,6 @@ static void measure(const grains *all, const method *m, int count, figures of[2]
 /* --- output --------------------------------------------------------------------------------- */
 
 static figures table[COUNT_OF(methods)][5][2];
-
-static FILE *create(const char *path) {
-    FILE *file = fopen(path, "w");
-    if (file) return file;
-    fprintf(stderr, "bench_fit: can't write %s\n", path);
-    exit(2);
-}
 
 static void print_table(int which, const char *title, FILE *csv) {
     printf("\n%s\n%-24s %5s %9s %9s %11s\n", title, "fit", "count", "mean", "least", "ms / grain");
@@ -317,10 +295,7 @@ static void get_grains(grains *all, const char *folder) {
         printf("%d outlines made here (a folder of real ones can be given)\n", all->count);
         return;
     }
-    if (!read_folder(all, folder) || all->count == 0) {
-        fprintf(stderr, "bench_fit: no outline below %s\n", folder);
-        exit(2);
-    }
+    if (!read_folder(all, folder) || all->count == 0) bench_fail("no outline below %s", folder);
     qsort(all->list, (size_t)all->count, sizeof *all->list, by_name);
     printf("%d outlines below %s\n", all->count, folder);
     if (all->skipped)

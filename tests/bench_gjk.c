@@ -10,6 +10,8 @@
 #define _POSIX_C_SOURCE 200809L
 #define DEM2D_IMPLEMENTATION
 #include "dem2d.h"
+#define BENCH_NAME "bench_gjk"
+#include "bench.h"
 
 #include <dirent.h>
 #include <math.h>
@@ -18,7 +20,6 @@
 #include <string.h>
 #include <time.h>
 
-#define PI 3.14159265358979323846
 #define GRAINS 500
 #define TEMPLATES 12 /* of each type that has templates */
 #define ORDER 8
@@ -39,22 +40,6 @@ static const double paper_f[TYPES][TYPES] = {{4.63, 5.51, 5.51, 4.34, 5.46},
                                              {0, 0, 5.20, 4.35, 5.45},
                                              {0, 0, 0, 2.91, 3.92},
                                              {0, 0, 0, 0, 5.10}};
-
-static void check(dem2d_result result, const char *what) {
-    if (result == DEM2D_OK) return;
-    fprintf(stderr, "bench_gjk: %s: %s\n", what, dem2d_result_text(result));
-    exit(2);
-}
-
-static uint64_t random_state = 1;
-
-/* Uniform in [lower, upper): splitmix64. */
-static double uniform(double lower, double upper) {
-    uint64_t z = (random_state += 0x9e3779b97f4a7c15u);
-    z = (z ^ (z >> 30)) * 0xbf58476d1ce4e5b9u;
-    z = (z ^ (z >> 27)) * 0x94d049bb133111ebu;
-    return lower + (upper - lower) * ((double)((z ^ (z >> 31)) >> 11) * 0x1p-53);
-}
 
 /* --- outlines ------------------------------------------------------------------------------- */
 
@@ -126,11 +111,13 @@ static void fit(library *lib, int slot, const dem2d_vec *points, int count) {
     dem2d_reduction_desc exact = {0};
     dem2d_vec control[3 * ARCS];
     exact.test = DEM2D_EXACT;
-    check(dem2d_fourier_fit(NULL, points, count, ORDER, 0, a, b), "Fourier fit");
-    check(dem2d_fourier_reduce(a, b, ORDER, &exact, NULL), "Fourier reduction");
-    check(dem2d_shape_create_fourier(NULL, a, b, ORDER, &lib->shapes[FS][slot]), "Fourier series");
-    check(dem2d_bezier_fit(NULL, points, count, ARCS, control), "Bezier fit");
-    check(dem2d_shape_create_bezier(NULL, control, ARCS, &lib->shapes[BEZIER][slot]), "polybezier");
+    expect_ok(dem2d_fourier_fit(NULL, points, count, ORDER, 0, a, b), "Fourier fit");
+    expect_ok(dem2d_fourier_reduce(a, b, ORDER, &exact, NULL), "Fourier reduction");
+    expect_ok(dem2d_shape_create_fourier(NULL, a, b, ORDER, &lib->shapes[FS][slot]),
+              "Fourier series");
+    expect_ok(dem2d_bezier_fit(NULL, points, count, ARCS, control), "Bezier fit");
+    expect_ok(dem2d_shape_create_bezier(NULL, control, ARCS, &lib->shapes[BEZIER][slot]),
+              "polybezier");
     lib->count[FS] = lib->count[BEZIER] = slot + 1;
 }
 
@@ -138,28 +125,25 @@ static void make_library(library *lib, const char *folder) {
     static dem2d_vec points[OUTLINE_ROOM];
     char *names[1000];
     const int files = folder ? list_outlines(folder, names, 1000) : 0;
-    if (folder && files == 0) {
-        fprintf(stderr, "bench_gjk: no outline in %s\n", folder);
-        exit(2);
-    }
+    if (folder && files == 0) bench_fail("no outline in %s", folder);
     for (int i = 0; i < (folder ? files : TEMPLATES); i++) {
         const int count = folder ? read_outline(names[i], points) : make_outline(i, points);
         fit(lib, i, points, count);
         if (folder) free(names[i]);
     }
-    check(dem2d_shape_create_circle(NULL, 1, &lib->shapes[CIRCLE][0]), "circle");
+    expect_ok(dem2d_shape_create_circle(NULL, 1, &lib->shapes[CIRCLE][0]), "circle");
     lib->count[CIRCLE] = 1;
     lib->count[ELLIPSE] = lib->count[POLYGON] = TEMPLATES;
     for (int i = 0; i < TEMPLATES; i++) {
         const double aspect = 1 + (i + 0.5) / TEMPLATES;
         const int sides = 4 + i % 4;
-        check(dem2d_shape_create_ellipse(NULL, aspect, 1, &lib->shapes[ELLIPSE][i]), "ellipse");
+        expect_ok(dem2d_shape_create_ellipse(NULL, aspect, 1, &lib->shapes[ELLIPSE][i]), "ellipse");
         for (int k = 0; k < sides; k++) { /* on a circle: convex whatever the angles */
             const double t = 2 * PI * (k + uniform(-0.3, 0.3)) / sides;
             points[k].x = cos(t), points[k].y = sin(t);
         }
-        check(dem2d_shape_create_polygon(NULL, points, sides, 0, &lib->shapes[POLYGON][i]),
-              "polygon");
+        expect_ok(dem2d_shape_create_polygon(NULL, points, sides, 0, &lib->shapes[POLYGON][i]),
+                  "polygon");
     }
 }
 
@@ -177,19 +161,19 @@ static void add_grains(packing *p, const library *lib, dem2d_material_id materia
     dem2d_shape_id ids[TYPES][TEMPLATES];
     for (int t = 0; t < TYPES; t++)
         for (int i = 0; i < lib->count[t]; i++)
-            check(dem2d_world_add_shape(p->world, lib->shapes[t][i], &ids[t][i]), "shape");
+            expect_ok(dem2d_world_add_shape(p->world, lib->shapes[t][i], &ids[t][i]), "shape");
     for (int i = 0; i < GRAINS; i++) {
         const int type = (int)uniform(0, TYPES), slot = (int)uniform(0, lib->count[type]);
         dem2d_particle_desc grain = {0};
         dem2d_shape_info info;
-        check(dem2d_shape_get(lib->shapes[type][slot], &info), "shape");
+        expect_ok(dem2d_shape_get(lib->shapes[type][slot], &info), "shape");
         grain.scale = uniform(0.02, 0.03) / info.equivalent; /* equivalent diameter 0.04 - 0.06 */
         grain.shape = ids[type][slot], grain.material = material;
         grain.position.x = (i % columns - (columns - 1) / 2.0) * cell;
         grain.position.y = (i / columns - (columns - 1) / 2.0) * cell;
         grain.angle = uniform(0, 2 * PI);
         p->types[i] = type;
-        check(dem2d_world_add_particle(p->world, &grain, &p->ids[i]), "particle");
+        expect_ok(dem2d_world_add_particle(p->world, &grain, &p->ids[i]), "particle");
     }
 }
 
@@ -205,7 +189,7 @@ static void add_walls(packing *p, dem2d_material_id material) {
         else
             wall.normal.y = -side, wall.point.y = 1.2 * side;
         wall.mode = DEM2D_WALL_SERVO, wall.stress = 1e5, wall.max_speed = 0.5, wall.length = 1;
-        check(dem2d_world_add_wall(p->world, &wall, &ids[i]), "wall");
+        expect_ok(dem2d_world_add_wall(p->world, &wall, &ids[i]), "wall");
     }
     for (int i = 0; i < 4; i++) { /* all four are known now: the length is the other two's gap */
         dem2d_wall_desc wall = {0};
@@ -217,7 +201,7 @@ static void add_walls(packing *p, dem2d_material_id material) {
             wall.normal.y = -side, wall.point.y = 1.2 * side;
         wall.mode = DEM2D_WALL_SERVO, wall.stress = 1e5, wall.max_speed = 0.5;
         wall.spans[0] = ids[i < 2 ? 2 : 0], wall.spans[1] = ids[i < 2 ? 3 : 1];
-        check(dem2d_world_set_wall(p->world, ids[i], &wall), "wall");
+        expect_ok(dem2d_world_set_wall(p->world, ids[i], &wall), "wall");
     }
 }
 
@@ -230,17 +214,17 @@ static void make_packing(packing *p, const library *lib) {
     dem2d_energy energy;
     int steps = 0;
     scene.time_step = 1e-4, scene.local_damping = 0.7;
-    check(dem2d_world_create(&scene, &p->world), "world");
-    check(dem2d_world_add_material(p->world, &stone, &material), "material");
+    expect_ok(dem2d_world_create(&scene, &p->world), "world");
+    expect_ok(dem2d_world_add_material(p->world, &stone, &material), "material");
     add_grains(p, lib, material);
     add_walls(p, material);
     do {
-        check(dem2d_world_step(p->world, 1000, NULL), "step");
-        check(dem2d_world_energy(p->world, &energy), "energy");
+        expect_ok(dem2d_world_step(p->world, 1000, NULL), "step");
+        expect_ok(dem2d_world_energy(p->world, &energy), "energy");
         steps += 1000;
     } while (steps < 40000 && !(energy.translational + energy.rotational < 1e-3 * energy.normal));
     dem2d_packing info;
-    check(dem2d_world_packing(p->world, &info), "packing");
+    expect_ok(dem2d_world_packing(p->world, &info), "packing");
     printf("%d grains after %d steps: coordination %.2f, mean overlap / radius %.2f %%, kinetic / "
            "spring energy %.1e\n\n",
            GRAINS, steps, info.coordination, 100 * info.mean_overlap,
@@ -281,7 +265,7 @@ static void count_pairs(const packing *p, counts *c) {
     static dem2d_particle_info info[GRAINS];
     const clock_t start = clock();
     for (int i = 0; i < GRAINS; i++)
-        check(dem2d_world_get_particle(p->world, p->ids[i], &info[i]), "particle");
+        expect_ok(dem2d_world_get_particle(p->world, p->ids[i], &info[i]), "particle");
     for (int i = 0; i < GRAINS; i++) {
         for (int k = i + 1; k < GRAINS; k++) {
             dem2d_contact contact;
@@ -289,10 +273,10 @@ static void count_pairs(const packing *p, counts *c) {
             const double dy = info[k].pose.position.y - info[i].pose.position.y;
             const double reach = info[i].radius + info[k].radius;
             if (dx * dx + dy * dy >= reach * reach) continue;
-            check(dem2d_pair_overlap(dem2d_world_shape(p->world, info[i].shape), info[i].pose,
-                                     dem2d_world_shape(p->world, info[k].shape), info[k].pose, NULL,
-                                     &contact),
-                  "overlap");
+            expect_ok(dem2d_pair_overlap(dem2d_world_shape(p->world, info[i].shape), info[i].pose,
+                                         dem2d_world_shape(p->world, info[k].shape), info[k].pose,
+                                         NULL, &contact),
+                      "overlap");
             count_pair(c, p->types[i], p->types[k], &contact);
         }
     }

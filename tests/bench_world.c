@@ -70,22 +70,6 @@ static const char *const part_names[PARTS] = {"discs", "polygons", "ellipses", "
                                               "mixed", "dt",       "order",    "skin",    "sizes"};
 static const char *const test_names[TESTS] = {"settled", "biaxial"};
 
-static FILE *create(const char *path) {
-    FILE *file = fopen(path, "w");
-    if (!file) fail("can't write %s", path);
-    return file;
-}
-
-static double read_clock(clockid_t clock) {
-    struct timespec now;
-    clock_gettime(clock, &now);
-    return (double)now.tv_sec + 1e-9 * (double)now.tv_nsec;
-}
-
-static double seconds(void) {
-    return read_clock(CLOCK_MONOTONIC);
-}
-
 /* On a core, of this thread. */
 static double busy_seconds(void) {
     return read_clock(CLOCK_THREAD_CPUTIME_ID);
@@ -98,11 +82,6 @@ typedef struct figure {
 } figure;
 
 static const figure no_figure = {NAN, NAN, NAN};
-
-static int compare_doubles(const void *a, const void *b) {
-    const double x = *(const double *)a, y = *(const double *)b;
-    return (x > y) - (x < y);
-}
 
 static figure summary(const double *values, int count) {
     double sorted[BATCHES];
@@ -176,10 +155,10 @@ static void add_materials(run *r, int test) {
     stone.normal_stiffness = smooth.normal_stiffness = STIFFNESS;
     stone.tangential_stiffness = smooth.tangential_stiffness = STIFFNESS;
     stone.friction = FRICTION;
-    check(dem2d_world_add_material(r->world, &stone, &r->grain_material), "material");
-    check(dem2d_world_add_material(r->world, &stone, &r->wall_material), "material");
+    expect_ok(dem2d_world_add_material(r->world, &stone, &r->grain_material), "material");
+    expect_ok(dem2d_world_add_material(r->world, &stone, &r->wall_material), "material");
     if (test != BIAXIAL) return;
-    check(dem2d_world_set_pair(r->world, r->grain_material, r->wall_material, &smooth), "pair");
+    expect_ok(dem2d_world_set_pair(r->world, r->grain_material, r->wall_material, &smooth), "pair");
 }
 
 static void add_grains(run *r) {
@@ -198,7 +177,7 @@ static dem2d_wall_desc wall_desc(const run *r, int which, double place) {
 
 static double wall_place(const run *r, int which) {
     dem2d_wall_info info;
-    check(dem2d_world_get_wall(r->world, r->walls[which], &info), "wall");
+    expect_ok(dem2d_world_get_wall(r->world, r->walls[which], &info), "wall");
     return which <= RIGHT ? info.point.x : info.point.y;
 }
 
@@ -206,7 +185,7 @@ static void add_walls(run *r, int test) {
     const double places[WALLS] = {r->bed->left, r->bed->right, r->bed->bottom, r->bed->top};
     for (int w = 0; w <= (test == BIAXIAL ? TOP : BOTTOM); w++) {
         const dem2d_wall_desc wall = wall_desc(r, w, places[w]);
-        check(dem2d_world_add_wall(r->world, &wall, &r->walls[w]), "wall");
+        expect_ok(dem2d_world_add_wall(r->world, &wall, &r->walls[w]), "wall");
     }
 }
 
@@ -220,14 +199,14 @@ static void control_walls(run *r) {
         wall.max_speed = fmax(0.1, 0.05 * (r->bed->right - r->bed->left));
         wall.spans[0] = r->walls[side ? BOTTOM : LEFT];
         wall.spans[1] = r->walls[side ? TOP : RIGHT];
-        check(dem2d_world_set_wall(r->world, r->walls[w], &wall), "wall");
+        expect_ok(dem2d_world_set_wall(r->world, r->walls[w], &wall), "wall");
     }
 }
 
 static dem2d_particle_info get_particle(const run *r, int i) {
     dem2d_particle_info info;
     memset(&info, 0, sizeof info);
-    check(dem2d_world_get_particle(r->world, r->ids[i], &info), "particle");
+    expect_ok(dem2d_world_get_particle(r->world, r->ids[i], &info), "particle");
     return info;
 }
 
@@ -238,13 +217,14 @@ static void compress(run *r) {
     const double height = wall.point.y - r->bed->bottom;
     wall.mode = DEM2D_WALL_MOVING;
     wall.velocity.y = -TOP_SPEED;
-    check(dem2d_world_set_wall(r->world, r->walls[TOP], &wall), "wall");
+    expect_ok(dem2d_world_set_wall(r->world, r->walls[TOP], &wall), "wall");
     for (int i = 0; i < r->bed->count; i++) {
         const dem2d_particle_info now = get_particle(r, i);
         dem2d_vec v = now.velocity;
         v.y -= TOP_SPEED * (now.pose.position.y - r->bed->bottom) / height;
-        check(dem2d_world_drive_particle(r->world, r->ids[i], DEM2D_FREE, v, now.angular_velocity),
-              "velocity");
+        expect_ok(
+            dem2d_world_drive_particle(r->world, r->ids[i], DEM2D_FREE, v, now.angular_velocity),
+            "velocity");
     }
 }
 
@@ -256,7 +236,7 @@ static run open_run(const bed *b, const setup *s) {
     desc.parallel_for = s->parallel, desc.parallel_user = s->user;
     desc.particle_capacity = b->count;
     r.bed = b;
-    check(dem2d_world_create(&desc, &r.world), "world");
+    expect_ok(dem2d_world_create(&desc, &r.world), "world");
     add_materials(&r, s->test);
     add_grains(&r);
     add_walls(&r, s->test);
@@ -272,12 +252,12 @@ static void close_run(run *r) {
 /* Returns seconds, of this thread on a core. */
 static double take_steps(run *r, int count) {
     const double start = busy_seconds();
-    check(dem2d_world_step(r->world, count, NULL), "step");
+    expect_ok(dem2d_world_step(r->world, count, NULL), "step");
     return busy_seconds() - start;
 }
 
 static void damp(run *r, double local) {
-    check(dem2d_world_set_damping(r->world, local, 0), "damping");
+    expect_ok(dem2d_world_set_damping(r->world, local, 0), "damping");
 }
 
 /* Where the grains are now; walls too. */
@@ -299,7 +279,7 @@ static bed save_bed(const run *r, int test) {
 /* Lists of pairs made so far. */
 static double rebuilds(const run *r) {
     dem2d_stats stats;
-    check(dem2d_world_stats(r->world, &stats), "stats");
+    expect_ok(dem2d_world_stats(r->world, &stats), "stats");
     return (double)stats.list_rebuilds;
 }
 
@@ -499,7 +479,7 @@ static void open_pool(pool *p) {
     memset(p, 0, sizeof *p);
     pthread_mutex_init(&p->mutex, NULL);
     pthread_cond_init(&p->wake, NULL);
-    if (pthread_create(&p->thread, NULL, help, p) != 0) fail("no second thread");
+    if (pthread_create(&p->thread, NULL, help, p) != 0) bench_fail("no second thread");
 }
 
 static void close_pool(pool *p) {
@@ -568,9 +548,10 @@ static void write_body(FILE *file, const bed *b, int i) {
     const dem2d_shape *shape = b->shapes[g->shape];
     dem2d_vec points[MOST_CORNERS];
     dem2d_shape_info info;
-    check(dem2d_shape_get(shape, &info), "template");
-    check(dem2d_shape_outline(shape, dem2d_pose_make(0, 0, g->angle, g->scale), info.count, points),
-          "corners");
+    expect_ok(dem2d_shape_get(shape, &info), "template");
+    expect_ok(
+        dem2d_shape_outline(shape, dem2d_pose_make(0, 0, g->angle, g->scale), info.count, points),
+        "corners");
     const double inertia = DENSITY * info.mass.polar_moment * pow(g->scale, 4);
     fprintf(file, "%d 1 %d\n%d\n", i + 1, 7 + 3 * info.count, info.count);
     fprintf(file, "%.17g %.17g %.17g 0 0 0\n", inertia / 2, inertia / 2, inertia);
@@ -584,7 +565,7 @@ static void write_polygons(FILE *file, const bed *b) {
     for (int i = 0; i < b->count; i++) {
         const grain *g = &b->grains[i];
         dem2d_shape_info info;
-        check(dem2d_shape_get(b->shapes[g->shape], &info), "template");
+        expect_ok(dem2d_shape_get(b->shapes[g->shape], &info), "template");
         fprintf(file, "%d 1 1 %.17g %.17g %.17g 0\n", i + 1,
                 DENSITY * info.mass.area * g->scale * g->scale, g->x, g->y);
     }
@@ -663,14 +644,14 @@ static peer start_lammps(const bed *b, int scene) {
     FILE *data = create("lammps.data");
     (scene == DISCS ? write_discs : write_polygons)(data, b);
     fclose(data);
-    if (pipe(ends) != 0) fail("no pipe");
+    if (pipe(ends) != 0) bench_fail("no pipe");
     fcntl(ends[1], F_SETFD, FD_CLOEXEC);
     l.process = fork();
-    if (l.process < 0) fail("no process");
+    if (l.process < 0) bench_fail("no process");
     if (l.process == 0) be_lammps(ends[0]);
     close(ends[0]);
     l.commands = fdopen(ends[1], "w");
-    if (!l.commands) fail("no pipe");
+    if (!l.commands) bench_fail("no pipe");
     (scene == DISCS ? send_discs : send_polygons)(l.commands, b);
     fprintf(l.commands,
             "neigh_modify delay 0 every 1 check yes\ntimestep %g\n"
@@ -831,7 +812,7 @@ static void clock_phases(bench *b) {
 static void count_things(bench *b) {
     timing *row = b->row;
     dem2d_stats stats;
-    check(dem2d_world_stats(b->one.world, &stats), "stats");
+    expect_ok(dem2d_world_stats(b->one.world, &stats), "stats");
     row->contacts = (double)(stats.contacts + stats.wall_contacts) / row->count;
     row->rate = row->contacts / (1e-9 * row->one.median);
     row->bytes = (double)stats.bytes / row->count;
@@ -973,8 +954,8 @@ static run open_impacts(const bed *b, double dt) {
     for (int i = 0; i < DT_GRAINS; i++) {
         dem2d_vec v = velocity[i];
         v.y += 0.5 * dt * GRAVITY;
-        check(dem2d_world_drive_particle(r.world, r.ids[i], DEM2D_FREE, v, i == 0 ? -3 : 0),
-              "velocity");
+        expect_ok(dem2d_world_drive_particle(r.world, r.ids[i], DEM2D_FREE, v, i == 0 ? -3 : 0),
+                  "velocity");
     }
     return r;
 }
@@ -988,7 +969,7 @@ static bed impact_bed(int model) {
         dem2d_shape_info info;
         b.grains[i] = places[i];
         b.grains[i].shape = model * TEMPLATES + (model == CIRCLE ? 0 : 1 + i);
-        check(dem2d_shape_get(b.shapes[b.grains[i].shape], &info), "template");
+        expect_ok(dem2d_shape_get(b.shapes[b.grains[i].shape], &info), "template");
         b.grains[i].scale /= info.equivalent;
     }
     return b;
@@ -1052,14 +1033,14 @@ static order_row order_rows[ORDERS];
 
 /* Corners on a circle, rounded by a seventh of it. */
 static dem2d_shape *make_original(void) {
-    const int count = 4 + (int)uniform(0, MOST_CORNERS - 3);
+    const int count = 4 + (int)bed_uniform(0, MOST_CORNERS - 3);
     dem2d_vec points[MOST_CORNERS];
     dem2d_shape *shape;
     for (int i = 0; i < count; i++) {
-        const double angle = 2 * PI * (i + uniform(-0.25, 0.25)) / count;
+        const double angle = 2 * PI * (i + bed_uniform(-0.25, 0.25)) / count;
         points[i].x = 0.9 * cos(angle), points[i].y = 0.9 * sin(angle);
     }
-    check(dem2d_shape_create_polygon(NULL, points, count, 0.15, &shape), "polygon");
+    expect_ok(dem2d_shape_create_polygon(NULL, points, count, 0.15, &shape), "polygon");
     return shape;
 }
 
@@ -1068,8 +1049,9 @@ static dem2d_shape *fit(const dem2d_shape *original, int order, dem2d_fit_report
     dem2d_fit_desc desc = {0};
     dem2d_shape *shape;
     desc.model = DEM2D_FOURIER, desc.count = order;
-    check(dem2d_shape_outline(original, dem2d_pose_make(0, 0, 0, 1), OUTLINE, outline), "outline");
-    check(dem2d_outline_fit(NULL, outline, OUTLINE, &desc, &shape, report), "fit");
+    expect_ok(dem2d_shape_outline(original, dem2d_pose_make(0, 0, 0, 1), OUTLINE, outline),
+              "outline");
+    expect_ok(dem2d_outline_fit(NULL, outline, OUTLINE, &desc, &shape, report), "fit");
     return shape;
 }
 
@@ -1079,7 +1061,7 @@ static void fit_originals(dem2d_shape *const *originals, int order, dem2d_shape 
     for (int i = 0; i < ORIGINALS; i++) {
         dem2d_fit_report report;
         dem2d_shape_info info;
-        check(dem2d_shape_get(originals[i], &info), "original");
+        expect_ok(dem2d_shape_get(originals[i], &info), "original");
         fits[i] = fit(originals[i], order, &report);
         r->error += (1 - report.coverage) / ORIGINALS;
         r->hausdorff = fmax(r->hausdorff, report.hausdorff / info.equivalent);
@@ -1099,7 +1081,8 @@ static run open_order(bed *b, dem2d_shape *const *fits) {
 static bed settle_originals(dem2d_shape *const *originals) {
     bed b = make_bed(500);
     b.shapes = originals, b.shape_count = ORIGINALS, b.right = 1;
-    for (int i = 0; i < b.count; i++) b.grains[i] = random_grain(&b, (int)uniform(0, ORIGINALS));
+    for (int i = 0; i < b.count; i++)
+        b.grains[i] = random_grain(&b, (int)bed_uniform(0, ORIGINALS));
     lay_rows(&b);
     return settle(b);
 }
@@ -1133,7 +1116,7 @@ static void measure_orders(void) {
     static dem2d_shape *originals[ORIGINALS], *fits[ORDERS][ORIGINALS];
     run runs[ORDERS];
     bed beds[ORDERS];
-    random_state = 64;
+    bed_state = 64;
     for (int i = 0; i < ORIGINALS; i++) originals[i] = make_original();
     bed settled = settle_originals(originals);
     for (int k = 0; k < ORDERS; k++) {
@@ -1456,22 +1439,22 @@ static dem2d_world *open_sizes(int count, double ratio) {
     scene.time_step = TIME_STEP;
     scene.particle_capacity = count;
     scene.skip_time_step_check = true;
-    check(dem2d_world_create(&scene, &world), "world");
-    check(dem2d_world_add_material(world, &stone, &grain.material), "material");
-    check(dem2d_world_add_shape(world, templates[0], &grain.shape), "shape");
+    expect_ok(dem2d_world_create(&scene, &world), "world");
+    expect_ok(dem2d_world_add_material(world, &stone, &grain.material), "material");
+    expect_ok(dem2d_world_add_shape(world, templates[0], &grain.shape), "shape");
     grain.motion = DEM2D_DRIVEN;
     double area = 0, *radii = get_memory((size_t)count, sizeof *radii);
     for (int i = 0; i < count; i++) { /* 1/r^2 uniform: a number for each r that falls as r^-3 */
-        radii[i] = 1 / sqrt(uniform(1, ratio * ratio));
+        radii[i] = 1 / sqrt(bed_uniform(1, ratio * ratio));
         area += PI * radii[i] * radii[i];
     }
     const double side = sqrt(2 * area);
     for (int i = 0; i < count; i++) {
         dem2d_particle_id id;
         grain.scale = radii[i];
-        grain.position.x = uniform(0, side);
-        grain.position.y = uniform(0, side);
-        check(dem2d_world_add_particle(world, &grain, &id), "particle");
+        grain.position.x = bed_uniform(0, side);
+        grain.position.y = bed_uniform(0, side);
+        expect_ok(dem2d_world_add_particle(world, &grain, &id), "particle");
     }
     free(radii);
     return world;
@@ -1482,11 +1465,11 @@ static double time_list(dem2d_world *world) {
     enum { TRIES = 5 };
     double times[TRIES];
     for (int k = 0; k < TRIES; k++) {
-        check(dem2d_world_set_time_step(world, TIME_STEP), "time step"); /* makes it stale */
+        expect_ok(dem2d_world_set_time_step(world, TIME_STEP), "time step"); /* makes it stale */
         const double before = busy_seconds();
-        check(dem2d_world_step(world, 1, NULL), "step");
+        expect_ok(dem2d_world_step(world, 1, NULL), "step");
         times[k] = busy_seconds() - before;
-        check(dem2d_world_step(world, 1, NULL), "step"); /* one without, to be taken off */
+        expect_ok(dem2d_world_step(world, 1, NULL), "step"); /* one without, to be taken off */
         times[k] -= busy_seconds() - before - times[k];
     }
     return summary(times, TRIES).median;
@@ -1504,9 +1487,9 @@ static void measure_sizes(void) {
         for (int k = 0; k < COUNT_OF(ratios); k++) {
             dem2d_world *world = open_sizes(opt.quick ? counts[i] / 8 : counts[i], ratios[k]);
             dem2d_stats stats;
-            check(dem2d_world_step(world, 2, NULL), "step");
+            expect_ok(dem2d_world_step(world, 2, NULL), "step");
             const double list = time_list(world);
-            check(dem2d_world_stats(world, &stats), "stats");
+            expect_ok(dem2d_world_stats(world, &stats), "stats");
             const double ns = 1e9 * list / stats.particles;
             const double pairs = (double)stats.pairs / stats.particles;
             printf("%8d %6g %16.0f %16.2f\n", stats.particles, ratios[k], ns, pairs);
@@ -1547,25 +1530,13 @@ static bool parse(int argc, char **argv) {
     return true;
 }
 
-/* A folder and those above it; there already, usually. */
-static void make_folder(const char *path) {
-    char part[4096];
-    if (strlen(path) >= sizeof part) return;
-    for (size_t i = 1; i <= strlen(path); i++) {
-        if (path[i] != '/' && path[i] != 0) continue;
-        memcpy(part, path, i), part[i] = 0;
-        mkdir(part, 0777);
-    }
-}
-
 int main(int argc, char **argv) {
     const double start = seconds();
     bool scenes = false;
     if (!parse(argc, argv)) return usage();
-    make_folder(opt.folder);
-    if (chdir(opt.folder) != 0) fail("no folder %s", opt.folder);
+    enter_folder(opt.folder);
     signal(SIGPIPE, SIG_IGN);
-    random_state = 1;
+    bed_state = 1;
     make_templates();
     if (!have_lammps()) printf("skipped: LAMMPS: %s\n", opt.lammps ? "no lmp here" : "not wanted");
     for (int i = 0; i < SCENES; i++) scenes = scenes || opt.parts[i];

@@ -21,7 +21,7 @@ static bool row(ledger_class kind, int steps, int groups) {
             closures[k] = fabs(l.closure) / l.turnover;
             greatest = fmax(greatest, closures[k]);
         }
-        const double median = ledger_median(closures, SEEDS);
+        const double median = middle_of(closures, SEEDS);
         worst = fmax(worst, median);
         sum += median;
     }

@@ -174,15 +174,4 @@ static dem2d_ledger ledger_scene_run(ledger_class kind, int seed, double steps, 
     return ledger;
 }
 
-static int ledger_order(const void *a, const void *b) {
-    const double x = *(const double *)a, y = *(const double *)b;
-    return (x > y) - (x < y);
-}
-
-/* Sorts them. */
-static double ledger_median(double *values, int count) {
-    qsort(values, (size_t)count, sizeof *values, ledger_order);
-    return (values[(count - 1) / 2] + values[count / 2]) / 2;
-}
-
 #endif

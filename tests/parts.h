@@ -44,6 +44,17 @@ PART dem2d_vec vec(double x, double y) {
     return v;
 }
 
+PART int compare_doubles(const void *a, const void *b) {
+    const double x = *(const double *)a, y = *(const double *)b;
+    return (x > y) - (x < y);
+}
+
+/* The median, of an even number the mean of the two in the middle. Sorts the values. */
+PART double middle_of(double *values, int count) {
+    qsort(values, (size_t)count, sizeof *values, compare_doubles);
+    return (values[(count - 1) / 2] + values[count / 2]) / 2;
+}
+
 /* --- templates -------------------------------------------------------------------------------- */
 
 PART dem2d_shape *make_disc(double radius) {

@@ -21,7 +21,7 @@ static double median_closure(ledger_class kind, double steps, double contact_tim
         assert_true(l.turnover > 0 && l.friction > 0);
         closures[seed] = fabs(l.closure) / l.turnover;
     }
-    return ledger_median(closures, SEEDS);
+    return middle_of(closures, SEEDS);
 }
 
 /* The short form of `make ledger`. */
