@@ -563,8 +563,12 @@ DETERMINISM
 #define DEM2D_VERSION_MAJOR 0
 #define DEM2D_VERSION_MINOR 6
 #define DEM2D_VERSION_PATCH 0
-#define DEM2D_VERSION 600 /* major * 10000 + minor * 100 + patch */
-#define DEM2D_VERSION_STRING "0.6.0"
+#define DEM2D_VERSION \
+    (DEM2D_VERSION_MAJOR * 10000 + DEM2D_VERSION_MINOR * 100 + DEM2D_VERSION_PATCH)
+#define DEM2DI_JOIN(major, minor, patch) #major "." #minor "." #patch
+#define DEM2DI_JOIN_VALUES(major, minor, patch) DEM2DI_JOIN(major, minor, patch)
+#define DEM2D_VERSION_STRING \
+    DEM2DI_JOIN_VALUES(DEM2D_VERSION_MAJOR, DEM2D_VERSION_MINOR, DEM2D_VERSION_PATCH)
 
 #if defined(DEM2D_STATIC)
 #if defined(__GNUC__)

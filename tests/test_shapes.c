@@ -82,8 +82,8 @@ static dem2d_result try_rounded(const dem2d_env *env, double scale, dem2d_shape 
     return dem2d_shape_create_polygon(env, points, 5, 0.7 * scale, shape);
 }
 
-static dem2d_result try_arcs(const dem2d_env *env, double scale, const dem2d_vec *control,
-                              int arcs, dem2d_shape **shape) {
+static dem2d_result try_arcs(const dem2d_env *env, double scale, const dem2d_vec *control, int arcs,
+                             dem2d_shape **shape) {
     dem2d_vec scaled[3 * 16];
     scale_points(scale, 3 * arcs, control, scaled);
     return dem2d_shape_create_bezier(env, scaled, arcs, shape);
@@ -107,8 +107,8 @@ static dem2d_result try_flat(const dem2d_env *env, double scale, dem2d_shape **s
     return try_arcs(env, scale, control, 8, shape);
 }
 
-static dem2d_result try_series(const dem2d_env *env, double scale, const double *a,
-                                const double *b, int order, dem2d_shape **shape) {
+static dem2d_result try_series(const dem2d_env *env, double scale, const double *a, const double *b,
+                               int order, dem2d_shape **shape) {
     double scaled_a[65], scaled_b[65];
     for (int n = 0; n <= order; n++) scaled_a[n] = scale * a[n], scaled_b[n] = scale * b[n];
     return dem2d_shape_create_fourier(env, scaled_a, scaled_b, order, shape);
@@ -1087,6 +1087,10 @@ static void rotations_and_poses(void **state) {
 
 static void texts_and_version(void **state) {
     (void)state;
+    char version[32];
+    snprintf(version, sizeof version, "%d.%d.%d", DEM2D_VERSION / 10000, DEM2D_VERSION / 100 % 100,
+             DEM2D_VERSION % 100);
+    assert_string_equal(version, DEM2D_VERSION_STRING);
     assert_int_equal(dem2d_version(), DEM2D_VERSION);
     for (int i = 0; i < DEM2D_RESULT_COUNT; i++) {
         const char *text = dem2d_result_text((dem2d_result)i);
