@@ -1576,9 +1576,9 @@ typedef struct dem2d_anisotropy {
     double direction;   ///< rad in (-pi/2, pi/2]; 0 if the coefficient is 0
 } dem2d_anisotropy;
 
-/// Fabric of the contacts between particles at the last force pass; all 0 without any. Means of
-/// lengths and forces by direction are corrected for the number of contacts there (Rothenburg,
-/// Bathurst 1989; Guo, Zhao 2013), taken as 1 + a_c cos, but not below 0.1.
+/// Fabric of the contacts between particles at the last force pass; all 0 without contacts. Means
+/// of lengths and forces by direction are divided by the density of contacts in that direction
+/// (Rothenburg, Bathurst 1989; Guo, Zhao 2013), taken as 1 + a_c cos, but not below 0.1.
 typedef struct dem2d_fabric {
     int contacts;                       ///< number of them
     double xx;                          ///< (1/N) sum of n n, with n the unit normals
@@ -1592,16 +1592,16 @@ typedef struct dem2d_fabric {
     dem2d_anisotropy branch_tangents;   ///< a_bt: across it, -mean a_bt sin 2 (angle - direction)
     dem2d_anisotropy normal_forces;     ///< a_n
     dem2d_anisotropy tangential_forces; ///< a_t: f_t = -f0 a_t sin 2 (angle - direction)
-    /// q/p foretold: (a_c + a_b + a_bt + a_n + a_t)/2, parts along the direction of a_c.
+    /// Predicted q/p: (a_c + a_b + a_bt + a_n + a_t)/2, of the parts along the direction of a_c.
     double stress_ratio;
 } dem2d_fabric;
 
-/// What a histogram counts or averages. Directions of normals fill [0, 2 pi), and each contact
-/// between particles counts for both, with opposite normals.
+/// What a histogram counts or averages. Directions of normals are in [0, 2 pi); each contact
+/// between particles counts twice, with opposite normals.
 typedef enum dem2d_histogram {
     DEM2D_HISTOGRAM_COORDINATION, ///< particles with 0, 1, .. bins - 1 or more contacts, no walls
     DEM2D_HISTOGRAM_ORIENTATION,  ///< particles by their long axis ([P] alignment), in [0, pi);
-                                  ///< without one: none
+                                  ///< particles without a long axis do not count
     DEM2D_HISTOGRAM_NORMAL,       ///< contacts by the direction of their normal
     DEM2D_HISTOGRAM_ALONG_BRANCH, ///< contacts by contact branch orientation: from centre to centre
     DEM2D_HISTOGRAM_BRANCH,       ///< m, mean branch along the normal, by the normal's direction
@@ -1610,61 +1610,65 @@ typedef enum dem2d_histogram {
     DEM2D_HISTOGRAM_COUNT
 } dem2d_histogram;
 
-/// How far a world is from rest, at the last force pass.
+/// Distance of a world from static equilibrium, at the last force pass.
 typedef struct dem2d_equilibrium {
     double mean_speed;    ///< m/s, of the centroids of particles that are not fixed
     double max_speed;     ///< m/s
     double kinetic_ratio; ///< the papers' relative kinetic energy: kinetic over spring energy; 0 at
                           ///< rest, HUGE_VAL without contacts
-    double unbalanced;    ///< mean |contact forces + weight| of the free over mean contact force
+    double unbalanced;    ///< mean |contact forces + weight| of free particles / mean contact force
 } dem2d_equilibrium;
 
-/// Counters.
+/// Counters of a world. Errors: NULL_ARGUMENT; so for all queries.
 DEM2D_API dem2d_result dem2d_world_stats(const dem2d_world *world, dem2d_stats *stats);
-/// Ids of living particles in the order of their index: up to capacity into ids (may be NULL when
-/// capacity is 0); count gets how many there are.
+/// Ids of all particles, sorted by index: the first `capacity` of them go into ids (may be NULL if
+/// capacity is 0); count gets the number of particles. Errors: OUT_OF_RANGE (capacity below 0).
 DEM2D_API dem2d_result dem2d_world_particles(const dem2d_world *world, dem2d_particle_id *ids,
                                              int capacity, int *count);
-/// Contacts of the last force pass, particle pairs then walls, each in the order of their
-/// ids: up to capacity into contacts (may be NULL when capacity is 0); count gets how many.
+/// Contacts of the last force pass, first of two particles, then with walls, each sorted by ids:
+/// the first `capacity` of them go into contacts (may be NULL if capacity is 0); count gets the
+/// number of contacts. Errors: OUT_OF_RANGE (capacity below 0).
 DEM2D_API dem2d_result dem2d_world_contacts(const dem2d_world *world, dem2d_contact_info *contacts,
                                             int capacity, int *count);
-/// Energies.
+/// Energies at the last force pass.
 DEM2D_API dem2d_result dem2d_world_energy(const dem2d_world *world, dem2d_energy *energy);
-/// The ledger, for a world that keeps one (desc.ledger), else OUT_OF_RANGE.
+/// The energy balance of a world with desc.ledger. Errors: OUT_OF_RANGE for a world without it.
 DEM2D_API dem2d_result dem2d_world_ledger(const dem2d_world *world, dem2d_ledger *ledger);
-/// Love-Weber stress (1/area) sum of f l over the contacts, walls included; area > 0, m2.
+/// Love-Weber stress: (1/area) times the sum of f l over the contacts, walls included; area > 0,
+/// m2. Errors: NOT_FINITE, OUT_OF_RANGE (area).
 DEM2D_API dem2d_result dem2d_world_stress(const dem2d_world *world, double area,
                                           dem2d_stress *stress);
-/// Stress in a particle: (1/its area) sum of arm and force over its contacts, walls included.
-/// Times the areas, those of all particles add up to dem2d_world_stress times its area.
+/// Stress in a particle: (1/its area) times the sum of arm and force over its contacts, walls
+/// included. The sum over all particles of stress times area is dem2d_world_stress times its area.
+/// Errors: STALE_ID.
 DEM2D_API dem2d_result dem2d_world_particle_stress(const dem2d_world *world, dem2d_particle_id id,
                                                    dem2d_stress *stress);
 /// Mean, deviator and direction of the symmetric part of a stress. Errors: NOT_FINITE.
 DEM2D_API dem2d_result dem2d_stress_principal(const dem2d_stress *stress,
                                               dem2d_principal *principal);
-/// Logarithmic strain -ln(now/before) of a length, compression positive; NaN unless both are above
-/// 0 and finite. The same bits everywhere, right to 2 ulp, of small strains too.
+/// Logarithmic strain -ln(now/before) of a length (m), compression positive; NaN unless both are
+/// above 0 and finite. The same bits on every platform, with an error of 2 ulp, for small strains,
+/// too.
 DEM2D_API double dem2d_strain(double now, double before);
 /// Coordination number, overlaps, solid area, rattlers.
 DEM2D_API dem2d_result dem2d_world_packing(const dem2d_world *world, dem2d_packing *packing);
-/// 1 - (area of the parts of particles inside a region)/(its area). Each particle's part is right
-/// to 1e-5 of its area, exact if it is a sharp polygon or wholly inside; what overlaps counts
+/// 1 - (area of particles inside a region)/(area of the region). The area of each particle has an
+/// error of 1e-5, and none if the particle is a sharp polygon or completely inside; overlaps count
 /// twice. Errors: NOT_FINITE, OUT_OF_RANGE (upper not above lower).
 DEM2D_API dem2d_result dem2d_world_porosity(const dem2d_world *world, const dem2d_box *region,
                                             double *porosity);
-/// Fabric: where contacts are, and how lengths and forces depend on their direction.
+/// Fabric: directions of contacts, and how branch lengths and forces depend on the direction.
 DEM2D_API dem2d_result dem2d_world_fabric(const dem2d_world *world, dem2d_fabric *fabric);
-/// A histogram of bins >= 1 equal parts into values; means over empty bins are 0. Errors:
-/// OUT_OF_RANGE, OUT_OF_MEMORY (it counts in memory of the environment).
+/// A histogram with bins >= 1 equal parts; values gets one number for each bin, and means over
+/// empty bins are 0. Errors: OUT_OF_RANGE, OUT_OF_MEMORY (it allocates room for the counts).
 DEM2D_API dem2d_result dem2d_world_histogram(const dem2d_world *world, dem2d_histogram kind,
                                              int bins, double *values);
-/// Speeds, kinetic energy and resultants against what the contacts carry.
+/// Speeds, kinetic energy and resultant forces, relative to energies and forces of the contacts.
 DEM2D_API dem2d_result dem2d_world_equilibrium(const dem2d_world *world,
                                                dem2d_equilibrium *equilibrium);
-/// Inertial number |strain_rate| d sqrt(density/pressure) (1/s; Pa, > 0): d is the mean diameter of
-/// the circles of equal area, the density that of the solid. Quasi-static below 1e-3; 0 without
-/// particles.
+/// Inertial number |strain_rate| d sqrt(density/pressure) with strain_rate in 1/s and pressure > 0
+/// in Pa; d is the mean diameter of the circles of equal area, the density that of the solid.
+/// Quasi-static below 1e-3; 0 without particles. Errors: NOT_FINITE, OUT_OF_RANGE.
 DEM2D_API dem2d_result dem2d_world_inertial_number(const dem2d_world *world, double strain_rate,
                                                    double pressure, double *number);
 
