@@ -2,7 +2,7 @@
    what the papers say of them holds here.
 
        make -C examples figures                     (about a minute; needs gnuplot)
-       build/figures --help
+       examples/build/figures --help
 
    P is the paper on polybezier grains, F the one on Fourier series (FS) of the support function, as
    the manual in dem2d.h cites them. `make figures` runs biaxial six times - five models,
@@ -20,9 +20,9 @@
 #define _POSIX_C_SOURCE 200809L
 #define DEM2D_IMPLEMENTATION
 #include "dem2d.h"
-#include "grains.h"
-#include "statistics.h"
-#include "svg.h"
+#include "../examples/grains.h"
+#include "../examples/statistics.h"
+#include "../examples/svg.h"
 
 static const char usage[] =
     "usage: figures DIR [options]\n"
