@@ -22,7 +22,7 @@
 #define HELLO_PATH "../examples/hello.c" // likewise DEM2D_HELLO
 #endif
 
-enum { MAX_COLUMNS = 100, MAX_NAMES = 256, NAME = 96 };
+enum { MAX_COLUMNS = 100, MAX_LINES = 60, MAX_NAMES = 256, NAME = 96 };
 
 static const char lower[] = "abcdefghijklmnopqrstuvwxyz";
 static const char word_characters[] = "abcdefghijklmnopqrstuvwxyz0123456789_"
@@ -468,6 +468,21 @@ static int check_text(const doc *d, const doc *hello) {
     return d->count ? errors : fault(d, -1, "no text", "");
 }
 
+// A function begins at the last line before it that begins with a letter, and ends at a brace.
+static int check_lengths(const doc *d, const doc *hello) {
+    (void)hello;
+    int errors = 0, start = -1;
+    for (int i = 0; i < d->count; i++) {
+        const char first = d->line[i][0];
+        if (first && strchr(word_characters, first)) start = i;
+        if (strcmp(d->line[i], "}") != 0) continue;
+        if (start >= 0 && i - start >= MAX_LINES)
+            errors += fault(d, start, "a function of more than 60 lines", "");
+        start = -1;
+    }
+    return errors;
+}
+
 static int check_goto(const doc *d, const doc *hello) {
     (void)hello;
     int errors = 0;
@@ -831,6 +846,7 @@ static rule rules[] = {
     {"versions agree", check_versions},
     {"allocation only in its section", check_memory},
     {"ASCII, no tabs, 100 columns", check_text},
+    {"no function over 60 lines", check_lengths},
     {"no goto", check_goto},
     {"sections use those above", check_uses},
     {"sections use what they name", check_calls},
@@ -903,6 +919,11 @@ static mutation mutations[] = {
     {"rejects: accent", check_text, "Some.", "S\xc3\xb6me."},
     {"rejects: carriage return", check_text, "/// Some.", "/// Some.\r"},
     {"rejects: 101 columns", check_text, "|\n", "||\n"},
+    {"rejects: 61 lines", check_lengths, "double x) { return x; }\n",
+     "double x) {\n"
+     "\n\n\n\n\n\n\n\n\n\n\n\n\n\n\n\n\n\n\n\n\n\n\n\n\n\n\n\n\n\n"
+     "\n\n\n\n\n\n\n\n\n\n\n\n\n\n\n\n\n\n\n\n\n\n\n\n\n\n\n\n"
+     "    return x;\n}\n"},
     {"rejects: goto", check_goto, "{ return malloc", "{ goto end; return malloc"},
     {"rejects: goto at the end of a line", check_goto, "/// Some.", "goto"},
     {"rejects: no uses", check_uses, "   uses: config\n", ""},
