@@ -10439,8 +10439,8 @@ static inline double dem2di_velocity_n(const dem2di_contact *contact,
 /* Sliding velocity: mean over the step that was made, of what normal and arms were at its beginning
    and are at its end: those of the end alone leave an error of first order in the step. Of a new
    contact that of its end. One rule for all pairs: dem2di_batch_slip is the same for circles. */
-static double dem2di_slip(const dem2di_contact *last, const dem2di_contact *contact,
-                          const dem2di_relative_motion *motion) {
+static DEM2DI_INLINE double dem2di_slip(const dem2di_contact *last, const dem2di_contact *contact,
+                                        const dem2di_relative_motion *motion) {
     double slip = dem2di_velocity_t(contact, motion);
     if (!(last->depth > 0)) return slip;
     return slip + (dem2di_velocity_t(last, motion) - slip) / 2;
@@ -10852,6 +10852,7 @@ typedef struct dem2di_list {
 typedef struct dem2di_count {
     int64_t calls, collisions, separations, proofs[DEM2D_PROOF_COUNT];
     int64_t unsound; /* forces that are not finite */
+    double load;     /* greatest of this pass, while nothing else bounds the states */
 } dem2di_count;
 
 /* The greatest eigenvalues of M_i^-1 sum_c f_c K_c, for the limit of the time step and for the safe
@@ -10966,6 +10967,7 @@ struct dem2d_world {
     dem2d_solver solver;
     dem2d_face_rule faces;
 
+    bool looks_back; /* the force pass keeps the contacts of the last one */
     bool check_time_step;
     bool check_due;  /* an edit since the last check of the time step and the speeds can matter */
     bool list_stale; /* the list must be built before the next force pass */
@@ -11544,17 +11546,21 @@ static size_t dem2di_contacts_largest(const dem2di_plan *plan, int discs, int co
     return most;
 }
 
-/* The contacts as they are into list.last, or (`back`) as they were from there. */
-static void dem2di_contacts_keep(dem2d_world *world, bool back) {
+/* Contacts from `first` to before `end` as they are into list.last, or (`back`) as they were from
+   there. */
+static void dem2di_contacts_keep(const dem2d_world *world, int first, int end, bool back) {
     const dem2di_list *list = &world->list;
     for (int k = 0; k < DEM2DI_COLUMNS; k++) {
         const dem2di_column *column = &dem2di_columns[k];
         if (!(column->treatment & DEM2DI_STORED)) continue;
         int begin = dem2di_contacts_begin(&world->plan, list->discs, list->count, column->group);
-        size_t bytes = (size_t)(list->count - begin) * column->size;
+        int from = first > begin ? first - begin : 0;
+        if (end - begin <= from) continue;
+        size_t at = (size_t)from * column->size, bytes = (size_t)(end - begin) * column->size - at;
         dem2di_column last = dem2di_column_last(column);
-        void *now = dem2di_column_get(world, column), *then = dem2di_column_get(world, &last);
-        if (bytes > 0) memcpy(back ? now : then, back ? then : now, bytes);
+        char *now = (char *)dem2di_column_get(world, column) + at;
+        char *then = (char *)dem2di_column_get(world, &last) + at;
+        memcpy(back ? now : then, back ? then : now, bytes);
     }
 }
 
@@ -13079,6 +13085,8 @@ static void dem2di_travel_task(void *context, int begin, int end) {
 #define DEM2DI_LIST_STEPS (1 << 20)
 static bool dem2di_bounded(const dem2d_world *world, const dem2di_plan *plan, int contacts) {
     double far = 0, size = 0, heavy = 0, speed = 0, spin = 0, light = 0, slender = 0, stiff = 0;
+    double ratio = 0, rolling = 0;
+    bool circles = true;
     for (int i = 0; i < world->body_count; i++) {
         const dem2di_state *now = &world->now[i];
         far = dem2di_max(far, fabs(now->x.x) + fabs(now->x.y));
@@ -13088,6 +13096,7 @@ static bool dem2di_bounded(const dem2d_world *world, const dem2di_plan *plan, in
         light = dem2di_max(light, world->inverse[i].mass);
         if (world->inverse[i].mass > 0) heavy = dem2di_max(heavy, 1 / world->inverse[i].mass);
         slender = dem2di_max(slender, world->inverse[i].inertia);
+        circles = circles && dem2di_is_circle(world, i);
     }
     for (int j = 0; j < world->wall_count; j++) {
         const dem2d_wall_desc *wall = &world->walls[j].desc;
@@ -13100,14 +13109,19 @@ static bool dem2di_bounded(const dem2d_world *world, const dem2di_plan *plan, in
     for (int k = 0; k < world->laws_side * world->laws_side; k++) {
         const dem2d_pair_desc *law = &world->laws[k];
         stiff = dem2di_max(stiff, law->normal_stiffness * (1 + law->friction));
+        ratio = dem2di_max(ratio, law->damping_ratio * (1 + law->friction));
+        rolling = dem2di_max(rolling, law->rolling_friction);
     }
-    double depth = 2 * (far + 2 * size), force = (contacts + 1.0) * stiff * depth;
-    double time = DEM2DI_LIST_STEPS * world->time_step; /* damping at most doubles */
+    double depth = 2 * (far + 2 * size), time = DEM2DI_LIST_STEPS * world->time_step;
+    double closing = 2 * (speed + depth / world->time_step),
+           dashpot = 2 * ratio * sqrt(heavy * stiff);
+    double force = (contacts + 1.0) * (stiff * depth + dashpot * closing); /* damping doubles */
     speed += 2 * time * (fabs(world->gravity.x) + fabs(world->gravity.y) + force * light);
-    spin += 2 * time * (force * 2 * size * slender);
+    spin += 2 * time * (force * 2 * size * (1 + rolling) * slender);
+    bool known = !plan->full || (circles && world->law == NULL);
     return far + time * speed < 1e300 && force * heavy < 1e300 &&
            spin * world->time_step < 1e50 && /* its cube is finite */
-           dem2di_has_disc_kernel(world, plan);
+           known && world->solver == DEM2D_CERTIFIED;
 }
 
 /* How far the rounding of a position moves a particle in a step. */
@@ -13182,7 +13196,7 @@ static void dem2di_loads_clear(dem2d_world *world) {
         memset(world->load_x, 0, (size_t)((char *)world->pushes - (char *)world->load_x));
 }
 
-/* The contacts of the last force pass are kept while those of the next are written over them. */
+/* Room for the contacts of the last force pass, which keeps them where it writes over them. */
 static bool dem2di_keep_last(dem2d_world *world) {
     const dem2di_list *list = &world->list;
     size_t bytes =
@@ -13190,7 +13204,6 @@ static bool dem2di_keep_last(dem2d_world *world) {
     bool room = dem2di_scratch_reserve(world, bytes);
     (void)dem2di_step_cut(world, world->scratch, list->discs, list->pairs, list->count,
                           &world->plan, room);
-    if (room) dem2di_contacts_keep(world, false);
     return room;
 }
 
@@ -13384,17 +13397,23 @@ static dem2d_result dem2di_build_list(dem2d_world *world) {
    given other velocities since, by what they had then. */
 static inline dem2di_relative_motion dem2di_motion_of(const dem2d_world *world, int contact) {
     const dem2di_key *key = &world->list.keys[contact];
-    dem2di_velocities a = dem2di_velocities_made(world, key->a), b;
-    if (contact >= world->list.pairs) {
-        b.v = world->wall_now[key->b].velocity;
-        b.w = 0;
-    } else {
-        b = dem2di_velocities_made(world, key->b);
-    }
+    const bool wall = contact >= world->list.pairs;
+    dem2d_vec a = world->now[key->a].v, b;
     dem2di_relative_motion motion;
-    motion.v = dem2di_sub(b.v, a.v);
-    motion.wa = a.w;
-    motion.wb = b.w;
+    b = wall ? world->wall_now[key->b].velocity : world->now[key->b].v;
+    motion.wa = world->now[key->a].w;
+    motion.wb = wall ? 0 : world->now[key->b].w;
+    if (world->redirected) {
+        const dem2di_velocities made_a = dem2di_velocities_made(world, key->a);
+        a = made_a.v;
+        motion.wa = made_a.w;
+        if (!wall) {
+            const dem2di_velocities made_b = dem2di_velocities_made(world, key->b);
+            b = made_b.v;
+            motion.wb = made_b.w;
+        }
+    }
+    motion.v = dem2di_sub(b, a);
     return motion;
 }
 
@@ -13802,11 +13821,20 @@ typedef struct dem2di_last {
     dem2di_extra extra; /* with the full law */
 } dem2di_last;
 
-static inline void dem2di_last_get(const dem2d_world *world, const dem2di_contacts *from, int i,
-                                   dem2di_last *last) {
-    (void)dem2di_contact_get(world, from, i, &last->contact);
-    if (world->plan.faces) last->ends = from->ends[i - world->list.discs];
-    if (world->plan.full) last->extra = from->extras[i - world->list.discs];
+static inline void dem2di_last_from(const dem2d_world *world, const dem2di_contacts *from, int i,
+                                    dem2di_last *last) {
+    int at = i - world->list.discs;
+    last->contact.normal.x = from->normal_x[i];
+    last->contact.normal.y = from->normal_y[i];
+    last->contact.depth = from->depth[i];
+    last->contact.shear = from->shear[i];
+    last->contact.arms = from->arms[at];
+    if (world->plan.faces) last->ends = from->ends[at];
+    if (world->plan.full) last->extra = from->extras[at];
+}
+
+static inline void dem2di_last_get(const dem2d_world *world, int i, dem2di_last *last) {
+    dem2di_last_from(world, &world->list.contacts, i, last);
 }
 
 /* Forces of springs and friction. */
@@ -13927,18 +13955,19 @@ static inline void dem2di_force(const dem2d_world *world, int i, const dem2di_la
     world->load_y[i] = force.y;
     world->load_a[i] = dem2di_torque_a(contact, moment);
     world->load_b[i] = dem2di_torque_b(contact, moment);
-    double sum = force.x + force.y + world->load_a[i] + world->load_b[i];
+    double sum = fabs(force.x) + fabs(force.y) + fabs(world->load_a[i]) + fabs(world->load_b[i]);
     count->unsound += !dem2di_finite(sum);
+    if (!world->bounded) count->load = dem2di_max(count->load, sum);
 }
 
 /* Where contact i has its points, beside it when there are two; B's centre is at d. A circle has
    its point on the line of the normal: at the middle of an overlap, and on a wall at the foot. */
-static inline void dem2di_contact_place(const dem2d_world *world, int i, int count,
-                                        const dem2d_contact_point points[2], dem2d_vec d,
-                                        dem2di_contact *contact) {
+static DEM2DI_INLINE void dem2di_contact_place(const dem2d_world *world, int i, int count,
+                                               const dem2d_contact_point points[2], dem2d_vec d,
+                                               dem2di_contact *contact) {
     const dem2di_list *list = &world->list;
     const dem2di_key *key = &list->keys[i];
-    bool wall = i >= list->pairs;
+    bool wall = i >= list->pairs, turns = world->plan.turns; /* circles have a lever of 0 */
     dem2di_arms *arms = &contact->arms;
     dem2d_vec point = points[0].position;
     if (count == 2) point = dem2di_ends_set(points, &list->contacts.ends[i - list->discs], contact);
@@ -13947,24 +13976,28 @@ static inline void dem2di_contact_place(const dem2d_world *world, int i, int cou
     arms->a_t = dem2di_cross(contact->normal, point);
     arms->b_n = wall ? 0 : dem2di_dot(contact->normal, from_b);
     arms->b_t = wall ? 0 : dem2di_cross(contact->normal, from_b);
-    if (dem2di_is_circle(world, key->a)) {
+    if (!turns || world->lever[key->a] == 0) {
         arms->a_n = world->now[key->a].radius - (wall ? contact->depth : contact->depth / 2);
         arms->a_t = 0;
     }
-    if (!wall && dem2di_is_circle(world, key->b)) {
+    if (!wall && (!turns || world->lever[key->b] == 0)) {
         arms->b_n = -(world->now[key->b].radius - contact->depth / 2);
         arms->b_t = 0;
     }
 }
 
-/* A contact before it is looked at: apart, with the normal of the last look. */
-static inline void dem2di_contact_open(const dem2d_world *world, int i, const dem2di_contact *last,
-                                       dem2di_contact *contact) {
-    memset(contact, 0, sizeof *contact);
-    contact->normal = last->normal;
-    contact->depth = -1;
+static inline void dem2di_no_load(const dem2d_world *world, int i) {
     world->load_x[i] = world->load_y[i] = world->load_a[i] = world->load_b[i] = 0;
-    dem2di_clear_beside(world, i);
+}
+
+/* Contact i is apart: nothing acts. The normal is that of the search. */
+static void dem2di_contact_apart(const dem2d_world *world, int i, dem2d_vec normal) {
+    dem2di_contact contact;
+    memset(&contact, 0, sizeof contact);
+    contact.normal = normal;
+    contact.depth = -1;
+    dem2di_contact_put(&world->list, i, &contact);
+    dem2di_no_load(world, i);
 }
 
 /* Geometry and force of one listed pair that is not of two circles. */
@@ -13972,18 +14005,20 @@ static void dem2di_pair_look(const dem2d_world *world, int i, dem2di_count *coun
     const dem2di_list *list = &world->list;
     int a = list->keys[i].a, b = list->keys[i].b;
     dem2di_history *history = &list->contacts.history[i - list->discs];
-    if (world->travel[a] + world->travel[b] < history->budget) return; /* surely still apart */
     dem2di_last last;
     dem2di_contact contact;
     dem2d_contact_point points[2];
-    dem2di_last_get(world, &list->contacts, i, &last);
-    dem2di_contact_open(world, i, &last.contact, &contact);
+    dem2di_last_get(world, i, &last);
+    contact.normal = last.contact.normal;
+    dem2di_clear_beside(world, i);
     int found = dem2di_pair_geometry(world, a, b, &last.contact, history, &contact, points, count);
-    if (found > 0) {
-        dem2d_vec d = dem2di_centre_line(world->now[a].x, world->now[b].x);
-        dem2di_contact_place(world, i, found, points, d, &contact);
-        dem2di_force(world, i, &last, found == 2, &contact, count);
+    if (found == 0) {
+        dem2di_contact_apart(world, i, contact.normal);
+        return;
     }
+    dem2d_vec d = dem2di_centre_line(world->now[a].x, world->now[b].x);
+    dem2di_contact_place(world, i, found, points, d, &contact);
+    dem2di_force(world, i, &last, found == 2, &contact, count);
     dem2di_contact_put(list, i, &contact);
 }
 
@@ -14070,15 +14105,19 @@ static void dem2di_touch_look(const dem2d_world *world, int i, dem2di_count *cou
     dem2di_last last;
     dem2di_contact contact;
     dem2d_contact_point points[2];
-    dem2di_last_get(world, &list->contacts, i, &last);
-    dem2di_contact_open(world, i, &last.contact, &contact);
+    dem2di_last_get(world, i, &last);
+    contact.normal = last.contact.normal;
+    dem2di_clear_beside(world, i);
     int found = segment ? dem2di_segment_geometry(world, a, j, &last.contact, history, &contact,
                                                   points, count)
                         : dem2di_plane_geometry(world, a, j, &contact, points, count);
-    if (found > 0) {
-        dem2di_contact_place(world, i, found, points, dem2di_vec(0, 0), &contact);
-        if (!segment || !world->plan.joints) dem2di_touch_force(world, i, &last, &contact, count);
+    if (found == 0) {
+        dem2di_contact_apart(world, i, contact.normal);
+        return;
     }
+    dem2di_contact_place(world, i, found, points, dem2di_vec(0, 0), &contact);
+    contact.force = contact.shear = 0;
+    if (!segment || !world->plan.joints) dem2di_touch_force(world, i, &last, &contact, count);
     dem2di_contact_put(list, i, &contact);
 }
 
@@ -14192,12 +14231,20 @@ static void dem2di_settle_joints(const dem2d_world *world, dem2di_count *count) 
         if (!world->walls[list->keys[i].b].desc.segment) continue;
         if (!dem2di_contact_get(world, &list->contacts, i, &contact)) {
             dem2di_clear_beside(world, i);
+            dem2di_no_load(world, i);
             continue;
         }
-        dem2di_last_get(world, &list->last, dem2di_joint_source(world, i), &last);
+        dem2di_last_from(world, &list->last, dem2di_joint_source(world, i), &last);
         dem2di_touch_force(world, i, &last, &contact, count);
         dem2di_contact_put(list, i, &contact);
     }
+}
+
+/* May the two of a listed pair that is not of two circles have met since they were found apart? */
+static inline bool dem2di_may_meet(const dem2d_world *world, int i) {
+    const dem2di_key *key = &world->list.keys[i];
+    double bound = world->list.contacts.history[i - world->list.discs].budget;
+    return !(world->travel[key->a] + world->travel[key->b] < bound);
 }
 
 /* Blocks of the three kinds of contacts, one kind after the other. */
@@ -14207,20 +14254,21 @@ static void dem2di_contact_task(void *context, int begin, int end) {
     int discs = dem2di_blocks(list->discs, DEM2DI_BLOCK);
     for (int block = begin; block < end; block++) {
         dem2di_count *count = &world->tallies[block].count;
+        bool round = block < discs;
+        int size = round ? DEM2DI_BLOCK : DEM2DI_BLOCK_OTHERS;
+        int first = round ? block * size : list->discs + (block - discs) * size;
+        int last = dem2di_block_end(first, size, round ? list->discs : list->count);
         memset(count, 0, sizeof *count);
-        if (block < discs) {
-            int first = block * DEM2DI_BLOCK;
-            dem2di_disc_range(world, first, dem2di_block_end(first, DEM2DI_BLOCK, list->discs),
-                              count);
+        if (world->looks_back) dem2di_contacts_keep(world, first, last, false);
+        if (round) {
+            dem2di_disc_range(world, first, last, count);
             continue;
         }
-        int first = list->discs + (block - discs) * DEM2DI_BLOCK_OTHERS;
-        int last = dem2di_block_end(first, DEM2DI_BLOCK_OTHERS, list->count);
         for (int i = first; i < last; i++)
-            if (i < list->pairs)
-                dem2di_pair_look(world, i, count);
-            else
+            if (i >= list->pairs)
                 dem2di_touch_look(world, i, count);
+            else if (dem2di_may_meet(world, i))
+                dem2di_pair_look(world, i, count);
     }
 }
 
@@ -14229,12 +14277,14 @@ static void dem2di_count_add(dem2di_count *sum, const dem2di_count *part) {
     sum->collisions += part->collisions;
     sum->separations += part->separations;
     sum->unsound += part->unsound;
+    sum->load = dem2di_max(sum->load, part->load);
     for (int k = 0; k < DEM2D_PROOF_COUNT; k++) sum->proofs[k] += part->proofs[k];
 }
 
 /* Geometry and forces of all contacts, over those of the last pass. */
 static void dem2di_contact_pass(dem2d_world *world, dem2di_count *count) {
     const dem2di_list *list = &world->list;
+    count->load = 0;
     int blocks = dem2di_contact_blocks(list->discs, list->count);
     dem2di_run(world, DEM2D_PHASE_CONTACTS, blocks, dem2di_contact_task, world);
     for (int k = 0; k < blocks; k++) dem2di_count_add(count, &world->tallies[k].count);
@@ -14358,7 +14408,7 @@ static double dem2di_servo_forgets(const dem2di_backing *backing, double time_st
 static void dem2di_push_ask(const dem2d_world *world, int i, const dem2di_contact *contact,
                             double elastic, double *impedance, double *spring) {
     dem2di_last last;
-    dem2di_last_get(world, &world->list.last, i, &last);
+    dem2di_last_from(world, &world->list.last, i, &last);
     dem2di_meeting meeting = dem2di_meeting_make(world, i, &last.contact, contact);
     double closing = meeting.closing, deeper = contact->depth / 16;
     double faster = deeper / world->time_step;
@@ -14608,6 +14658,22 @@ static void dem2di_book_motion(dem2d_world *world, const dem2di_ledger *last) {
         ledger->closure = error;
     }
     ledger->edited = false;
+}
+
+/* Is the next state of each particle finite if no load exceeds the greatest of this pass? */
+static bool dem2di_surely_finite(const dem2d_world *world, const dem2di_count *count) {
+    const double dt = world->time_step, load = count->load * (world->list.count + 1.0);
+    double far = 0, speed = 0, spin = 0;
+    if (count->unsound > world->count.unsound) return false;
+    for (int i = 0; i < world->body_count; i++) {
+        const dem2di_state *now = &world->now[i];
+        const dem2di_inverse *inverse = &world->inverse[i];
+        far = dem2di_max(far, fabs(now->x.x) + fabs(now->x.y));
+        speed = dem2di_max(speed, fabs(now->v.x) + fabs(now->v.y) + dt * (load * inverse->mass));
+        spin = dem2di_max(spin, fabs(now->w) + dt * (load * inverse->inertia));
+    }
+    speed += dt * (fabs(world->gravity.x) + fabs(world->gravity.y)); /* damping doubles at most */
+    return far + 4 * dt * speed < 1e300 && 4 * dt * spin < 1e50;
 }
 
 /* A particle that the step would give a state that is not finite, or -1. */
@@ -14891,7 +14957,8 @@ static void dem2di_commit(dem2d_world *world) {
 
 /* Would the step give a particle or a wall a state that is not finite? */
 static dem2d_result dem2di_check_next(const dem2d_world *world, const dem2di_count *count) {
-    int slot = world->bounded && count->unsound == 0 ? -1 : dem2di_unsound(world);
+    bool known = world->bounded && count->unsound == world->count.unsound;
+    int slot = known || dem2di_surely_finite(world, count) ? -1 : dem2di_unsound(world);
     if (slot >= 0)
         return dem2di_fail(&world->env, DEM2D_STATE, world->bodies[slot].index,
                            "particle %d would get a state that is not finite",
@@ -14919,6 +14986,7 @@ static dem2d_result dem2di_step(dem2d_world *world) {
     bool due = dem2di_check_is_due(world);
     bool back = dem2di_looks_back(world, &world->plan, world->bounded, world->softness);
     if (back && !dem2di_keep_last(world)) return dem2di_out_of_memory(world, "contacts");
+    world->looks_back = back;
     dem2di_contact_pass(world, &count);
     if (due) result = dem2di_check_step(world, &slow, &fast);
     if (result == DEM2D_OK) {
@@ -14927,7 +14995,7 @@ static dem2d_result dem2di_step(dem2d_world *world) {
         result = dem2di_check_next(world, &count);
     }
     if (result != DEM2D_OK) {
-        if (back) dem2di_contacts_keep(world, true);
+        if (back) dem2di_contacts_keep(world, 0, world->list.count, true);
         return result;
     }
     const dem2di_ledger ledger = world->ledger;
