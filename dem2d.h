@@ -31,7 +31,7 @@ CONTENTS (search for the anchor, ">>" and the word)
                     trigonometric polynomials                               >>series
                     support kernels                                         >>support
                     area, centroid, polar moment                            >>mass
-                    creation and questions of shapes                        >>shapes
+                    creation and queries of shapes                          >>shapes
                     outlines from pixels, and their measures                >>outlines
                     templates from outlines, virtual grains                 >>fitting
                     distance: Gilbert-Johnson-Keerthi                       >>gjk
@@ -44,7 +44,7 @@ CONTENTS (search for the anchor, ">>" and the word)
                     spring, friction, critical time step                    >>law
                     leapfrog motion                                         >>motion
                     the world: objects with ids                             >>world
-                    the list of contacts, particles sorted in space         >>list
+                    the neighbour list, particles sorted in space           >>list
                     the ledger of energies                                  >>ledger
                     contacts, sums, motion; the stable time step            >>step
                     energy, stress, fabric, packing, distance from rest     >>measures
@@ -529,10 +529,10 @@ SNAPSHOTS
     dem2d_world_save writes all that later steps and queries depend on, with the neighbour list and
     the order in memory; dem2d_world_load continues to the same bits, on any machine and with any
     number of threads. Not saved: capacities, the environment, parallel_for. The tags of custom
-    shapes identify their support functions. A snapshot names its arrays and their fields: later
-    headers read it, with 0 for what they have beside these. What is not known is refused by its
-    name, since a later header wrote it. A checksum detects damage before the bytes are used, and
-    every number is checked for its range; this does not protect from forgery.
+    shapes identify their support functions. A snapshot names its arrays and their fields: a later
+    header reads it and sets its additional fields to 0. An unknown name means that a later header
+    wrote the file: it is refused, and the log gets the name. A checksum detects damage before the
+    bytes are used, and every number is checked for its range; this does not protect from forgery.
 
 DETERMINISM
     Same input, same bits: on gcc and clang, C and C++, -O0 to -O3, with or without FMA hardware
@@ -17562,46 +17562,45 @@ DEM2D_API dem2d_result dem2d_world_write_csv(const dem2d_world *world, const dem
    CHANGES
      0.6.0  Runs differ from those of 0.5.0 with friction between circles, dashpots, polybeziers,
             two contact points with friction, and servo walls. Snapshots (version 4) name their
-            arrays and fields, so that later headers read them; those of before are refused. The
-            state hash is made by the same tables: it has other values.
-            Papers: the manual lists what differs from each of their equations and steps. A world
-            with DEM2D_GJK_EPA takes every pair anew in every step, circles too, from the line of
-            centres; DEM2D_ONE_POINT takes the middle at walls, too. dem2d_contact.residual is
-            EPA's; the swarm's settings are in dem2d_fit_desc; DEM2D_HISTOGRAM_ALONG_BRANCH.
-            Polybeziers: right answers for arcs that turn by pi, straight, nearly straight and tiny
-            arcs, and joints that are smooth to seven digits only, whose repair dem2d_shape_info
-            tells (deviation). Witness points are on the outline to 1e-10 of the size; where arcs
-            are not quite convex, on its hull. Fits have a radius of curvature of at most 20 times
-            the size (max_radius, unbounded) and straight arcs along straight edges; shapes and fits
-            tell the greatest. The bounds of the time step count the rocking stiffness of flat
-            surfaces.
+            arrays and fields, so that later headers read them; earlier snapshots are refused. The
+            state hash uses the same tables, and has other values.
+            Papers: the manual lists the differences from each of their equations and steps. With
+            DEM2D_GJK_EPA a world collides every pair, circles too, in every step from the line of
+            centres; DEM2D_ONE_POINT takes the middle at walls, too. New: dem2d_contact.residual of
+            EPA, the settings of the swarm in dem2d_fit_desc, DEM2D_HISTOGRAM_ALONG_BRANCH.
+            Polybeziers: correct results for arcs that turn by pi, for straight, nearly straight and
+            tiny arcs, and for joints that are smooth only to seven digits;
+            dem2d_shape_info.deviation is the size of the repair. Witness points are on the outline
+            to 1e-10 of the size; where arcs are not exactly convex, on its hull. Fits bound the
+            radius of curvature by 20 times the size (max_radius, unbounded) and use straight arcs
+            along straight edges; shapes and reports have the greatest radius. The bounds of the
+            time step include the rocking stiffness of flat surfaces.
             Contacts: each of two points keeps its spring at its corner, whichever grain has the
-            lower id (dem2d_contact_point.corner). Polygons that a longer segment cuts through along
-            one of their edges are no longer missed. Two points on straight arcs keep their energy
-            where one arc turns away and the next takes over. DEM2D_CONTACT_AREA is gone: two points
-            conserve energy at a hundredth of its cost.
-            Sliding: one rule for all pairs, the mean over the step that was made, whatever time
-            step and velocities have been set since. The ledger closes with dashpots at two points
-            and where contacts open, and tells the turnover.
-            Servo walls know the dashpots of their contacts and the next step of the particles: they
-            hold their stress for every damping ratio, and those that face each other come to rest.
-            Worlds: every snapshot that was written can be read, also when segments have parted or
-            met since the list was built. Joints of segments are found in every step. A step that is
-            refused keeps the moments of a law that has just lost its rolling friction, and a servo
-            wall never gets a speed that is not finite. Circles put on each other show no contact
-            before a force pass has found it; a particle that becomes fixed loses its contacts with
-            walls at once; a law without a tangential spring keeps no tangential force of the law
-            before it. dem2d_stats.time sums the time steps.
+            lower id (dem2d_contact_point.corner). Polygons cut by a longer segment along one of
+            their edges are found. Two points on straight arcs conserve energy where one arc
+            replaces another. DEM2D_CONTACT_AREA is removed: two points conserve energy at a
+            hundredth of its cost.
+            Sliding: for all pairs the mean over the last step, independent of later changes of time
+            step and velocities. The ledger closes with dashpots at two points and where contacts
+            open, and has the turnover.
+            Servo walls use the dashpots of their contacts and the next step of the particles: they
+            hold their stress for every damping ratio, and facing servo walls come to rest.
+            Worlds: every saved snapshot can be loaded, also if joints of segments have changed
+            since the list was built. Joints of segments are found in every step. A refused step
+            changes no moment of a contact, and a servo wall never gets a speed that is not finite.
+            Circles have contacts only after a force pass; a particle that becomes fixed loses its
+            contacts with walls at once; if a law without tangential spring replaces one with it,
+            the tangential force becomes 0. dem2d_stats.time is the sum of the time steps.
             Pictures and outlines: two bytes per pixel, label masks, a region of interest,
-            thresholds and grains in spite of frames. Outlines that cross themselves are refused
-            (DEM2D_CROSSING). The long axis of a template is exact for every model.
-            Writers: an SVG picture has a view, half-planes beside the grains, marks of fixed and
-            driven grains, and chains no wider than grains. Numbers have a decimal point in every
-            locale. desc may be NULL where all of it may be zero.
+            thresholds without frames, grains inside frames. Outlines that cross themselves are
+            refused (DEM2D_CROSSING). The long axis of a template is exact for every model.
+            Writers: an SVG picture has a view, shows half-planes beside the grains, marks fixed and
+            driven grains, and draws no chain wider than the grains. Numbers have a decimal point in
+            every locale. desc may be NULL where all of it may be zero.
             Names: dem2d_stats.looks -> collisions, gaps -> separations.
-            Log and compilers: warnings have the result DEM2D_WARNING. The header refuses the parts
-            of -ffast-math that the compiler tells it of. After the implementation clang is back at
-            the contraction of its command line, on every target.
+            Log and compilers: warnings have the result DEM2D_WARNING. The header does not compile
+            with parts of -ffast-math for which the compiler defines a macro. After the
+            implementation clang uses the contraction of its command line again, on every target.
      0.5.0  The two points of faces conserve energy between free polygons as well: each has a
             normal of its own and tells its energy. Snapshots of version 2.
      0.4.0  Dashpots by restitution, rolling friction, a caller's law, segment walls. Measures of
