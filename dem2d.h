@@ -12218,6 +12218,8 @@ static bool dem2di_redirect(dem2d_world *world, int slot, dem2d_vec v, double w)
     bool same = v.x == now->v.x && v.y == now->v.y && w == now->w;
     if (same || world->bodies[slot].redirected) return true;
     if (!dem2di_group_reserve(world, DEM2DI_MADE, world->body_count)) return false;
+    if (!world->redirected) /* of the others 0 */
+        memset(world->made, 0, (size_t)world->body_count * sizeof *world->made);
     world->made[slot] = dem2di_velocities_of(&world->now[slot]);
     world->bodies[slot].redirected = world->redirected = true;
     return true;
@@ -15906,27 +15908,6 @@ static void *dem2di_rows_start(const void *object, const dem2di_column *column) 
     return alone ? itself : dem2di_column_get(object, column);
 }
 
-/* A row in which all that has no meaning is 0. */
-typedef union dem2di_row {
-    dem2di_velocities made;
-    dem2di_state state;
-    dem2di_key key;
-    double number;
-} dem2di_row;
-
-/* Row i of what is saved: in the column, or made of it. */
-static const void *dem2di_saved_row(const void *object, const dem2di_column *column, int i,
-                                    dem2di_row *made) {
-    const dem2d_world *w = (const dem2d_world *)object;
-    if (column->group == DEM2DI_WORLD || column->group == DEM2DI_SHAPE) return object;
-    const char *start = (const char *)dem2di_column_get(object, column);
-    if (column->group == DEM2DI_MADE && !w->bodies[i].redirected) {
-        memset(&made->made, 0, sizeof made->made);
-        return made;
-    }
-    return start + (size_t)i * column->size;
-}
-
 /* --- the hash -----------------------------------------------------------------------------------
  */
 
@@ -15963,6 +15944,13 @@ static void dem2di_hash_fields(dem2di_hashing *hashing) {
     }
 }
 
+/* A row that is made for the hash. */
+typedef union dem2di_row {
+    dem2di_state state;
+    dem2di_key key;
+    double number;
+} dem2di_row;
+
 /* Row of a hashed column for a place in the order of ids; NULL: nothing is there. Poses are as a
    caller sees them: a refused step may have changed how rotations are held. */
 static const void *dem2di_hashed_row(const dem2d_world *w, const dem2di_column *column, int place,
@@ -15973,7 +15961,6 @@ static const void *dem2di_hashed_row(const dem2d_world *w, const dem2di_column *
     const char *start = (const char *)dem2di_column_get(w, column);
     if (group == DEM2DI_BODIES || group == DEM2DI_MADE) slot = w->names[place].slot;
     if (slot < 0 || (group == DEM2DI_NAMES && w->names[place].slot < 0)) return NULL;
-    if (group == DEM2DI_MADE && !w->bodies[slot].redirected) return NULL;
     if (group == DEM2DI_WALLS && !w->walls[place].alive) return NULL;
     if (group == DEM2DI_TEMPLATES && w->templates[place].shape == NULL) return NULL;
     const char *row = start + (size_t)slot * column->size;
@@ -16027,7 +16014,8 @@ static void dem2di_hash_column(void *context, const void *object, const dem2di_c
     memset(hashing->field, 0, sizeof hashing->field);
     bool contacts = group >= DEM2DI_KEYS && group < DEM2DI_SHAPE;
     bool by_id = group == DEM2DI_BODIES || group == DEM2DI_MADE;
-    int rows = by_id ? hashing->world->name_count : dem2di_rows(object, column);
+    int rows = dem2di_rows(object, column);
+    if (by_id && rows > 0) rows = hashing->world->name_count;
     const char *row = (const char *)dem2di_rows_start(object, column);
     if (contacts) dem2di_hash_contacts(hashing);
     for (int i = 0; i < rows && !contacts; i++, row += column->size) {
@@ -16089,25 +16077,21 @@ static void dem2di_put_name(dem2di_saver *saver, const char *name) {
 /* Which fields of a column have a number that is not 0: bits. */
 static uint64_t dem2di_fields_used(const void *object, const dem2di_column *column) {
     uint64_t used = (column->treatment & DEM2DI_FIRST) != 0; /* one tells how many rows there are */
-    dem2di_row made;
-    for (int i = 0; i < dem2di_rows(object, column); i++) {
-        const void *row = dem2di_saved_row(object, column, i, &made);
+    const char *row = (const char *)dem2di_rows_start(object, column);
+    for (int i = 0; i < dem2di_rows(object, column); i++, row += column->size)
         for (int f = 0; f < column->count; f++)
             for (int k = 0; k < dem2di_numbers_of(&column->fields[f]) && !(used >> f & 1); k++)
                 if (dem2di_number_get(&column->fields[f], row, k) != 0) used |= (uint64_t)1 << f;
-    }
     return used;
 }
 
 static void dem2di_put_rows(dem2di_saver *saver, const void *object, const dem2di_column *column,
                             uint64_t used) {
-    dem2di_row made;
-    for (int i = 0; i < dem2di_rows(object, column); i++) {
-        const void *row = dem2di_saved_row(object, column, i, &made);
+    const char *row = (const char *)dem2di_rows_start(object, column);
+    for (int i = 0; i < dem2di_rows(object, column); i++, row += column->size)
         for (int f = 0; f < column->count; f++)
             for (int k = 0; k < dem2di_numbers_of(&column->fields[f]) && (used >> f & 1); k++)
                 dem2di_put_word(saver, dem2di_number_get(&column->fields[f], row, k));
-    }
 }
 
 static void dem2di_put_column(void *context, const void *object, const dem2di_column *column) {
