@@ -11310,92 +11310,76 @@ typedef struct dem2di_column {
     int count; /* of fields */
 } dem2di_column;
 
-#define DEM2DI_COLUMN(name, group, pointer, treatment, fields)                             \
-    {                                                                                      \
-        name, group, offsetof(dem2d_world, pointer), sizeof(*((dem2d_world *)0)->pointer), \
-            treatment, fields                                                              \
+#define DEM2DI_COLUMN(name, group, pointer, treatment, fields)                           \
+    {                                                                                    \
+        name, DEM2DI_##group, offsetof(dem2d_world, pointer),                            \
+            sizeof(*((dem2d_world *)0)->pointer), treatment, DEM2DI_ALL(dem2di_##fields) \
     }
-#define DEM2DI_SHAPE_COLUMN(name, group, pointer, fields)        \
-    {                                                            \
-        name, group, offsetof(dem2di_slot_shape, shape.pointer), \
-            sizeof(*((dem2di_slot_shape *)0)->shape.pointer),    \
-            DEM2DI_SHARES | DEM2DI_FIRST | DEM2DI_HASHED, fields \
+#define DEM2DI_UNSAVED(group, pointer, treatment)                    \
+    {                                                                \
+        NULL, DEM2DI_##group, offsetof(dem2d_world, pointer),        \
+            sizeof(*((dem2d_world *)0)->pointer), treatment, NULL, 0 \
     }
-#define DEM2DI_NONE NULL, 0 /* no fields */
+#define DEM2DI_CONTACT_COLUMN(name, group, pointer, fields) \
+    DEM2DI_COLUMN(name, group, list.contacts.pointer, DEM2DI_STORED | DEM2DI_HASHED, fields)
+#define DEM2DI_SHAPE_COLUMN(name, group, pointer, fields)                             \
+    {                                                                                 \
+        name, DEM2DI_SHAPE_##group, offsetof(dem2di_slot_shape, shape.pointer),       \
+            sizeof(*((dem2di_slot_shape *)0)->shape.pointer),                         \
+            DEM2DI_SHARES | DEM2DI_FIRST | DEM2DI_HASHED, DEM2DI_ALL(dem2di_##fields) \
+    }
 
 static const dem2di_column dem2di_columns[] = {
     {"world", DEM2DI_WORLD, 0, 0, DEM2DI_SHARES | DEM2DI_HASHED, DEM2DI_ALL(dem2di_setting_fields)},
     {"progress", DEM2DI_WORLD, 0, 0, DEM2DI_SHARES, DEM2DI_ALL(dem2di_progress_fields)},
     {"plan", DEM2DI_WORLD, 0, 0, DEM2DI_SHARES, DEM2DI_ALL(dem2di_plan_fields)},
     {"ledger", DEM2DI_WORLD, 0, 0, DEM2DI_SHARES, DEM2DI_ALL(dem2di_ledger_fields)},
-    DEM2DI_COLUMN("templates", DEM2DI_TEMPLATES, templates, DEM2DI_FIRST,
-                  DEM2DI_ALL(dem2di_template_fields)),
-    DEM2DI_COLUMN("materials", DEM2DI_MATERIALS, materials, DEM2DI_FIRST | DEM2DI_HASHED,
-                  DEM2DI_ALL(dem2di_material_fields)),
-    DEM2DI_COLUMN("laws", DEM2DI_LAWS, laws, DEM2DI_FIRST | DEM2DI_HASHED,
-                  DEM2DI_ALL(dem2di_pair_fields)),
-    DEM2DI_COLUMN("ids", DEM2DI_NAMES, names, DEM2DI_FIRST | DEM2DI_HASHED,
-                  DEM2DI_ALL(dem2di_name_fields)),
-    DEM2DI_COLUMN("slots", DEM2DI_NAMES, names, DEM2DI_SHARES, DEM2DI_ALL(dem2di_slot_fields)),
-    DEM2DI_COLUMN("particles", DEM2DI_BODIES, bodies, DEM2DI_FIRST | DEM2DI_MOVES | DEM2DI_HASHED,
-                  DEM2DI_ALL(dem2di_body_fields)),
-    DEM2DI_COLUMN("before", DEM2DI_BODIES, before, DEM2DI_MOVES | DEM2DI_SWAPS | DEM2DI_HASHED,
-                  DEM2DI_ALL(dem2di_state_fields)),
-    DEM2DI_COLUMN("now", DEM2DI_BODIES, now, DEM2DI_MOVES | DEM2DI_HASHED,
-                  DEM2DI_ALL(dem2di_state_fields)),
-    DEM2DI_COLUMN("wear", DEM2DI_BODIES, wear, 0, DEM2DI_ALL(dem2di_any_field)),
-    DEM2DI_COLUMN(NULL, DEM2DI_BODIES, inverse, DEM2DI_MOVES, DEM2DI_NONE),
-    DEM2DI_COLUMN(NULL, DEM2DI_BODIES, list.own, 0, DEM2DI_NONE),
-    DEM2DI_COLUMN("travel", DEM2DI_TRAVELS, travel, DEM2DI_MOVES | DEM2DI_SWAPS,
-                  DEM2DI_ALL(dem2di_way_field)),
-    DEM2DI_COLUMN(NULL, DEM2DI_TRAVELS, next_travel, 0, DEM2DI_NONE),
-    DEM2DI_COLUMN(NULL, DEM2DI_TRAVELS, lever, DEM2DI_MOVES, DEM2DI_NONE),
-    DEM2DI_COLUMN("made", DEM2DI_MADE, made, DEM2DI_MOVES | DEM2DI_HASHED,
-                  DEM2DI_ALL(dem2di_velocity_fields)),
-    DEM2DI_COLUMN(NULL, DEM2DI_STARTS, list.first, 0, DEM2DI_NONE),
-    DEM2DI_COLUMN("wall_ids", DEM2DI_WALLS, walls, DEM2DI_FIRST | DEM2DI_HASHED,
-                  DEM2DI_ALL(dem2di_wall_id_fields)),
-    DEM2DI_COLUMN("walls", DEM2DI_WALLS, walls, DEM2DI_SHARES | DEM2DI_HASHED,
-                  DEM2DI_ALL(dem2di_wall_fields)),
-    DEM2DI_COLUMN("wall_list", DEM2DI_WALLS, walls, DEM2DI_SHARES,
-                  DEM2DI_ALL(dem2di_wall_list_fields)),
-    DEM2DI_COLUMN("wall_before", DEM2DI_WALLS, wall_before, DEM2DI_SWAPS | DEM2DI_HASHED,
-                  DEM2DI_ALL(dem2di_wall_state_fields)),
-    DEM2DI_COLUMN("wall_now", DEM2DI_WALLS, wall_now, DEM2DI_SWAPS | DEM2DI_HASHED,
-                  DEM2DI_ALL(dem2di_wall_state_fields)),
-    DEM2DI_COLUMN(NULL, DEM2DI_WALLS, wall_next, 0, DEM2DI_NONE),
-    DEM2DI_COLUMN("pairs", DEM2DI_KEYS, list.keys, DEM2DI_FIRST | DEM2DI_HASHED,
-                  DEM2DI_ALL(dem2di_key_fields)),
-    DEM2DI_COLUMN("normal_x", DEM2DI_KEYS, list.contacts.normal_x, DEM2DI_STORED | DEM2DI_HASHED,
-                  DEM2DI_ALL(dem2di_finite_field)),
-    DEM2DI_COLUMN("normal_y", DEM2DI_KEYS, list.contacts.normal_y, DEM2DI_STORED | DEM2DI_HASHED,
-                  DEM2DI_ALL(dem2di_finite_field)),
-    DEM2DI_COLUMN("depth", DEM2DI_KEYS, list.contacts.depth, DEM2DI_STORED | DEM2DI_HASHED,
-                  DEM2DI_ALL(dem2di_finite_field)),
-    DEM2DI_COLUMN("normal_force", DEM2DI_KEYS, list.contacts.force, DEM2DI_STORED | DEM2DI_HASHED,
-                  DEM2DI_ALL(dem2di_finite_field)),
-    DEM2DI_COLUMN("shear_force", DEM2DI_KEYS, list.contacts.shear, DEM2DI_STORED | DEM2DI_HASHED,
-                  DEM2DI_ALL(dem2di_finite_field)),
-    DEM2DI_COLUMN("arms", DEM2DI_GENERAL, list.contacts.arms, DEM2DI_STORED | DEM2DI_HASHED,
-                  DEM2DI_ALL(dem2di_arms_fields)),
-    DEM2DI_COLUMN("searches", DEM2DI_GENERAL, list.contacts.history, DEM2DI_STORED,
-                  DEM2DI_ALL(dem2di_history_fields)),
-    DEM2DI_COLUMN("ends", DEM2DI_ENDS, list.contacts.ends, DEM2DI_STORED | DEM2DI_HASHED,
-                  DEM2DI_ALL(dem2di_ends_fields)),
-    DEM2DI_COLUMN("extras", DEM2DI_EXTRAS, list.contacts.extras, DEM2DI_STORED | DEM2DI_HASHED,
-                  DEM2DI_ALL(dem2di_extra_fields)),
-    DEM2DI_COLUMN(NULL, DEM2DI_ADJACENCY, list.adjacent, 0, DEM2DI_NONE),
-    DEM2DI_COLUMN(NULL, DEM2DI_TALLIES, tallies, 0, DEM2DI_NONE),
-    {NULL, DEM2DI_SCRATCH, offsetof(dem2d_world, scratch), DEM2DI_LINE, 0, DEM2DI_NONE},
+    DEM2DI_COLUMN("templates", TEMPLATES, templates, DEM2DI_FIRST, template_fields),
+    DEM2DI_COLUMN("materials", MATERIALS, materials, DEM2DI_FIRST | DEM2DI_HASHED, material_fields),
+    DEM2DI_COLUMN("laws", LAWS, laws, DEM2DI_FIRST | DEM2DI_HASHED, pair_fields),
+    DEM2DI_COLUMN("ids", NAMES, names, DEM2DI_FIRST | DEM2DI_HASHED, name_fields),
+    DEM2DI_COLUMN("slots", NAMES, names, DEM2DI_SHARES, slot_fields),
+    DEM2DI_COLUMN("particles", BODIES, bodies, DEM2DI_FIRST | DEM2DI_MOVES | DEM2DI_HASHED,
+                  body_fields),
+    DEM2DI_COLUMN("before", BODIES, before, DEM2DI_MOVES | DEM2DI_SWAPS | DEM2DI_HASHED,
+                  state_fields),
+    DEM2DI_COLUMN("now", BODIES, now, DEM2DI_MOVES | DEM2DI_HASHED, state_fields),
+    DEM2DI_COLUMN("wear", BODIES, wear, 0, any_field),
+    DEM2DI_UNSAVED(BODIES, inverse, DEM2DI_MOVES),
+    DEM2DI_UNSAVED(BODIES, list.own, 0),
+    DEM2DI_COLUMN("travel", TRAVELS, travel, DEM2DI_MOVES | DEM2DI_SWAPS, way_field),
+    DEM2DI_UNSAVED(TRAVELS, next_travel, 0),
+    DEM2DI_UNSAVED(TRAVELS, lever, DEM2DI_MOVES),
+    DEM2DI_COLUMN("made", MADE, made, DEM2DI_MOVES | DEM2DI_HASHED, velocity_fields),
+    DEM2DI_UNSAVED(STARTS, list.first, 0),
+    DEM2DI_COLUMN("wall_ids", WALLS, walls, DEM2DI_FIRST | DEM2DI_HASHED, wall_id_fields),
+    DEM2DI_COLUMN("walls", WALLS, walls, DEM2DI_SHARES | DEM2DI_HASHED, wall_fields),
+    DEM2DI_COLUMN("wall_list", WALLS, walls, DEM2DI_SHARES, wall_list_fields),
+    DEM2DI_COLUMN("wall_before", WALLS, wall_before, DEM2DI_SWAPS | DEM2DI_HASHED,
+                  wall_state_fields),
+    DEM2DI_COLUMN("wall_now", WALLS, wall_now, DEM2DI_SWAPS | DEM2DI_HASHED, wall_state_fields),
+    DEM2DI_UNSAVED(WALLS, wall_next, 0),
+    DEM2DI_COLUMN("pairs", KEYS, list.keys, DEM2DI_FIRST | DEM2DI_HASHED, key_fields),
+    DEM2DI_CONTACT_COLUMN("normal_x", KEYS, normal_x, finite_field),
+    DEM2DI_CONTACT_COLUMN("normal_y", KEYS, normal_y, finite_field),
+    DEM2DI_CONTACT_COLUMN("depth", KEYS, depth, finite_field),
+    DEM2DI_CONTACT_COLUMN("normal_force", KEYS, force, finite_field),
+    DEM2DI_CONTACT_COLUMN("shear_force", KEYS, shear, finite_field),
+    DEM2DI_CONTACT_COLUMN("arms", GENERAL, arms, arms_fields),
+    DEM2DI_COLUMN("searches", GENERAL, list.contacts.history, DEM2DI_STORED, history_fields),
+    DEM2DI_CONTACT_COLUMN("ends", ENDS, ends, ends_fields),
+    DEM2DI_CONTACT_COLUMN("extras", EXTRAS, extras, extra_fields),
+    DEM2DI_UNSAVED(ADJACENCY, list.adjacent, 0),
+    DEM2DI_UNSAVED(TALLIES, tallies, 0),
+    {NULL, DEM2DI_SCRATCH, offsetof(dem2d_world, scratch), DEM2DI_LINE, 0, NULL, 0},
     /* of each shape, what its support points come from: the rest follows with the same bits */
     {"shape", DEM2DI_SHAPE, 0, 0, DEM2DI_SHARES | DEM2DI_HASHED, DEM2DI_ALL(dem2di_shape_fields)},
-    DEM2DI_SHAPE_COLUMN("corners", DEM2DI_SHAPE_COUNT, corners, DEM2DI_ALL(dem2di_vec_field)),
-    DEM2DI_SHAPE_COLUMN("given", DEM2DI_SHAPE_COUNT, given, DEM2DI_ALL(dem2di_arc_fields)),
-    DEM2DI_SHAPE_COLUMN("arcs", DEM2DI_SHAPE_PARTS, arcs, DEM2DI_ALL(dem2di_arc_fields)),
-    DEM2DI_SHAPE_COLUMN("tangents", DEM2DI_SHAPE_PARTS, tangents, DEM2DI_ALL(dem2di_vec_field)),
-    DEM2DI_SHAPE_COLUMN("terms", DEM2DI_SHAPE_BLOCKS, blocks, DEM2DI_ALL(dem2di_block_fields)),
-    DEM2DI_SHAPE_COLUMN("least_rho", DEM2DI_SHAPE_SECTORS, least_rho,
-                        DEM2DI_ALL(dem2di_finite_field)),
+    DEM2DI_SHAPE_COLUMN("corners", COUNT, corners, vec_field),
+    DEM2DI_SHAPE_COLUMN("given", COUNT, given, arc_fields),
+    DEM2DI_SHAPE_COLUMN("arcs", PARTS, arcs, arc_fields),
+    DEM2DI_SHAPE_COLUMN("tangents", PARTS, tangents, vec_field),
+    DEM2DI_SHAPE_COLUMN("terms", BLOCKS, blocks, block_fields),
+    DEM2DI_SHAPE_COLUMN("least_rho", SECTORS, least_rho, finite_field),
 };
 
 #define DEM2DI_COLUMNS ((int)(sizeof dem2di_columns / sizeof *dem2di_columns))
