@@ -11102,7 +11102,7 @@ static const dem2di_field dem2di_progress_fields[] = {
     DEM2DI_SAVED("law_tag", dem2d_world, law_tag, DEM2DI_TAG),
     DEM2DI_SAVED("redirected", dem2d_world, redirected, DEM2DI_SWITCH),
     DEM2DI_SAVED("list_stale", dem2d_world, list_stale, DEM2DI_SWITCH),
-    DEM2DI_SAVED("list_worn", dem2d_world, list_worn, DEM2DI_SWITCH),
+    DEM2DI_SAVED("list_used_up", dem2d_world, list_worn, DEM2DI_SWITCH),
     DEM2DI_SAVED("check_due", dem2d_world, check_due, DEM2DI_SWITCH),
     DEM2DI_SAVED("skin_fixed", dem2d_world, skin_fixed, DEM2DI_SWITCH),
     DEM2DI_SAVED("scattered", dem2d_world, scattered, DEM2DI_SWITCH),
@@ -11111,14 +11111,14 @@ static const dem2di_field dem2di_progress_fields[] = {
     DEM2DI_SAVED("skin", dem2d_world, skin, DEM2DI_POSITIVE),
     DEM2DI_SAVED("interval", dem2d_world, interval, DEM2DI_FROM_0),
     DEM2DI_SAVED("spread", dem2d_world, spread, DEM2DI_FROM_0),
-    DEM2DI_SAVED("worn", dem2d_world, worn, DEM2DI_ANY_NUMBER),
-    DEM2DI_SAVED("creep", dem2d_world, creep, DEM2DI_ANY_NUMBER),
+    DEM2DI_SAVED("list_displacement", dem2d_world, worn, DEM2DI_ANY_NUMBER),
+    DEM2DI_SAVED("rounding_displacement", dem2d_world, creep, DEM2DI_ANY_NUMBER),
     DEM2DI_SAVED("rounding", dem2d_world, rounding, DEM2DI_ANY_NUMBER),
     DEM2DI_SAVED("listed_at", dem2d_world, listed_at, DEM2DI_COUNTER),
     DEM2DI_SAVED("list_rebuilds", dem2d_world, rebuilds, DEM2DI_COUNTER),
     DEM2DI_SAVED("slow_time_step", dem2d_world, slow_time_step, DEM2DI_COUNTER),
     DEM2DI_SAVED("fast_motion", dem2d_world, fast_motion, DEM2DI_COUNTER),
-    DEM2DI_SAVED("support_calls", dem2d_world, count.calls, DEM2DI_COUNTER),
+    DEM2DI_SAVED("support_evaluations", dem2d_world, count.calls, DEM2DI_COUNTER),
     DEM2DI_SAVED("collisions", dem2d_world, count.collisions, DEM2DI_COUNTER),
     DEM2DI_SAVED("separations", dem2d_world, count.separations, DEM2DI_COUNTER),
     DEM2DI_SAVED("unsound", dem2d_world, count.unsound, DEM2DI_COUNTER),
@@ -11334,30 +11334,30 @@ static const dem2di_column dem2di_columns[] = {
     {"progress", DEM2DI_WORLD, 0, 0, DEM2DI_SHARES, DEM2DI_ALL(dem2di_progress_fields)},
     {"plan", DEM2DI_WORLD, 0, 0, DEM2DI_SHARES, DEM2DI_ALL(dem2di_plan_fields)},
     {"ledger", DEM2DI_WORLD, 0, 0, DEM2DI_SHARES, DEM2DI_ALL(dem2di_ledger_fields)},
-    DEM2DI_COLUMN("templates", TEMPLATES, templates, DEM2DI_FIRST, template_fields),
+    DEM2DI_COLUMN("templates", TEMPLATES, templates, DEM2DI_FIRST | DEM2DI_HASHED, template_fields),
     DEM2DI_COLUMN("materials", MATERIALS, materials, DEM2DI_FIRST | DEM2DI_HASHED, material_fields),
     DEM2DI_COLUMN("laws", LAWS, laws, DEM2DI_FIRST | DEM2DI_HASHED, pair_fields),
     DEM2DI_COLUMN("ids", NAMES, names, DEM2DI_FIRST | DEM2DI_HASHED, name_fields),
     DEM2DI_COLUMN("slots", NAMES, names, DEM2DI_SHARES, slot_fields),
     DEM2DI_COLUMN("particles", BODIES, bodies, DEM2DI_FIRST | DEM2DI_MOVES | DEM2DI_HASHED,
                   body_fields),
-    DEM2DI_COLUMN("before", BODIES, before, DEM2DI_MOVES | DEM2DI_SWAPS | DEM2DI_HASHED,
+    DEM2DI_COLUMN("last_states", BODIES, before, DEM2DI_MOVES | DEM2DI_SWAPS | DEM2DI_HASHED,
                   state_fields),
-    DEM2DI_COLUMN("now", BODIES, now, DEM2DI_MOVES | DEM2DI_HASHED, state_fields),
-    DEM2DI_COLUMN("wear", BODIES, wear, 0, any_field),
+    DEM2DI_COLUMN("states", BODIES, now, DEM2DI_MOVES | DEM2DI_HASHED, state_fields),
+    DEM2DI_COLUMN("inverse_skins_squared", BODIES, wear, 0, any_field),
     DEM2DI_UNSAVED(BODIES, inverse, DEM2DI_MOVES),
     DEM2DI_UNSAVED(BODIES, list.own, 0),
-    DEM2DI_COLUMN("travel", TRAVELS, travel, DEM2DI_MOVES | DEM2DI_SWAPS, way_field),
+    DEM2DI_COLUMN("displacements", TRAVELS, travel, DEM2DI_MOVES | DEM2DI_SWAPS, way_field),
     DEM2DI_UNSAVED(TRAVELS, next_travel, 0),
     DEM2DI_UNSAVED(TRAVELS, lever, DEM2DI_MOVES),
-    DEM2DI_COLUMN("made", MADE, made, DEM2DI_MOVES | DEM2DI_HASHED, velocity_fields),
+    DEM2DI_COLUMN("last_velocities", MADE, made, DEM2DI_MOVES | DEM2DI_HASHED, velocity_fields),
     DEM2DI_UNSAVED(STARTS, list.first, 0),
     DEM2DI_COLUMN("wall_ids", WALLS, walls, DEM2DI_FIRST | DEM2DI_HASHED, wall_id_fields),
     DEM2DI_COLUMN("walls", WALLS, walls, DEM2DI_SHARES | DEM2DI_HASHED, wall_fields),
-    DEM2DI_COLUMN("wall_list", WALLS, walls, DEM2DI_SHARES, wall_list_fields),
-    DEM2DI_COLUMN("wall_before", WALLS, wall_before, DEM2DI_SWAPS | DEM2DI_HASHED,
+    DEM2DI_COLUMN("wall_skins", WALLS, walls, DEM2DI_SHARES, wall_list_fields),
+    DEM2DI_COLUMN("last_wall_states", WALLS, wall_before, DEM2DI_SWAPS | DEM2DI_HASHED,
                   wall_state_fields),
-    DEM2DI_COLUMN("wall_now", WALLS, wall_now, DEM2DI_SWAPS | DEM2DI_HASHED, wall_state_fields),
+    DEM2DI_COLUMN("wall_states", WALLS, wall_now, DEM2DI_SWAPS | DEM2DI_HASHED, wall_state_fields),
     DEM2DI_UNSAVED(WALLS, wall_next, 0),
     DEM2DI_COLUMN("pairs", KEYS, list.keys, DEM2DI_FIRST | DEM2DI_HASHED, key_fields),
     DEM2DI_CONTACT_COLUMN("normal_x", KEYS, normal_x, finite_field),
@@ -11366,9 +11366,9 @@ static const dem2di_column dem2di_columns[] = {
     DEM2DI_CONTACT_COLUMN("normal_force", KEYS, force, finite_field),
     DEM2DI_CONTACT_COLUMN("shear_force", KEYS, shear, finite_field),
     DEM2DI_CONTACT_COLUMN("arms", GENERAL, arms, arms_fields),
-    DEM2DI_COLUMN("searches", GENERAL, list.contacts.history, DEM2DI_STORED, history_fields),
-    DEM2DI_CONTACT_COLUMN("ends", ENDS, ends, ends_fields),
-    DEM2DI_CONTACT_COLUMN("extras", EXTRAS, extras, extra_fields),
+    DEM2DI_COLUMN("histories", GENERAL, list.contacts.history, DEM2DI_STORED, history_fields),
+    DEM2DI_CONTACT_COLUMN("two_points", ENDS, ends, ends_fields),
+    DEM2DI_CONTACT_COLUMN("law_states", EXTRAS, extras, extra_fields),
     DEM2DI_UNSAVED(ADJACENCY, list.adjacent, 0),
     DEM2DI_UNSAVED(TALLIES, tallies, 0),
     {NULL, DEM2DI_SCRATCH, offsetof(dem2d_world, scratch), DEM2DI_LINE, 0, NULL, 0},
@@ -16062,7 +16062,7 @@ static void dem2di_put_name(dem2di_saver *saver, const char *name) {
 static uint64_t dem2di_fields_used(const void *object, const dem2di_column *column) {
     uint64_t used = (column->treatment & DEM2DI_FIRST) != 0; /* one tells how many rows there are */
     const char *row = (const char *)dem2di_rows_start(object, column);
-    for (int i = 0; i < dem2di_rows(object, column); i++, row += column->size)
+    for (int left = dem2di_rows(object, column); left > 0; left--, row += column->size)
         for (int f = 0; f < column->count; f++)
             for (int k = 0; k < dem2di_numbers_of(&column->fields[f]) && !(used >> f & 1); k++)
                 if (dem2di_number_get(&column->fields[f], row, k) != 0) used |= (uint64_t)1 << f;
@@ -16072,7 +16072,7 @@ static uint64_t dem2di_fields_used(const void *object, const dem2di_column *colu
 static void dem2di_put_rows(dem2di_saver *saver, const void *object, const dem2di_column *column,
                             uint64_t used) {
     const char *row = (const char *)dem2di_rows_start(object, column);
-    for (int i = 0; i < dem2di_rows(object, column); i++, row += column->size)
+    for (int left = dem2di_rows(object, column); left > 0; left--, row += column->size)
         for (int f = 0; f < column->count; f++)
             for (int k = 0; k < dem2di_numbers_of(&column->fields[f]) && (used >> f & 1); k++)
                 dem2di_put_word(saver, dem2di_number_get(&column->fields[f], row, k));
@@ -16174,7 +16174,7 @@ static void dem2di_load_expect(dem2di_loader *loader, bool holds, const char *el
         loader->result = dem2di_fail(loader->env, DEM2D_FORMAT, -1, "snapshot: %s", else_what);
 }
 
-/* What has been loaded can't be. The log knows. */
+/* A check has failed, and has told the log. */
 static void dem2di_load_check(dem2di_loader *loader, dem2d_result result) {
     if (dem2di_load_good(loader) && result != DEM2D_OK) loader->result = DEM2D_FORMAT;
 }
@@ -16184,7 +16184,7 @@ static void dem2di_load_room(dem2di_loader *loader, bool reserved) {
         loader->result = dem2di_fail(loader->env, DEM2D_OUT_OF_MEMORY, -1, "no memory for a world");
 }
 
-/* About a field (or NULL) of a column. */
+/* An error that names a column and, unless it is NULL, a field. */
 static void dem2di_load_refuse(dem2di_loader *loader, dem2d_result result, const char *what,
                                const char *column, const char *field) {
     if (!dem2di_load_good(loader)) return;
@@ -16200,7 +16200,7 @@ static uint64_t dem2di_take_word(dem2di_loader *loader) {
     return dem2di_word_of(loader->next - 8);
 }
 
-/* A name of at most 24 characters, fit to be told. */
+/* A name of at most 24 characters; what can't be printed becomes '?'. */
 static void dem2di_take_name(dem2di_loader *loader, char name[8 * DEM2DI_NAME_WORDS + 1]) {
     for (int k = 0; k < 8 * DEM2DI_NAME_WORDS; k += 8) {
         uint64_t word = dem2di_take_word(loader);
@@ -16274,8 +16274,8 @@ static void dem2di_take_rows(dem2di_loader *loader, const dem2di_record *record)
             }
 }
 
-/* Columns that were not there are 0. Those that show by their bytes how many rows there are must be
-   there. */
+/* Columns that the snapshot does not have are 0. The first of a group must be there: its bytes show
+   that there are so many rows. */
 static void dem2di_load_missing(dem2di_loader *loader, const void *object, bool shape) {
     for (int k = 0; k < DEM2DI_COLUMNS && dem2di_load_good(loader); k++) {
         const dem2di_column *column = &dem2di_columns[k];
