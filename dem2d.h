@@ -204,7 +204,10 @@ CONCEPTS
     List        The neighbour list (Verlet list) holds the pairs that are nearer than the sum of
                 their skins. It is rebuilt when a particle has moved as far as its skin. Skins are
                 tuned to the motion: thick skins list more pairs that are apart, thin ones cause
-                more rebuilds. A fast particle gets a thicker skin.
+                more rebuilds. A fast particle gets a thicker skin. Edits keep the list, unless a
+                particle or a wall comes, goes or leaves its skin, a fixed particle is freed or a
+                free one fixed, or the first friction, dashpot or rolling friction comes or the
+                last goes.
     Step        Positions are at step n, velocities half a step earlier (leapfrog). Contacts,
                 forces, energies and stresses are those of the last force evaluation ("force pass"):
                 at the positions before the last move. Kinetic energy is the mean of the two half
@@ -500,7 +503,7 @@ THREADS
 
 COSTS (instructions per circle and step of a settled bed with 2.0 contacts each, gcc -O2, by
 `make -C tests bench-cost`; a feature that the scene does not use costs nothing: which features are
-in use is decided when the list is rebuilt)
+in use is decided after an edit)
     circles, no friction, no damping                     307    53 without a contact
     the list rebuilt once in 100 steps                   +30
     friction and its history                            +157
@@ -10797,7 +10800,8 @@ typedef struct dem2di_name {
 typedef struct dem2di_wall {
     dem2d_wall_desc desc; /* normal of unit length */
     int span[2];          /* indices, or -1 */
-    dem2d_vec listed;     /* point when the list was built */
+    dem2d_vec listed[3];  /* point, end (segments) and normal when the list was built */
+    bool reshaped;        /* has been turned, or become longer or shorter, since */
     double skin;          /* how far it may move before the next time */
     dem2d_rot along;      /* of a segment: direction from point to end, */
     double extent;        /* and length */
@@ -10871,21 +10875,33 @@ typedef struct dem2di_tally {
     int64_t spread; /* sum of the distances in memory of the partners found */
 } dem2di_tally;
 
-/* What the scene makes use of: decided when the list is renewed, not per contact. */
+/* The features in use: decided after an edit, not per contact. See dem2di_prepare. */
 typedef struct dem2di_plan {
     bool friction; /* some law between the materials in use has it */
     bool spin;     /* something turns, or may be turned */
     bool turns; /* some particle is no circle: rotations matter, and pairs are skipped by travel */
     bool one_law; /* all particles are of one material: */
     int material;
-    bool joints;        /* two segments may meet */
-    bool full;          /* some law has a dashpot or rolling friction, or is the caller's: what the
-                           circles' batches do not know, so that all pairs have links and extras */
-    bool full_again;    /* for one list more: what contacts had of it in the last force pass must
-                           outlast    a step that is refused */
+    bool joints; /* two segments meet, or may */
+    bool full;   /* some law has a dashpot or rolling friction, or is the caller's: what the
+                    circles' batches do not know, so that all pairs have links and extras */
+    bool full_now, full_made; /* the laws need that now; they did in the last force pass */
     bool faces;         /* contacts may have two points: by the rule, and some particle has faces */
     bool heavy, damped; /* gravity, damping: as they are set at the step */
 } dem2di_plan;
+
+/* Values that may be set without a look at the bounds of the motion: speeds and gravity, and angles
+   turned in a step. */
+#define DEM2DI_SPEED_SURE 1e30
+#define DEM2DI_TURN_SURE 1e30
+
+/* A list lasts at most so many steps. */
+#define DEM2DI_LIST_STEPS (1 << 20)
+
+/* At least the length of a vector. */
+static double dem2di_size_of(dem2d_vec v) {
+    return fabs(v.x) + fabs(v.y);
+}
 
 /* Of the pair list before anything is known of the motion: skin in radii, steps between two
    lists. */
@@ -10970,6 +10986,7 @@ struct dem2d_world {
     bool looks_back; /* the force pass keeps the contacts of the last one */
     bool check_time_step;
     bool check_due;  /* an edit since the last check of the time step and the speeds can matter */
+    int plan_due;    /* steps for which the features in use are found anew, see dem2di_prepare */
     bool list_stale; /* the list must be built before the next force pass */
     bool list_worn;  /* because something has left its skin */
     bool skin_fixed; /* as the caller wants it */
@@ -10979,6 +10996,7 @@ struct dem2d_world {
     double worn;     /* part of the skins used up since the list was built */
     double creep;    /* part of a skin that the rounding of a position may use up in a step */
     double rounding; /* m, of a position */
+    dem2d_box box;   /* holds all centres while the list lasts */
     bool bounded;    /* no state can become infinite while the list lasts */
     double softness; /* of the list: times the stiffness of a contact it bounds all eigenvalues */
     double spread;   /* mean distance in memory of two partners when last sorted */
@@ -11104,6 +11122,7 @@ static const dem2di_field dem2di_progress_fields[] = {
     DEM2DI_SAVED("list_stale", dem2d_world, list_stale, DEM2DI_SWITCH),
     DEM2DI_SAVED("list_used_up", dem2d_world, list_worn, DEM2DI_SWITCH),
     DEM2DI_SAVED("check_due", dem2d_world, check_due, DEM2DI_SWITCH),
+    DEM2DI_SAVED("plan_due", dem2d_world, plan_due, DEM2DI_WHOLE(0, 2)),
     DEM2DI_SAVED("skin_fixed", dem2d_world, skin_fixed, DEM2DI_SWITCH),
     DEM2DI_SAVED("scattered", dem2d_world, scattered, DEM2DI_SWITCH),
     DEM2DI_SAVED("bounded", dem2d_world, bounded, DEM2DI_SWITCH),
@@ -11114,6 +11133,8 @@ static const dem2di_field dem2di_progress_fields[] = {
     DEM2DI_SAVED("list_displacement", dem2d_world, worn, DEM2DI_ANY_NUMBER),
     DEM2DI_SAVED("rounding_displacement", dem2d_world, creep, DEM2DI_ANY_NUMBER),
     DEM2DI_SAVED("rounding", dem2d_world, rounding, DEM2DI_ANY_NUMBER),
+    DEM2DI_SAVED("lower", dem2d_world, box.lower, DEM2DI_ANY_NUMBER),
+    DEM2DI_SAVED("upper", dem2d_world, box.upper, DEM2DI_ANY_NUMBER),
     DEM2DI_SAVED("listed_at", dem2d_world, listed_at, DEM2DI_COUNTER),
     DEM2DI_SAVED("list_rebuilds", dem2d_world, rebuilds, DEM2DI_COUNTER),
     DEM2DI_SAVED("slow_time_step", dem2d_world, slow_time_step, DEM2DI_COUNTER),
@@ -11142,7 +11163,8 @@ static const dem2di_field dem2di_plan_fields[] = {
     DEM2DI_SAVED("material", dem2d_world, plan.material, DEM2DI_WHOLE(0, DEM2DI_MATERIALS_MAX)),
     DEM2DI_SAVED("joints", dem2d_world, plan.joints, DEM2DI_SWITCH),
     DEM2DI_SAVED("full", dem2d_world, plan.full, DEM2DI_SWITCH),
-    DEM2DI_SAVED("full_again", dem2d_world, plan.full_again, DEM2DI_SWITCH),
+    DEM2DI_SAVED("full_now", dem2d_world, plan.full_now, DEM2DI_SWITCH),
+    DEM2DI_SAVED("full_made", dem2d_world, plan.full_made, DEM2DI_SWITCH),
     DEM2DI_SAVED("faces", dem2d_world, plan.faces, DEM2DI_SWITCH)};
 
 #define DEM2DI_ACCOUNT(name, place) DEM2DI_SAVED(name, dem2d_world, ledger.place, DEM2DI_ANY_NUMBER)
@@ -11202,6 +11224,7 @@ static const dem2di_field dem2di_wall_id_fields[] = {
 
 static const dem2di_field dem2di_wall_list_fields[] = {
     DEM2DI_SAVED("listed", dem2di_wall, listed, DEM2DI_VECTOR),
+    DEM2DI_SAVED("reshaped", dem2di_wall, reshaped, DEM2DI_SWITCH),
     DEM2DI_SAVED("skin", dem2di_wall, skin, DEM2DI_FROM_0)};
 
 static const dem2di_field dem2di_wall_state_fields[] = {
@@ -11629,6 +11652,12 @@ DEM2D_API dem2d_result dem2d_world_create(const dem2d_world_desc *desc, dem2d_wo
     return DEM2D_OK;
 }
 
+/* An edit may change the features in use, or bounds of the motion: see dem2di_plan_make for why
+   they are found anew in two steps. */
+static void dem2di_edited(dem2d_world *world) {
+    world->plan_due = 2;
+}
+
 /* Ids: an index in range whose slot is in use with this generation. */
 static bool dem2di_shape_lives(const dem2d_world *w, dem2d_shape_id id) {
     return (int64_t)id.index < w->template_count && w->templates[id.index].shape != NULL &&
@@ -11783,9 +11812,11 @@ DEM2D_API dem2d_result dem2d_world_set_pair(dem2d_world *world, dem2d_material_i
     if (!dem2di_material_lives(world, b)) return dem2di_stale(world, "material", b.index);
     dem2d_result result = dem2di_check_fields(&world->env, DEM2DI_ALL(dem2di_pair_fields), desc);
     if (result != DEM2D_OK) return result;
+    dem2d_pair_desc *law = dem2di_law(world, (int)a.index, (int)b.index), old = *law;
     dem2di_law_set(world, (int)a.index, (int)b.index, desc);
-    world->list_stale = world->check_due = true;
-    world->ledger.edited = true;
+    if (memcmp(&old, law, sizeof old) == 0) return DEM2D_OK;
+    world->check_due = world->ledger.edited = true;
+    dem2di_edited(world);
     return DEM2D_OK;
 }
 
@@ -11919,6 +11950,7 @@ DEM2D_API dem2d_result dem2d_world_add_particle(dem2d_world *world, const dem2d_
     world->body_count++;
     world->list_stale = world->check_due = true;
     world->ledger.edited = true;
+    dem2di_edited(world);
     id->index = (uint32_t)body.index;
     id->generation = world->names[body.index].generation;
     return DEM2D_OK;
@@ -11981,6 +12013,7 @@ DEM2D_API dem2d_result dem2d_world_remove_particle(dem2d_world *world, dem2d_par
     body->shape_index = -1;
     world->holes++;
     dem2di_forget(world, slot);
+    dem2di_edited(world);
     dem2di_name_give(world, (int)id.index);
     return DEM2D_OK;
 }
@@ -12178,6 +12211,32 @@ DEM2D_API dem2d_result dem2d_world_get_particle(const dem2d_world *world, dem2d_
     return DEM2D_OK;
 }
 
+/* A listed contact ends: in the next force pass the two were apart, and nothing is known of them.
+ */
+static void dem2di_contact_end(dem2d_world *world, int i) {
+    const dem2di_list *list = &world->list;
+    const dem2di_contacts *contacts = &list->contacts;
+    contacts->normal_x[i] = contacts->normal_y[i] = contacts->force[i] = contacts->shear[i] = 0;
+    contacts->depth[i] = -1;
+    if (i < list->discs) return;
+    memset(&contacts->history[i - list->discs], 0, sizeof *contacts->history);
+    dem2di_clear_beside(world, i);
+}
+
+/* A particle has been put elsewhere: all its contacts end, and as much of its skin is used up. */
+static void dem2di_moved(dem2d_world *world, int slot, dem2d_vec way) {
+    const dem2di_list *list = &world->list;
+    world->check_due = world->ledger.edited = true;
+    if (world->list_stale) {
+        dem2di_forget(world, slot);
+        return;
+    }
+    for (int k = list->first[slot]; k < list->first[slot + 1]; k++)
+        dem2di_contact_end(world, list->adjacent[k]);
+    world->worn += dem2di_length(way) * sqrt(world->wear[slot]);
+    world->list_stale = !(world->worn <= 1 - DEM2DI_LIST_STEPS * DBL_EPSILON);
+}
+
 DEM2D_API dem2d_result dem2d_world_move_particle(dem2d_world *world, dem2d_particle_id id,
                                                  dem2d_vec position, double angle) {
     if (world == NULL) return DEM2D_NULL_ARGUMENT;
@@ -12188,11 +12247,11 @@ DEM2D_API dem2d_result dem2d_world_move_particle(dem2d_world *world, dem2d_parti
     moved.angle = angle;
     dem2d_result result = dem2di_check_motion(&world->env, &moved);
     if (result != DEM2D_OK) return result;
+    dem2d_vec way = dem2di_sub(position, world->now[slot].x);
     world->now[slot].x = position;
     world->now[slot].q = dem2di_orientation(world, angle);
     world->before[slot] = world->now[slot];
-    world->check_due = true;
-    dem2di_forget(world, slot);
+    dem2di_moved(world, slot, way);
     return DEM2D_OK;
 }
 
@@ -12220,6 +12279,26 @@ static bool dem2di_outruns(const dem2d_world *world, int slot) {
     return speed * world->time_step > inner * world->bodies[slot].scale;
 }
 
+/* May a velocity that was set change the features in use, or the bounds of the motion? */
+static bool dem2di_speeds_matter(const dem2d_world *world, int slot) {
+    const dem2di_state *now = &world->now[slot];
+    return (now->w != 0 && !world->plan.spin) || dem2di_size_of(now->v) > DEM2DI_SPEED_SURE ||
+           fabs(now->w) * world->time_step > DEM2DI_TURN_SURE;
+}
+
+/* Another kind of motion. Pairs of two fixed particles, and of those and walls, are not listed. */
+static void dem2di_set_motion(dem2d_world *world, int slot, dem2d_motion motion) {
+    dem2di_body *body = &world->bodies[slot];
+    if ((dem2d_motion)body->motion == motion) return;
+    if (motion == DEM2D_FIXED || (dem2d_motion)body->motion == DEM2D_FIXED)
+        world->list_stale = true;
+    body->motion = (uint8_t)motion;
+    if (motion == DEM2D_FIXED) dem2di_forget_fixed(world, slot);
+    world->inverse[slot] = dem2di_inverse_of(world, body);
+    world->check_due = world->ledger.edited = true;
+    dem2di_edited(world);
+}
+
 DEM2D_API dem2d_result dem2d_world_drive_particle(dem2d_world *world, dem2d_particle_id id,
                                                   dem2d_motion motion, dem2d_vec velocity,
                                                   double angular_velocity) {
@@ -12236,13 +12315,10 @@ DEM2D_API dem2d_result dem2d_world_drive_particle(dem2d_world *world, dem2d_part
         return dem2di_out_of_memory(world, "velocities");
     world->now[slot].v = velocity;
     world->now[slot].w = angular_velocity;
-    if (motion != (dem2d_motion)world->bodies[slot].motion || dem2di_outruns(world, slot))
-        world->check_due = true;
-    world->bodies[slot].motion = (uint8_t)motion;
-    if (motion == DEM2D_FIXED) dem2di_forget_fixed(world, slot);
-    world->inverse[slot] = dem2di_inverse_of(world, &world->bodies[slot]);
-    world->list_stale = true; /* pairs of two fixed ones are not listed */
-    world->ledger.edited = true;
+    if (world->bodies[slot].redirected) world->ledger.edited = true;
+    if (dem2di_outruns(world, slot)) world->check_due = true;
+    if (dem2di_speeds_matter(world, slot)) dem2di_edited(world);
+    dem2di_set_motion(world, slot, motion);
     return DEM2D_OK;
 }
 
@@ -12313,7 +12389,6 @@ static void dem2di_wall_place(dem2d_world *world, int slot, const dem2d_wall_des
         memset(&now->backing, 0, sizeof now->backing);
     }
     world->wall_before[slot] = *now;
-    world->list_stale = true;
     world->ledger.edited = true;
 }
 
@@ -12337,6 +12412,46 @@ static void dem2di_wall_unspan(dem2d_world *world, const dem2di_wall *wall) {
         if (wall->span[i] >= 0) world->walls[wall->span[i]].users--;
 }
 
+/* The end of a segment now. */
+static dem2d_vec dem2di_segment_end(const dem2di_wall *wall, dem2d_vec point) {
+    return dem2di_along(point, wall->extent, dem2di_vec(wall->along.c, wall->along.s));
+}
+
+/* How far a wall has moved, as far as contacts can tell. */
+static double dem2di_wall_way(const dem2di_wall *wall, dem2d_vec moved) {
+    return wall->desc.segment ? dem2di_length(moved) : fabs(dem2di_dot(moved, wall->desc.normal));
+}
+
+/* The list is built with a wall as it is now. */
+static void dem2di_wall_listed(dem2d_world *world, int slot) {
+    dem2di_wall *wall = &world->walls[slot];
+    wall->listed[0] = world->wall_now[slot].point;
+    wall->listed[1] = dem2di_segment_end(wall, wall->listed[0]);
+    wall->listed[2] = wall->desc.normal;
+    wall->reshaped = false;
+}
+
+/* Bound of how far the distance of any particle from a wall has changed since the list was built,
+   with the wall's point now: of a segment the greater way of its ends; of a half-plane that is
+   turned, the change at the corners of the box that holds all particles. */
+static double dem2di_wall_change(const dem2d_world *world, const dem2di_wall *wall,
+                                 dem2d_vec point) {
+    const dem2d_box *box = &world->box;
+    dem2d_vec moved = dem2di_sub(point, wall->listed[0]);
+    if (!wall->reshaped) return dem2di_wall_way(wall, moved);
+    dem2d_vec end = dem2di_sub(dem2di_segment_end(wall, point), wall->listed[1]);
+    if (wall->desc.segment) return dem2di_max(dem2di_length(moved), dem2di_length(end));
+    dem2d_vec turned = dem2di_sub(wall->desc.normal, wall->listed[2]);
+    double most = 0, way = dem2di_dot(moved, wall->desc.normal);
+    for (int k = 0; k < 4; k++) {
+        dem2d_vec corner =
+            dem2di_vec(k & 1 ? box->upper.x : box->lower.x, k & 2 ? box->upper.y : box->lower.y);
+        double change = dem2di_dot(dem2di_sub(corner, wall->listed[0]), turned) - way;
+        most = dem2di_max(most, fabs(change));
+    }
+    return most;
+}
+
 DEM2D_API dem2d_result dem2d_world_add_wall(dem2d_world *world, const dem2d_wall_desc *desc,
                                             dem2d_wall_id *id) {
     if (world == NULL || desc == NULL || id == NULL) return DEM2D_NULL_ARGUMENT;
@@ -12354,7 +12469,9 @@ DEM2D_API dem2d_result dem2d_world_add_wall(dem2d_world *world, const dem2d_wall
     wall->generation = generation;
     if (desc->mode == DEM2D_WALL_MOVING) world->wall_now[slot].velocity = desc->velocity;
     dem2di_wall_place(world, slot, desc);
-    world->check_due = true;
+    dem2di_wall_listed(world, slot);
+    world->list_stale = world->check_due = true;
+    dem2di_edited(world);
     if (slot == world->wall_count) world->wall_count++;
     id->index = (uint32_t)slot;
     id->generation = wall->generation;
@@ -12368,16 +12485,6 @@ static dem2d_vec dem2di_wall_velocity(const dem2d_world *world, int wall) {
     return desc->mode == DEM2D_WALL_MOVING ? desc->velocity : dem2di_vec(0, 0);
 }
 
-/* How far a wall has moved, as far as contacts can tell. */
-static double dem2di_wall_way(const dem2di_wall *wall, dem2d_vec moved) {
-    return wall->desc.segment ? dem2di_length(moved) : fabs(dem2di_dot(moved, wall->desc.normal));
-}
-
-/* The end of a segment now. */
-static dem2d_vec dem2di_segment_end(const dem2di_wall *wall, dem2d_vec point) {
-    return dem2di_along(point, wall->extent, dem2di_vec(wall->along.c, wall->along.s));
-}
-
 /* Distance of a point from a wall; behind a half-plane negative. */
 static double dem2di_wall_distance(const dem2d_world *world, int wall, dem2d_vec x) {
     const dem2di_wall *w = &world->walls[wall];
@@ -12388,6 +12495,52 @@ static double dem2di_wall_distance(const dem2d_world *world, int wall, dem2d_vec
     return dem2di_length(dem2di_along(from, -place, along));
 }
 
+/* Ends this near are a joint, of the shorter segment; and a contact point is at one, of the radius:
+   a gap that no grain can tell, far above the rounding of walls that move together. */
+#define DEM2DI_JOINT 1e-6
+
+/* The ends of two segments that are a joint: numbers of 0 (start) and 1 (end) in `which`; false
+   when there is none. */
+static bool dem2di_segments_meet(const dem2d_world *world, int a, int b, int which[2],
+                                 dem2d_vec *at) {
+    const dem2di_wall *w[2] = {&world->walls[a], &world->walls[b]};
+    int slot[2] = {a, b};
+    dem2d_vec end[2][2];
+    for (int k = 0; k < 2; k++) {
+        if (!w[k]->alive || !w[k]->desc.segment) return false;
+        end[k][0] = world->wall_now[slot[k]].point;
+        end[k][1] = dem2di_segment_end(w[k], end[k][0]);
+    }
+    double near = DEM2DI_JOINT * dem2di_min(w[0]->extent, w[1]->extent);
+    for (which[0] = 0; which[0] < 2; which[0]++)
+        for (which[1] = 0; which[1] < 2; which[1]++) {
+            *at = end[0][which[0]];
+            if (dem2di_length(dem2di_sub(*at, end[1][which[1]])) <= near) return true;
+        }
+    return false;
+}
+
+/* Is a wall a segment that meets another, or may, when one of the two moves? */
+static bool dem2di_may_join(const dem2d_world *world, int wall) {
+    const dem2di_wall *w = world->walls;
+    int which[2];
+    dem2d_vec at;
+    for (int i = 0; i < world->wall_count && w[wall].desc.segment; i++) {
+        if (i == wall || !w[i].alive || !w[i].desc.segment) continue;
+        bool still = w[i].desc.mode == DEM2D_WALL_STILL && w[wall].desc.mode == DEM2D_WALL_STILL;
+        if (!still || dem2di_segments_meet(world, wall, i, which, &at)) return true;
+    }
+    return false;
+}
+
+/* May a wall that was set again change the features in use, or the bounds of the motion? */
+static bool dem2di_wall_matters(const dem2d_world *world, const dem2di_wall *old, int slot) {
+    const dem2d_wall_desc *desc = &world->walls[slot].desc;
+    double speed = dem2di_size_of(desc->velocity) + desc->max_speed;
+    return (!world->plan.joints && dem2di_may_join(world, slot)) || speed > DEM2DI_SPEED_SURE ||
+           fabs(desc->stress) > fabs(old->desc.stress) || desc->length > old->desc.length;
+}
+
 DEM2D_API dem2d_result dem2d_world_set_wall(dem2d_world *world, dem2d_wall_id id,
                                             const dem2d_wall_desc *desc) {
     if (world == NULL || desc == NULL) return DEM2D_NULL_ARGUMENT;
@@ -12396,13 +12549,21 @@ DEM2D_API dem2d_result dem2d_world_set_wall(dem2d_world *world, dem2d_wall_id id
     if (result != DEM2D_OK) return result;
     if (!dem2di_line_make(world, desc)) return DEM2D_OUT_OF_MEMORY;
     dem2di_wall *wall = &world->walls[id.index];
-    dem2di_wall old = *wall;
+    const dem2di_wall old = *wall;
     dem2di_wall_unspan(world, wall);
     dem2di_wall_place(world, (int)id.index, desc);
-    if (old.desc.material.index != desc->material.index || old.desc.segment != desc->segment)
-        world->check_due = true;
-    if (old.desc.segment != desc->segment || !(dem2di_dot(old.desc.normal, wall->desc.normal) > 0))
+    dem2d_vec normal = wall->desc.normal;
+    bool other_kind = old.desc.segment != desc->segment;
+    wall->reshaped = old.reshaped || old.extent != wall->extent || old.desc.normal.x != normal.x ||
+                     old.desc.normal.y != normal.y;
+    if (other_kind || !(dem2di_dot(old.desc.normal, normal) > 0))
         dem2di_forget_wall(world, (int)id.index);
+    if (!(dem2di_wall_change(world, wall, desc->point) <= wall->skin)) world->list_stale = true;
+    if (other_kind || old.desc.material.index != desc->material.index) {
+        world->check_due = true;
+        dem2di_edited(world);
+    }
+    if (dem2di_wall_matters(world, &old, (int)id.index)) dem2di_edited(world);
     return DEM2D_OK;
 }
 
@@ -12417,6 +12578,7 @@ DEM2D_API dem2d_result dem2d_world_remove_wall(dem2d_world *world, dem2d_wall_id
     dem2di_wall_unspan(world, wall);
     wall->alive = false;
     dem2di_forget_wall(world, (int)id.index);
+    dem2di_edited(world);
     return DEM2D_OK;
 }
 
@@ -12455,7 +12617,7 @@ DEM2D_API dem2d_result dem2d_world_set_gravity(dem2d_world *world, dem2d_vec gra
                                            offsetof(dem2d_world_desc, gravity), &gravity);
     if (result != DEM2D_OK) return result;
     world->gravity = gravity;
-    world->list_stale = true; /* with its bounds of the motion */
+    if (dem2di_size_of(gravity) > DEM2DI_SPEED_SURE) dem2di_edited(world);
     return DEM2D_OK;
 }
 
@@ -12482,15 +12644,14 @@ DEM2D_API dem2d_result dem2d_world_set_time_step(dem2d_world *world, double time
     dem2d_result result = dem2di_check_one(&world->env, dem2di_world_fields,
                                            offsetof(dem2d_world_desc, time_step), &time_step);
     if (result != DEM2D_OK) return result;
-    if (time_step != world->time_step) {
-        world->timed = dem2di_time(world);
-        world->timed_at = world->steps;
-    }
+    if (time_step == world->time_step) return DEM2D_OK;
+    world->timed = dem2di_time(world);
+    world->timed_at = world->steps;
     if (time_step > world->time_step) world->check_due = true;
     world->time_step = time_step;
     if (world->steps == 0) world->made_step = time_step;
-    world->list_stale = true;
     world->ledger.edited = true;
+    dem2di_edited(world);
     return DEM2D_OK;
 }
 
@@ -12737,88 +12898,56 @@ typedef struct dem2di_build {
     double softness;
 } dem2di_build;
 
-/* Ends this near are a joint, of the shorter segment; and a contact point is at one, of the radius:
-   a gap that no grain can tell, far above the rounding of walls that move together. */
-#define DEM2DI_JOINT 1e-6
-
-/* The ends of two segments that are a joint, or may be one when the walls have moved together by
-   `way`: numbers of 0 (start) and 1 (end) in `which`; false when there is none. */
-static bool dem2di_segments_meet(const dem2d_world *world, int a, int b, double way, int which[2],
-                                 dem2d_vec *at) {
-    const dem2di_wall *w[2] = {&world->walls[a], &world->walls[b]};
-    int slot[2] = {a, b};
-    dem2d_vec end[2][2];
-    for (int k = 0; k < 2; k++) {
-        if (!w[k]->alive || !w[k]->desc.segment) return false;
-        end[k][0] = world->wall_now[slot[k]].point;
-        end[k][1] = dem2di_segment_end(w[k], end[k][0]);
-    }
-    double near = DEM2DI_JOINT * dem2di_min(w[0]->extent, w[1]->extent) + way;
-    for (which[0] = 0; which[0] < 2; which[0]++)
-        for (which[1] = 0; which[1] < 2; which[1]++) {
-            *at = end[0][which[0]];
-            if (dem2di_length(dem2di_sub(*at, end[1][which[1]])) <= near) return true;
-        }
-    return false;
-}
-
-/* May two segments be joined before the list is renewed? It is, when a wall has moved by its skin:
-   twice that is beyond what both may add. */
-static bool dem2di_may_join(const dem2d_world *world) {
-    int which[2];
-    dem2d_vec at;
-    for (int a = 0; a < world->wall_count; a++)
-        for (int b = 0; b < a && world->walls[a].desc.segment; b++) {
-            const dem2di_wall *w[2] = {&world->walls[a], &world->walls[b]};
-            double way = 0;
-            for (int k = 0; k < 2; k++)
-                if (w[k]->desc.mode != DEM2D_WALL_STILL) way += 2 * w[k]->skin;
-            if (dem2di_segments_meet(world, a, b, way, which, &at)) return true;
-        }
-    return false;
-}
-
 /* Do two circles take the kernel of circles? It knows friction and the closed form, and no more. */
 static bool dem2di_has_disc_kernel(const dem2d_world *world, const dem2di_plan *plan) {
     return world->solver == DEM2D_CERTIFIED && !plan->full;
 }
 
-/* What the scene makes use of. */
+/* The features in use. A full law that is no longer needed is still there in the first step after
+   an edit: what contacts had of it in the last force pass must outlast a step that is refused. */
 static dem2di_plan dem2di_plan_make(const dem2d_world *world) {
     dem2di_plan plan;
     memset(&plan, 0, sizeof plan);
-    plan.one_law = true;
     bool used[DEM2DI_MATERIALS_MAX] = {false}, met[DEM2DI_MATERIALS_MAX] = {false};
+    int bodies = 0;
+    plan.one_law = true;
     for (int i = 0; i < world->body_count; i++) {
         const dem2di_body *body = &world->bodies[i];
-        used[body->material] = true;
-        plan.spin = plan.spin || world->now[i].w != 0;
+        if (body->shape_index < 0) continue;
         const dem2d_shape *shape = dem2di_shape_of(world, body);
+        used[body->material] = true;
+        if (bodies++ == 0) plan.material = body->material;
+        plan.one_law = plan.one_law && body->material == plan.material;
+        plan.spin = plan.spin || world->now[i].w != 0;
         plan.turns = plan.turns || shape->type != DEM2D_CIRCLE;
         plan.faces = plan.faces || (shape->flat && world->faces == DEM2D_TWO_POINTS);
-        plan.material = world->bodies[0].material;
-        plan.one_law = plan.one_law && body->material == plan.material;
     }
-    for (int j = 0; j < world->wall_count; j++)
-        if (world->walls[j].alive) met[world->walls[j].desc.material.index] = true;
+    for (int j = 0; j < world->wall_count; j++) {
+        if (!world->walls[j].alive) continue;
+        met[world->walls[j].desc.material.index] = true;
+        plan.joints = plan.joints || dem2di_may_join(world, j);
+    }
     for (int a = 0; a < world->material_count; a++)
         for (int b = 0; b < world->material_count; b++) {
             const dem2d_pair_desc *law = dem2di_law(world, a, b);
             if (!used[a] || !(used[b] || met[b])) continue;
             plan.friction = plan.friction || law->friction > 0;
-            plan.full = plan.full || law->rolling_friction > 0 || law->damping_ratio > 0;
+            plan.full_now = plan.full_now || law->rolling_friction > 0 || law->damping_ratio > 0;
         }
-    plan.joints = dem2di_may_join(world);
-    plan.full = plan.full || world->law != NULL;
+    plan.full_now = plan.full_now || world->law != NULL;
+    plan.full_made = world->plan.full_made;
+    plan.full = plan.full_now || plan.full_made;
     plan.faces = plan.faces && world->law == NULL;
-    const dem2di_plan *last = &world->plan;
-    plan.full_again =
-        !plan.full && last->full && !(last->full_again && world->steps > world->listed_at);
-    plan.full = plan.full || plan.full_again;
     plan.turns = plan.turns || !dem2di_has_disc_kernel(world, &plan);
-    plan.turns = plan.turns || (world->plan.turns && world->body_count > 0);
+    plan.turns = plan.turns || (world->plan.turns && bodies > 0);
     plan.spin = plan.spin || plan.turns || plan.friction;
     return plan;
+}
+
+/* May the list stay when the features in use change from those of one plan to another's? They have
+   the same arrays and the same kinds of pairs. */
+static bool dem2di_plan_fits(const dem2di_plan *one, const dem2di_plan *other) {
+    return one->full == other->full && one->faces == other->faces && one->turns == other->turns;
 }
 
 /* How far apart the bounding circles of a listed pair are now. */
@@ -13067,16 +13196,16 @@ static void dem2di_travel_task(void *context, int begin, int end) {
 
 /* Can no state become infinite before the next list? Particles and walls stay within their skins,
    so no overlap exceeds the scene, and no force its stiffness times that. With `steps` steps, this
-   is true of any sane scene; where it is not, each step is tried before it is taken. */
-#define DEM2DI_LIST_STEPS (1 << 20)
+   is true of any sane scene; where it is not, each step is tried before it is taken. Speeds and
+   gravity up to these values may be set without asking again. */
 static bool dem2di_bounded(const dem2d_world *world, const dem2di_plan *plan, int contacts) {
-    double far = 0, size = 0, heavy = 0, speed = 0, spin = 0, light = 0, slender = 0, stiff = 0;
-    double ratio = 0, rolling = 0;
+    double far = 0, size = 0, heavy = 0, light = 0, slender = 0, stiff = 0, ratio = 0, rolling = 0;
+    double speed = DEM2DI_SPEED_SURE, spin = DEM2DI_TURN_SURE / world->time_step;
     bool circles = true;
     for (int i = 0; i < world->body_count; i++) {
         const dem2di_state *now = &world->now[i];
-        far = dem2di_max(far, fabs(now->x.x) + fabs(now->x.y));
-        speed = dem2di_max(speed, fabs(now->v.x) + fabs(now->v.y));
+        far = dem2di_max(far, dem2di_size_of(now->x));
+        speed = dem2di_max(speed, dem2di_size_of(now->v));
         spin = dem2di_max(spin, fabs(now->w));
         size = dem2di_max(size, now->radius);
         light = dem2di_max(light, world->inverse[i].mass);
@@ -13086,9 +13215,8 @@ static bool dem2di_bounded(const dem2d_world *world, const dem2di_plan *plan, in
     }
     for (int j = 0; j < world->wall_count; j++) {
         const dem2d_wall_desc *wall = &world->walls[j].desc;
-        dem2d_vec point = world->wall_now[j].point, v = dem2di_wall_velocity(world, j);
-        far = dem2di_max(far, fabs(point.x) + fabs(point.y));
-        speed = dem2di_max(speed, fabs(v.x) + fabs(v.y) + wall->max_speed);
+        far = dem2di_max(far, dem2di_size_of(world->wall_now[j].point));
+        speed = dem2di_max(speed, dem2di_size_of(dem2di_wall_velocity(world, j)) + wall->max_speed);
         stiff = dem2di_max(stiff, fabs(wall->stress));
         heavy = dem2di_max(heavy, wall->length);
     }
@@ -13102,7 +13230,8 @@ static bool dem2di_bounded(const dem2d_world *world, const dem2di_plan *plan, in
     double closing = 2 * (speed + depth / world->time_step),
            dashpot = 2 * ratio * sqrt(heavy * stiff);
     double force = (contacts + 1.0) * (stiff * depth + dashpot * closing); /* damping doubles */
-    speed += 2 * time * (fabs(world->gravity.x) + fabs(world->gravity.y) + force * light);
+    speed +=
+        2 * time * (dem2di_max(DEM2DI_SPEED_SURE, dem2di_size_of(world->gravity)) + force * light);
     spin += 2 * time * (force * 2 * size * (1 + rolling) * slender);
     bool known = !plan->full || (circles && world->law == NULL);
     return far + time * speed < 1e300 && force * heavy < 1e300 &&
@@ -13110,15 +13239,24 @@ static bool dem2di_bounded(const dem2d_world *world, const dem2di_plan *plan, in
            known && world->solver == DEM2D_CERTIFIED;
 }
 
-/* How far the rounding of a position moves a particle in a step. */
-static void dem2di_rounding_set(dem2d_world *world) {
-    double far = 0, size = 0, wear = 0;
+/* How far the rounding of a position moves a particle in a step, and the box that holds all centres
+   while the list lasts. */
+static void dem2di_extent_set(dem2d_world *world) {
+    double far = 0, size = 0, wear = 0, skin = 0;
+    dem2d_box *box = &world->box;
     for (int i = 0; i < world->body_count; i++) {
-        const dem2di_state *now = &world->now[i];
-        far = dem2di_max(far, fabs(now->x.x) + fabs(now->x.y));
-        size = dem2di_max(size, now->radius);
+        dem2d_vec x = world->now[i].x;
+        box->lower.x = i == 0 ? x.x : dem2di_min(box->lower.x, x.x);
+        box->lower.y = i == 0 ? x.y : dem2di_min(box->lower.y, x.y);
+        box->upper.x = i == 0 ? x.x : dem2di_max(box->upper.x, x.x);
+        box->upper.y = i == 0 ? x.y : dem2di_max(box->upper.y, x.y);
+        far = dem2di_max(far, dem2di_size_of(x));
+        size = dem2di_max(size, world->now[i].radius);
         wear = dem2di_max(wear, world->wear[i]);
+        skin = dem2di_max(skin, 1 / sqrt(world->wear[i]));
     }
+    box->lower = dem2di_sub(box->lower, dem2di_vec(skin, skin));
+    box->upper = dem2di_add(box->upper, dem2di_vec(skin, skin));
     world->rounding =
         2 * DBL_EPSILON * (far + size); /* half an ulp of both coordinates, and more */
     world->creep = world->rounding * sqrt(wear);
@@ -13316,10 +13454,11 @@ static void dem2di_build_finish(dem2di_build *build) {
     if (world->plan.turns)
         dem2di_run(world, DEM2D_PHASE_LIST, dem2di_blocks(world->body_count, DEM2DI_BLOCK),
                    dem2di_travel_task, world);
-    dem2di_rounding_set(world);
+    dem2di_extent_set(world);
     world->bounded = build->bounded;
     world->softness = build->softness;
-    for (int j = 0; j < world->wall_count; j++) world->walls[j].listed = world->wall_now[j].point;
+    for (int j = 0; j < world->wall_count; j++)
+        if (world->walls[j].alive) dem2di_wall_listed(world, j);
     world->listed_at = world->steps;
     world->worn = 0;
     world->list_stale = world->list_worn = false;
@@ -13343,7 +13482,7 @@ static dem2d_result dem2di_list_failed(dem2d_world *world, double skin, double i
 }
 
 /* Renew the list. On failure the old one stays. */
-static dem2d_result dem2di_build_list(dem2d_world *world) {
+static dem2d_result dem2di_build_list(dem2d_world *world, const dem2di_plan *plan) {
     dem2di_build build;
     memset(&build, 0, sizeof build);
     build.world = world;
@@ -13356,7 +13495,7 @@ static dem2d_result dem2di_build_list(dem2d_world *world) {
             largest = dem2di_max(largest, world->now[i].radius);
         for (int j = 0; j < world->wall_count; j++)
             world->walls[j].skin = dem2di_skin_of(world, largest, dem2di_wall_velocity(world, j));
-        build.plan = dem2di_plan_make(world);
+        build.plan = *plan;
         room = !build.plan.turns || dem2di_group_reserve(world, DEM2DI_TRAVELS, world->body_count);
     }
     if (!room || !dem2di_build_search(&build)) return dem2di_list_failed(world, skin, interval);
@@ -13371,6 +13510,19 @@ static dem2d_result dem2di_build_list(dem2d_world *world) {
     if (!dem2di_build_cut(&build)) return dem2di_list_failed(world, skin, interval);
     dem2di_build_finish(&build);
     dem2di_watch_spread(world, sorted);
+    return DEM2D_OK;
+}
+
+/* What a step needs beforehand: the features in use, when an edit may have changed them, and the
+   list, when it is used up or when arrays or kinds of pairs change. */
+static dem2d_result dem2di_prepare(dem2d_world *world, bool *listed) {
+    const dem2di_plan plan = world->plan_due > 0 ? dem2di_plan_make(world) : world->plan;
+    *listed = world->list_stale || !dem2di_plan_fits(&plan, &world->plan);
+    if (*listed) return dem2di_build_list(world, &plan);
+    if (world->plan_due == 0) return DEM2D_OK;
+    if (world->plan.friction && !plan.friction) dem2di_loads_clear(world); /* torques of circles */
+    world->plan = plan;
+    world->bounded = dem2di_bounded(world, &plan, world->list.count);
     return DEM2D_OK;
 }
 
@@ -14161,7 +14313,7 @@ static void dem2di_joint_yield(const dem2d_world *world, int a, int b) {
     int which[2], near[2];
     bool two[2], ends[2], side[2];
     dem2d_vec at;
-    if (!dem2di_segments_meet(world, wall[0], wall[1], 0, which, &at)) return;
+    if (!dem2di_segments_meet(world, wall[0], wall[1], which, &at)) return;
     for (int k = 0; k < 2; k++) {
         int corner = dem2di_segment_corner(world, contact[k]);
         near[k] = dem2di_point_near(world, contact[k], at);
@@ -14192,7 +14344,7 @@ static int dem2di_joint_source(const dem2d_world *world, int contact) {
         int other = list->adjacent[k];
         if (dem2di_segment_touched(world, &list->last, other) &&
             !dem2di_segment_touched(world, &list->contacts, other) &&
-            dem2di_segments_meet(world, key->b, list->keys[other].b, 0, which, &at))
+            dem2di_segments_meet(world, key->b, list->keys[other].b, which, &at))
             return other;
     }
     return contact;
@@ -14556,8 +14708,7 @@ static bool dem2di_wall_pass(dem2d_world *world) {
             next->velocity = dem2di_wall_velocity(world, j);
         }
         next->point = dem2di_along(next->point, world->time_step, next->velocity);
-        double way = dem2di_wall_way(wall, dem2di_sub(next->point, wall->listed));
-        stale = stale || !(way <= wall->skin);
+        stale = stale || !(dem2di_wall_change(world, wall, next->point) <= wall->skin);
     }
     return stale;
 }
@@ -14962,12 +15113,9 @@ static dem2d_result dem2di_check_next(const dem2d_world *world, const dem2di_cou
    have to be put back. */
 static dem2d_result dem2di_step(dem2d_world *world) {
     dem2di_count count = world->count;
-    dem2d_result result = DEM2D_OK;
-    bool slow = false, fast = false, worn = false, listed = world->list_stale;
-    if (listed) {
-        result = dem2di_build_list(world);
-        if (result != DEM2D_OK) return result;
-    }
+    bool slow = false, fast = false, worn = false, listed;
+    dem2d_result result = dem2di_prepare(world, &listed);
+    if (result != DEM2D_OK) return result;
     world->list_stale = listed; /* should the step fail, the next try begins with a list as well */
     bool due = dem2di_check_is_due(world);
     bool back = dem2di_looks_back(world, &world->plan, world->bounded, world->softness);
@@ -14990,9 +15138,10 @@ static dem2d_result dem2di_step(dem2d_world *world) {
     if (ledger.kept) dem2di_book_motion(world, &ledger);
     worn = worn || path > 1 - DEM2DI_LIST_STEPS * DBL_EPSILON ||
            world->steps - world->listed_at >= DEM2DI_LIST_STEPS;
+    world->plan.full_made = world->plan.full_now;
+    if (world->plan_due > 0) world->plan_due--;
     world->worn = path;
-    world->list_worn = worn;
-    world->list_stale = worn || world->plan.full_again;
+    world->list_stale = world->list_worn = worn;
     world->rebuilds += listed;
     world->count = count;
     world->slow_time_step += slow;
@@ -16510,16 +16659,15 @@ static bool dem2di_key_sound(const dem2d_world *w, int contact) {
     return a != b && round == (contact < w->list.discs) && (round || w->plan.turns);
 }
 
-/* May the next step go by the plan without a look at the scene? Where the list is not stale, only
-   walls have moved by themselves since the plan was made: what depends on where they are (joints)
-   can't be checked, and need not be, as no memory depends on it. */
+/* May the next step go by the plan without a look at the scene? */
 static bool dem2di_plan_holds(const dem2d_world *w) {
     const dem2di_plan *plan = &w->plan;
     if (w->list_stale || w->body_count == 0) return true;
-    if (w->holes > 0 || plan->full_again) return false;
+    if (w->holes > 0) return false;
+    if (w->plan_due > 0) return true;
     dem2di_plan need = dem2di_plan_make(w);
-    return plan->friction >= need.friction && plan->spin >= need.spin &&
-           plan->turns >= need.turns && plan->faces >= need.faces && plan->full == need.full &&
+    return dem2di_plan_fits(plan, &need) && plan->spin >= need.spin &&
+           plan->joints >= need.joints &&
            (!plan->one_law || (need.one_law && plan->material == need.material));
 }
 
@@ -17559,6 +17707,11 @@ DEM2D_API dem2d_result dem2d_world_write_csv(const dem2d_world *world, const dem
             Circles have contacts only after a force pass; a particle that becomes fixed loses its
             contacts with walls at once; if a law without tangential spring replaces one with it,
             the tangential force becomes 0. dem2d_stats.time is the sum of the time steps.
+            Results and hashes do not depend on the neighbour list, its skin or the order in memory,
+            for any shape. The time step is checked in the first step, after edits that can matter
+            and in every 160th step. Edits no longer rebuild the list, unless they list other pairs.
+            A wall that is set again keeps the history of its contacts, unless it turns by a right
+            angle or more.
             Pictures and outlines: two bytes per pixel, label masks, a region of interest,
             thresholds without frames, grains inside frames. Outlines that cross themselves are
             refused (DEM2D_CROSSING). The long axis of a template is exact for every model.
