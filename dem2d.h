@@ -1404,6 +1404,11 @@ typedef struct dem2d_contact_info {
     double normal_force;     ///< N/m, on B along the normal; >= 0 but by a caller's law
     double tangential_force; ///< N/m, on B along the normal turned by +90 degrees
     double moment;           ///< N, on B, against rolling
+    int part_a;              ///< part of A that touches: 0, as every particle has one part
+    int part_b;              ///< part of B, likewise
+    int shift[2]; ///< cells from A to the image of B: {0, 0}, as no direction is periodic
+    int feature;  ///< tells contacts of the same two parts apart: 0, as they have one
+    int sign;     ///< 1 where the contact adds its force, -1 where it takes it away: 1
 } dem2d_contact_info;
 
 /// Counters of a world.
@@ -1453,7 +1458,9 @@ DEM2D_API dem2d_result dem2d_world_add_material(dem2d_world *world, const dem2d_
 /// contact points have twice the stiffness and twice the dashpot. Errors: NULL_ARGUMENT,
 /// OUT_OF_RANGE, NOT_FINITE.
 DEM2D_API dem2d_result dem2d_damping_ratio(double restitution, double *damping_ratio);
-/// Set the properties of contacts of two materials (or of one with itself), from now on.
+/// Set the properties of contacts of two materials (or of one with itself), from now on. Forces in
+/// queries stay those of the last force pass; energies and bounds of the time step use the new
+/// properties at once.
 DEM2D_API dem2d_result dem2d_world_set_pair(dem2d_world *world, dem2d_material_id a,
                                             dem2d_material_id b, const dem2d_pair_desc *desc);
 /// Add a particle.
@@ -1633,7 +1640,7 @@ DEM2D_API dem2d_result dem2d_world_particles(const dem2d_world *world, dem2d_par
 /// number of contacts. Errors: OUT_OF_RANGE (capacity below 0).
 DEM2D_API dem2d_result dem2d_world_contacts(const dem2d_world *world, dem2d_contact_info *contacts,
                                             int capacity, int *count);
-/// Energies at the last force pass.
+/// Energies at the last force pass, of springs as their materials are now.
 DEM2D_API dem2d_result dem2d_world_energy(const dem2d_world *world, dem2d_energy *energy);
 /// The energy balance of a world with desc.ledger. Errors: OUT_OF_RANGE for a world without it.
 DEM2D_API dem2d_result dem2d_world_ledger(const dem2d_world *world, dem2d_ledger *ledger);
@@ -12812,12 +12819,12 @@ static void dem2di_arrange_task(void *context, int begin, int end) {
     dem2d_world *w = (dem2d_world *)context;
     size_t slots = (size_t)w->body_count;
     dem2di_cutter cutter = {w->scratch, 0};
+    int *to = (int *)dem2di_cut(&cutter, slots, sizeof *to);
+    char *room = cutter.memory + cutter.used; /* over the sorted items, once they are done with */
     dem2di_order *items = (dem2di_order *)dem2di_cut(&cutter, slots, sizeof *items);
     dem2di_order *spare = (dem2di_order *)dem2di_cut(&cutter, slots, sizeof *spare);
-    int *to = (int *)dem2di_cut(&cutter, slots, sizeof *to);
     (void)begin;
     (void)end;
-    char *room = (char *)dem2di_cut(&cutter, slots, dem2di_moved_size());
     int n = w->body_count, count = dem2di_order_make(w, items, spare, to);
     dem2di_columns_move(w, to, n, count, room);
     for (int i = 0; i < count; i++) w->names[w->bodies[i].index].slot = i;
@@ -12837,10 +12844,10 @@ static bool dem2di_arrange(dem2d_world *world) {
     if (world->holes == 0 && !world->scattered) return true;
     size_t slots = (size_t)world->body_count;
     dem2di_cutter cutter = {NULL, 0};
-    (void)dem2di_cut(&cutter, slots, sizeof(dem2di_order));
-    (void)dem2di_cut(&cutter, slots, sizeof(dem2di_order));
+    size_t sorted = 2 * sizeof(dem2di_order), moved = dem2di_moved_size();
     (void)dem2di_cut(&cutter, slots, sizeof(int));
-    (void)dem2di_cut(&cutter, slots, dem2di_moved_size());
+    (void)dem2di_cut(&cutter, slots, sorted > moved ? sorted : moved);
+    (void)dem2di_cut(&cutter, 1, DEM2DI_LINE); /* each of the two sorted may end within a line */
     if (!dem2di_scratch_reserve(world, cutter.used)) return false;
     dem2di_run(world, DEM2D_PHASE_LIST, 1, dem2di_arrange_task, world);
     if (world->list.adjacent != NULL) dem2di_adjacency_make(world); /* there is no list at first */
@@ -15256,6 +15263,7 @@ static dem2d_contact_info dem2di_contact_of(const dem2d_world *world, const dem2
         info.wall = dem2di_wall_id(world, key->b);
     else
         info.b = dem2di_particle_id(world, key->b);
+    info.sign = 1;
     info.normal = contact->normal;
     info.point = dem2di_add(world->before[key->a].x, dem2di_arm_a(contact));
     info.branch = walk->branch;
@@ -17719,6 +17727,9 @@ DEM2D_API dem2d_result dem2d_world_write_csv(const dem2d_world *world, const dem
             driven grains, and draws no chain wider than the grains. Numbers have a decimal point in
             every locale. desc may be NULL where all of it may be zero.
             Names: dem2d_stats.looks -> collisions, gaps -> separations.
+            Contacts are stored: queries read what the last force pass wrote. After
+            dem2d_world_set_pair energies and bounds of the time step use the new properties at
+            once. dem2d_contact_info has part_a, part_b, shift, feature and sign.
             Log and compilers: warnings have the result DEM2D_WARNING. The header does not compile
             with parts of -ffast-math for which the compiler defines a macro. After the
             implementation clang uses the contraction of its command line again, on every target.

@@ -61,6 +61,8 @@ static dem2d_contact_info only_contact(const dem2d_world *world) {
     int count;
     assert_ok(dem2d_world_contacts(world, &info, 1, &count));
     assert_int_equal(count, 1);
+    assert_true(info.part_a == 0 && info.part_b == 0 && info.shift[0] == 0 && info.shift[1] == 0);
+    assert_true(info.feature == 0 && info.sign == 1);
     return info;
 }
 
