@@ -7622,7 +7622,8 @@ static dem2d_result dem2di_fit_fourier(dem2di_fit *fit) {
     if (a == NULL) return dem2di_fail_memory(fit->env, order, "terms");
     double *b = a + terms;
     dem2d_result result = DEM2D_OK;
-    dem2d_reduction_desc reduction = {DEM2D_SUFFICIENT, 0, 0};
+    dem2d_reduction_desc reduction;
+    memset(&reduction, 0, sizeof reduction);
     int steps = 0;
     if (desc->method == DEM2D_FIT_REDUCTION || desc->method == DEM2D_FIT_REDUCTION_EXACT) {
         if (desc->method == DEM2D_FIT_REDUCTION_EXACT) reduction.test = DEM2D_EXACT;

@@ -176,7 +176,7 @@ static void write_series(const job *j) {
             snprintf(names[i], sizeof names[i], "vtk/%s_%02d.vtp", vtk_names[k], i);
             files[i] = names[i];
         }
-        const dem2d_pvd_desc desc = {j->frames, j->frame_times, files, NULL, NULL};
+        const dem2d_pvd_desc desc = {.count = j->frames, .times = j->frame_times, .files = files};
         char *folder = join_text(j->options->out, "/", vtk_names[k]);
         char *path = join_text(folder, ".", "pvd");
         need(dem2d_pvd_write(example_env(), &desc, path), STATUS_BAD_INPUT, path);

@@ -101,7 +101,8 @@ static inline void take_fall(dem2d_world *world, const fall *f, const char *stag
 static inline dem2d_world *run_fall(const fall *f, dem2d_parallel_fn *parallel_for, void *user,
                                     double *seconds) {
     dem2d_world_desc scene = {0};
-    dem2d_material_desc stone = {2700, 1e7, 1e7, 0.4, 0, 0}; // kg/m2, N/m, N/m, friction
+    dem2d_material_desc stone = {.density = 2700, .friction = 0.4}; // kg/m2
+    stone.normal_stiffness = stone.tangential_stiffness = 1e7;      // N/m
     dem2d_material_id material;
     dem2d_world *world;
     const double pitch = 0.05; // m

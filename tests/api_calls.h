@@ -140,10 +140,16 @@ static dem2d_wall_desc good_wall(const fixture *f) {
     return d;
 }
 
-static const dem2d_material_desc good_material = {2700, 1e6, 5e5, 0.4, 0, 0};
+static const dem2d_material_desc good_material = {
+    .density = 2700, .normal_stiffness = 1e6, .tangential_stiffness = 5e5, .friction = 0.4};
 
 /* With all that the full law has. */
-static const dem2d_material_desc full_material = {2700, 1e6, 5e5, 0.4, 0.1, 0.05};
+static const dem2d_material_desc full_material = {.density = 2700,
+                                                  .normal_stiffness = 1e6,
+                                                  .tangential_stiffness = 5e5,
+                                                  .friction = 0.4,
+                                                  .damping_ratio = 0.1,
+                                                  .rolling_friction = 0.05};
 
 static void fixture_shapes(fixture *f) {
     dem2d_shape *circle;
@@ -491,7 +497,7 @@ static void soft_law(void *user, const dem2d_law_input *in, dem2d_law_output *ou
 
 static void with_load(args *a, fixture *f) { /* two round grains in contact, by a law */
     dem2d_world_desc d = good_world(NULL);
-    const dem2d_save_desc save = {store_write, &f->snapshot};
+    const dem2d_save_desc save = {.write = store_write, .user = &f->snapshot};
     dem2d_custom_desc custom = {0};
     dem2d_particle_desc grain = good_particle(f);
     dem2d_particle_id id;

@@ -54,7 +54,7 @@ static void add_wall(bench *b, int i, dem2d_wall_mode mode) {
 }
 
 static void open_bench(bench *b, const dem2d_world_desc *desc, double friction) {
-    dem2d_material_desc stone = {DENSITY, STIFFNESS, 0, 0, 0, 0};
+    dem2d_material_desc stone = material_desc(DENSITY, STIFFNESS, 0, 0);
     stone.friction = friction, stone.tangential_stiffness = friction > 0 ? STIFFNESS : 0;
     expect_ok(dem2d_world_create(desc, &b->world), "world");
     expect_ok(dem2d_world_add_material(b->world, &stone, &b->material), "material");
@@ -181,8 +181,8 @@ static bench open_scene(const scene *s, uint64_t seed) {
     b.width = grains.right;
     b.height = s->place == GAS ? grains.top : grains.grains[s->count - 1].y + 0.06;
     open_bench(&b, &desc, s->friction);
-    const dem2d_pair_desc pair = {STIFFNESS, s->friction > 0 ? STIFFNESS : 0, s->friction,
-                                  s->damping_ratio, s->rolling};
+    dem2d_pair_desc pair = pair_desc(STIFFNESS, s->friction > 0 ? STIFFNESS : 0, s->friction);
+    pair.damping_ratio = s->damping_ratio, pair.rolling_friction = s->rolling;
     expect_ok(dem2d_world_set_pair(b.world, b.material, b.material, &pair), "pair");
     get_arrays(&b, s->count);
     add_bed(b.world, &grains, b.material, b.ids);
@@ -293,12 +293,12 @@ static void serial(void *user, dem2d_phase phase, int count, dem2d_task_fn *task
 }
 
 static void set_friction(bench *b, double friction) {
-    const dem2d_pair_desc pair = {STIFFNESS, friction > 0 ? STIFFNESS : 0, friction, 0, 0};
+    const dem2d_pair_desc pair = pair_desc(STIFFNESS, friction > 0 ? STIFFNESS : 0, friction);
     expect_ok(dem2d_world_set_pair(b->world, b->material, b->material, &pair), "pair");
 }
 
 static void set_dashpot(bench *b, double damping_ratio) {
-    const dem2d_pair_desc pair = {STIFFNESS, 0, 0, damping_ratio, 0};
+    const dem2d_pair_desc pair = {.normal_stiffness = STIFFNESS, .damping_ratio = damping_ratio};
     expect_ok(dem2d_world_set_pair(b->world, b->material, b->material, &pair), "pair");
 }
 
@@ -388,8 +388,9 @@ static void add_fixed_pair(bench *b) {
 }
 
 static void add_rough_material(bench *b) {
-    const dem2d_material_desc rough = {DENSITY, STIFFNESS, STIFFNESS, 0.4, 0, 0};
-    const dem2d_pair_desc pair = {STIFFNESS, STIFFNESS, 0.4, 0.1, 0.1};
+    const dem2d_material_desc rough = material_desc(DENSITY, STIFFNESS, STIFFNESS, 0.4);
+    dem2d_pair_desc pair = pair_desc(STIFFNESS, STIFFNESS, 0.4);
+    pair.damping_ratio = pair.rolling_friction = 0.1;
     dem2d_material_id id;
     expect_ok(dem2d_world_add_material(b->world, &rough, &id), "material");
     expect_ok(dem2d_world_set_pair(b->world, id, id, &pair), "pair");

@@ -53,7 +53,7 @@ static double energy_in(const scene *s) {
 }
 
 static scene make_scene(dem2d_face_rule rule, double time_step, double gravity) {
-    const dem2d_material_desc stone = {DENSITY, KN, 0, 0, 0, 0};
+    const dem2d_material_desc stone = material_desc(DENSITY, KN, 0, 0);
     dem2d_world_desc desc = {0};
     desc.time_step = time_step, desc.gravity.y = -gravity, desc.faces = rule;
     return open_scene(&desc, &stone);

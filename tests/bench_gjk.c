@@ -209,7 +209,8 @@ static void add_walls(packing *p, dem2d_material_id material) {
    passed: faces, with one contact point each, never come wholly to rest. */
 static void make_packing(packing *p, const library *lib) {
     dem2d_world_desc scene = {0};
-    dem2d_material_desc stone = {2700, 1e7, 1e7, 0.2, 0, 0};
+    dem2d_material_desc stone = {
+        .density = 2700, .normal_stiffness = 1e7, .tangential_stiffness = 1e7, .friction = 0.2};
     dem2d_material_id material;
     dem2d_energy energy;
     int steps = 0;

@@ -1433,7 +1433,7 @@ static int usage(void) {
    takes the same area, together half of the square; none moves, but all pairs are listed. */
 static dem2d_world *open_sizes(int count, double ratio) {
     dem2d_world *world;
-    dem2d_material_desc stone = {DENSITY, 1e7, 0, 0, 0, 0};
+    dem2d_material_desc stone = {.density = DENSITY, .normal_stiffness = 1e7};
     dem2d_particle_desc grain = {0};
     dem2d_world_desc scene = {0};
     scene.time_step = TIME_STEP;

@@ -55,6 +55,24 @@ PART double middle_of(double *values, int count) {
     return (values[(count - 1) / 2] + values[count / 2]) / 2;
 }
 
+/* --- materials -------------------------------------------------------------------------------- */
+
+/* Springs and friction, no dashpot, no rolling friction. */
+PART dem2d_pair_desc pair_desc(double kn, double kt, double friction) {
+    dem2d_pair_desc desc;
+    memset(&desc, 0, sizeof desc);
+    desc.normal_stiffness = kn, desc.tangential_stiffness = kt, desc.friction = friction;
+    return desc;
+}
+
+PART dem2d_material_desc material_desc(double density, double kn, double kt, double friction) {
+    dem2d_material_desc desc;
+    memset(&desc, 0, sizeof desc);
+    desc.density = density, desc.normal_stiffness = kn, desc.tangential_stiffness = kt;
+    desc.friction = friction;
+    return desc;
+}
+
 /* --- templates -------------------------------------------------------------------------------- */
 
 PART dem2d_shape *make_disc(double radius) {

@@ -230,7 +230,8 @@ PART dem2d_world_desc scene_desc(int kind) {
 
 /* A falling heap of `count` grains; env, skin and threads as in desc. */
 PART void scene_make(snapshot_scene *s, int kind, int count, const dem2d_world_desc *desc) {
-    dem2d_material_desc stone = {2700, 1e6, 1e6, 0.5, 0, 0}, rubber = {1000, 2e5, 1e5, 0.8, 0, 0};
+    dem2d_material_desc stone = material_desc(2700, 1e6, 1e6, 0.5),
+                        rubber = material_desc(1000, 2e5, 1e5, 0.8);
     int columns = 3;
     memset(s, 0, sizeof *s);
     s->kind = kind;

@@ -129,7 +129,8 @@ static void case_step(void) {
  * percent.
  */
 static void case_stiffness(void) {
-    const dem2d_material_desc soft = {10, 1e4, 1e4, 0.3, 0, 0}, hard = {10, 1e10, 1e10, 0.3, 0, 0};
+    const dem2d_material_desc soft = material_desc(10, 1e4, 1e4, 0.3),
+                              hard = material_desc(10, 1e10, 1e10, 0.3);
     dem2d_world_desc d = {0};
     dem2d_material_id other;
     const double r = 0.1, mass = 10 * PI * r * r;
@@ -875,7 +876,11 @@ static void press_set(press_scene *p, const press *c, double top_speed, double t
 static press_scene press_make(const press *c) {
     const double r = 0.02, kn = 1e7, overlap = 1e-3 * r, mass = 2000 * PI * r * r;
     const double cell = c->side > 1 ? 2.3 * r : 4 * r, width = c->side * cell;
-    const dem2d_material_desc rock = {2000, kn, 0.8 * kn, 0.3, c->law ? 0 : c->damping_ratio, 0};
+    const dem2d_material_desc rock = {.density = 2000,
+                                      .normal_stiffness = kn,
+                                      .tangential_stiffness = 0.8 * kn,
+                                      .friction = 0.3,
+                                      .damping_ratio = c->law ? 0 : c->damping_ratio};
     dem2d_world_desc d = {0};
     d.time_step = contact_time(mass, kn, false) / c->steps, d.local_damping = c->local;
     d.gravity.y = -c->weight * kn * overlap / mass, d.law = c->law;

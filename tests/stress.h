@@ -234,8 +234,10 @@ static double contact_time(double mass, double stiffness, bool like) {
     return PI * sqrt((like ? mass / 2 : mass) / stiffness);
 }
 
-static const dem2d_material_desc stone = {2700, 1e7, 5e6, 0.4, 0, 0};
-static const dem2d_material_desc glass = {2700, 1e7, 0, 0, 0, 0}; /* elastic, without friction */
+static const dem2d_material_desc stone = {
+    .density = 2700, .normal_stiffness = 1e7, .tangential_stiffness = 5e6, .friction = 0.4};
+static const dem2d_material_desc glass = {.density = 2700,
+                                          .normal_stiffness = 1e7}; /* elastic, without friction */
 
 /* A pile of all kinds in a box `width` grains wide, dropped from a lattice. */
 static stress_scene make_pile(const dem2d_world_desc *desc, const dem2d_material_desc *material,

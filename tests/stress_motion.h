@@ -122,7 +122,11 @@ static void drum_step(drum *d, double spacing, double angle, double turn) {
 }
 
 static drum make_drum(bool discs, double steps_per_contact) {
-    const dem2d_material_desc damped = {2700, 1e7, 5e6, 0.5, 0.3, 0};
+    const dem2d_material_desc damped = {.density = 2700,
+                                        .normal_stiffness = 1e7,
+                                        .tangential_stiffness = 5e6,
+                                        .friction = 0.5,
+                                        .damping_ratio = 0.3};
     dem2d_world_desc desc = {0};
     drum d = {.discs = discs, .spacing = discs ? 2.02 : 2.6};
     d.time_step = contact_time(2700 * PI, 1e7, true) / steps_per_contact;
@@ -255,7 +259,12 @@ typedef struct swing {
 } swing;
 
 static swing make_swing(bool box) {
-    const dem2d_material_desc rough = {2700, 1e7, 5e6, 0.5, 0.2, 0.5};
+    const dem2d_material_desc rough = {.density = 2700,
+                                       .normal_stiffness = 1e7,
+                                       .tangential_stiffness = 5e6,
+                                       .friction = 0.5,
+                                       .damping_ratio = 0.2,
+                                       .rolling_friction = 0.5};
     const double mass = 2700 * (box ? 2 : PI), high = box ? 0.5 : 1;
     dem2d_world_desc desc = {0};
     swing w = {.gravity = 9.81, .load = 0.5 * 0.5 * 9.81};
@@ -320,7 +329,8 @@ static void case_ratcheting(void) {
 #define AMPLITUDE 2e-5 /* of a radius; overlaps are about 1e-2 */
 enum { SPECTRUM_SIDE = 5, SPECTRUM = SPECTRUM_SIDE * SPECTRUM_SIDE, MODES = 3 * SPECTRUM };
 
-static const dem2d_material_desc firm = {2700, 1e7, 5e6, 0.3, 0, 0};
+static const dem2d_material_desc firm = {
+    .density = 2700, .normal_stiffness = 1e7, .tangential_stiffness = 5e6, .friction = 0.3};
 
 static void stop_walls(stress_scene *s, double speed) {
     for (int i = 0; i < 4; i++) {
@@ -334,7 +344,7 @@ static void stop_walls(stress_scene *s, double speed) {
 
 static stress_scene make_jammed(uint64_t seed, double *time_step) {
     const double cell = 2.7, unit = sqrt(firm.density * PI / firm.normal_stiffness);
-    const dem2d_pair_desc sticky = {1e7, 5e6, 1e3, 0, 0};
+    const dem2d_pair_desc sticky = pair_desc(1e7, 5e6, 1e3);
     dem2d_world_desc desc = {0};
     desc.time_step = *time_step = 0.1 * unit;
     desc.contact_tolerance = 4e-15, desc.local_damping = 0.3;

@@ -182,7 +182,7 @@ static dem2d_result life_move(life *l, int i) {
 }
 
 static dem2d_result life_rub(life *l, int i) {
-    dem2d_pair_desc d = {1e6, 5e5, 0.4, 0, 0};
+    dem2d_pair_desc d = pair_desc(1e6, 5e5, 0.4);
     if (l->desc->full == LATE) d.damping_ratio = 0.2, d.rolling_friction = 0.1;
     return dem2d_world_set_pair(l->world, l->materials[i], l->materials[i], &d);
 }
@@ -199,7 +199,7 @@ static dem2d_result life_guest(life *l, int i) {
 /* The world is saved, and goes on from there. */
 static dem2d_result life_reload(life *l, int i) {
     store bytes = {NULL, 0, 0};
-    const dem2d_save_desc save = {store_write, &bytes};
+    const dem2d_save_desc save = {.write = store_write, .user = &bytes};
     dem2d_load_desc load = {0};
     dem2d_world *world = l->world;
     (void)i;
@@ -407,9 +407,11 @@ static dem2d_result write_to(const fixture *f, int which, dem2d_write_fn *write,
     static const double values[] = {1, -0.1};
     dem2d_svg_desc svg = {0};
     dem2d_vtp_desc vtp = {0};
-    const dem2d_save_desc save = {write, user};
-    const dem2d_csv_desc csv = {2, names, values, false, write, user};
-    const dem2d_pvd_desc pvd = {2, values, names, write, user};
+    const dem2d_save_desc save = {.write = write, .user = user};
+    const dem2d_csv_desc csv = {
+        .count = 2, .names = names, .values = values, .write = write, .user = user};
+    const dem2d_pvd_desc pvd = {
+        .count = 2, .times = values, .files = names, .write = write, .user = user};
     svg.write = write, svg.user = user, svg.force_chains = true, svg.outline_points = 5;
     vtp.write = write, vtp.user = user, vtp.outline_points = 5;
     vtp.part = which == VTP_GRAINS     ? DEM2D_VTP_PARTICLES

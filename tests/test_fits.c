@@ -390,7 +390,7 @@ static void reduction_is_the_papers(void **state) {
                                          .count = 8,
                                          .method = exact ? DEM2D_FIT_REDUCTION_EXACT
                                                          : DEM2D_FIT_REDUCTION};
-            const dem2d_reduction_desc how = {exact ? DEM2D_EXACT : DEM2D_SUFFICIENT, 0, 0};
+            const dem2d_reduction_desc how = {.test = exact ? DEM2D_EXACT : DEM2D_SUFFICIENT};
             const outline *o = &given[i];
             double a[9], b[9];
             long double found_a[9], found_b[9];

@@ -272,7 +272,7 @@ static void reduction_makes_it_convex(void **state) {
         for (int test = DEM2D_SUFFICIENT; test <= DEM2D_EXACT; test++) {
             double ra[18], rb[18];
             memcpy(ra, a, sizeof a), memcpy(rb, b, sizeof b);
-            const dem2d_reduction_desc desc = {(dem2d_convexity_test)test, 0, 0};
+            const dem2d_reduction_desc desc = {.test = (dem2d_convexity_test)test};
             assert_ok(dem2d_fourier_reduce(ra, rb, order, &desc, &counts[test]));
             dem2d_convexity c;
             assert_ok(dem2d_fourier_convexity(ra, rb, order, &c));
@@ -302,22 +302,28 @@ static void reduction_options(void **state) {
     uint64_t random = 53;
     random_series(&random, 8, 6, a, b);
     memcpy(c, a, sizeof a), memcpy(d, b, sizeof b);
-    const dem2d_reduction_desc none = {DEM2D_NO_TEST, 0, 0}, zero = {DEM2D_SUFFICIENT, 0, 0};
-    const dem2d_reduction_desc same = {DEM2D_SUFFICIENT, 0.9, 1e-6};
-    const dem2d_reduction_desc steep = {DEM2D_SUFFICIENT, 0.5, 1e-3};
+    const dem2d_reduction_desc none = {.test = DEM2D_NO_TEST}, zero = {.test = DEM2D_SUFFICIENT};
+    const dem2d_reduction_desc same = {.test = DEM2D_SUFFICIENT, .factor = 0.9, .tolerance = 1e-6};
+    const dem2d_reduction_desc steep = {.test = DEM2D_SUFFICIENT, .factor = 0.5, .tolerance = 1e-3};
     int count = -1, other;
     assert_ok(dem2d_fourier_reduce(c, d, 8, &none, &count));
     assert_int_equal(count, 0);
     assert_memory_equal(a, c, sizeof a);
     assert_memory_equal(b, d, sizeof b);
     static const dem2d_reduction_desc bad[] = {
-        {DEM2D_SUFFICIENT, 1, 0},  {DEM2D_SUFFICIENT, -0.5, 0},     {DEM2D_SUFFICIENT, 1.5, 0},
-        {DEM2D_SUFFICIENT, 0, -1}, {(dem2d_convexity_test)3, 0, 0}, {DEM2D_EXACT, NAN, 0},
-        {DEM2D_EXACT, 0.5, NAN},   {DEM2D_EXACT, 0.5, HUGE_VAL}};
+        {.test = DEM2D_SUFFICIENT, .factor = 1},
+        {.test = DEM2D_SUFFICIENT, .factor = -0.5},
+        {.test = DEM2D_SUFFICIENT, .factor = 1.5},
+        {.test = DEM2D_SUFFICIENT, .tolerance = -1},
+        {.test = (dem2d_convexity_test)3},
+        {.test = DEM2D_EXACT, .factor = NAN},
+        {.test = DEM2D_EXACT, .factor = 0.5, .tolerance = NAN},
+        {.test = DEM2D_EXACT, .factor = 0.5, .tolerance = HUGE_VAL}};
     for (int i = 0; i < COUNT_OF(bad); i++)
         assert_result(dem2d_fourier_reduce(c, d, 8, &bad[i], &count),
                       i < 5 ? DEM2D_OUT_OF_RANGE : DEM2D_NOT_FINITE);
-    static const dem2d_reduction_desc wide = {DEM2D_NO_TEST, 0, 1.7e308}; /* of a0, above 1 */
+    static const dem2d_reduction_desc wide = {.test = DEM2D_NO_TEST,
+                                              .tolerance = 1.7e308}; /* of a0, above 1 */
     const double wider[3] = {2, 0, 0};
     memcpy(c, wider, sizeof wider);
     assert_ok(dem2d_fourier_reduce(c, d, 2, &wide, NULL));
@@ -455,7 +461,7 @@ static void bezier_fit_of_rough_outlines(void **state) {
         }
         double a[9], b[9];
         dem2d_shape *shape;
-        const dem2d_reduction_desc exact = {DEM2D_EXACT, 0, 0};
+        const dem2d_reduction_desc exact = {.test = DEM2D_EXACT};
         assert_ok(dem2d_fourier_fit(NULL, p, n, 8, 0, a, b));
         assert_ok(dem2d_fourier_reduce(a, b, 8, &exact, NULL));
         assert_ok(dem2d_shape_create_fourier(NULL, a, b, 8, &shape));
@@ -599,7 +605,7 @@ static void real_outlines(void **state) {
         assert_true(covered > 0);
         bezier += covered, worst = fmin(worst, covered), count++;
         double a[9], b[9];
-        const dem2d_reduction_desc exact = {DEM2D_EXACT, 0, 0};
+        const dem2d_reduction_desc exact = {.test = DEM2D_EXACT};
         dem2d_shape *shape;
         assert_ok(dem2d_fourier_fit(NULL, points, n, 8, 0, a, b));
         assert_ok(dem2d_fourier_reduce(a, b, 8, &exact, NULL));

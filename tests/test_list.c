@@ -21,7 +21,7 @@ static dem2d_world_desc quiet_desc(void) {
 
 static scene open_scene(const dem2d_world_desc *desc, double stiffness, double friction) {
     static const dem2d_vec corners[3] = {{1, 0}, {-0.5, 0.8}, {-0.5, -0.8}};
-    const dem2d_material_desc stone = {1000, stiffness, stiffness, friction, 0, 0};
+    const dem2d_material_desc stone = material_desc(1000, stiffness, stiffness, friction);
     dem2d_shape *shapes[3];
     scene s;
     assert_ok(dem2d_world_create(desc, &s.world));
@@ -228,7 +228,7 @@ static void test_refused_law(void **state) {
     view last[2];
     for (int refused = 0; refused < 2; refused++) {
         const scene s = open_scene(&desc, 1e5, 0.5);
-        const dem2d_pair_desc stiff = {1e15, 0, 0, 0, 0}, old = {1e5, 1e5, 0.5, 0, 0};
+        const dem2d_pair_desc stiff = pair_desc(1e15, 0, 0), old = pair_desc(1e5, 1e5, 0.5);
         dem2d_particle_id ids[2];
         ids[0] = add(&s, 0, 1, 0, 0, 0);
         ids[1] = add(&s, 0, 1, 1.5, 1.3, -0.3);
@@ -262,7 +262,8 @@ static void test_lost_spring(void **state) {
     for (int kernel = 0; kernel < 2; kernel++) {
         desc.solver = kernel == 0 ? DEM2D_CERTIFIED : DEM2D_GJK_EPA;
         const scene s = open_scene(&desc, 1e5, 0.5);
-        const dem2d_pair_desc bare = {1e5, 0, 0.5, 0, 0.1};
+        const dem2d_pair_desc bare = {
+            .normal_stiffness = 1e5, .friction = 0.5, .rolling_friction = 0.1};
         dem2d_particle_id ids[2];
         ids[0] = add(&s, 0, 1, 0, 0, 0);
         ids[1] = add(&s, 0, 1, 1.5, 1.3, -0.3);
@@ -450,7 +451,7 @@ static void test_checks(void **state) {
     (void)state;
     const dem2d_world_desc desc = quiet_desc();
     const scene s = open_scene(&desc, 1e6, 0);
-    const dem2d_pair_desc stiff = {1.1e6, 0, 0, 0, 0};
+    const dem2d_pair_desc stiff = pair_desc(1.1e6, 0, 0);
     const dem2d_vec v = {0, 0}, slow = {1, 0}, fast = {2e4, 0}, far = {50, 0};
     const dem2d_particle_id runner = add(&s, 0, 1, 0, 1000, 0), id = add(&s, 0, 1, 0, 0, 0);
     assert_ok(dem2d_world_drive_particle(s.world, runner, DEM2D_DRIVEN, fast, 0));

@@ -348,7 +348,7 @@ static void add_walls(run *r, const scene_row *s) {
 
 /* Without a runner the library does its work itself. */
 static void make_empty(run *r, const scene_row *s, const runner *runner, calls *calls) {
-    dem2d_material_desc stone = {2700, 1e6, s->friction > 0 ? 1e6 : 0, s->friction, 0, 0};
+    dem2d_material_desc stone = material_desc(2700, 1e6, s->friction > 0 ? 1e6 : 0, s->friction);
     dem2d_world_desc desc = {0};
     memset(r, 0, sizeof *r);
     r->host.runner = runner, r->host.calls = calls, r->host.caller = pthread_self();

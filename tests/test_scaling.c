@@ -100,7 +100,7 @@ static void add_walls(dem2d_world *world, const scene_row *s, dem2d_material_id 
 }
 
 static dem2d_world *make_world(const scene_row *s, double size, dem2d_wall_id walls[WALLS]) {
-    dem2d_material_desc stone = {2700, 1e7 * size * size, 5e6 * size * size, 0.4, 0, 0};
+    dem2d_material_desc stone = material_desc(2700, 1e7 * size * size, 5e6 * size * size, 0.4);
     dem2d_world_desc desc = {0};
     dem2d_particle_desc grain = {0};
     dem2d_shape_id shapes[KINDS];

@@ -274,9 +274,16 @@ static void test_resume_empty(void **state) {
 static bool change_scene(snapshot_scene *s, int which) {
     dem2d_world *w = s->world;
     const dem2d_particle_id some = {5, 1}, other = {6, 1};
-    const dem2d_pair_desc slippery = {5e5, 0, 0, 0, 0}, rough = {5e5, 5e5, 1, 0, 0};
-    const dem2d_pair_desc dashed = {5e5, 5e5, 0.5, 0.25, 0}, rolling = {5e5, 5e5, 0.5, 0, 0.125};
-    const dem2d_material_desc lead = {11000, 2e6, 0, 0.25, 0, 0};
+    const dem2d_pair_desc slippery = pair_desc(5e5, 0, 0), rough = pair_desc(5e5, 5e5, 1);
+    const dem2d_pair_desc dashed = {.normal_stiffness = 5e5,
+                                    .tangential_stiffness = 5e5,
+                                    .friction = 0.5,
+                                    .damping_ratio = 0.25},
+                          rolling = {.normal_stiffness = 5e5,
+                                     .tangential_stiffness = 5e5,
+                                     .friction = 0.5,
+                                     .rolling_friction = 0.125};
+    const dem2d_material_desc lead = material_desc(11000, 2e6, 0, 0.25);
     dem2d_wall_desc wall = {0};
     dem2d_material_id id;
     switch (which) {
@@ -392,7 +399,11 @@ static void fix_half(snapshot_scene *s, bool free_again) {
 
 /* Changes that a caller may make, one of them; false: none are left. */
 static bool edit_world(snapshot_scene *s, int which) {
-    const dem2d_pair_desc smooth = {1e6, 0, 0, 0, 0}, rough = {1e6, 1e6, 0.5, 0.25, 0.125};
+    const dem2d_pair_desc smooth = pair_desc(1e6, 0, 0), rough = {.normal_stiffness = 1e6,
+                                                                  .tangential_stiffness = 1e6,
+                                                                  .friction = 0.5,
+                                                                  .damping_ratio = 0.25,
+                                                                  .rolling_friction = 0.125};
     const dem2d_particle_id grain = {2, 1}, another = {1, 1};
     dem2d_wall_desc wall = {0};
     dem2d_wall_id id;
@@ -578,7 +589,7 @@ static void test_resume_joints(void **state) {
     for (int full = 0; full < 2; full++) {
         snapshot_scene s;
         dem2d_world_desc desc = scene_desc(SCENE_DASHED);
-        const dem2d_material_desc plain = {2700, 1e6, 1e6, 0.5, 0, 0};
+        const dem2d_material_desc plain = material_desc(2700, 1e6, 1e6, 0.5);
         dem2d_particle_desc grain = {0};
         dem2d_particle_id id;
         dem2d_contact_info before = {0};
@@ -689,7 +700,8 @@ static void test_ids(void **state) {
         assert_int_equal(next[0].generation, i < 3 ? 2 : 1);
     }
     assert_same_world(s.world, copy.world);
-    const dem2d_material_desc lead = {11000, 2e6, 3e5, 0.75, 0, 0}; /* meets all that are there */
+    const dem2d_material_desc lead =
+        material_desc(11000, 2e6, 3e5, 0.75); /* meets all that are there */
     dem2d_material_id more[2];
     assert_ok(dem2d_world_add_material(s.world, &lead, &more[0]));
     assert_ok(dem2d_world_add_material(copy.world, &lead, &more[1]));
@@ -1183,7 +1195,7 @@ static void check_writes_fail(int kind) {
     assert_ok(dem2d_world_step(s.world, 50, NULL));
     scene_bytes whole = scene_save(s.world), part = {0};
     assert_true(whole.size > 2 * DEM2DI_CHUNK);
-    const dem2d_save_desc save = {scene_write, &part};
+    const dem2d_save_desc save = {.write = scene_write, .user = &part};
     for (part.limit = 1; part.limit <= whole.size; part.limit++) {
         part.size = 0;
         test_log_clear(&env);

@@ -10,7 +10,8 @@
 
 /* --- building blocks ------------------------------------------------------------------------- */
 
-static const dem2d_material_desc stone = {2700, 1e7, 1e7, 0.4, 0, 0};
+static const dem2d_material_desc stone = {
+    .density = 2700, .normal_stiffness = 1e7, .tangential_stiffness = 1e7, .friction = 0.4};
 
 static dem2d_world_desc basic_desc(void) {
     dem2d_world_desc desc = {0};
@@ -383,7 +384,7 @@ enum { MATERIALS, PAIRS, PARTICLES, WALLS };
 
 static dem2d_result add_bad(int what, const scene *s, dem2d_shape_id shape, const bad_field *bad) {
     dem2d_material_desc material = stone;
-    dem2d_pair_desc meeting = {1e6, 1e6, 0.5, 0, 0};
+    dem2d_pair_desc meeting = pair_desc(1e6, 1e6, 0.5);
     dem2d_particle_desc grain = one_desc(s, shape, 0, 0);
     dem2d_wall_desc plane = wall_desc(s, 0, 0, 0, 1);
     dem2d_material_id material_id;
@@ -556,7 +557,7 @@ static void check_stale(dem2d_world *w, dem2d_shape_id shape, dem2d_material_id 
                         dem2d_particle_id grain, dem2d_wall_id plane) {
     dem2d_particle_info particle_info;
     dem2d_wall_info wall_info;
-    const dem2d_pair_desc meeting = {1, 1, 1, 0, 0};
+    const dem2d_pair_desc meeting = pair_desc(1, 1, 1);
     dem2d_wall_desc desc = {0};
     const dem2d_result results[] = {
         dem2d_world_remove_shape(w, shape),
@@ -637,8 +638,8 @@ static void test_results(void **state) {
 /* A disc of one material driven along a heavy disc of another: stiffnesses and friction are read
    off the contact. */
 static void check_meeting(const dem2d_pair_desc *given, double kn, double kt, double mu) {
-    const dem2d_material_desc first = {2700, 1e6, 4e5, 0.5, 0, 0},
-                              second = {1e9, 3e6, 1.2e6, 0.2, 0, 0};
+    const dem2d_material_desc first = material_desc(2700, 1e6, 4e5, 0.5),
+                              second = material_desc(1e9, 3e6, 1.2e6, 0.2);
     dem2d_world_desc desc = basic_desc();
     desc.time_step = 1e-5;
     scene s = open_scene(&desc, &first);
@@ -668,7 +669,7 @@ static void check_meeting(const dem2d_pair_desc *given, double kn, double kt, do
 
 static void test_mixing(void **state) {
     (void)state;
-    const dem2d_pair_desc given = {5e6, 2e5, 0.05, 0, 0};
+    const dem2d_pair_desc given = pair_desc(5e6, 2e5, 0.05);
     check_meeting(NULL, 1.5e6, 6e5, 0.2); /* harmonic means, the smaller friction */
     check_meeting(&given, 5e6, 2e5, 0.05);
 }
@@ -778,7 +779,7 @@ static void test_wall_motion(void **state) {
 /* A servo wall on a column of n grains in a frictionless channel: the stress on the lid and on the
    floor is the target, and the lid's length is the width of the channel. */
 static void check_servo(int n, bool boxes, double stress) {
-    const dem2d_material_desc smooth = {2700, 1e7, 0, 0, 0, 0};
+    const dem2d_material_desc smooth = material_desc(2700, 1e7, 0, 0);
     const dem2d_vec square[4] = {{0, 0}, {0.1, 0}, {0.1, 0.1}, {0, 0.1}};
     const double width = 0.1001;
     dem2d_world_desc desc = basic_desc();
@@ -836,7 +837,11 @@ typedef struct servo_press {
 static servo_press make_press(const servo_case *c) {
     const double r = 0.05, kn = 1e7, overlap = 1e-3 * r;
     const dem2d_vec square[4] = {{-r, -r}, {r, -r}, {r, r}, {-r, r}};
-    const dem2d_material_desc stone = {2000, kn, 0.8 * kn, 0.3, c->law ? 0 : c->damping_ratio, 0};
+    const dem2d_material_desc stone = {.density = 2000,
+                                       .normal_stiffness = kn,
+                                       .tangential_stiffness = 0.8 * kn,
+                                       .friction = 0.3,
+                                       .damping_ratio = c->law ? 0 : c->damping_ratio};
     const double mass = 2000 * (c->box ? 4 : pi) * r * r, unit = overlap * sqrt(kn / mass);
     dem2d_world_desc desc = {0};
     desc.time_step = pi * sqrt(mass / kn) / c->steps;
@@ -928,7 +933,8 @@ static void test_servo_refused(void **state) {
    discs that is thrown at one of them comes to rest. */
 static void test_servo_facing(void **state) {
     (void)state;
-    const dem2d_material_desc rubber = {2000, 1e7, 0, 0, 0.3, 0};
+    const dem2d_material_desc rubber = {
+        .density = 2000, .normal_stiffness = 1e7, .damping_ratio = 0.3};
     const double r = 0.05, target = 1e4, mass = 2000 * pi * r * r, tc = pi * sqrt(mass / 1e7);
     dem2d_world_desc desc = {0};
     desc.time_step = tc / 30;
@@ -973,7 +979,7 @@ static void test_servo_speed(void **state) {
 
 /* Three discs in a row with known overlaps, the last one smaller. */
 static scene make_row(dem2d_particle_id ids[3]) {
-    const dem2d_material_desc smooth = {2700, 1e6, 0, 0, 0, 0};
+    const dem2d_material_desc smooth = material_desc(2700, 1e6, 0, 0);
     const dem2d_world_desc desc = basic_desc();
     const scene s = open_scene(&desc, &smooth);
     const dem2d_shape_id disc = add_disc(s.world, 1);
@@ -1108,7 +1114,7 @@ static void test_spring_energy(void **state) {
     (void)state;
     dem2d_particle_id ids[3];
     const scene s = make_row(ids);
-    const dem2d_pair_desc sticky = {1e6, 5e5, 100, 0, 0};
+    const dem2d_pair_desc sticky = pair_desc(1e6, 5e5, 100);
     dem2d_energy e;
     assert_ok(dem2d_world_set_pair(s.world, s.material, s.material, &sticky));
     assert_ok(dem2d_world_move_particle(s.world, ids[2], vec(50, 0), 0));
@@ -1316,7 +1322,7 @@ static void test_time_step_bounds(void **state) {
     (void)state;
     static const double tangential[] = {0, 1e7, 5e7};
     for (int i = 0; i < COUNT_OF(tangential); i++) {
-        const dem2d_material_desc material = {2700, 1e7, tangential[i], 0.5, 0, 0};
+        const dem2d_material_desc material = material_desc(2700, 1e7, tangential[i], 0.5);
         const dem2d_world_desc desc = basic_desc();
         const scene s = open_scene(&desc, &material);
         const dem2d_particle_id id = add_one(&s, add_disc(s.world, 0.1), 0, 0.1 - 1e-7);
@@ -1355,7 +1361,7 @@ static void test_time_step_bounds(void **state) {
 static void test_time_step_too_long(void **state) {
     (void)state;
     static world_state failed, twin_state;
-    const dem2d_material_desc smooth = {2700, 1e7, 0, 0, 0, 0};
+    const dem2d_material_desc smooth = material_desc(2700, 1e7, 0, 0);
     scene twins[2];
     test_env env;
     test_env_init(&env);
@@ -1594,7 +1600,7 @@ static void test_svg_changes_nothing(void **state) {
 static void test_changes_are_checked(void **state) {
     (void)state;
     const dem2d_world_desc desc = basic_desc();
-    const dem2d_pair_desc hard = {1e13, 1e13, 0.4, 0, 0};
+    const dem2d_pair_desc hard = pair_desc(1e13, 1e13, 0.4);
     for (int change = 0; change < 2; change++) {
         const scene s = open_scene(&desc, &stone);
         const dem2d_particle_id id = add_one(&s, add_disc(s.world, 0.1), 0, 0.1 - 1e-5);

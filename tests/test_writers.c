@@ -912,7 +912,10 @@ static void test_vtp_contacts(void **state) {
     static dem2d_contact_info contacts[400];
     full_scene s;
     int count, two = 0, walls = 0, rolls = 0;
-    const dem2d_pair_desc rough = {1e7, 1e7, 0.4, 0, 0.05};
+    const dem2d_pair_desc rough = {.normal_stiffness = 1e7,
+                                   .tangential_stiffness = 1e7,
+                                   .friction = 0.4,
+                                   .rolling_friction = 0.05};
     make_scene(&s, NULL);
     fill_scene(&s, GRAINS);
     step(&s.base, 7900); /* rolling friction earlier would keep faces from meeting */

@@ -18,11 +18,7 @@ typedef struct scene {
 
 /* 2700 kg/m2, 1e7 N/m. */
 PART dem2d_material_desc stone_desc(double tangential_stiffness, double friction) {
-    dem2d_material_desc desc;
-    memset(&desc, 0, sizeof desc);
-    desc.density = 2700, desc.normal_stiffness = 1e7;
-    desc.tangential_stiffness = tangential_stiffness, desc.friction = friction;
-    return desc;
+    return material_desc(2700, 1e7, tangential_stiffness, friction);
 }
 
 PART scene open_scene(const dem2d_world_desc *desc, const dem2d_material_desc *material) {
