@@ -1898,7 +1898,7 @@ DEM2D_API dem2d_result dem2d_world_write_csv(const dem2d_world *world, const dem
 
 /* Rounding error of a support value of A minus B, in units of R_A + R_B + |d|: two rotations, two
    support functions and two subtractions of about eps each are below 8 eps; this is twice that. */
-#define DEM2DI_ROUNDING (16 * DBL_EPSILON)
+#define DEM2DI_ROUNDOFF (16 * DBL_EPSILON)
 
 #ifdef __cplusplus
 extern "C" {
@@ -2406,7 +2406,7 @@ static int dem2di_compare_points(const void *a, const void *b) {
 
 /* Rounding error of the cross product of two edges whose ends have coordinates up to `size`: each
    component of an edge has an error of eps size. */
-static double dem2di_cross_rounding(double size, dem2d_vec a, dem2d_vec b) {
+static double dem2di_cross_roundoff(double size, dem2d_vec a, dem2d_vec b) {
     return 4 * DBL_EPSILON * size * (dem2di_length(a) + dem2di_length(b));
 }
 
@@ -2429,7 +2429,7 @@ static int dem2di_monotone_chain(const dem2d_vec *sorted, int count, dem2d_vec *
             while (length >= base + 2) {
                 dem2d_vec a = dem2di_sub(chain[length - 1], chain[length - 2]);
                 dem2d_vec b = dem2di_sub(p, chain[length - 1]);
-                if (dem2di_cross(a, b) > dem2di_cross_rounding(size, a, b)) break;
+                if (dem2di_cross(a, b) > dem2di_cross_roundoff(size, a, b)) break;
                 length--;
             }
             chain[length++] = p;
@@ -2492,12 +2492,12 @@ static dem2d_result dem2di_keep_corners(dem2d_vec *points, int *index, int *coun
     for (int i = 0; i < n; i++) {
         dem2d_vec here = points[i], after = i + 1 < n ? points[i + 1] : first;
         dem2d_vec a = dem2di_sub(here, before), b = dem2di_sub(after, here);
-        double turn = dem2di_cross(a, b), rounding = dem2di_cross_rounding(size, a, b);
+        double turn = dem2di_cross(a, b), roundoff = dem2di_cross_roundoff(size, a, b);
         before = here;
         *bad = index[i];
-        if (turn < -rounding) return DEM2D_NOT_CONVEX;
-        if (turn <= rounding && dem2di_dot(a, b) < 0) return DEM2D_NOT_CONVEX;
-        if (turn <= rounding) continue;
+        if (turn < -roundoff) return DEM2D_NOT_CONVEX;
+        if (turn <= roundoff && dem2di_dot(a, b) < 0) return DEM2D_NOT_CONVEX;
+        if (turn <= roundoff) continue;
         points[kept] = here;
         index[kept++] = index[i];
     }
@@ -3490,11 +3490,11 @@ static void dem2di_bound_arc(dem2di_arc_bounds *bounds, const dem2di_arc *arc, i
 }
 
 /* The first (or last) difference of an arc that is longer than rounding errors; NULL if none is. */
-static const dem2d_vec *dem2di_arc_side(const dem2di_arc *arc, double rounding, bool last) {
+static const dem2d_vec *dem2di_arc_side(const dem2di_arc *arc, double roundoff, bool last) {
     const dem2d_vec *d[3] = {&arc->d0, &arc->d1, &arc->d2};
     for (int i = 0; i < 3; i++) {
         const dem2d_vec *side = d[last ? 2 - i : i];
-        if (dem2di_length(*side) > rounding) return side;
+        if (dem2di_length(*side) > roundoff) return side;
     }
     return NULL;
 }
@@ -3526,10 +3526,10 @@ static double dem2di_arc_rho_max(const dem2di_arc *arc, double known) {
 }
 
 /* Tangents at the ends of an arc. */
-static bool dem2di_arc_tangents(const dem2di_arc *arc, double rounding, dem2d_vec *start,
+static bool dem2di_arc_tangents(const dem2di_arc *arc, double roundoff, dem2d_vec *start,
                                 dem2d_vec *end) {
-    const dem2d_vec *first = dem2di_arc_side(arc, rounding, false);
-    const dem2d_vec *last = dem2di_arc_side(arc, rounding, true);
+    const dem2d_vec *first = dem2di_arc_side(arc, roundoff, false);
+    const dem2d_vec *last = dem2di_arc_side(arc, roundoff, true);
     return first != NULL && last != NULL && dem2di_unit(*first, start) && dem2di_unit(*last, end);
 }
 
@@ -3574,7 +3574,7 @@ static void dem2di_arc_least_rho(dem2d_shape *shape, const dem2di_arc *arc, int 
 
 /* Lengths that are too short to have a direction in a control polygon, m. */
 typedef struct dem2di_limits {
-    double rounding; /* rounding error of the difference of two points */
+    double roundoff; /* rounding error of the difference of two points */
     double tiny;     /* an arc not longer than this is a corner */
 } dem2di_limits;
 
@@ -3588,38 +3588,38 @@ static dem2d_vec dem2di_arc_chord(const dem2di_arc *arc) {
 
 /* Cross product of two differences (of lengths la, lb) that still counts as parallel: by rounding
    errors of coordinates or by the smoothness. */
-static double dem2di_turn_slack(double la, double lb, double rounding) {
-    return dem2di_max(rounding * (la + lb), DEM2DI_SMOOTH * la * lb);
+static double dem2di_turn_slack(double la, double lb, double roundoff) {
+    return dem2di_max(roundoff * (la + lb), DEM2DI_SMOOTH * la * lb);
 }
 
 /* Does b turn left from a, or to the right within the smoothness, and not backwards? Also true for
    differences within rounding errors, which have no direction. */
-static bool dem2di_turns_left(dem2d_vec a, dem2d_vec b, double rounding) {
+static bool dem2di_turns_left(dem2d_vec a, dem2d_vec b, double roundoff) {
     double la = dem2di_length(a), lb = dem2di_length(b), turn = dem2di_cross(a, b);
-    if (la <= rounding || lb <= rounding) return true;
-    return turn >= -dem2di_turn_slack(la, lb, rounding) &&
-           (turn > rounding * (la + lb) || dem2di_dot(a, b) > 0);
+    if (la <= roundoff || lb <= roundoff) return true;
+    return turn >= -dem2di_turn_slack(la, lb, roundoff) &&
+           (turn > roundoff * (la + lb) || dem2di_dot(a, b) > 0);
 }
 
 /* Is the arc convex, turning left by at most pi, within the smoothness? Every turn of the control
    polygon is to the left, and so is the total turn. */
-static bool dem2di_arc_convex(const dem2di_arc *arc, double rounding) {
-    const dem2d_vec *start = dem2di_arc_side(arc, rounding, false);
-    const dem2d_vec *end = dem2di_arc_side(arc, rounding, true);
-    double slack = dem2di_turn_slack(dem2di_length(*start), dem2di_length(*end), rounding);
-    return dem2di_turns_left(arc->d0, arc->d1, rounding) &&
-           dem2di_turns_left(arc->d1, arc->d2, rounding) &&
+static bool dem2di_arc_convex(const dem2di_arc *arc, double roundoff) {
+    const dem2d_vec *start = dem2di_arc_side(arc, roundoff, false);
+    const dem2d_vec *end = dem2di_arc_side(arc, roundoff, true);
+    double slack = dem2di_turn_slack(dem2di_length(*start), dem2di_length(*end), roundoff);
+    return dem2di_turns_left(arc->d0, arc->d1, roundoff) &&
+           dem2di_turns_left(arc->d1, arc->d2, roundoff) &&
            dem2di_cross(*start, *end) >= -2 * slack; /* slack of two turns */
 }
 
 /* Is the joint of two arcs smooth? kink gets the sine between the tangents. */
-static bool dem2di_joint_smooth(const dem2di_arc *before, const dem2di_arc *after, double rounding,
+static bool dem2di_joint_smooth(const dem2di_arc *before, const dem2di_arc *after, double roundoff,
                                 double *kink) {
-    dem2d_vec a = *dem2di_arc_side(before, rounding, true);
-    dem2d_vec b = *dem2di_arc_side(after, rounding, false);
+    dem2d_vec a = *dem2di_arc_side(before, roundoff, true);
+    dem2d_vec b = *dem2di_arc_side(after, roundoff, false);
     double la = dem2di_length(a), lb = dem2di_length(b), turn = dem2di_cross(a, b);
     *kink = turn / la / lb;
-    return fabs(turn) <= dem2di_turn_slack(la, lb, rounding) && dem2di_dot(a, b) > 0;
+    return fabs(turn) <= dem2di_turn_slack(la, lb, roundoff) && dem2di_dot(a, b) > 0;
 }
 
 /* Check the caller's arcs: no arc is a point, each is tiny or convex, and joints of two arcs that
@@ -3631,15 +3631,15 @@ static dem2d_result dem2di_check_arcs(const dem2d_env *env, const dem2di_arc *ar
         int place = reversed ? count - 1 - k : k; /* in the caller's numbering */
         const dem2di_arc *arc = &arcs[k];
         double kink;
-        if (dem2di_arc_side(arc, limits.rounding, false) == NULL)
+        if (dem2di_arc_side(arc, limits.roundoff, false) == NULL)
             return dem2di_fail(env, DEM2D_DUPLICATE_POINT, place,
                                "all control points of arc %d coincide", place);
         bool tiny = dem2di_arc_length(arc) <= limits.tiny;
-        if (!tiny && !dem2di_arc_convex(arc, limits.rounding))
+        if (!tiny && !dem2di_arc_convex(arc, limits.roundoff))
             return dem2di_fail(env, DEM2D_NOT_CONVEX, place, "arc %d is not convex", place);
         if (reversed) place = (count - k) % count;
         if (!tiny && dem2di_arc_length(before) > limits.tiny &&
-            !dem2di_joint_smooth(before, arc, limits.rounding, &kink))
+            !dem2di_joint_smooth(before, arc, limits.roundoff, &kink))
             return dem2di_fail(env, DEM2D_NOT_SMOOTH, place,
                                "the tangents at the start of arc %d differ by a sine of %g", place,
                                kink);
@@ -3739,7 +3739,7 @@ static bool dem2di_chain_set(dem2di_chain *chain, const dem2di_arc *arcs, int co
 /* Estimate the rounding errors of the coordinates from kinks of joints and from turns to the right:
    distance of the point between two differences from their chord. */
 static void dem2di_chain_noise(dem2di_chain *chain) {
-    chain->noise = chain->limits.rounding / 8; /* of one coordinate */
+    chain->noise = chain->limits.roundoff / 8; /* of one coordinate */
     for (int k = 0; k < chain->count; k++) {
         dem2d_vec a = chain->d[k], b = chain->d[(k + 1) % chain->count];
         double turn = dem2di_cross(a, b), lengths = dem2di_length(a) + dem2di_length(b);
@@ -3753,7 +3753,7 @@ static void dem2di_chain_noise(dem2di_chain *chain) {
    greatest of a few errors is seldom below a quarter of another. */
 static bool dem2di_chain_straight(const dem2di_chain *chain, int k) {
     int n = chain->count, from = k, last = k + 2, left = n - 3;
-    double rounding = chain->limits.rounding;
+    double roundoff = chain->limits.roundoff;
     for (; left > 0 && chain->tied[(from + n - 1) % n]; left--) from = (from + n - 1) % n;
     for (; left > 0 && chain->tied[last]; left--) last = (last + 1) % n;
     dem2d_vec along, sum = chain->d[last], at = dem2di_vec(0, 0);
@@ -3761,9 +3761,9 @@ static bool dem2di_chain_straight(const dem2di_chain *chain, int k) {
     if (!dem2di_unit(sum, &along)) return false;
     for (int i = from; i != last; i = (i + 1) % n) {
         dem2d_vec d = chain->d[i];
-        double length = dem2di_length(d), slack = dem2di_max(DEM2DI_SMOOTH * length, rounding);
+        double length = dem2di_length(d), slack = dem2di_max(DEM2DI_SMOOTH * length, roundoff);
         at = dem2di_add(at, d);
-        if (length > rounding && (dem2di_dot(d, along) < 0 || fabs(dem2di_cross(d, along)) > slack))
+        if (length > roundoff && (dem2di_dot(d, along) < 0 || fabs(dem2di_cross(d, along)) > slack))
             return false;
         if (fabs(dem2di_cross(at, along)) > 4 * chain->noise) return false;
     }
@@ -3772,12 +3772,12 @@ static bool dem2di_chain_straight(const dem2di_chain *chain, int k) {
 
 /* Tie differences that are too short to have a direction to their neighbours, and straight arcs. */
 static void dem2di_chain_tie(dem2di_chain *chain) {
-    double rounding = chain->limits.rounding;
+    double roundoff = chain->limits.roundoff;
     dem2di_chain_noise(chain);
     for (int k = 0; k < chain->count; k += 3) {
         const dem2d_vec *d = &chain->d[k];
-        chain->tied[k] = dem2di_length(d[0]) <= rounding || dem2di_length(d[1]) <= rounding;
-        chain->tied[k + 1] = dem2di_length(d[2]) <= rounding;
+        chain->tied[k] = dem2di_length(d[0]) <= roundoff || dem2di_length(d[1]) <= roundoff;
+        chain->tied[k + 1] = dem2di_length(d[2]) <= roundoff;
     }
     for (int k = 0; k < chain->count; k += 3)
         if (dem2di_chain_straight(chain, k)) chain->tied[k] = chain->tied[k + 1] = true;
@@ -3893,7 +3893,7 @@ static void dem2di_arc_split(const dem2di_arc *arc, double t, dem2di_arc half[2]
 static int dem2di_arc_parts(dem2di_chain *chain, const dem2di_arc *arc, dem2di_arc part[2]) {
     dem2d_vec start, end, tangent;
     part[0] = *arc;
-    if (!dem2di_arc_tangents(arc, chain->limits.rounding, &start, &end)) return 1;
+    if (!dem2di_arc_tangents(arc, chain->limits.roundoff, &start, &end)) return 1;
     if (dem2di_dot(start, end) >= -DEM2DI_SMOOTH ||
         !dem2di_unit(dem2di_sub(dem2di_perp(start), dem2di_perp(end)), &tangent))
         return 1;
@@ -3984,17 +3984,17 @@ static dem2d_result dem2di_bezier_parts(const dem2d_env *env, const dem2di_arc *
 
 /* Unit tangents at the ends of parts. The part before a straight arc has exactly the same tangent
    as the straight arc, so that no direction selects the straight arc itself. */
-static void dem2di_bezier_tangents(dem2d_shape *shape, double rounding) {
+static void dem2di_bezier_tangents(dem2d_shape *shape, double roundoff) {
     int n = shape->parts;
     dem2d_vec start, unused;
     for (int k = 0; k < n; k++)
-        (void)dem2di_arc_tangents(&shape->arcs[k], rounding, &start, &shape->tangents[k]);
+        (void)dem2di_arc_tangents(&shape->arcs[k], roundoff, &start, &shape->tangents[k]);
     for (int k = 0; k < n; k++) {
         int next = (k + 1) % n;
         if (dem2di_arc_straight(&shape->arcs[next]))
             shape->tangents[k] = shape->tangents[next];
         else if (dem2di_arc_length(&shape->arcs[k]) == 0 &&
-                 dem2di_arc_tangents(&shape->arcs[next], rounding, &start, &unused))
+                 dem2di_arc_tangents(&shape->arcs[next], roundoff, &start, &unused))
             shape->tangents[k] = start;
     }
 }
@@ -4071,7 +4071,7 @@ static dem2d_result dem2di_bezier_make(const dem2d_env *env, dem2di_arc *arcs, i
     made->offset = offset;
     made->mass = mass;
     made->deviation = moved;
-    dem2di_bezier_tangents(made, limits.rounding);
+    dem2di_bezier_tangents(made, limits.roundoff);
     if (dem2di_bezier_turns(made) != 1) {
         dem2d_shape_destroy(made);
         return dem2di_fail(env, DEM2D_NOT_CONVEX, -1, "the arcs do not make exactly one turn");
@@ -4097,8 +4097,8 @@ DEM2D_API dem2d_result dem2d_shape_create_bezier(const dem2d_env *env, const dem
     if (fabs(area) <= 8 * DBL_EPSILON * size * extent)
         return dem2di_fail(env, DEM2D_ZERO_AREA, -1, "the control polygon's area is %g", area / 2);
     dem2di_limits limits;
-    limits.rounding = 8 * DBL_EPSILON * size;
-    limits.tiny = dem2di_max(DEM2DI_TINY * extent, 4 * limits.rounding); /* has a direction */
+    limits.roundoff = 8 * DBL_EPSILON * size;
+    limits.tiny = dem2di_max(DEM2DI_TINY * extent, 4 * limits.roundoff); /* has a direction */
     size_t n = (size_t)arcs, each = 4 * sizeof(dem2di_arc); /* an arc, and room for three parts */
     dem2di_arc *work = (dem2di_arc *)dem2di_allocate(env, n, each);
     if (work == NULL) return dem2di_fail_memory(env, arcs, "arcs");
@@ -4112,7 +4112,7 @@ DEM2D_API dem2d_result dem2d_shape_create_bezier(const dem2d_env *env, const dem
 /* Rounding error of rho of a series, relative to the sum of its terms: its bound is found to 2e-14,
    and term n has about n rounding errors. */
 #define DEM2DI_SERIES_TOLERANCE 2e-14
-#define DEM2DI_SERIES_ROUNDING 6e-14
+#define DEM2DI_SERIES_ROUNDOFF 6e-14
 
 /* Of a Fourier series. */
 #define DEM2DI_ORDER DEM2DI_WHOLE(0, 1 << 20)
@@ -4141,14 +4141,14 @@ static dem2d_convexity dem2di_convexity(const double *a, const double *b, int or
     convexity.sufficient = convexity.sufficient_margin >= 0;
     convexity.rho_min_lower = rho.lower;
     convexity.rho_min_upper = rho.upper;
-    convexity.exact = rho.lower >= -DEM2DI_SERIES_ROUNDING * radius.size;
+    convexity.exact = rho.lower >= -DEM2DI_SERIES_ROUNDOFF * radius.size;
     return convexity;
 }
 
 /* Lower bound of rho in each sector, by Taylor's formula in each quarter of it. */
 static void dem2di_fourier_least_rho(dem2d_shape *shape, const double *a, const double *b) {
     dem2di_series radius = dem2di_series_make(a, b, shape->count, true, 1);
-    double rounding = DEM2DI_SERIES_ROUNDING * radius.size, d[3];
+    double roundoff = DEM2DI_SERIES_ROUNDOFF * radius.size, d[3];
     for (int k = 0; k < 4 * DEM2DI_RHO_SECTORS; k++) {
         dem2d_vec u = dem2di_sector_start(2 * k + 1, 8 * DEM2DI_RHO_SECTORS);
         dem2d_vec v = dem2di_sector_start(2 * k, 8 * DEM2DI_RHO_SECTORS);
@@ -4158,7 +4158,7 @@ static void dem2di_fourier_least_rho(dem2d_shape *shape, const double *a, const 
         double half = dem2di_max(dem2di_cross(v, u) / dem2di_dot(v, u),
                                  dem2di_cross(u, w) / dem2di_dot(u, w));
         double value = dem2di_series_value(&radius, dem2d_rot_angle(dem2di_rot(u)), d);
-        double least = dem2di_taylor_bound(&radius, value, d, half) - rounding;
+        double least = dem2di_taylor_bound(&radius, value, d, half) - roundoff;
         double *sector = &shape->least_rho[k / 4];
         if (k % 4 == 0) *sector = HUGE_VAL;
         *sector = dem2di_min(*sector, dem2di_max(least, shape->rho_min));
@@ -4328,7 +4328,7 @@ static dem2d_vec dem2di_at_pose(const dem2d_pose *pose, dem2d_vec s) {
 
 /* Do the parts for contacts differ from the caller's arcs by more than rounding errors? */
 static bool dem2di_deviates(const dem2d_shape *shape) {
-    return shape->deviation > DEM2DI_ROUNDING * shape->circumscribed;
+    return shape->deviation > DEM2DI_ROUNDOFF * shape->circumscribed;
 }
 
 /* Parameters where an arc of any form may have its extreme along a direction: 0, up to two zeros of
@@ -5247,7 +5247,7 @@ typedef struct dem2di_side {
    are tested for a crossing inside both. At a point of the outline the edges through it are sorted
    by their order after the point, which gives the winding numbers between them. Points within
    rounding errors of an edge are on it: edges that touch do not cross. */
-#define DEM2DI_SWEEP_ROUNDING (64 * DBL_EPSILON) /* of the coordinates: some products and sums */
+#define DEM2DI_SWEEP_ROUNDOFF (64 * DBL_EPSILON) /* of the coordinates: some products and sums */
 
 typedef struct dem2di_sweep_edge {
     dem2d_vec left, right; /* in the order of the sweep; of a vertical edge left is below */
@@ -5271,7 +5271,7 @@ typedef struct dem2di_sweep {
     dem2di_sweep_edge *edges;   /* count */
     dem2di_sweep_point *points; /* count */
     int count, room;            /* points that differ from the one before; all points */
-    double rounding;            /* of coordinates, which are relative to origin and size */
+    double roundoff;            /* of coordinates, which are relative to origin and size */
     dem2d_vec origin;
     double size;
     int root, lowest;  /* edges, or -1 */
@@ -5435,7 +5435,7 @@ static bool dem2di_sweep_windings(dem2di_sweep *s, int below, int top, dem2d_vec
 /* Do two points coincide within rounding errors? */
 static bool dem2di_sweep_same(const dem2di_sweep *s, dem2d_vec p, dem2d_vec q) {
     dem2d_vec apart = dem2di_sub(p, q);
-    return dem2di_dot(apart, apart) <= 4 * s->rounding * s->rounding;
+    return dem2di_dot(apart, apart) <= 4 * s->roundoff * s->roundoff;
 }
 
 /* Edge i of those at the sorted points, two for each point: the one that begins there, the one that
@@ -5485,7 +5485,7 @@ static void dem2di_sweep_points(dem2di_sweep *s, const dem2d_vec *points, int co
     s->origin = dem2di_box_of(points, count, &extent).lower;
     s->size = dem2di_max(extent.x, extent.y);
     if (!(s->size > 0)) return; /* all in one place */
-    s->rounding = DEM2DI_SWEEP_ROUNDING * (dem2di_coordinate_size(points, count) / s->size);
+    s->roundoff = DEM2DI_SWEEP_ROUNDOFF * (dem2di_coordinate_size(points, count) / s->size);
     for (int i = 0; i < count; i++) {
         dem2d_vec p = dem2di_sub(points[i], s->origin);
         p = dem2di_vec(p.x / s->size, p.y / s->size);
@@ -5511,7 +5511,7 @@ static void dem2di_sweep_edges(dem2di_sweep *s) {
         e->left = rises ? p : q;
         e->right = rises ? q : p;
         e->sign = rises ? 1 : -1;
-        e->slack = s->rounding * dem2di_length(dem2di_sub(q, p));
+        e->slack = s->roundoff * dem2di_length(dem2di_sub(q, p));
         e->cut = false;
     }
     s->root = s->lowest = -1;
@@ -7723,8 +7723,8 @@ static bool dem2di_is_convex(const dem2d_vec *points, int count) {
     for (int i = 0; i < count; i++) {
         dem2d_vec a = dem2di_sub(points[(i + 1) % count], points[i]);
         dem2d_vec b = dem2di_sub(points[(i + 2) % count], points[(i + 1) % count]);
-        double rounding = 1e-6 * dem2di_length(a) * dem2di_length(b); /* a turn of 1e-6 rad */
-        if (!(dem2di_cross(a, b) > rounding)) return false;
+        double roundoff = 1e-6 * dem2di_length(a) * dem2di_length(b); /* a turn of 1e-6 rad */
+        if (!(dem2di_cross(a, b) > roundoff)) return false;
     }
     return dem2di_turns_once(points, count);
 }
@@ -7874,7 +7874,7 @@ DEM2D_API dem2d_result dem2d_outline_fit(const dem2d_env *env, const dem2d_vec *
     if (result != DEM2D_OK) return result;
     result = dem2di_check_crossing(env, "points", points, count);
     double turn = dem2di_twice_area(fit.outline.points, count);
-    if (result == DEM2D_OK && !(turn > DEM2DI_ROUNDING * fit.outline.radius * fit.outline.radius))
+    if (result == DEM2D_OK && !(turn > DEM2DI_ROUNDOFF * fit.outline.radius * fit.outline.radius))
         result = dem2di_fail(env, DEM2D_ZERO_AREA, -1, "the outline's area is %g", turn / 2);
     size_t room = DEM2DI_FIT_POINTS;
     if (result == DEM2D_OK) {
@@ -8189,9 +8189,9 @@ static void dem2di_feature_clear(dem2di_search *search) {
 
 /* The state of a resolved pair: the sign of the depth, outside rounding errors. */
 static dem2d_contact_state dem2di_state_of(const dem2di_pair *pair, const dem2di_search *search) {
-    double rounding = DEM2DI_ROUNDING * pair->size;
-    if (search->upper < -rounding) return DEM2D_SEPARATED;
-    return search->upper > rounding ? DEM2D_PENETRATING : DEM2D_TOUCHING;
+    double roundoff = DEM2DI_ROUNDOFF * pair->size;
+    if (search->upper < -roundoff) return DEM2D_SEPARATED;
+    return search->upper > roundoff ? DEM2D_PENETRATING : DEM2D_TOUCHING;
 }
 
 /* GJK ([P] sec. 3.1, steps 1-7) in the plane. With `detect` it stops at the first separating
@@ -8200,7 +8200,7 @@ static dem2d_contact_state dem2di_state_of(const dem2di_pair *pair, const dem2di
    lower = 0: EPA then finds the depth. */
 static void dem2di_gjk(dem2di_pair *pair, dem2d_vec start, double tolerance, int cap, bool detect,
                        dem2di_search *search) {
-    double rounding = DEM2DI_ROUNDING * pair->size, distance;
+    double roundoff = DEM2DI_ROUNDOFF * pair->size, distance;
     dem2d_vec u = start;
     search->iterations = 0;
     dem2di_feature_clear(search);
@@ -8210,7 +8210,7 @@ static void dem2di_gjk(dem2di_pair *pair, dem2d_vec start, double tolerance, int
     search->a = search->b = dem2di_vec(0, 0);
     search->simplex[0] = dem2di_evaluate(pair, search, u);
     search->count = 1;
-    if (detect && search->upper < -rounding) {
+    if (detect && search->upper < -roundoff) {
         search->lower = -dem2di_length(search->simplex[0].w);
         search->state = DEM2D_SEPARATED;
         return;
@@ -8218,7 +8218,7 @@ static void dem2di_gjk(dem2di_pair *pair, dem2d_vec start, double tolerance, int
     search->simplex[1] = search->simplex[0];
     distance = dem2di_nearest(search->simplex, &search->count, &u);
     search->state = DEM2D_PENETRATING;
-    while (distance > rounding) {
+    while (distance > roundoff) {
         search->lower = -distance;
         if (search->iterations++ == cap) {
             search->state = DEM2D_UNRESOLVED;
@@ -8227,7 +8227,7 @@ static void dem2di_gjk(dem2di_pair *pair, dem2d_vec start, double tolerance, int
         }
         dem2di_vertex v = dem2di_evaluate(pair, search, u);
         double gap = -search->upper;
-        if (gap > rounding && (detect || distance - gap <= tolerance)) {
+        if (gap > roundoff && (detect || distance - gap <= tolerance)) {
             if (!detect)
                 dem2di_witness(search, &search->simplex[0], &search->simplex[search->count - 1]);
             search->state = DEM2D_SEPARATED;
@@ -8319,7 +8319,7 @@ static bool dem2di_edge_set(const dem2di_pair *pair, dem2di_polytope *polytope, 
     dem2di_edge *edge = &polytope->edge[slot];
     dem2d_vec along = dem2di_sub(polytope->vertex[to].w, polytope->vertex[from].w);
     double length = dem2di_length(along);
-    if (!(length > DEM2DI_ROUNDING * pair->size)) return false;
+    if (!(length > DEM2DI_ROUNDOFF * pair->size)) return false;
     edge->from = from;
     edge->to = to;
     edge->normal = dem2di_vec(along.y / length, -along.x / length);
@@ -8389,13 +8389,13 @@ static void dem2di_epa(dem2di_pair *pair, dem2di_polytope *polytope, double tole
     search->lower = -pair->size;
     if (polytope->edges == 0) return; /* support points that are not finite or all coincide */
     if (cap > DEM2DI_EPA_ITERATIONS) cap = DEM2DI_EPA_ITERATIONS;
-    double rounding = DEM2DI_ROUNDING * pair->size;
+    double roundoff = DEM2DI_ROUNDOFF * pair->size;
     for (int iteration = 0;; iteration++) {
         int nearest = dem2di_nearest_edge(polytope);
         dem2di_edge edge = polytope->edge[nearest];
         search->lower = dem2di_min(search->upper, edge.distance);
         if (polytope->arcs && search->upper - edge.distance <= tolerance &&
-            (search->upper < -rounding || edge.distance >= -rounding))
+            (search->upper < -roundoff || edge.distance >= -roundoff))
             break; /* the sign is certain, too */
         if (iteration == cap) return;
         search->iterations++;
@@ -8589,7 +8589,7 @@ static void dem2di_edge_report(const dem2di_pair *pair, const dem2di_core core[2
         dem2di_walk beyond;
         dem2di_walk_set(pair, core, k[0], k[1], side, &beyond);
         dem2di_walk_on(pair, core, side, &beyond, &next);
-        if (fabs(next.h - edge->h) <= DEM2DI_ROUNDING * pair->size &&
+        if (fabs(next.h - edge->h) <= DEM2DI_ROUNDOFF * pair->size &&
             dem2di_dot(next.tangent, edge->tangent) > 0) {
             edge = &next;
             t = dem2di_edge_foot(pair, edge);
@@ -8600,7 +8600,7 @@ static void dem2di_edge_report(const dem2di_pair *pair, const dem2di_core core[2
     p[edge->own] = dem2di_along(p[edge->own], t, dem2di_sub(edge->to, p[edge->own]));
     /* a foot still outside is on a third edge in line, of the other core */
     double off = dem2di_dot(dem2di_sub(dem2di_add(p[0], p[1]), pair->d), edge->tangent);
-    if (fabs(off) > DEM2DI_ROUNDING * pair->size)
+    if (fabs(off) > DEM2DI_ROUNDOFF * pair->size)
         p[1 - edge->own] = dem2di_along(p[1 - edge->own], -off, edge->tangent);
     search->feature.own = edge->own;
     for (int i = 0; i < 2; i++) search->feature.corner[i] = edge->k[i];
@@ -8614,7 +8614,7 @@ static void dem2di_edge_report(const dem2di_pair *pair, const dem2di_core core[2
    minus B nearest to the origin. The distance has one minimum on the side that faces the origin. */
 static void dem2di_cores_apart(const dem2di_pair *pair, const dem2di_core core[2], int ka, int kb,
                                dem2d_vec u, dem2di_search *search) {
-    double rounding = DEM2DI_ROUNDING * pair->size;
+    double roundoff = DEM2DI_ROUNDOFF * pair->size;
     dem2di_walk walk;
     bool moved = false;
     for (int side = 1; side >= -1 && !moved; side -= 2) {
@@ -8624,7 +8624,7 @@ static void dem2di_cores_apart(const dem2di_pair *pair, const dem2di_core core[2
             dem2di_walk next = walk;
             dem2di_walk_on(pair, core, side, &next, &edge);
             /* an edge that faces away from the origin, or leads away from it */
-            if (edge.h > rounding || !(side * dem2di_dot(walk.w, edge.tangent) < 0)) break;
+            if (edge.h > roundoff || !(side * dem2di_dot(walk.w, edge.tangent) < 0)) break;
             walk = next;
             moved = true;
             if (side * dem2di_dot(walk.w, edge.tangent) < 0) continue;
@@ -8634,7 +8634,7 @@ static void dem2di_cores_apart(const dem2di_pair *pair, const dem2di_core core[2
     }
     /* two corners; if rounding errors hide the direction, the separating one is kept */
     dem2d_vec away;
-    if (dem2di_length(walk.w) > rounding && dem2di_unit(walk.w, &away)) u = dem2di_negate(away);
+    if (dem2di_length(walk.w) > roundoff && dem2di_unit(walk.w, &away)) u = dem2di_negate(away);
     search->feature.own = -1;
     search->feature.corner[0] = walk.k[0];
     search->feature.corner[1] = walk.k[1];
@@ -9076,7 +9076,7 @@ static bool dem2di_bracket_next(dem2di_bracket *bracket, bool slow, dem2d_vec *u
 /* Does h curve upward, so that Newton's step can find a minimum? Not if the radius is so large that
    its circle is straight within rounding errors over the size of the pair: that is an edge. */
 static bool dem2di_curves_up(const dem2di_pair *pair, double bend) {
-    return bend > 0 && bend * DEM2DI_ROUNDING < pair->size;
+    return bend > 0 && bend * DEM2DI_ROUNDOFF < pair->size;
 }
 
 /* Is h stationary at the last evaluation? At an edge: if the slope changes sign there. At the
@@ -9092,9 +9092,9 @@ static inline bool dem2di_stationary(const dem2di_pair *pair, const dem2di_brack
     if (dem2di_curves_up(pair, bend) && fabs(slope) <= angle * bend &&
         slope * slope <= angle * angle * bend * pair->size)
         return true;
-    double rounding = DEM2DI_ROUNDING * pair->size;
-    if (!bracket->chord || eval->h - dem2di_dot(bracket->at[0].w, eval->u) > rounding ||
-        eval->h - dem2di_dot(bracket->at[1].w, eval->u) > rounding)
+    double roundoff = DEM2DI_ROUNDOFF * pair->size;
+    if (!bracket->chord || eval->h - dem2di_dot(bracket->at[0].w, eval->u) > roundoff ||
+        eval->h - dem2di_dot(bracket->at[1].w, eval->u) > roundoff)
         return false;
     eval->edge = true;
     for (int i = 0; i < 2; i++) {
@@ -9222,7 +9222,7 @@ static bool dem2di_descend(dem2di_pair *pair, dem2d_vec u, double angle, int cap
             search->normal.x = eval->u.x;
             search->normal.y = eval->u.y;
         }
-        if (detect && eval->h < -DEM2DI_ROUNDING * pair->size) return true;
+        if (detect && eval->h < -DEM2DI_ROUNDOFF * pair->size) return true;
         bool stationary = dem2di_stationary(pair, &bracket, angle, eval);
         double bend = eval->rho[0] + eval->rho[1] - eval->h;
         if (stationary) {
@@ -9392,7 +9392,7 @@ static bool dem2di_probe_at(dem2di_pair *pair, dem2d_vec direction, int turn, de
    8). */
 static void dem2di_branch_bisect(dem2di_pair *pair, dem2di_search *search) {
     /* the values also have the deviation of the shapes */
-    const double rounding = DEM2DI_ROUNDING * pair->size + dem2di_pair_deviation(pair);
+    const double roundoff = DEM2DI_ROUNDOFF * pair->size + dem2di_pair_deviation(pair);
     dem2di_probe near, far, at;
     if (!dem2di_probe_at(pair, search->normal, 1, &near)) return;
     int turn = near.slope < 0 ? 1 : -1;
@@ -9402,12 +9402,12 @@ static void dem2di_branch_bisect(dem2di_pair *pair, dem2di_search *search) {
     for (double angle = 4 * DBL_EPSILON; angle < 1 && !between; angle *= 8) {
         dem2d_vec direction = dem2di_along(near.u, turn * angle, dem2di_perp(near.u));
         if (!dem2di_probe_at(pair, direction, turn, &far)) return;
-        between = far.slope >= 0 || far.h > near.h + rounding;
+        between = far.slope >= 0 || far.h > near.h + roundoff;
         if (!between) near = far;
     }
     while (between && dem2di_probe_at(pair, dem2di_add(near.u, far.u), turn, &at)) {
         bool last = turn * dem2di_cross(near.u, far.u) <= 2 * DBL_EPSILON;
-        *(at.slope >= 0 || at.h > near.h + rounding ? &far : &near) = at;
+        *(at.slope >= 0 || at.h > near.h + roundoff ? &far : &near) = at;
         if (last) break;
     }
     search->normal = near.h < far.h ? near.u : far.u;
@@ -9420,8 +9420,8 @@ static void dem2di_branch_bisect(dem2di_pair *pair, dem2di_search *search) {
    if there is none whose value is within the tolerance and has the certain sign. */
 static bool dem2di_branch_refine(dem2di_pair *pair, double tolerance, double angle, int cap,
                                  dem2di_search *search) {
-    double rounding = DEM2DI_ROUNDING * pair->size, most = search->upper + tolerance;
-    if (search->upper < -rounding) most = dem2di_min(most, -rounding);
+    double roundoff = DEM2DI_ROUNDOFF * pair->size, most = search->upper + tolerance;
+    if (search->upper < -roundoff) most = dem2di_min(most, -roundoff);
     dem2di_eval eval;
     dem2di_search last = *search;
     if (dem2di_has_core(pair->a) && dem2di_has_core(pair->b)) {
@@ -9483,7 +9483,7 @@ static void dem2di_certified(dem2di_pair *pair, const dem2di_feature *last, dem2
     /* Newton's last step leaves an error of about its angle squared in the normal: a hundredth of
        the tolerance, or a tenth in a time step (`detect`), where that saves every fifth evaluation.
        64 evaluations are more than bisection of the cone needs. */
-    double relative = dem2di_max(tolerance, DEM2DI_ROUNDING);
+    double relative = dem2di_max(tolerance, DEM2DI_ROUNDOFF);
     double absolute = relative * pair->size, angle = (detect ? 0.3 : 0.1) * sqrt(relative);
     if (dem2di_edges_unknown(pair->a) || dem2di_edges_unknown(pair->b)) angle *= 0.01;
     search->iterations = 0;
@@ -9501,13 +9501,13 @@ static void dem2di_certified(dem2di_pair *pair, const dem2di_feature *last, dem2
     }
     /* If the start does not converge at once, start from the line of centres. If bounds within the
        tolerance leave the sign open, descend a third time, from there down to rounding errors. */
-    double rounding = DEM2DI_ROUNDING * pair->size;
+    double roundoff = DEM2DI_ROUNDOFF * pair->size;
     for (int i = 0; i < 3; i++) {
         dem2di_eval eval;
         int evaluations = i == 0 ? DEM2DI_WARM_EVALUATIONS : cap < 64 ? cap : 64;
         bool rest = dem2di_descend(pair, i == 1 ? dem2di_centres(pair) : start, angle, evaluations,
                                    detect, &eval, search);
-        if (detect && search->upper < -rounding) {
+        if (detect && search->upper < -roundoff) {
             search->lower = -HUGE_VAL;
             search->proof = DEM2D_BY_RADIUS;
             search->state = DEM2D_SEPARATED;
@@ -9518,7 +9518,7 @@ static void dem2di_certified(dem2di_pair *pair, const dem2di_feature *last, dem2
             search->state = dem2di_state_of(pair, search);
         }
         bool proved = rest && dem2di_certify(pair, &eval, absolute, search);
-        bool open = proved && eval.h >= -rounding && search->lower < -rounding;
+        bool open = proved && eval.h >= -roundoff && search->lower < -roundoff;
         if (proved && (!open || i == 2)) return;
         if (!open && i >= 1) break;
         if (!open) continue;
@@ -9675,7 +9675,7 @@ static bool dem2di_second_place(const dem2di_face *a, const dem2di_face *b, doub
     end->base = b->endless || side * ((xb - xa) + apart * (a->rise + b->rise) / 2) > 0;
     end->x = end->base ? xa : xb;
     double length = side * (end->x - from);
-    if (!(length > 0) || -tilt * length > DEM2DI_ROUNDING * size) return false;
+    if (!(length > 0) || -tilt * length > DEM2DI_ROUNDOFF * size) return false;
     end->rise = end->base ? b->rise : a->rise;
     double on_a = dem2di_face_height(a, end->x), gap = dem2di_face_height(b, end->x) - on_a;
     double radii = a->rounding + b->rounding, square = 1 + end->rise * end->rise;
@@ -9890,7 +9890,7 @@ static int dem2di_wall_points(const dem2d_shape *shape, dem2d_rot q, double scal
 /* [P] sec. 3: GJK, then EPA when the shapes overlap. */
 static void dem2di_gjk_epa(dem2di_pair *pair, dem2d_vec start, double tolerance, int cap,
                            bool detect, dem2di_search *search) {
-    double absolute = dem2di_max(tolerance, DEM2DI_ROUNDING) * pair->size;
+    double absolute = dem2di_max(tolerance, DEM2DI_ROUNDOFF) * pair->size;
     dem2di_gjk(pair, start, absolute, cap, detect, search);
     if (search->state != DEM2D_PENETRATING) return;
     dem2di_polytope polytope;
@@ -9953,7 +9953,7 @@ static void dem2di_contact_report(const dem2di_pair *pair, const dem2di_search *
     contact->normal.x = search->normal.x;
     contact->normal.y = search->normal.y;
     contact->depth = search->upper;
-    contact->error = dem2di_max(0, search->upper - search->lower) + DEM2DI_ROUNDING * pair->size;
+    contact->error = dem2di_max(0, search->upper - search->lower) + DEM2DI_ROUNDOFF * pair->size;
     contact->residual = search->residual;
     contact->point_a.x = pose_a->position.x + search->a.x;
     contact->point_a.y = pose_a->position.y + search->a.y;
@@ -9973,7 +9973,7 @@ static void dem2di_contact_report(const dem2di_pair *pair, const dem2di_search *
 /* Are squares of the size, and of its rounding error, normal numbers? */
 static bool dem2di_pair_sound(const dem2di_pair *pair) {
     double square = pair->size * pair->size;
-    return dem2di_finite(square) && square * DEM2DI_ROUNDING * DEM2DI_ROUNDING > DBL_MIN;
+    return dem2di_finite(square) && square * DEM2DI_ROUNDOFF * DEM2DI_ROUNDOFF > DBL_MIN;
 }
 
 static const dem2di_field dem2di_contact_fields[] = {
@@ -10000,7 +10000,7 @@ static dem2d_result dem2di_query_prepare(const dem2d_shape *a, dem2d_pose *pose_
         *used = *desc;
     }
     if (used->tolerance == 0) used->tolerance = 1e-10;
-    used->tolerance = dem2di_max(used->tolerance, DEM2DI_ROUNDING);
+    used->tolerance = dem2di_max(used->tolerance, DEM2DI_ROUNDOFF);
     if (used->max_iterations == 0) used->max_iterations = 128;
     return DEM2D_OK;
 }
@@ -10043,7 +10043,7 @@ static dem2d_result dem2di_query_gjk(const dem2d_shape *a, dem2d_pose pose_a, co
     search.residual = 0;
     dem2di_gjk(&pair, dem2di_start(&pair, used.start), used.tolerance * pair.size,
                used.max_iterations, detect, &search);
-    if (search.state == DEM2D_PENETRATING && search.upper <= DEM2DI_ROUNDING * pair.size)
+    if (search.state == DEM2D_PENETRATING && search.upper <= DEM2DI_ROUNDOFF * pair.size)
         search.state = DEM2D_TOUCHING;
     dem2di_contact_report(&pair, &search, &pose_a, &pose_b, used.skip_points, contact);
     return DEM2D_OK;
@@ -10108,15 +10108,15 @@ DEM2D_API dem2d_result dem2d_wall_contact(const dem2d_shape *shape, dem2d_pose p
     double depth = dem2di_wall_depth(&pose, point, u, support);
     double size =
         shape->circumscribed * pose.scale + fabs(dem2di_dot(dem2di_sub(pose.position, point), u));
-    double rounding = DEM2DI_ROUNDING * size;
-    contact->state = depth < -rounding  ? DEM2D_SEPARATED
-                     : depth > rounding ? DEM2D_PENETRATING
+    double roundoff = DEM2DI_ROUNDOFF * size;
+    contact->state = depth < -roundoff  ? DEM2D_SEPARATED
+                     : depth > roundoff ? DEM2D_PENETRATING
                                         : DEM2D_TOUCHING;
     contact->support_calls = 1;
     contact->iterations = 0;
     contact->normal = u;
     contact->depth = depth;
-    contact->error = rounding;
+    contact->error = roundoff;
     contact->residual = 0;
     contact->point_a = dem2di_add(pose.position, support);
     contact->point = contact->point_b = dem2di_along(contact->point_a, -depth, u);
@@ -12975,7 +12975,7 @@ static double dem2di_skin_make(const dem2d_world *world, int slot) {
         int contact = list->adjacent[k];
         if (contact >= list->pairs || !(list->contacts.depth[contact] > 0)) continue;
         double gap = dem2di_gap_now(world, contact);
-        if (gap > skin) skin = gap * (1 + DEM2DI_ROUNDING);
+        if (gap > skin) skin = gap * (1 + DEM2DI_ROUNDOFF);
     }
     return skin;
 }
@@ -12990,7 +12990,7 @@ static void dem2di_disc_task(void *context, int begin, int end) {
             const dem2di_body *body = &world->bodies[i];
             dem2di_disc *disc = &build->grid.discs[i];
             double skin =
-                dem2di_max(dem2di_skin_make(world, i), DEM2DI_ROUNDING * world->now[i].radius);
+                dem2di_max(dem2di_skin_make(world, i), DEM2DI_ROUNDOFF * world->now[i].radius);
             world->wear[i] = 1 / (skin * skin);
             disc->centre = world->now[i].x;
             disc->reach = world->now[i].radius + skin;
@@ -13859,7 +13859,7 @@ static void dem2di_disc_range(const dem2d_world *world, int begin, int end, dem2
 /* Part of a gap that proves nothing: nearer to each other than this (m), two shapes may be found in
    contact by one search and apart by another. */
 static double dem2di_gap_unsure(const dem2d_world *world, double size) {
-    return (dem2di_max(world->tolerance, DEM2DI_ROUNDING) + DEM2DI_ROUNDING) * size;
+    return (dem2di_max(world->tolerance, DEM2DI_ROUNDOFF) + DEM2DI_ROUNDOFF) * size;
 }
 
 /* Separation bound of a pair that is apart by a gap (m): until the accumulated displacements of
