@@ -43,7 +43,8 @@ CONTENTS (search for the anchor, ">>" and the word)
                     candidate pairs from cell grids                         >>broad
                     spring, friction, critical time step                    >>law
                     leapfrog motion                                         >>motion
-                    the world: objects with ids                             >>world
+                    what a world holds: structs, fields, columns            >>world
+                    shapes, materials, particles, walls, by their ids       >>objects
                     the neighbour list, particles sorted in space           >>list
                     the ledger of energies                                  >>ledger
                     contacts, sums, motion; the stable time step            >>step
@@ -10760,8 +10761,8 @@ static bool dem2di_state_finite(const dem2di_state *state) {
 }
 
 /* ============================================================================================
-   >>world  Objects with ids
-   uses: config, math, memory, fields, support, shapes, gjk, broad, law, motion
+   >>world  What a world holds: structs, and tables of their fields and of the columns
+   uses: config, memory, fields, support, broad, law, motion
    ============================================================================================ */
 
 typedef struct dem2di_template {
@@ -11582,6 +11583,11 @@ static void dem2di_contacts_keep(const dem2d_world *world, int first, int end, b
 static dem2d_result dem2di_out_of_memory(const dem2d_world *world, const char *what) {
     return dem2di_fail(&world->env, DEM2D_OUT_OF_MEMORY, -1, "no memory for %s", what);
 }
+
+/* ============================================================================================
+   >>objects  Objects with ids: shapes, materials, particles, walls, and what queries read of them
+   uses: config, math, memory, fields, shapes, gjk, broad, law, motion, world
+   ============================================================================================ */
 
 DEM2D_API void dem2d_world_destroy(dem2d_world *world) {
     if (world == NULL) return;
@@ -12665,7 +12671,7 @@ DEM2D_API dem2d_result dem2d_world_set_time_step(dem2d_world *world, double time
 
 /* ============================================================================================
    >>list  The list of contacts: particles in the order of space, partners, what they remember
-   uses: config, math, gjk, broad, law, motion, world
+   uses: config, math, gjk, broad, law, motion, world, objects
    ============================================================================================ */
 
 /* Parallel work is cut into blocks of so many items: enough to pay for a call of the callback's,
@@ -13536,7 +13542,7 @@ static dem2d_result dem2di_prepare(dem2d_world *world, bool *listed) {
 
 /* ============================================================================================
    >>ledger  The ledger of energies: what is stored, and what went where in a step
-   uses: config, math, broad, law, motion, world
+   uses: config, math, broad, law, motion, world, objects
    ============================================================================================ */
 
 /* How the two of a contact moved against each other in the step that was made: those who have been
@@ -13679,7 +13685,7 @@ static double dem2di_ledger_turnover(const dem2di_ledger *ledger, const dem2di_l
 /* ============================================================================================
    >>step  Contacts, their sums, walls, motion; the stable time step
    uses: config, math, memory, fields, support, shapes, gjk, faces, contact, broad, law, motion,
-         world, list, ledger
+         world, objects, list, ledger
    ============================================================================================ */
 
 /* Contacts of circles are taken in batches: what they need is fetched, all are computed by a loop
@@ -15172,7 +15178,7 @@ DEM2D_API dem2d_result dem2d_world_step(dem2d_world *world, int count, int *done
 
 /* ============================================================================================
    >>measures  Lists of what is there, energy, stress, fabric, packing, distance from rest
-   uses: config, math, memory, fields, mass, shapes, broad, law, motion, world
+   uses: config, math, memory, fields, mass, shapes, broad, law, motion, world, objects
    ============================================================================================ */
 
 /* A walk over the contacts of the last force pass in the order of their ids: those of particles, or
@@ -15889,7 +15895,8 @@ static dem2d_result dem2di_writer_close(const dem2d_env *env, const char *path,
 
 /* ============================================================================================
    >>snapshot  State hash, snapshots: both follow the tables of columns and fields
-   uses: config, memory, fields, support, shapes, broad, motion, world, list, measures, output
+   uses: config, memory, fields, support, shapes, broad, motion, world, objects, list, measures,
+         output
    ============================================================================================ */
 
 /* To save, load, check and hash one number more, give it a line in the table of fields of its
@@ -16843,7 +16850,7 @@ DEM2D_API dem2d_result dem2d_world_load(const dem2d_load_desc *desc, const char 
 
 /* ============================================================================================
    >>writers  Pictures, files for ParaView, histories
-   uses: config, math, memory, fields, mass, shapes, broad, law, world, measures, output
+   uses: config, math, memory, fields, mass, shapes, broad, law, world, objects, measures, output
    ============================================================================================ */
 
 /* Write text without formatting, of any length. */
