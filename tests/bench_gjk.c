@@ -178,28 +178,25 @@ static void add_grains(packing *p, const library *lib, dem2d_material_id materia
 }
 
 /* Left, right, bottom, top: servo walls that meet at 100 kPa. */
+static dem2d_wall_desc side_desc(dem2d_material_id material, int which) {
+    const double side = which % 2 ? 1 : -1;
+    dem2d_wall_desc wall = {0};
+    wall.material = material;
+    wall.normal = which < 2 ? vec(-side, 0) : vec(0, -side);
+    wall.point = which < 2 ? vec(1.2 * side, 0) : vec(0, 1.2 * side);
+    wall.mode = DEM2D_WALL_SERVO, wall.stress = 1e5, wall.max_speed = 0.5;
+    return wall;
+}
+
 static void add_walls(packing *p, dem2d_material_id material) {
     dem2d_wall_id ids[4];
     for (int i = 0; i < 4; i++) {
-        dem2d_wall_desc wall = {0};
-        const double side = i % 2 ? 1 : -1;
-        wall.material = material;
-        if (i < 2)
-            wall.normal.x = -side, wall.point.x = 1.2 * side;
-        else
-            wall.normal.y = -side, wall.point.y = 1.2 * side;
-        wall.mode = DEM2D_WALL_SERVO, wall.stress = 1e5, wall.max_speed = 0.5, wall.length = 1;
+        dem2d_wall_desc wall = side_desc(material, i);
+        wall.length = 1;
         expect_ok(dem2d_world_add_wall(p->world, &wall, &ids[i]), "wall");
     }
     for (int i = 0; i < 4; i++) { /* all four are known now: the length is the other two's gap */
-        dem2d_wall_desc wall = {0};
-        const double side = i % 2 ? 1 : -1;
-        wall.material = material;
-        if (i < 2)
-            wall.normal.x = -side, wall.point.x = 1.2 * side;
-        else
-            wall.normal.y = -side, wall.point.y = 1.2 * side;
-        wall.mode = DEM2D_WALL_SERVO, wall.stress = 1e5, wall.max_speed = 0.5;
+        dem2d_wall_desc wall = side_desc(material, i);
         wall.spans[0] = ids[i < 2 ? 2 : 0], wall.spans[1] = ids[i < 2 ? 3 : 1];
         expect_ok(dem2d_world_set_wall(p->world, ids[i], &wall), "wall");
     }

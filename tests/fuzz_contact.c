@@ -207,7 +207,8 @@ static void try_pair(void) {
     check_quickly(&s, "warm", DEM2D_CERTIFIED, &warm, u);
     check_agreement(&s, "warm", &cold, &warm);
     if (random_below(&d, 8) == 0) {
-        const dem2d_contact c = ask(&s.p, DEM2D_CERTIFIED, garbage_starts[random_below(&d, GARBAGE)]);
+        const dem2d_contact c =
+            ask(&s.p, DEM2D_CERTIFIED, garbage_starts[random_below(&d, GARBAGE)]);
         check_quickly(&s, "garbage start", DEM2D_CERTIFIED, &c, u);
         check_agreement(&s, "garbage start", &cold, &c);
     }

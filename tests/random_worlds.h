@@ -25,7 +25,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "parts.h"
+#include "world_scene.h"
 
 enum {
     MOST_MATERIALS = 3,
@@ -1171,53 +1171,18 @@ static void world_check_ledger(world_run *run) {
 /* --- what a run does between its steps ---------------------------------------------------------
  */
 
-typedef struct world_bytes {
-    char *bytes;
-    size_t size, room, next;
-} world_bytes;
-
-static bool world_write(void *user, const char *bytes, size_t count) {
-    world_bytes *to = (world_bytes *)user;
-    if (to->size + count > to->room) {
-        to->room = 2 * (to->size + count);
-        to->bytes = (char *)realloc(to->bytes, to->room);
-        if (to->bytes == NULL) abort();
-    }
-    memcpy(to->bytes + to->size, bytes, count);
-    to->size += count;
-    return true;
-}
-
-static bool world_read(void *user, char *bytes, size_t count) {
-    world_bytes *from = (world_bytes *)user;
-    if (count > from->size - from->next) return false;
-    memcpy(bytes, from->bytes + from->next, count);
-    from->next += count;
-    return true;
-}
-
-static world_bytes world_save_bytes(world_run *run) {
-    world_bytes bytes = {NULL, 0, 0, 0};
-    dem2d_save_desc desc;
-    memset(&desc, 0, sizeof desc);
-    desc.write = world_write;
-    desc.user = &bytes;
-    world_must(run, dem2d_world_save(run->world, &desc, NULL), "save");
-    return bytes;
-}
-
-static bool world_same_bytes(const world_bytes *a, const world_bytes *b) {
+static bool world_same_bytes(const scene_bytes *a, const scene_bytes *b) {
     return a->size == b->size && memcmp(a->bytes, b->bytes, a->size) == 0;
 }
 
 /* The world is saved, and what is loaded takes its place. */
 static void world_interrupt(world_run *run) {
-    world_bytes saved = world_save_bytes(run), again = {NULL, 0, 0, 0};
+    scene_bytes saved = scene_save(run->world), again = {NULL, 0, 0, 0, 0};
     const dem2d_env env = world_env(run);
     dem2d_world *loaded = NULL;
     dem2d_load_desc desc;
     memset(&desc, 0, sizeof desc);
-    desc.read = world_read;
+    desc.read = scene_read;
     desc.user = &saved;
     desc.custom = world_custom;
     desc.custom_user = run;
@@ -1229,7 +1194,7 @@ static void world_interrupt(world_run *run) {
     if (result == DEM2D_OK) {
         dem2d_world_destroy(run->world);
         run->world = loaded;
-        again = world_save_bytes(run);
+        again = scene_save(run->world);
         if (!world_same_bytes(&saved, &again)) world_fault(run, "saved again, other bytes");
         world_met(run, WITH_SNAPSHOT);
     } else {
@@ -1304,13 +1269,13 @@ static int world_fail(world_run *run) {
 
 static void world_ask_and_fail(world_run *run) {
     const uint64_t hash = dem2d_world_hash(run->world);
-    world_bytes before = world_save_bytes(run);
+    scene_bytes before = scene_save(run->world);
     world_ask(run);
-    world_bytes asked = world_save_bytes(run);
+    scene_bytes asked = scene_save(run->world);
     if (!world_same_bytes(&before, &asked) || dem2d_world_hash(run->world) != hash)
         world_fault(run, "a query changes the world");
     if (world_fail(run) > 0) world_fault(run, "a call that must fail does not");
-    world_bytes failed = world_save_bytes(run);
+    scene_bytes failed = scene_save(run->world);
     if (!world_same_bytes(&before, &failed) || dem2d_world_hash(run->world) != hash)
         world_fault(run, "a failing call changes the world");
     world_met(run, WITH_QUERIES);

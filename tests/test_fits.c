@@ -5,6 +5,7 @@
 #include "dem2d.h"
 
 #include "testing.h"
+#include "outline_oracle.h"
 
 #include <dirent.h>
 
@@ -103,18 +104,8 @@ static double size_of(const outline *o) {
     return (double)sqrtl(area_of(o->p, o->count) / TEST_PI);
 }
 
-typedef struct crossing {
-    double x;
-    int of; /* polygon 0 or 1 */
-} crossing;
-
 static crossing lines[LINES][ROOM];
 static int crossed[LINES];
-
-static int by_x(const void *a, const void *b) {
-    const double p = ((const crossing *)a)->x, q = ((const crossing *)b)->x;
-    return (p > q) - (p < q);
-}
 
 /* Lines are tilted: no edge lies along one. */
 static dem2d_vec tilt(dem2d_vec p) {
@@ -961,36 +952,24 @@ static void bad_fits_are_refused(void **state) {
     dem2d_shape_destroy(shape);
 }
 
-static const struct {
-    dem2d_vec p[4];
-    int count;
-    dem2d_result result;
-} bad_points[] = {
-    {{{0, 0}, {1, 0}, {NAN, 1}, {0, 1}}, 4, DEM2D_NOT_FINITE},
-    {{{0, 0}, {1, 0}, {1, 1}, {0, -HUGE_VAL}}, 4, DEM2D_NOT_FINITE},
-    {{{0, 0}, {1, 0}}, 2, DEM2D_TOO_FEW_POINTS},
-    {{{0, 0}}, -1, DEM2D_TOO_FEW_POINTS},
-    {{{0, 0}, {1, 2}, {3, 6}, {2, 4}}, 4, DEM2D_ZERO_AREA},
-    {{{1, 2}, {1, 2}, {1, 2}, {1, 2}}, 4, DEM2D_ZERO_AREA},
-};
-
 static void bad_points_are_refused(void **state) {
     (void)state;
-    for (int i = 0; i < COUNT_OF(bad_points); i++) {
+    for (int i = 0; i < BAD_OUTLINES; i++) {
         test_env env;
         dem2d_difference d, before;
         test_env_init(&env);
         for (int k = 0; k < COUNT_OF(kinds); k++) {
             dem2d_shape *shape = NULL;
-            assert_result(dem2d_outline_fit(&env.env, bad_points[i].p, bad_points[i].count,
+            assert_result(dem2d_outline_fit(&env.env, bad_outlines[i].p, bad_outlines[i].count,
                                             &kinds[k].desc, &shape, NULL),
-                          bad_points[i].result);
-            assert_int_equal(env.log.result, bad_points[i].result);
+                          bad_outlines[i].result);
+            assert_int_equal(env.log.result, bad_outlines[i].result);
             assert_null(shape);
         }
         memset(&d, 0x5a, sizeof d), memcpy(&before, &d, sizeof d);
-        assert_result(dem2d_radial_compare(&env.env, bad_points[i].p, bad_points[i].count, 4, &d),
-                      bad_points[i].result);
+        assert_result(
+            dem2d_radial_compare(&env.env, bad_outlines[i].p, bad_outlines[i].count, 4, &d),
+            bad_outlines[i].result);
         assert_memory_equal(&d, &before, sizeof d);
         assert_clean(&env);
     }

@@ -4,58 +4,16 @@
 #include "dem2d.h"
 
 #include "testing.h"
+#include "outline_oracle.h"
 
 #include <dirent.h>
-
-#define MOST 4096  /* points of an outline */
-#define LINES 1000 /* scan lines */
 
 /* --- coverage -----------------------------------------------------------------------------------
  */
 
-typedef struct crossing {
-    double x;
-    int of; /* polygon 0 or 1 */
-} crossing;
-
-static int by_x(const void *a, const void *b) {
-    const double p = ((const crossing *)a)->x, q = ((const crossing *)b)->x;
-    return (p > q) - (p < q);
-}
-
-static int cross_line(const dem2d_vec *p, int n, int of, double y, crossing *out) {
-    int count = 0;
-    for (int i = 0; i < n; i++) {
-        const dem2d_vec a = p[i], b = p[(i + 1) % n];
-        if ((a.y <= y) == (b.y <= y)) continue;
-        out[count++] = (crossing){a.x + (y - a.y) / (b.y - a.y) * (b.x - a.x), of};
-    }
-    return count;
-}
-
-/* 1 - area(symmetric difference) / area(reference), exact along each of 1000 lines: the error of
-   the midpoint rule is far below 1e-4. */
 static double coverage(const dem2d_vec *reference, int n, const dem2d_vec *other, int m) {
-    static crossing line[2 * MOST];
-    double low = HUGE_VAL, high = -HUGE_VAL, difference = 0, area = 0;
-    for (int i = 0; i < n + m; i++) {
-        const double y = i < n ? reference[i].y : other[i - n].y;
-        low = fmin(low, y), high = fmax(high, y);
-    }
-    for (int i = 0; i < LINES; i++) {
-        const double y = low + (high - low) * (i + 0.5) / LINES;
-        int count = cross_line(reference, n, 0, y, line);
-        count += cross_line(other, m, 1, y, line + count);
-        qsort(line, (size_t)count, sizeof line[0], by_x);
-        bool in[2] = {false, false};
-        for (int k = 0; k < count; k++) {
-            const double length = k > 0 ? line[k].x - line[k - 1].x : 0;
-            if (in[0] != in[1]) difference += length;
-            if (in[0]) area += length;
-            in[line[k].of] = !in[line[k].of];
-        }
-    }
-    return 1 - difference / area;
+    const scan_areas areas = scan_outlines(reference, n, other, m, 1000);
+    return 1 - areas.difference / areas.first;
 }
 
 /* Coverage of an outline by a shape, which is put where its data was. */
@@ -497,26 +455,15 @@ static dem2d_result fit(int which, const dem2d_env *env, const dem2d_vec *p, int
 
 static void fits_check_their_points(void **state) {
     (void)state;
-    static const struct {
-        dem2d_vec p[4];
-        int count;
-        dem2d_result result;
-    } bad[] = {
-        {{{0, 0}, {1, 0}, {NAN, 1}, {0, 1}}, 4, DEM2D_NOT_FINITE},
-        {{{0, 0}, {1, 0}, {1, 1}, {0, -HUGE_VAL}}, 4, DEM2D_NOT_FINITE},
-        {{{0, 0}, {1, 0}}, 2, DEM2D_TOO_FEW_POINTS},
-        {{{0, 0}}, -1, DEM2D_TOO_FEW_POINTS},
-        {{{0, 0}, {1, 2}, {3, 6}, {2, 4}}, 4, DEM2D_ZERO_AREA},
-        {{{1, 2}, {1, 2}, {1, 2}, {1, 2}}, 4, DEM2D_ZERO_AREA},
-    };
     double out[64], before[64];
     memset(out, 0x5a, sizeof out), memcpy(before, out, sizeof out);
     for (int which = 0; which < 3; which++) {
-        for (int i = 0; i < COUNT_OF(bad); i++) {
+        for (int i = 0; i < BAD_OUTLINES; i++) {
             test_env env;
             test_env_init(&env);
-            const dem2d_result expected = bad[i].result;
-            assert_result(fit(which, &env.env, bad[i].p, bad[i].count, out), expected);
+            const dem2d_result expected = bad_outlines[i].result;
+            assert_result(fit(which, &env.env, bad_outlines[i].p, bad_outlines[i].count, out),
+                          expected);
             assert_memory_equal(out, before, sizeof out);
             assert_result(env.log.result, expected);
             if (i < 2) assert_logged(&env, expected, 2 + i, NULL);

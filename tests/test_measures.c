@@ -135,11 +135,14 @@ static void test_strain(void **state) {
     uint64_t random = 1;
     if (LDBL_MANT_DIG <= DBL_MANT_DIG) skip(); /* no better logarithm to compare with */
     for (int i = 0; i < 20000; i++) {
-        const double before = ldexp(random_between(&random, 1, 2), random_below(&random, 1000) - 500);
+        const double before =
+            ldexp(random_between(&random, 1, 2), random_below(&random, 1000) - 500);
         check_strain(before * random_between(&random, 0.5, 2), before);
-        check_strain(before * (1 + ldexp(random_between(&random, -1, 1), -random_below(&random, 52))),
+        check_strain(before *
+                         (1 + ldexp(random_between(&random, -1, 1), -random_below(&random, 52))),
                      before);
-        check_strain(ldexp(random_between(&random, 1, 2), random_below(&random, 1000) - 500), before);
+        check_strain(ldexp(random_between(&random, 1, 2), random_below(&random, 1000) - 500),
+                     before);
     }
     const double odd[] = {
         DBL_MAX,     DBL_MAX / 1.4,       DBL_MIN,           4.9e-324, 3e-310, 1, 1 - 0x1p-53,

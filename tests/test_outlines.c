@@ -3,10 +3,9 @@
 #include "dem2d.h"
 
 #include "testing.h"
+#include "outline_oracle.h"
 
-#define SIDE 24   /* pixels of a random picture */
-#define MOST 4096 /* points of an outline */
-#define LINES 4000
+#define SIDE 24 /* pixels of a random picture */
 
 /* --- pictures --------------------------------------------------------------------------------- */
 
@@ -942,46 +941,9 @@ static void measures_have_no_length(void **state) {
 
 /* --- differences ------------------------------------------------------------------------------ */
 
-typedef struct crossing {
-    double x;
-    int of; /* outline 0 or 1 */
-} crossing;
-
-static int by_x(const void *a, const void *b) {
-    const double p = ((const crossing *)a)->x, q = ((const crossing *)b)->x;
-    return (p > q) - (p < q);
-}
-
-static int cross_line(const dem2d_vec *p, int n, int of, double y, crossing *out) {
-    int count = 0;
-    for (int i = 0; i < n; i++) {
-        const dem2d_vec a = p[i], b = p[(i + 1) % n];
-        if ((a.y <= y) == (b.y <= y)) continue;
-        out[count++] = (crossing){a.x + (y - a.y) / (b.y - a.y) * (b.x - a.x), of};
-    }
-    return count;
-}
-
 /* Area of the symmetric difference by scan lines. */
 static double difference_by_lines(const dem2d_vec *p, int n, const dem2d_vec *q, int m) {
-    static crossing line[2 * MOST];
-    double low = HUGE_VAL, high = -HUGE_VAL, sum = 0;
-    for (int i = 0; i < n + m; i++) {
-        const double y = i < n ? p[i].y : q[i - n].y;
-        low = fmin(low, y), high = fmax(high, y);
-    }
-    for (int i = 0; i < LINES; i++) {
-        const double y = low + (high - low) * (i + 0.5) / LINES;
-        int count = cross_line(p, n, 0, y, line);
-        count += cross_line(q, m, 1, y, line + count);
-        qsort(line, (size_t)count, sizeof line[0], by_x);
-        bool in[2] = {false, false};
-        for (int k = 0; k < count; k++) {
-            if (in[0] != in[1]) sum += line[k].x - line[k - 1].x;
-            in[line[k].of] = !in[line[k].of];
-        }
-    }
-    return sum * (high - low) / LINES;
+    return scan_outlines(p, n, q, m, 4000).difference;
 }
 
 static double farthest_corner(const dem2d_vec *p, int n, const dem2d_vec *q, int m) {
@@ -1000,7 +962,8 @@ static void differences_of_stars(void **state) {
     for (int run = 0; run < 300; run++) {
         dem2d_vec p[200], q[200];
         dem2d_difference d, back;
-        const int n = star(&random, 5 + random_below(&random, run % 3 ? 20 : 190), 0.6, vec(1, 1), p);
+        const int n =
+            star(&random, 5 + random_below(&random, run % 3 ? 20 : 190), 0.6, vec(1, 1), p);
         const dem2d_vec at = vec(random_between(&random, 0, run % 5), 1);
         int m = star(&random, 5 + random_below(&random, 190), 0.1 * (run % 9), at, q);
         if (run % 4 == 0) { /* many corners on corners, sides on sides */
@@ -1203,8 +1166,7 @@ static void check_message(const test_env *env, const dem2d_vec *p, int n) {
     int edge[2];
     dem2d_vec at;
     assert_result(env->log.result, DEM2D_CROSSING);
-    assert_int_equal(sscanf(env->log.text,
-                            "points: edges %d and %d cross or overlap at (%lf, %lf)",
+    assert_int_equal(sscanf(env->log.text, "points: edges %d and %d cross or overlap at (%lf, %lf)",
                             &edge[0], &edge[1], &at.x, &at.y),
                      4);
     assert_int_equal(env->log.index, edge[0]);
