@@ -10382,7 +10382,7 @@ typedef struct dem2di_contact {
 /* What the next search of a pair starts from. */
 typedef struct dem2di_history {
     dem2di_feature feature; /* of two polygons, that carried it: tried first in the next step */
-    double budget;          /* the pair is apart until both have travelled this far together */
+    double bound;           /* the pair is apart until both have travelled this far together */
 } dem2di_history;
 
 /* The points of a contact of two. The contact holds their sums, as its normal that of the sum of
@@ -10554,9 +10554,9 @@ static inline void dem2di_arms_shift(dem2di_arms *arms, double by) {
  */
 
 /* How two that touch move against each other. */
-typedef struct dem2di_meeting {
+typedef struct dem2di_relative_velocity {
     double closing, slip, turning, mass; /* as in dem2d_law_input */
-} dem2di_meeting;
+} dem2di_relative_velocity;
 
 /* Coefficient of the dashpot, N s/m. */
 static double dem2di_dashpot(const dem2d_pair_desc *law, double mass) {
@@ -10570,12 +10570,12 @@ static double dem2di_damped(double spring, double dashpot, double closing) {
 
 /* Normal forces of two points, each with its own closing speed, what dashpots have of them, and
    their new centre. */
-static void dem2di_ends_damp(const dem2d_pair_desc *law, const dem2di_meeting *meeting,
+static void dem2di_ends_damp(const dem2d_pair_desc *law, const dem2di_relative_velocity *relative,
                              double force[2], double viscous[2], dem2di_ends *ends,
                              dem2di_contact *contact) {
-    double dashpot = dem2di_dashpot(law, meeting->mass);
+    double dashpot = dem2di_dashpot(law, relative->mass);
     for (int i = 0; i < 2; i++) {
-        double closing = meeting->closing + meeting->turning * ends->offset[i], spring = force[i];
+        double closing = relative->closing + relative->turning * ends->offset[i], spring = force[i];
         force[i] = dem2di_damped(spring, ends->weight[i] * dashpot, closing);
         viscous[i] = force[i] - spring;
     }
@@ -10765,6 +10765,40 @@ static bool dem2di_state_finite(const dem2di_state *state) {
    uses: config, memory, fields, support, broad, law, motion
    ============================================================================================ */
 
+/* HOW THE DATA LIVE AND FLOW
+
+   Bodies (particles, by slots; walls) have states at the last force pass (before), now, and those
+   of the next step, which come over before. Pairs are near each other: the list has their keys,
+   sorted by kind (circles, others, walls), and where the contacts of each particle are. A contact
+   is what the last force pass found of a pair and what the next step starts from. Each of these is
+   a column, an array with one line in the table dem2di_columns.
+
+   Passes of a step, each in a function that changes only what it is named for:
+     list       positions -> keys, contacts carried over, adjacency; only when the list is used up
+     force      positions, velocities, last contacts, laws -> next contacts over the last, loads.
+                Of each pair first the geometry (collide), then the law; kernels of circles do both.
+                Where segments are joined, it is decided in between which contacts count (resolve)
+     gather     loads -> force and torque of each particle, in the order of its partners' ids
+     control    forces on servo walls, next states of their particles -> velocities of walls
+     check      contacts, loads -> may the step be taken? The last pass that may refuse it
+     integrate  states, forces -> next states
+     observe    last and next contacts, states -> ledger: only reads the others' results
+     commit     the next states become those of now
+
+   Invariants between steps, which tests/inside.h checks:
+     1. Ids and slots of particles lead to each other. Slots that are free have a shape of -1.
+     2. A key is of two particles that live, the one of lower id first, or of a particle and a wall
+        that live; or it is forgotten (a < 0), its contact is apart, and the list is stale.
+     3. A contact is closed where its depth is above 0. Otherwise it has no force, points or law
+        state. Two circles that are both of the disc kind have their arms from the depth.
+     4. adjacent has each contact of a listed pair once for each of its particles, first as B.
+     5. before is where the last force pass was, with the contacts that it found: queries, writers
+   and the hash read these and compute nothing anew.
+     6. Loads, list.last, and all else in scratch are valid during a step only, but for the zeros of
+        contacts that are apart.
+   Results depend on positions, velocities, laws, and the history of each contact since it closed;
+   not on which pairs are listed, the order in memory, or how work is shared out. */
+
 typedef struct dem2di_template {
     dem2d_shape *shape; /* NULL: free slot */
     uint32_t generation;
@@ -10876,13 +10910,13 @@ typedef struct dem2di_stiffest {
 } dem2di_stiffest;
 
 /* What one block of parallel work found. */
-typedef struct dem2di_tally {
+typedef struct dem2di_block_result {
     dem2di_count count;
     dem2di_stiffest stiffest;
     double most;    /* greatest reach of the discs; greatest square of speed over skin */
     int fast;       /* slot of the one of least id that may pass through others, or -1 */
     int64_t spread; /* sum of the distances in memory of the partners found */
-} dem2di_tally;
+} dem2di_block_result;
 
 /* The features in use: decided after an edit, not per contact. See dem2di_prepare. */
 typedef struct dem2di_plan {
@@ -10966,7 +11000,7 @@ typedef enum dem2di_group {
     DEM2DI_ENDS,    /* of these, where plan.faces */
     DEM2DI_EXTRAS,  /* where plan.full */
     DEM2DI_ADJACENCY,
-    DEM2DI_TALLIES,
+    DEM2DI_BLOCK_RESULTS,
     DEM2DI_SCRATCH, /* lines */
     DEM2DI_SHAPE,   /* one row: a shape itself; its columns by its count, its parts, ... */
     DEM2DI_SHAPE_COUNT,
@@ -10992,7 +11026,7 @@ struct dem2d_world {
     dem2d_solver solver;
     dem2d_face_rule faces;
 
-    bool looks_back; /* the force pass keeps the contacts of the last one */
+    bool keeps_last; /* the force pass keeps the contacts of the last one */
     bool check_time_step;
     bool check_due;  /* an edit since the last check of the time step and the speeds can matter */
     int plan_due;    /* steps for which the features in use are found anew, see dem2di_prepare */
@@ -11043,7 +11077,7 @@ struct dem2d_world {
     double *load_a, *load_b; /* torques on A and on B */
     dem2di_push *pushes;     /* room for the contacts of a servo wall */
     char *scratch;           /* what only a step or only the building of the list needs */
-    dem2di_tally *tallies;
+    dem2di_block_result *block_results;
 
     int capacity[DEM2DI_GROUPS]; /* elements that the columns of a group have room for */
 };
@@ -11256,7 +11290,7 @@ static const dem2di_field dem2di_arms_fields[] = {
     DEM2DI_SAVED("b_t", dem2di_arms, b_t, DEM2DI_FINITE)};
 
 static const dem2di_field dem2di_history_fields[] = {
-    DEM2DI_SAVED("budget", dem2di_history, budget, DEM2DI_FINITE),
+    DEM2DI_SAVED("bound", dem2di_history, bound, DEM2DI_FINITE),
     DEM2DI_SAVED("feature", dem2di_history, feature.own, DEM2DI_TAG),
     DEM2DI_SAVED("corners", dem2di_history, feature.corner, DEM2DI_TAG)};
 
@@ -11402,7 +11436,7 @@ static const dem2di_column dem2di_columns[] = {
     DEM2DI_CONTACT_COLUMN("two_points", ENDS, ends, ends_fields),
     DEM2DI_CONTACT_COLUMN("law_states", EXTRAS, extras, extra_fields),
     DEM2DI_UNSAVED(ADJACENCY, list.adjacent, 0),
-    DEM2DI_UNSAVED(TALLIES, tallies, 0),
+    DEM2DI_UNSAVED(BLOCK_RESULTS, block_results, 0),
     {NULL, DEM2DI_SCRATCH, offsetof(dem2d_world, scratch), DEM2DI_LINE, 0, NULL, 0},
     /* of each shape, what its support points come from: the rest follows with the same bits */
     {"shape", DEM2DI_SHAPE, 0, 0, DEM2DI_SHARES | DEM2DI_HASHED, DEM2DI_ALL(dem2di_shape_fields)},
@@ -11564,7 +11598,7 @@ static size_t dem2di_contacts_largest(const dem2di_plan *plan, int discs, int co
 
 /* Contacts from `first` to before `end` as they are into list.last, or (`back`) as they were from
    there. */
-static void dem2di_contacts_keep(const dem2d_world *world, int first, int end, bool back) {
+static void dem2di_contacts_keep(dem2d_world *world, int first, int end, bool back) {
     const dem2di_list *list = &world->list;
     for (int k = 0; k < DEM2DI_COLUMNS; k++) {
         const dem2di_column *column = &dem2di_columns[k];
@@ -11971,7 +12005,7 @@ DEM2D_API dem2d_result dem2d_world_add_particle(dem2d_world *world, const dem2d_
 }
 
 /* What contact i has beside it: nothing, until it is found or computed. */
-static inline void dem2di_clear_beside(const dem2d_world *world, int i) {
+static inline void dem2di_clear_beside(dem2d_world *world, int i) {
     const dem2di_contacts *contacts = &world->list.contacts;
     int at = i - world->list.discs;
     if (world->plan.faces) memset(&contacts->ends[at], 0, sizeof *contacts->ends);
@@ -12121,8 +12155,7 @@ static inline bool dem2di_contact_get(const dem2d_world *world, const dem2di_con
 }
 
 /* A contact into the columns of the list. Between two circles the arms follow from the rest. */
-static inline void dem2di_contact_put(const dem2di_list *list, int i,
-                                      const dem2di_contact *contact) {
+static inline void dem2di_contact_put(dem2di_list *list, int i, const dem2di_contact *contact) {
     const dem2di_contacts *to = &list->contacts;
     to->normal_x[i] = contact->normal.x;
     to->normal_y[i] = contact->normal.y;
@@ -12717,15 +12750,15 @@ static bool dem2di_scratch_reserve(dem2d_world *world, size_t bytes) {
     return dem2di_group_reserve(world, DEM2DI_SCRATCH, (int)lines);
 }
 
-static int dem2di_contact_blocks(int discs, int count) {
+static int dem2di_force_blocks(int discs, int count) {
     return dem2di_blocks(discs, DEM2DI_BLOCK) + dem2di_blocks(count - discs, DEM2DI_BLOCK_OTHERS);
 }
 
 /* Room for what the blocks find. */
-static bool dem2di_tallies_reserve(dem2d_world *world, int discs, int count) {
-    int blocks = dem2di_contact_blocks(discs, count);
+static bool dem2di_block_results_reserve(dem2d_world *world, int discs, int count) {
+    int blocks = dem2di_force_blocks(discs, count);
     int bodies = dem2di_blocks(world->body_count, DEM2DI_BLOCK);
-    return dem2di_group_reserve(world, DEM2DI_TALLIES, blocks > bodies ? blocks : bodies);
+    return dem2di_group_reserve(world, DEM2DI_BLOCK_RESULTS, blocks > bodies ? blocks : bodies);
 }
 
 /* --- the contacts of each particle ------------------------------------------------------------ */
@@ -12895,7 +12928,7 @@ static double dem2di_skin_of(const dem2d_world *world, double size, dem2d_vec v)
 /* --- building ----------------------------------------------------------------------------------
  */
 
-enum { DEM2DI_DISCS, DEM2DI_OTHERS, DEM2DI_TOUCHES, DEM2DI_KINDS };
+enum { DEM2DI_DISCS, DEM2DI_OTHERS, DEM2DI_WALL_CONTACTS, DEM2DI_KINDS };
 
 /* A list that is being made. */
 typedef struct dem2di_build {
@@ -12904,10 +12937,10 @@ typedef struct dem2di_build {
     dem2di_grid grid;
     int *count[DEM2DI_KINDS]; /* of each particle's finds; then where they go */
     int total[DEM2DI_KINDS];
-    dem2di_key *keys;              /* as in the list, */
-    int *old;                      /* and its contact in the old list, or -1 */
-    dem2di_order *touches, *spare; /* wall and id of particle; slot */
-    char *column;                  /* room for a column of contacts, where the grid was */
+    dem2di_key *keys;                    /* as in the list, */
+    int *old;                            /* and its contact in the old list, or -1 */
+    dem2di_order *wall_contacts, *spare; /* wall and id of particle; slot */
+    char *column;                        /* room for a column of contacts, where the grid was */
     bool bounded, back; /* as in the world; whether the next step may look back on contacts */
     double softness;
 } dem2di_build;
@@ -13005,7 +13038,7 @@ static void dem2di_disc_task(void *context, int begin, int end) {
                            dem2di_has_disc_kernel(world, &build->plan);
             largest = dem2di_max(largest, disc->reach);
         }
-        world->tallies[block].most = largest;
+        world->block_results[block].most = largest;
     }
 }
 
@@ -13063,7 +13096,7 @@ static void dem2di_count_task(void *context, int begin, int end) {
         dem2di_grid_partners(&build->grid, &finds);
         build->count[DEM2DI_DISCS][i] = finds.count[0];
         build->count[DEM2DI_OTHERS][i] = finds.count[1];
-        build->count[DEM2DI_TOUCHES][i] =
+        build->count[DEM2DI_WALL_CONTACTS][i] =
             dem2di_find_walls(build->world, &build->grid.discs[i], i, NULL);
     }
 }
@@ -13132,12 +13165,12 @@ static void dem2di_carry_over(const dem2di_build *build, int discs, int count) {
 /* What else changes for contacts that are not of two circles: separation bounds count from here,
    and those that were of circles get their arms. */
 static void dem2di_carry_others(const dem2di_build *build, int discs, int pairs) {
-    const dem2d_world *world = build->world;
+    dem2d_world *world = build->world;
     const dem2di_contacts *contacts = &world->list.contacts;
     for (int i = discs; i < pairs; i++) {
         const dem2di_key *key = &build->keys[i];
         if (world->plan.turns)
-            contacts->history[i - discs].budget -= world->travel[key->a] + world->travel[key->b];
+            contacts->history[i - discs].bound -= world->travel[key->a] + world->travel[key->b];
         if (build->old[i] < 0 || build->old[i] >= world->list.discs) continue;
         dem2di_arms *arms = &contacts->arms[i - discs];
         arms->a_n = world->now[key->a].radius - contacts->depth[i] / 2;
@@ -13168,25 +13201,27 @@ static void dem2di_fill_task(void *context, int begin, int end) {
                     key->b = turned ? a : b;
                     build->old[key - build->keys] = dem2di_listed(world, key, false);
                 }
-            const int *walls = &build->count[DEM2DI_TOUCHES][i];
-            if (*walls < (i + 1 < build->grid.count ? walls[1] : build->total[DEM2DI_TOUCHES]))
-                (void)dem2di_find_walls(world, &build->grid.discs[i], i, build->touches + *walls);
+            const int *walls = &build->count[DEM2DI_WALL_CONTACTS][i];
+            if (*walls <
+                (i + 1 < build->grid.count ? walls[1] : build->total[DEM2DI_WALL_CONTACTS]))
+                (void)dem2di_find_walls(world, &build->grid.discs[i], i,
+                                        build->wall_contacts + *walls);
         }
-        world->tallies[block].spread = spread;
+        world->block_results[block].spread = spread;
     }
 }
 
 /* Contacts with walls, in the order of the walls and the particles' ids. */
-static void dem2di_touches_task(void *context, int begin, int end) {
+static void dem2di_wall_contacts_task(void *context, int begin, int end) {
     dem2di_build *build = (dem2di_build *)context;
-    int count = build->total[DEM2DI_TOUCHES];
+    int count = build->total[DEM2DI_WALL_CONTACTS];
     int pairs = build->total[DEM2DI_DISCS] + build->total[DEM2DI_OTHERS];
     (void)begin;
     (void)end;
-    dem2di_sort(build->touches, build->spare, count);
+    dem2di_sort(build->wall_contacts, build->spare, count);
     for (int i = 0; i < count; i++) {
-        build->keys[pairs + i].a = build->touches[i].value;
-        build->keys[pairs + i].b = (int)(build->touches[i].key >> 32);
+        build->keys[pairs + i].a = build->wall_contacts[i].value;
+        build->keys[pairs + i].b = (int)(build->wall_contacts[i].key >> 32);
         build->old[pairs + i] = dem2di_listed(build->world, &build->keys[pairs + i], true);
     }
 }
@@ -13286,7 +13321,7 @@ static double dem2di_softness_of(const dem2di_build *build, double *sums) {
     double most = 0;
     if (build->total[DEM2DI_OTHERS] > 0 || build->plan.full || build->plan.turns) return HUGE_VAL;
     for (int i = 0; i < world->body_count; i++) sums[i] = 0;
-    for (int i = 0; i < pairs + build->total[DEM2DI_TOUCHES]; i++) {
+    for (int i = 0; i < pairs + build->total[DEM2DI_WALL_CONTACTS]; i++) {
         int partner[2];
         partner[0] = build->keys[i].a;
         partner[1] = i < pairs ? build->keys[i].b : partner[0];
@@ -13384,9 +13419,9 @@ static bool dem2di_looks_back(const dem2d_world *world, const dem2di_plan *plan,
 /* Scratch memory for the search and for what it finds. Contacts on their way come over the grid. */
 static bool dem2di_build_cut(dem2di_build *build) {
     dem2d_world *world = build->world;
-    size_t n = (size_t)build->grid.count, walls = (size_t)build->total[DEM2DI_TOUCHES];
+    size_t n = (size_t)build->grid.count, walls = (size_t)build->total[DEM2DI_WALL_CONTACTS];
     int discs = build->total[DEM2DI_DISCS], pairs = discs + build->total[DEM2DI_OTHERS];
-    int count = pairs + build->total[DEM2DI_TOUCHES];
+    int count = pairs + build->total[DEM2DI_WALL_CONTACTS];
     for (int pass = 0; pass < 2; pass++) {
         dem2di_cutter cutter = {pass == 0 ? NULL : world->scratch, 0};
         dem2di_grid *grid = &build->grid;
@@ -13401,7 +13436,8 @@ static bool dem2di_build_cut(dem2di_build *build) {
         if (column > cutter.used) (void)dem2di_cut(&cutter, column - cutter.used, 1);
         build->keys = (dem2di_key *)dem2di_cut(&cutter, (size_t)count, sizeof *build->keys);
         build->old = (int *)dem2di_cut(&cutter, (size_t)count, sizeof *build->old);
-        build->touches = (dem2di_order *)dem2di_cut(&cutter, walls, sizeof *build->touches);
+        build->wall_contacts =
+            (dem2di_order *)dem2di_cut(&cutter, walls, sizeof *build->wall_contacts);
         build->spare = (dem2di_order *)dem2di_cut(&cutter, walls, sizeof *build->spare);
         size_t step = dem2di_step_cut(world, NULL, discs, pairs, count, &build->plan, build->back);
         if (pass == 0 && !dem2di_scratch_reserve(world, cutter.used > step ? cutter.used : step))
@@ -13420,7 +13456,7 @@ static bool dem2di_build_search(dem2di_build *build) {
     if (!dem2di_build_cut(build)) return false;
     dem2di_run(world, DEM2D_PHASE_LIST, blocks, dem2di_disc_task, build);
     for (int k = 0; k < blocks; k++)
-        build->grid.size = dem2di_max(build->grid.size, world->tallies[k].most * DEM2DI_CELL);
+        build->grid.size = dem2di_max(build->grid.size, world->block_results[k].most * DEM2DI_CELL);
     if (world->body_count > 0) build->grid.origin = world->now[0].x;
     dem2di_run(world, DEM2D_PHASE_LIST, blocks, dem2di_place_task, build);
     dem2di_run(world, DEM2D_PHASE_LIST, 1, dem2di_grid_task, build);
@@ -13434,7 +13470,7 @@ static bool dem2di_build_search(dem2di_build *build) {
     int discs = build->total[DEM2DI_DISCS];
     return dem2di_list_reserve(world, &build->plan, discs, (int)total) &&
            dem2di_adjacency_reserve(world, discs + build->total[DEM2DI_OTHERS], (int)total) &&
-           dem2di_tallies_reserve(world, discs, (int)total);
+           dem2di_block_results_reserve(world, discs, (int)total);
 }
 
 /* Rotations for angles when the first particle that is no circle comes: what queries say stays the
@@ -13454,7 +13490,7 @@ static void dem2di_build_finish(dem2di_build *build) {
     dem2d_world *world = build->world;
     dem2di_list *list = &world->list;
     int discs = build->total[DEM2DI_DISCS], pairs = discs + build->total[DEM2DI_OTHERS];
-    int count = pairs + build->total[DEM2DI_TOUCHES];
+    int count = pairs + build->total[DEM2DI_WALL_CONTACTS];
     dem2di_carry_over(build, discs, count);
     dem2di_carry_others(build, discs, pairs);
     list->discs = discs;
@@ -13483,7 +13519,7 @@ static void dem2di_build_finish(dem2di_build *build) {
 static void dem2di_watch_spread(dem2d_world *world, bool sorted) {
     double sum = 0;
     for (int k = 0; k < dem2di_blocks(world->body_count, DEM2DI_BLOCK); k++)
-        sum += (double)world->tallies[k].spread;
+        sum += (double)world->block_results[k].spread;
     double mean = world->list.pairs > 0 ? sum / world->list.pairs : 0;
     if (sorted) world->spread = mean;
     world->scattered = mean > 2 * world->spread;
@@ -13502,7 +13538,7 @@ static dem2d_result dem2di_build_list(dem2d_world *world, const dem2di_plan *pla
     build.world = world;
     double skin = world->skin, interval = world->interval, largest = 0;
     bool sorted = world->scattered;
-    bool room = dem2di_tallies_reserve(world, 0, 0) && dem2di_arrange(world);
+    bool room = dem2di_block_results_reserve(world, 0, 0) && dem2di_arrange(world);
     if (room) {
         dem2di_tune_skin(world);
         for (int i = 0; i < world->body_count; i++)
@@ -13515,10 +13551,10 @@ static dem2d_result dem2di_build_list(dem2d_world *world, const dem2di_plan *pla
     if (!room || !dem2di_build_search(&build)) return dem2di_list_failed(world, skin, interval);
     int blocks = dem2di_blocks(world->body_count, DEM2DI_BLOCK);
     dem2di_run(world, DEM2D_PHASE_LIST, blocks, dem2di_fill_task, &build);
-    dem2di_run(world, DEM2D_PHASE_LIST, 1, dem2di_touches_task, &build);
+    dem2di_run(world, DEM2D_PHASE_LIST, 1, dem2di_wall_contacts_task, &build);
     build.bounded = dem2di_bounded(world, &build.plan,
                                    build.total[DEM2DI_DISCS] + build.total[DEM2DI_OTHERS] +
-                                       build.total[DEM2DI_TOUCHES]);
+                                       build.total[DEM2DI_WALL_CONTACTS]);
     build.softness = dem2di_softness_of(&build, (double *)(void *)world->scratch);
     build.back = dem2di_looks_back(world, &build.plan, build.bounded, build.softness);
     if (!dem2di_build_cut(&build)) return dem2di_list_failed(world, skin, interval);
@@ -13573,8 +13609,8 @@ static inline dem2di_relative_motion dem2di_motion_of(const dem2d_world *world, 
    forces at one of the two, which act for half of it: each at its own point, whose approach the
    velocities and the contact then give. After the last pass no spring relaxes by more than its
    depth: the force ends where it opens. */
-static double dem2di_book_dashpots(const dem2d_world *world, const dem2di_contacts *from, int i,
-                                   double depth, double closing, double turning) {
+static double dem2di_dashpot_work(const dem2d_world *world, const dem2di_contacts *from, int i,
+                                  double depth, double closing, double turning) {
     const dem2di_extra *extra = dem2di_extra_of(world, from, i);
     const dem2di_ends *ends = dem2di_ends_of(world, from, i);
     double work = 0;
@@ -13593,7 +13629,7 @@ static double dem2di_book_dashpots(const dem2d_world *world, const dem2di_contac
    they take is their mean times the way; where it opens or closes in between, the force of the one
    pass times the way by the contact's own geometry there. What sliding and rolling take is that
    less what the springs gained. */
-static void dem2di_book_contact(const dem2d_world *world, int i, dem2di_ledger *ledger) {
+static void dem2di_observe_contact(const dem2d_world *world, int i, dem2di_ledger *ledger) {
     const dem2di_contacts *pass[2]; /* the last, this */
     dem2di_stored gained = {0, 0, 0};
     bool closed[2];
@@ -13617,7 +13653,7 @@ static void dem2di_book_contact(const dem2d_world *world, int i, dem2di_ledger *
         deeper += k == 1 ? contact.depth : -contact.depth;
         if (extra != NULL) moment += extra->moment / 2;
         ledger->sum[DEM2DI_DASHED] +=
-            dem2di_book_dashpots(world, pass[k], i, contact.depth, closing, turning);
+            dem2di_dashpot_work(world, pass[k], i, contact.depth, closing, turning);
     }
     if (closed[0] && closed[1]) slide /= 2;
     double taken = -(shear * slide + moment * turning * world->made_step);
@@ -13626,21 +13662,21 @@ static void dem2di_book_contact(const dem2d_world *world, int i, dem2di_ledger *
 }
 
 /* All contacts in the order of their ids, before the motion. */
-static void dem2di_book_contacts(dem2d_world *world) {
+static void dem2di_observe_contacts(dem2d_world *world) {
     const dem2di_list *list = &world->list;
     memset(&world->ledger.stored, 0, sizeof world->ledger.stored);
     for (int index = 0; index < world->name_count; index++) {
         int slot = world->names[index].slot;
         if (slot < 0) continue;
         for (int k = list->own[slot]; k < list->first[slot + 1]; k++)
-            dem2di_book_contact(world, list->adjacent[k], &world->ledger);
+            dem2di_observe_contact(world, list->adjacent[k], &world->ledger);
     }
 }
 
 /* Power on one particle in the first half of the step (0) and in the second, by accounts, and its
    kinetic energy. The new state is where the one of the last force pass was. */
-static void dem2di_book_particle(const dem2d_world *world, int slot, dem2di_load load,
-                                 double power[2][DEM2DI_HALVES], double *kinetic) {
+static void dem2di_observe_particle(const dem2d_world *world, int slot, dem2di_load load,
+                                    double power[2][DEM2DI_HALVES], double *kinetic) {
     const dem2di_body *body = &world->bodies[slot];
     const dem2di_state *old = &world->now[slot], *made = &world->before[slot];
     double mass = dem2di_body_mass(world, body), inertia = dem2di_body_inertia(world, body);
@@ -13801,50 +13837,53 @@ static void dem2di_batch_solve(dem2di_batch *batch, int count, double time_step,
 }
 DEM2DI_VECTORS_END
 
-/* The contacts and loads of a batch from the columns (`out` is false) or into them. */
-static DEM2DI_INLINE void dem2di_batch_copy(const dem2d_world *world, int first, int count,
-                                            bool friction, bool out, dem2di_batch *batch) {
-    const dem2di_contacts *contacts = &world->list.contacts;
+/* The last contacts of a batch from the columns. */
+static DEM2DI_INLINE void dem2di_batch_get(const dem2d_world *world, int first, int count,
+                                           dem2di_batch *batch) {
+    const dem2di_contacts *from = &world->list.contacts;
     const size_t bytes = (size_t)count * sizeof(double);
-    if (!out) {
-        if (!friction) return;
-        memcpy(batch->normal_x, contacts->normal_x + first, bytes);
-        memcpy(batch->normal_y, contacts->normal_y + first, bytes);
-        memcpy(batch->depth, contacts->depth + first, bytes);
-        memcpy(batch->shear, contacts->shear + first, bytes);
-        return;
-    }
-    memcpy(contacts->normal_x + first, batch->normal_x, bytes);
-    memcpy(contacts->normal_y + first, batch->normal_y, bytes);
-    memcpy(contacts->depth + first, batch->depth, bytes);
-    memcpy(contacts->force + first, batch->force, bytes);
+    memcpy(batch->normal_x, from->normal_x + first, bytes);
+    memcpy(batch->normal_y, from->normal_y + first, bytes);
+    memcpy(batch->depth, from->depth + first, bytes);
+    memcpy(batch->shear, from->shear + first, bytes);
+}
+
+/* The next contacts and their loads into the columns. */
+static DEM2DI_INLINE void dem2di_batch_put(dem2d_world *world, int first, int count, bool friction,
+                                           const dem2di_batch *batch) {
+    const dem2di_contacts *to = &world->list.contacts;
+    const size_t bytes = (size_t)count * sizeof(double);
+    memcpy(to->normal_x + first, batch->normal_x, bytes);
+    memcpy(to->normal_y + first, batch->normal_y, bytes);
+    memcpy(to->depth + first, batch->depth, bytes);
+    memcpy(to->force + first, batch->force, bytes);
     memcpy(world->load_x + first, batch->load_x, bytes);
     memcpy(world->load_y + first, batch->load_y, bytes);
     if (!friction) {
-        memset(contacts->shear + first, 0, bytes);
+        memset(to->shear + first, 0, bytes);
         return;
     }
-    memcpy(contacts->shear + first, batch->shear, bytes);
+    memcpy(to->shear + first, batch->shear, bytes);
     memcpy(world->load_a + first, batch->load_a, bytes);
     memcpy(world->load_b + first, batch->load_b, bytes);
 }
 
 /* Returns how many are closed. */
-static DEM2DI_INLINE int dem2di_disc_batch(const dem2d_world *world, int first, int count,
-                                           bool friction, bool one_law) {
+static DEM2DI_INLINE int dem2di_disc_batch(dem2d_world *world, int first, int count, bool friction,
+                                           bool one_law) {
     dem2di_batch batch;
     int closed = 0;
-    dem2di_batch_copy(world, first, count, friction, false, &batch);
+    if (friction) dem2di_batch_get(world, first, count, &batch);
     dem2di_batch_fetch(world, first, count, friction, !one_law, &batch);
     if (friction && world->redirected) dem2di_batch_made(world, first, count, &batch);
     dem2di_batch_solve(&batch, count, world->made_step,
                        dem2di_law(world, world->plan.material, world->plan.material), &world->plan);
-    dem2di_batch_copy(world, first, count, friction, true, &batch);
+    dem2di_batch_put(world, first, count, friction, &batch);
     for (int k = 0; k < count; k++) closed += batch.depth[k] > 0;
     return closed;
 }
 
-static void dem2di_disc_range(const dem2d_world *world, int begin, int end, dem2di_count *count) {
+static void dem2di_disc_range(dem2d_world *world, int begin, int end, dem2di_count *count) {
     const dem2di_plan *plan = &world->plan;
     int closed = 0;
     for (int first = begin; first < end; first += DEM2DI_BATCH) {
@@ -13871,7 +13910,8 @@ static double dem2di_gap_unsure(const dem2d_world *world, double size) {
 /* Separation bound of a pair that is apart by a gap (m): until the accumulated displacements of
    both particles reach it, any search would find them apart. GJK and EPA take every pair anew, as
    in the papers. */
-static double dem2di_budget(const dem2d_world *world, int a, int b, double gap, double size) {
+static double dem2di_separation_bound(const dem2d_world *world, int a, int b, double gap,
+                                      double size) {
     if (world->solver == DEM2D_GJK_EPA) return 0;
     return world->travel[a] + world->travel[b] + (gap - dem2di_gap_unsure(world, size));
 }
@@ -13896,10 +13936,10 @@ static void dem2di_pair_search(const dem2d_world *world, dem2di_pair *pair,
 
 /* A look at two shapes from the contact's normal and history on: its normal, depth and points, or
    their gap. Returns the number of points that carry the contact. */
-static int dem2di_shapes_look(const dem2d_world *world, dem2di_pair *pair,
-                              const dem2di_contact *last, dem2di_history *history,
-                              dem2di_contact *contact, dem2d_contact_point points[2], double *gap,
-                              dem2di_count *count) {
+static int dem2di_collide_shapes(const dem2d_world *world, dem2di_pair *pair,
+                                 const dem2di_contact *last, dem2di_history *history,
+                                 dem2di_contact *contact, dem2d_contact_point points[2],
+                                 double *gap, dem2di_count *count) {
     dem2di_search search;
     count->collisions++;
     dem2di_pair_search(world, pair, last, &history->feature, &search);
@@ -13920,9 +13960,9 @@ static int dem2di_shapes_look(const dem2d_world *world, dem2di_pair *pair,
 }
 
 /* Two circles that overlap, among the others for the full law. */
-static int dem2di_round_geometry(const dem2di_state *a, const dem2di_state *b,
-                                 dem2di_contact *contact, dem2d_contact_point points[2],
-                                 dem2di_count *count) {
+static int dem2di_collide_circles(const dem2di_state *a, const dem2di_state *b,
+                                  dem2di_contact *contact, dem2d_contact_point points[2],
+                                  dem2di_count *count) {
     dem2di_round round = dem2di_round_make(dem2di_disc_line(a, b), a->radius, b->radius, 1);
     contact->normal = round.normal;
     contact->depth = round.depth;
@@ -13934,16 +13974,16 @@ static int dem2di_round_geometry(const dem2di_state *a, const dem2di_state *b,
 
 /* Geometry of one pair at the present positions. Returns the number of points that carry the
    contact, 0 when it is apart. */
-static int dem2di_pair_geometry(const dem2d_world *world, int a, int b, const dem2di_contact *last,
-                                dem2di_history *history, dem2di_contact *contact,
-                                dem2d_contact_point points[2], dem2di_count *count) {
+static int dem2di_collide_pair(const dem2d_world *world, int a, int b, const dem2di_contact *last,
+                               dem2di_history *history, dem2di_contact *contact,
+                               dem2d_contact_point points[2], dem2di_count *count) {
     const dem2di_body *body_a = &world->bodies[a], *body_b = &world->bodies[b];
     const dem2di_state *state_a = &world->now[a], *state_b = &world->now[b];
     dem2d_vec d = dem2di_centre_line(state_a->x, state_b->x);
     double reach = state_a->radius + state_b->radius, distance = dem2di_length(d);
-    history->budget = 0;
+    history->bound = 0;
     if (distance >= reach) {
-        history->budget = dem2di_budget(world, a, b, distance - reach, distance + reach);
+        history->bound = dem2di_separation_bound(world, a, b, distance - reach, distance + reach);
         return 0;
     }
     dem2di_pair pair;
@@ -13951,7 +13991,7 @@ static int dem2di_pair_geometry(const dem2d_world *world, int a, int b, const de
     pair.b = dem2di_shape_of(world, body_b);
     if (pair.a->type == DEM2D_CIRCLE && pair.b->type == DEM2D_CIRCLE &&
         world->solver != DEM2D_GJK_EPA)
-        return dem2di_round_geometry(state_a, state_b, contact, points, count);
+        return dem2di_collide_circles(state_a, state_b, contact, points, count);
     pair.ra = state_a->q;
     pair.rb = state_b->q;
     pair.scale_a = body_a->scale;
@@ -13960,8 +14000,8 @@ static int dem2di_pair_geometry(const dem2d_world *world, int a, int b, const de
     pair.distance = distance;
     pair.size = reach + distance;
     double gap;
-    int found = dem2di_shapes_look(world, &pair, last, history, contact, points, &gap, count);
-    if (found == 0) history->budget = dem2di_budget(world, a, b, gap, pair.size);
+    int found = dem2di_collide_shapes(world, &pair, last, history, contact, points, &gap, count);
+    if (found == 0) history->bound = dem2di_separation_bound(world, a, b, gap, pair.size);
     return found;
 }
 
@@ -13990,8 +14030,8 @@ static inline void dem2di_last_get(const dem2d_world *world, int i, dem2di_last 
 }
 
 /* Forces of springs and friction. */
-static inline void dem2di_spring_force(const dem2d_world *world, int i, const dem2di_last *last,
-                                       bool two, dem2di_contact *contact) {
+static inline void dem2di_spring_force(dem2d_world *world, int i, const dem2di_last *last, bool two,
+                                       dem2di_contact *contact) {
     const dem2d_pair_desc *law = dem2di_law_of(world, i);
     double slip = 0;
     if (law->friction > 0) {
@@ -14011,24 +14051,24 @@ static inline void dem2di_spring_force(const dem2d_world *world, int i, const de
 }
 
 /* How the two of contact i meet. */
-static dem2di_meeting dem2di_meeting_make(const dem2d_world *world, int i,
-                                          const dem2di_contact *last,
-                                          const dem2di_contact *contact) {
+static dem2di_relative_velocity dem2di_relative_velocity_of(const dem2d_world *world, int i,
+                                                            const dem2di_contact *last,
+                                                            const dem2di_contact *contact) {
     double inverse = dem2di_reduced_inverse(world, i);
     dem2di_relative_motion motion = dem2di_motion_of(world, i);
-    dem2di_meeting meeting;
-    meeting.turning = motion.wb - motion.wa;
-    meeting.closing = -dem2di_velocity_n(contact, &motion);
-    meeting.slip = 0;
+    dem2di_relative_velocity relative;
+    relative.turning = motion.wb - motion.wa;
+    relative.closing = -dem2di_velocity_n(contact, &motion);
+    relative.slip = 0;
     if (dem2di_law_of(world, i)->friction > 0 || world->law != NULL)
-        meeting.slip = dem2di_slip(last, contact, &motion);
-    meeting.mass = inverse > 0 ? 1 / inverse : 0;
-    return meeting;
+        relative.slip = dem2di_slip(last, contact, &motion);
+    relative.mass = inverse > 0 ? 1 / inverse : 0;
+    return relative;
 }
 
 /* What the caller's law says of contact i at a depth. */
 static void dem2di_ask_law(const dem2d_world *world, int i, const dem2di_last *last,
-                           const dem2di_meeting *meeting, dem2d_vec normal, double depth,
+                           const dem2di_relative_velocity *relative, dem2d_vec normal, double depth,
                            dem2d_law_output *output) {
     const dem2di_list *list = &world->list;
     const dem2di_key *key = &list->keys[i];
@@ -14044,10 +14084,10 @@ static void dem2di_ask_law(const dem2d_world *world, int i, const dem2di_last *l
     input.normal = normal;
     input.time_step = world->made_step;
     input.depth = depth;
-    input.closing = meeting->closing;
-    input.slip = meeting->slip;
-    input.turning = meeting->turning;
-    input.mass = meeting->mass;
+    input.closing = relative->closing;
+    input.slip = relative->slip;
+    input.turning = relative->turning;
+    input.mass = relative->mass;
     input.radius = dem2di_reduced_radius(world, i);
     input.tangential_force = last->contact.shear;
     input.moment = last->extra.moment;
@@ -14057,16 +14097,17 @@ static void dem2di_ask_law(const dem2d_world *world, int i, const dem2di_last *l
 }
 
 /* The full law: dashpot and rolling as well, or the caller's. Two points may get another centre. */
-static void dem2di_full_force(const dem2d_world *world, int i, const dem2di_last *last, bool two,
+static void dem2di_full_force(dem2d_world *world, int i, const dem2di_last *last, bool two,
                               dem2di_contact *contact) {
     const dem2di_list *list = &world->list;
     const dem2d_pair_desc *law = dem2di_law_of(world, i);
     const double dt = world->made_step;
     dem2di_extra *extra = &list->contacts.extras[i - list->discs];
-    dem2di_meeting meeting = dem2di_meeting_make(world, i, &last->contact, contact);
+    dem2di_relative_velocity relative =
+        dem2di_relative_velocity_of(world, i, &last->contact, contact);
     if (world->law != NULL) {
         dem2d_law_output output;
-        dem2di_ask_law(world, i, last, &meeting, contact->normal, contact->depth, &output);
+        dem2di_ask_law(world, i, last, &relative, contact->normal, contact->depth, &output);
         contact->force = output.normal_force;
         contact->shear = output.tangential_force;
         extra->moment = output.moment;
@@ -14078,22 +14119,23 @@ static void dem2di_full_force(const dem2d_world *world, int i, const dem2di_last
         dem2di_ends *ends = &list->contacts.ends[i - list->discs];
         double force[2];
         dem2di_ends_press(law, ends, force);
-        dem2di_ends_damp(law, &meeting, force, extra->viscous, ends, contact);
-        dem2di_law_apply_ends(law, meeting.slip, dt, force, &last->contact, &last->ends, ends,
+        dem2di_ends_damp(law, &relative, force, extra->viscous, ends, contact);
+        dem2di_law_apply_ends(law, relative.slip, dt, force, &last->contact, &last->ends, ends,
                               contact);
     } else {
         double spring = law->normal_stiffness * contact->depth;
-        contact->force = dem2di_damped(spring, dem2di_dashpot(law, meeting.mass), meeting.closing);
-        dem2di_law_apply(law, meeting.slip, dt, last->contact.shear, contact);
+        contact->force =
+            dem2di_damped(spring, dem2di_dashpot(law, relative.mass), relative.closing);
+        dem2di_law_apply(law, relative.slip, dt, last->contact.shear, contact);
         extra->viscous[0] = contact->force - spring;
     }
     if (law->rolling_friction > 0)
-        extra->moment = dem2di_rolling(law, dem2di_reduced_radius(world, i), meeting.turning, dt,
+        extra->moment = dem2di_rolling(law, dem2di_reduced_radius(world, i), relative.turning, dt,
                                        contact->force, last->extra.moment);
 }
 
 /* Force of contact i, whose geometry is known. */
-static inline void dem2di_force(const dem2d_world *world, int i, const dem2di_last *last, bool two,
+static inline void dem2di_force(dem2d_world *world, int i, const dem2di_last *last, bool two,
                                 dem2di_contact *contact, dem2di_count *count) {
     double moment = 0;
     if (world->plan.full) {
@@ -14114,7 +14156,7 @@ static inline void dem2di_force(const dem2d_world *world, int i, const dem2di_la
 
 /* Where contact i has its points, beside it when there are two; B's centre is at d. A circle has
    its point on the line of the normal: at the middle of an overlap, and on a wall at the foot. */
-static DEM2DI_INLINE void dem2di_contact_place(const dem2d_world *world, int i, int count,
+static DEM2DI_INLINE void dem2di_contact_place(dem2d_world *world, int i, int count,
                                                const dem2d_contact_point points[2], dem2d_vec d,
                                                dem2di_contact *contact) {
     const dem2di_list *list = &world->list;
@@ -14138,12 +14180,12 @@ static DEM2DI_INLINE void dem2di_contact_place(const dem2d_world *world, int i, 
     }
 }
 
-static inline void dem2di_no_load(const dem2d_world *world, int i) {
+static inline void dem2di_no_load(dem2d_world *world, int i) {
     world->load_x[i] = world->load_y[i] = world->load_a[i] = world->load_b[i] = 0;
 }
 
 /* Contact i is apart: nothing acts. The normal is that of the search. */
-static void dem2di_contact_apart(const dem2d_world *world, int i, dem2d_vec normal) {
+static void dem2di_contact_apart(dem2d_world *world, int i, dem2d_vec normal) {
     dem2di_contact contact;
     memset(&contact, 0, sizeof contact);
     contact.normal = normal;
@@ -14153,8 +14195,8 @@ static void dem2di_contact_apart(const dem2d_world *world, int i, dem2d_vec norm
 }
 
 /* Geometry and force of one listed pair that is not of two circles. */
-static void dem2di_pair_look(const dem2d_world *world, int i, dem2di_count *count) {
-    const dem2di_list *list = &world->list;
+static void dem2di_update_pair(dem2d_world *world, int i, dem2di_count *count) {
+    dem2di_list *list = &world->list;
     int a = list->keys[i].a, b = list->keys[i].b;
     dem2di_history *history = &list->contacts.history[i - list->discs];
     dem2di_last last;
@@ -14163,7 +14205,7 @@ static void dem2di_pair_look(const dem2d_world *world, int i, dem2di_count *coun
     dem2di_last_get(world, i, &last);
     contact.normal = last.contact.normal;
     dem2di_clear_beside(world, i);
-    int found = dem2di_pair_geometry(world, a, b, &last.contact, history, &contact, points, count);
+    int found = dem2di_collide_pair(world, a, b, &last.contact, history, &contact, points, count);
     if (found == 0) {
         dem2di_contact_apart(world, i, contact.normal);
         return;
@@ -14175,8 +14217,8 @@ static void dem2di_pair_look(const dem2d_world *world, int i, dem2di_count *coun
 }
 
 /* A particle at a half-plane: one support call, none for a circle. Returns the number of points. */
-static int dem2di_plane_geometry(const dem2d_world *world, int a, int wall, dem2di_contact *contact,
-                                 dem2d_contact_point points[2], dem2di_count *count) {
+static int dem2di_collide_plane(const dem2d_world *world, int a, int wall, dem2di_contact *contact,
+                                dem2d_contact_point points[2], dem2di_count *count) {
     const dem2di_body *body = &world->bodies[a];
     const dem2d_shape *shape = dem2di_shape_of(world, body);
     const dem2di_state *state = &world->now[a];
@@ -14206,10 +14248,10 @@ static int dem2di_plane_geometry(const dem2d_world *world, int a, int wall, dem2
 
 /* A particle at a segment: a pair, of which only what is near the particle counts, so that the
    search is as exact as for its neighbours. Points are on the segment. */
-static int dem2di_segment_geometry(const dem2d_world *world, int a, int wall,
-                                   const dem2di_contact *last, dem2di_history *history,
-                                   dem2di_contact *contact, dem2d_contact_point points[2],
-                                   dem2di_count *count) {
+static int dem2di_collide_segment(const dem2d_world *world, int a, int wall,
+                                  const dem2di_contact *last, dem2di_history *history,
+                                  dem2di_contact *contact, dem2d_contact_point points[2],
+                                  dem2di_count *count) {
     const dem2di_wall *w = &world->walls[wall];
     const dem2di_body *body = &world->bodies[a];
     const dem2di_state *state = &world->now[a];
@@ -14229,7 +14271,7 @@ static int dem2di_segment_geometry(const dem2d_world *world, int a, int wall,
     pair.d = dem2di_along(start, from + (to - from) / 2, along);
     pair.distance = dem2di_length(pair.d);
     pair.size = state->radius + pair.scale_b / 2 + pair.distance;
-    int found = dem2di_shapes_look(world, &pair, last, history, contact, points, &gap, count);
+    int found = dem2di_collide_shapes(world, &pair, last, history, contact, points, &gap, count);
     for (int k = 0; k < found; k++) {
         double depth = found == 2 ? points[k].depth : contact->depth;
         points[k].position = dem2di_along(points[k].position, -depth / 2, contact->normal);
@@ -14239,8 +14281,8 @@ static int dem2di_segment_geometry(const dem2d_world *world, int a, int wall,
 }
 
 /* Force of a contact with a wall whose geometry is known. */
-static void dem2di_touch_force(const dem2d_world *world, int i, const dem2di_last *last,
-                               dem2di_contact *contact, dem2di_count *count) {
+static void dem2di_wall_force(dem2d_world *world, int i, const dem2di_last *last,
+                              dem2di_contact *contact, dem2di_count *count) {
     bool two = dem2di_ends_of(world, &world->list.contacts, i) != NULL;
     if (world->faces == DEM2D_ONE_POINT) /* [P] fig. 4b: from the foot point to the middle */
         contact->arms.a_n += contact->depth / 2;
@@ -14249,8 +14291,8 @@ static void dem2di_touch_force(const dem2d_world *world, int i, const dem2di_las
 
 /* The same as for a pair, for a particle and a wall. Where segments are joined, forces come after
    all of the geometry. */
-static void dem2di_touch_look(const dem2d_world *world, int i, dem2di_count *count) {
-    const dem2di_list *list = &world->list;
+static void dem2di_update_wall_contact(dem2d_world *world, int i, dem2di_count *count) {
+    dem2di_list *list = &world->list;
     int a = list->keys[i].a, j = list->keys[i].b;
     bool segment = world->walls[j].desc.segment;
     dem2di_history *history = &list->contacts.history[i - list->discs];
@@ -14260,16 +14302,16 @@ static void dem2di_touch_look(const dem2d_world *world, int i, dem2di_count *cou
     dem2di_last_get(world, i, &last);
     contact.normal = last.contact.normal;
     dem2di_clear_beside(world, i);
-    int found = segment ? dem2di_segment_geometry(world, a, j, &last.contact, history, &contact,
-                                                  points, count)
-                        : dem2di_plane_geometry(world, a, j, &contact, points, count);
+    int found = segment ? dem2di_collide_segment(world, a, j, &last.contact, history, &contact,
+                                                 points, count)
+                        : dem2di_collide_plane(world, a, j, &contact, points, count);
     if (found == 0) {
         dem2di_contact_apart(world, i, contact.normal);
         return;
     }
     dem2di_contact_place(world, i, found, points, dem2di_vec(0, 0), &contact);
     contact.force = contact.shear = 0;
-    if (!segment || !world->plan.joints) dem2di_touch_force(world, i, &last, &contact, count);
+    if (!segment || !world->plan.joints) dem2di_wall_force(world, i, &last, &contact, count);
     dem2di_contact_put(list, i, &contact);
 }
 
@@ -14303,13 +14345,13 @@ static int dem2di_point_near(const dem2d_world *world, int i, dem2d_vec place) {
     return -1;
 }
 
-static bool dem2di_segment_touched(const dem2d_world *world, const dem2di_contacts *from, int i) {
+static bool dem2di_meets_segment(const dem2d_world *world, const dem2di_contacts *from, int i) {
     const dem2di_list *list = &world->list;
     return i >= list->pairs && world->walls[list->keys[i].b].desc.segment && from->depth[i] > 0;
 }
 
 /* A contact of two points keeps the other one. */
-static void dem2di_drop_point(const dem2d_world *world, int i, int point) {
+static void dem2di_drop_point(dem2d_world *world, int i, int point) {
     const dem2di_list *list = &world->list;
     const dem2di_contacts *contacts = &list->contacts;
     dem2di_ends *ends = &contacts->ends[i - list->discs];
@@ -14321,7 +14363,7 @@ static void dem2di_drop_point(const dem2d_world *world, int i, int point) {
 /* Two contacts of a particle with segments a < b: the one at the end of its segment yields to one
    along the side of the other, of two at the ends the second, of two points where faces meet on
    both sides of the joint both. Segments in line are one face, which has no point at the joint. */
-static void dem2di_joint_yield(const dem2d_world *world, int a, int b) {
+static void dem2di_joint_yield(dem2d_world *world, int a, int b) {
     const dem2di_list *list = &world->list;
     const int contact[2] = {a, b}, wall[2] = {list->keys[a].b, list->keys[b].b};
     int which[2], near[2];
@@ -14356,27 +14398,33 @@ static int dem2di_joint_source(const dem2d_world *world, int contact) {
     if (list->last.depth[contact] > 0) return contact;
     for (int k = list->own[key->a]; k < list->first[key->a + 1]; k++) {
         int other = list->adjacent[k];
-        if (dem2di_segment_touched(world, &list->last, other) &&
-            !dem2di_segment_touched(world, &list->contacts, other) &&
+        if (dem2di_meets_segment(world, &list->last, other) &&
+            !dem2di_meets_segment(world, &list->contacts, other) &&
             dem2di_segments_meet(world, key->b, list->keys[other].b, which, &at))
             return other;
     }
     return contact;
 }
 
-/* All contacts with segments, one after the other: few of any scene's. */
-static void dem2di_settle_joints(const dem2d_world *world, dem2di_count *count) {
+/* The resolve pass: of the contacts of a particle with joined segments, which count. One after the
+   other, as few of any scene's are at segments. */
+static void dem2di_resolve_joints(dem2d_world *world) {
     const dem2di_list *list = &world->list;
     for (int i = list->pairs; i < list->count; i++) {
         int a = list->keys[i].a;
-        if (!dem2di_segment_touched(world, &list->contacts, i)) continue;
+        if (!dem2di_meets_segment(world, &list->contacts, i)) continue;
         for (int k = list->own[a]; k < list->first[a + 1]; k++) {
             int other = list->adjacent[k];
-            if (other > i && dem2di_segment_touched(world, &list->contacts, i) &&
-                dem2di_segment_touched(world, &list->contacts, other))
+            if (other > i && dem2di_meets_segment(world, &list->contacts, i) &&
+                dem2di_meets_segment(world, &list->contacts, other))
                 dem2di_joint_yield(world, i, other);
         }
     }
+}
+
+/* The force pass of all contacts with segments, whose springs may be those of another contact. */
+static void dem2di_force_joints(dem2d_world *world, dem2di_count *count) {
+    dem2di_list *list = &world->list;
     for (int i = list->pairs; i < list->count; i++) {
         dem2di_contact contact;
         dem2di_last last;
@@ -14387,7 +14435,7 @@ static void dem2di_settle_joints(const dem2d_world *world, dem2di_count *count) 
             continue;
         }
         dem2di_last_from(world, &list->last, dem2di_joint_source(world, i), &last);
-        dem2di_touch_force(world, i, &last, &contact, count);
+        dem2di_wall_force(world, i, &last, &contact, count);
         dem2di_contact_put(list, i, &contact);
     }
 }
@@ -14395,32 +14443,32 @@ static void dem2di_settle_joints(const dem2d_world *world, dem2di_count *count) 
 /* May the two of a listed pair that is not of two circles have met since they were found apart? */
 static inline bool dem2di_may_meet(const dem2d_world *world, int i) {
     const dem2di_key *key = &world->list.keys[i];
-    double bound = world->list.contacts.history[i - world->list.discs].budget;
+    double bound = world->list.contacts.history[i - world->list.discs].bound;
     return !(world->travel[key->a] + world->travel[key->b] < bound);
 }
 
 /* Blocks of the three kinds of contacts, one kind after the other. */
-static void dem2di_contact_task(void *context, int begin, int end) {
+static void dem2di_force_task(void *context, int begin, int end) {
     dem2d_world *world = (dem2d_world *)context;
     const dem2di_list *list = &world->list;
     int discs = dem2di_blocks(list->discs, DEM2DI_BLOCK);
     for (int block = begin; block < end; block++) {
-        dem2di_count *count = &world->tallies[block].count;
+        dem2di_count *count = &world->block_results[block].count;
         bool round = block < discs;
         int size = round ? DEM2DI_BLOCK : DEM2DI_BLOCK_OTHERS;
         int first = round ? block * size : list->discs + (block - discs) * size;
         int last = dem2di_block_end(first, size, round ? list->discs : list->count);
         memset(count, 0, sizeof *count);
-        if (world->looks_back) dem2di_contacts_keep(world, first, last, false);
+        if (world->keeps_last) dem2di_contacts_keep(world, first, last, false);
         if (round) {
             dem2di_disc_range(world, first, last, count);
             continue;
         }
         for (int i = first; i < last; i++)
             if (i >= list->pairs)
-                dem2di_touch_look(world, i, count);
+                dem2di_update_wall_contact(world, i, count);
             else if (dem2di_may_meet(world, i))
-                dem2di_pair_look(world, i, count);
+                dem2di_update_pair(world, i, count);
     }
 }
 
@@ -14434,13 +14482,15 @@ static void dem2di_count_add(dem2di_count *sum, const dem2di_count *part) {
 }
 
 /* Geometry and forces of all contacts, over those of the last pass. */
-static void dem2di_contact_pass(dem2d_world *world, dem2di_count *count) {
+static void dem2di_force_pass(dem2d_world *world, dem2di_count *count) {
     const dem2di_list *list = &world->list;
     count->load = 0;
-    int blocks = dem2di_contact_blocks(list->discs, list->count);
-    dem2di_run(world, DEM2D_PHASE_CONTACTS, blocks, dem2di_contact_task, world);
-    for (int k = 0; k < blocks; k++) dem2di_count_add(count, &world->tallies[k].count);
-    if (world->plan.joints) dem2di_settle_joints(world, count);
+    int blocks = dem2di_force_blocks(list->discs, list->count);
+    dem2di_run(world, DEM2D_PHASE_CONTACTS, blocks, dem2di_force_task, world);
+    for (int k = 0; k < blocks; k++) dem2di_count_add(count, &world->block_results[k].count);
+    if (!world->plan.joints) return;
+    dem2di_resolve_joints(world);
+    dem2di_force_joints(world, count);
 }
 
 /* Part of the normal stiffness that the two points carry together. */
@@ -14485,9 +14535,9 @@ static DEM2DI_INLINE dem2di_load dem2di_gather(const dem2d_world *world, int slo
 }
 
 /* A particle a step later. */
-static DEM2DI_INLINE dem2di_state dem2di_next_state(const dem2d_world *world, int slot,
-                                                    const dem2di_damping *damping, bool heavy,
-                                                    bool damped, bool spin, bool turns) {
+static DEM2DI_INLINE dem2di_state dem2di_integrate(const dem2d_world *world, int slot,
+                                                   const dem2di_damping *damping, bool heavy,
+                                                   bool damped, bool spin, bool turns) {
     const double time_step = world->time_step;
     const dem2di_inverse *inverse = &world->inverse[slot];
     dem2di_state next = world->now[slot];
@@ -14515,7 +14565,7 @@ static DEM2DI_INLINE dem2di_state dem2di_next_state(const dem2d_world *world, in
 static dem2di_state dem2di_foresee(const dem2d_world *world, int slot) {
     dem2di_damping damping =
         dem2di_damping_make(world->local_damping, world->global_damping, world->time_step);
-    return dem2di_next_state(world, slot, &damping, true, true, true, world->plan.turns);
+    return dem2di_integrate(world, slot, &damping, true, true, true, world->plan.turns);
 }
 
 /* --- servo walls --------------------------------------------------------------------------------
@@ -14561,12 +14611,13 @@ static void dem2di_push_ask(const dem2d_world *world, int i, const dem2di_contac
                             double elastic, double *impedance, double *spring) {
     dem2di_last last;
     dem2di_last_from(world, &world->list.last, i, &last);
-    dem2di_meeting meeting = dem2di_meeting_make(world, i, &last.contact, contact);
-    double closing = meeting.closing, deeper = contact->depth / 16;
+    dem2di_relative_velocity relative =
+        dem2di_relative_velocity_of(world, i, &last.contact, contact);
+    double closing = relative.closing, deeper = contact->depth / 16;
     double faster = deeper / world->time_step;
     dem2d_law_output output;
-    meeting.closing += faster;
-    dem2di_ask_law(world, i, &last, &meeting, contact->normal, contact->depth + deeper, &output);
+    relative.closing += faster;
+    dem2di_ask_law(world, i, &last, &relative, contact->normal, contact->depth + deeper, &output);
     *impedance = dem2di_max((output.normal_force - contact->force) / faster, *impedance);
     *spring = contact->force - (*impedance - elastic) * closing;
 }
@@ -14705,7 +14756,7 @@ static double dem2di_servo_speed(dem2d_world *world, int j, int begin, int end) 
 
 /* New wall velocities and points; true when one has left the reach of the list. Contacts with walls
    are listed in the order of the walls. */
-static bool dem2di_wall_pass(dem2d_world *world) {
+static bool dem2di_control_pass(dem2d_world *world) {
     const dem2di_list *list = &world->list;
     bool stale = false;
     int begin = list->pairs, end;
@@ -14729,13 +14780,13 @@ static bool dem2di_wall_pass(dem2d_world *world) {
 
 /* New velocities and positions of the particles from begin to end, over the states of the last
    force pass. Returns the greatest square of speed over skin. */
-static DEM2DI_INLINE double dem2di_motion_range(const dem2d_world *world, int begin, int end,
-                                                bool heavy, bool damped, bool spin, bool turns) {
+static DEM2DI_INLINE double dem2di_integrate_range(dem2d_world *world, int begin, int end,
+                                                   bool heavy, bool damped, bool spin, bool turns) {
     dem2di_damping damping =
         dem2di_damping_make(world->local_damping, world->global_damping, world->time_step);
     double most = 0;
     for (int i = begin; i < end; i++) {
-        dem2di_state next = dem2di_next_state(world, i, &damping, heavy, damped, spin, turns);
+        dem2di_state next = dem2di_integrate(world, i, &damping, heavy, damped, spin, turns);
         if (turns)
             world->next_travel[i] = dem2di_travel(&next, world->lever[i], world->time_step,
                                                   world->travel[i] + world->rounding);
@@ -14746,42 +14797,42 @@ static DEM2DI_INLINE double dem2di_motion_range(const dem2d_world *world, int be
 }
 
 /* The loop for what the scene has. */
-static double dem2di_motion_block(const dem2d_world *w, int b, int e) {
+static double dem2di_integrate_block(dem2d_world *w, int b, int e) {
     const dem2di_plan *p = &w->plan;
-#define DEM2DI_MOTION(spin, turns)                                                    \
-    (p->heavy    ? p->damped ? dem2di_motion_range(w, b, e, true, true, spin, turns)  \
-                             : dem2di_motion_range(w, b, e, true, false, spin, turns) \
-        : p->damped ? dem2di_motion_range(w, b, e, false, true, spin, turns)          \
-                 : dem2di_motion_range(w, b, e, false, false, spin, turns))
-    if (p->turns) return DEM2DI_MOTION(true, true);
-    if (p->spin) return DEM2DI_MOTION(true, false);
-    return DEM2DI_MOTION(false, false);
-#undef DEM2DI_MOTION
+#define DEM2DI_INTEGRATE(spin, turns)                                                    \
+    (p->heavy    ? p->damped ? dem2di_integrate_range(w, b, e, true, true, spin, turns)  \
+                             : dem2di_integrate_range(w, b, e, true, false, spin, turns) \
+        : p->damped ? dem2di_integrate_range(w, b, e, false, true, spin, turns)          \
+                 : dem2di_integrate_range(w, b, e, false, false, spin, turns))
+    if (p->turns) return DEM2DI_INTEGRATE(true, true);
+    if (p->spin) return DEM2DI_INTEGRATE(true, false);
+    return DEM2DI_INTEGRATE(false, false);
+#undef DEM2DI_INTEGRATE
 }
 
-static void dem2di_motion_task(void *context, int begin, int end) {
+static void dem2di_integrate_task(void *context, int begin, int end) {
     dem2d_world *world = (dem2d_world *)context;
     for (int block = begin; block < end; block++) {
         int first = block * DEM2DI_BLOCK;
         int last = dem2di_block_end(first, DEM2DI_BLOCK, world->body_count);
-        world->tallies[block].most = dem2di_motion_block(world, first, last);
+        world->block_results[block].most = dem2di_integrate_block(world, first, last);
     }
 }
 
 /* Sums of forces, velocities and positions. Returns the part of a skin used up so far: path lengths
    are sums of speeds, here of the greatest for its skin in each step. */
-static double dem2di_motion_pass(dem2d_world *world) {
+static double dem2di_integrate_pass(dem2d_world *world) {
     int blocks = dem2di_blocks(world->body_count, DEM2DI_BLOCK);
     double most = 0;
     world->plan.heavy = world->gravity.x != 0 || world->gravity.y != 0;
     world->plan.damped = world->local_damping > 0 || world->global_damping > 0;
-    dem2di_run(world, DEM2D_PHASE_MOTION, blocks, dem2di_motion_task, world);
-    for (int k = 0; k < blocks; k++) most = dem2di_max(most, world->tallies[k].most);
+    dem2di_run(world, DEM2D_PHASE_MOTION, blocks, dem2di_integrate_task, world);
+    for (int k = 0; k < blocks; k++) most = dem2di_max(most, world->block_results[k].most);
     return world->worn + sqrt(most) * world->time_step + world->creep;
 }
 
 /* The rest of the ledger, after the motion: work at the velocities before and behind. */
-static void dem2di_book_motion(dem2d_world *world, const dem2di_ledger *last) {
+static void dem2di_observe_motion(dem2d_world *world, const dem2di_ledger *last) {
     dem2di_ledger *ledger = &world->ledger;
     double power[2][DEM2DI_HALVES] = {{0}};
     ledger->kinetic = 0;
@@ -14789,7 +14840,7 @@ static void dem2di_book_motion(dem2d_world *world, const dem2di_ledger *last) {
         int slot = world->names[index].slot;
         if (slot < 0) continue;
         dem2di_load load = dem2di_gather(world, slot, world->plan.spin);
-        dem2di_book_particle(world, slot, load, power, &ledger->kinetic);
+        dem2di_observe_particle(world, slot, load, power, &ledger->kinetic);
     }
     for (int j = 0; j < world->wall_count; j++) {
         const dem2di_wall_state *old = &world->wall_now[j], *made = &world->wall_next[j];
@@ -15020,10 +15071,10 @@ static void dem2di_check_task(void *context, int begin, int end) {
         int last = dem2di_block_end(first, DEM2DI_BLOCK, world->body_count);
         for (int i = first; i < last; i++)
             if (dem2di_outruns(world, i)) fast = dem2di_first_of(world, fast, i);
-        world->tallies[block].fast = fast;
+        world->block_results[block].fast = fast;
         if (world->check_time_step && !dem2di_is_soft(world, world->softness))
             dem2di_stiffest_range(world, world->now, first, last, false, enough,
-                                  &world->tallies[block].stiffest);
+                                  &world->block_results[block].stiffest);
     }
 }
 
@@ -15031,7 +15082,7 @@ static void dem2di_check_task(void *context, int begin, int end) {
 static bool dem2di_check_motions(const dem2d_world *world) {
     int fast = -1;
     for (int k = 0; k < dem2di_blocks(world->body_count, DEM2DI_BLOCK); k++)
-        fast = dem2di_first_of(world, fast, world->tallies[k].fast);
+        fast = dem2di_first_of(world, fast, world->block_results[k].fast);
     if (fast >= 0 && world->fast_motion == 0)
         (void)dem2di_fail(&world->env, DEM2D_WARNING, world->bodies[fast].index,
                           "particle %d moves by more than its inscribed radius in a step: it may "
@@ -15047,7 +15098,7 @@ static dem2d_result dem2di_check_stiffness(const dem2d_world *world, bool *slow)
     dem2di_stiffest all = {{0, 0}, {-1, -1}};
     for (int k = 0; k < dem2di_blocks(world->body_count, DEM2DI_BLOCK); k++)
         for (int bound = 0; bound < 2; bound++) {
-            const dem2di_stiffest *one = &world->tallies[k].stiffest;
+            const dem2di_stiffest *one = &world->block_results[k].stiffest;
             dem2di_stiffest_meet(world, &all, bound, one->value[bound], one->at[bound]);
         }
     int particle[2];
@@ -15107,7 +15158,7 @@ static void dem2di_commit(dem2d_world *world) {
 }
 
 /* Would the step give a particle or a wall a state that is not finite? */
-static dem2d_result dem2di_check_next(const dem2d_world *world, const dem2di_count *count) {
+static dem2d_result dem2di_check_states(const dem2d_world *world, const dem2di_count *count) {
     bool known = world->bounded && count->unsound == world->count.unsound;
     int slot = known || dem2di_surely_finite(world, count) ? -1 : dem2di_unsound(world);
     if (slot >= 0)
@@ -15122,9 +15173,8 @@ static dem2d_result dem2di_check_next(const dem2d_world *world, const dem2di_cou
     return DEM2D_OK;
 }
 
-/* The straight road: candidate pairs, contacts, walls, sums and motion; then commit. What can fail
-   does so before the motion, which comes over the states of the last force pass: only the contacts
-   have to be put back. */
+/* One step, pass by pass: see the head of the world's section. What can be refused is so before the
+   next states come over those of the last force pass: only the contacts have to be put back. */
 static dem2d_result dem2di_step(dem2d_world *world) {
     dem2di_count count = world->count;
     bool slow = false, fast = false, worn = false, listed;
@@ -15134,22 +15184,22 @@ static dem2d_result dem2di_step(dem2d_world *world) {
     bool due = dem2di_check_is_due(world);
     bool back = dem2di_looks_back(world, &world->plan, world->bounded, world->softness);
     if (back && !dem2di_keep_last(world)) return dem2di_out_of_memory(world, "contacts");
-    world->looks_back = back;
-    dem2di_contact_pass(world, &count);
+    world->keeps_last = back;
+    dem2di_force_pass(world, &count);
     if (due) result = dem2di_check_step(world, &slow, &fast);
     if (result == DEM2D_OK) {
         dem2di_wall_sums(world);
-        worn = dem2di_wall_pass(world);
-        result = dem2di_check_next(world, &count);
+        worn = dem2di_control_pass(world);
+        result = dem2di_check_states(world, &count);
     }
     if (result != DEM2D_OK) {
         if (back) dem2di_contacts_keep(world, 0, world->list.count, true);
         return result;
     }
     const dem2di_ledger ledger = world->ledger;
-    if (ledger.kept) dem2di_book_contacts(world); /* nothing fails from here on */
-    double path = dem2di_motion_pass(world);
-    if (ledger.kept) dem2di_book_motion(world, &ledger);
+    if (ledger.kept) dem2di_observe_contacts(world); /* nothing fails from here on */
+    double path = dem2di_integrate_pass(world);
+    if (ledger.kept) dem2di_observe_motion(world, &ledger);
     worn = worn || path > 1 - DEM2DI_LIST_STEPS * DBL_EPSILON ||
            world->steps - world->listed_at >= DEM2DI_LIST_STEPS;
     world->plan.full_made = world->plan.full_now;
@@ -15181,38 +15231,38 @@ DEM2D_API dem2d_result dem2d_world_step(dem2d_world *world, int count, int *done
    uses: config, math, memory, fields, mass, shapes, broad, law, motion, world, objects
    ============================================================================================ */
 
-/* A walk over the contacts of the last force pass in the order of their ids: those of particles, or
-   with `walls` those with walls. All else 0 at the start. */
-typedef struct dem2di_tour {
+/* An iterator over the contacts of the last force pass in the order of their ids: those of
+   particles, or with `walls` those with walls. All else 0 at the start. */
+typedef struct dem2di_contact_iterator {
     bool walls;
     int index, entry; /* where it goes on */
     int number;       /* where it is, and the contact there */
     dem2di_contact contact;
     dem2d_vec branch; /* from A's centre to B's; to a wall: the contact point */
-} dem2di_tour;
+} dem2di_contact_iterator;
 
-static bool dem2di_tour_next(const dem2d_world *world, dem2di_tour *walk) {
+static bool dem2di_next_contact(const dem2d_world *world, dem2di_contact_iterator *iterator) {
     const dem2di_list *list = &world->list;
-    for (; walk->index < world->name_count; walk->index++, walk->entry = 0) {
-        int slot = world->names[walk->index].slot;
+    for (; iterator->index < world->name_count; iterator->index++, iterator->entry = 0) {
+        int slot = world->names[iterator->index].slot;
         if (slot < 0) continue;
-        while (list->own[slot] + walk->entry < list->first[slot + 1]) {
-            int i = list->adjacent[list->own[slot] + walk->entry++];
-            if ((i >= list->pairs) != walk->walls) continue;
-            if (!dem2di_contact_get(world, &list->contacts, i, &walk->contact)) continue;
-            walk->number = i;
-            walk->branch = dem2di_branch_of(&walk->contact, walk->walls);
+        while (list->own[slot] + iterator->entry < list->first[slot + 1]) {
+            int i = list->adjacent[list->own[slot] + iterator->entry++];
+            if ((i >= list->pairs) != iterator->walls) continue;
+            if (!dem2di_contact_get(world, &list->contacts, i, &iterator->contact)) continue;
+            iterator->number = i;
+            iterator->branch = dem2di_branch_of(&iterator->contact, iterator->walls);
             return true;
         }
     }
     return false;
 }
 
-static dem2di_tour dem2di_tour_start(bool walls) {
-    dem2di_tour walk;
-    memset(&walk, 0, sizeof walk);
-    walk.walls = walls;
-    return walk;
+static dem2di_contact_iterator dem2di_first_contacts(bool walls) {
+    dem2di_contact_iterator iterator;
+    memset(&iterator, 0, sizeof iterator);
+    iterator.walls = walls;
+    return iterator;
 }
 
 static int dem2di_open_contacts(const dem2d_world *world, int begin, int end) {
@@ -15260,25 +15310,26 @@ DEM2D_API dem2d_result dem2d_world_particles(const dem2d_world *world, dem2d_par
     return DEM2D_OK;
 }
 
-static dem2d_contact_info dem2di_contact_of(const dem2d_world *world, const dem2di_tour *walk) {
-    const dem2di_key *key = &world->list.keys[walk->number];
-    const dem2di_contact *contact = &walk->contact;
+static dem2d_contact_info dem2di_contact_of(const dem2d_world *world,
+                                            const dem2di_contact_iterator *iterator) {
+    const dem2di_key *key = &world->list.keys[iterator->number];
+    const dem2di_contact *contact = &iterator->contact;
     dem2d_contact_info info;
     memset(&info, 0, sizeof info);
     info.a = dem2di_particle_id(world, key->a);
-    if (walk->walls)
+    if (iterator->walls)
         info.wall = dem2di_wall_id(world, key->b);
     else
         info.b = dem2di_particle_id(world, key->b);
     info.sign = 1;
     info.normal = contact->normal;
     info.point = dem2di_add(world->before[key->a].x, dem2di_arm_a(contact));
-    info.branch = walk->branch;
-    info.points = dem2di_ends_of(world, &world->list.contacts, walk->number) != NULL ? 2 : 1;
+    info.branch = iterator->branch;
+    info.points = dem2di_ends_of(world, &world->list.contacts, iterator->number) != NULL ? 2 : 1;
     info.depth = contact->depth;
     info.normal_force = contact->force;
     info.tangential_force = contact->shear;
-    const dem2di_extra *extra = dem2di_extra_of(world, &world->list.contacts, walk->number);
+    const dem2di_extra *extra = dem2di_extra_of(world, &world->list.contacts, iterator->number);
     info.moment = extra != NULL ? extra->moment : 0;
     return info;
 }
@@ -15291,9 +15342,9 @@ DEM2D_API dem2d_result dem2d_world_contacts(const dem2d_world *world, dem2d_cont
         return dem2di_fail(&world->env, DEM2D_OUT_OF_RANGE, -1, "capacity = %d", capacity);
     int open = 0;
     for (int wall = 0; wall < 2; wall++) {
-        dem2di_tour walk = dem2di_tour_start(wall == 1);
-        for (; dem2di_tour_next(world, &walk); open++)
-            if (open < capacity) contacts[open] = dem2di_contact_of(world, &walk);
+        dem2di_contact_iterator iterator = dem2di_first_contacts(wall == 1);
+        for (; dem2di_next_contact(world, &iterator); open++)
+            if (open < capacity) contacts[open] = dem2di_contact_of(world, &iterator);
     }
     *count = open;
     return DEM2D_OK;
@@ -15301,10 +15352,10 @@ DEM2D_API dem2d_result dem2d_world_contacts(const dem2d_world *world, dem2d_cont
 
 /* Energy in the springs of the contacts of particles, or with walls. */
 static void dem2di_spring_energy(const dem2d_world *world, bool walls, dem2d_energy *energy) {
-    dem2di_tour walk = dem2di_tour_start(walls);
-    while (dem2di_tour_next(world, &walk)) {
+    dem2di_contact_iterator iterator = dem2di_first_contacts(walls);
+    while (dem2di_next_contact(world, &iterator)) {
         dem2di_stored part =
-            dem2di_stored_in(world, &world->list.contacts, walk.number, &walk.contact);
+            dem2di_stored_in(world, &world->list.contacts, iterator.number, &iterator.contact);
         energy->normal += part.normal;
         energy->tangential += part.tangential;
         energy->rolling += part.rolling;
@@ -15375,9 +15426,9 @@ DEM2D_API dem2d_result dem2d_world_stress(const dem2d_world *world, double area,
     if (result != DEM2D_OK) return result;
     dem2d_stress sum = {0, 0, 0, 0};
     for (int wall = 0; wall < 2; wall++) {
-        dem2di_tour walk = dem2di_tour_start(wall == 1);
-        while (dem2di_tour_next(world, &walk))
-            dem2di_stress_add(&sum, walk.branch, dem2di_contact_force(&walk.contact));
+        dem2di_contact_iterator iterator = dem2di_first_contacts(wall == 1);
+        while (dem2di_next_contact(world, &iterator))
+            dem2di_stress_add(&sum, iterator.branch, dem2di_contact_force(&iterator.contact));
     }
     *stress = dem2di_stress_over(&sum, area);
     return DEM2D_OK;
@@ -15459,12 +15510,12 @@ DEM2D_API dem2d_result dem2d_world_packing(const dem2d_world *world, dem2d_packi
         area += dem2di_body_area(world, body);
     }
     for (int wall = 0; wall < 2; wall++) {
-        dem2di_tour walk = dem2di_tour_start(wall == 1);
-        while (dem2di_tour_next(world, &walk)) {
-            const dem2di_key *key = &world->list.keys[walk.number];
+        dem2di_contact_iterator iterator = dem2di_first_contacts(wall == 1);
+        while (dem2di_next_contact(world, &iterator)) {
+            const dem2di_key *key = &world->list.keys[iterator.number];
             double radius = dem2di_equivalent(world, key->a);
             if (!wall) radius = dem2di_min(radius, dem2di_equivalent(world, key->b));
-            double relative = walk.contact.depth / radius;
+            double relative = iterator.contact.depth / radius;
             greatest = dem2di_max(greatest, relative);
             if (wall) continue;
             overlap += relative;
@@ -15604,19 +15655,19 @@ typedef struct dem2di_fabric_sums {
 static dem2di_fabric_sums dem2di_fabric_sum(const dem2d_world *world, dem2d_anisotropy density) {
     dem2di_fabric_sums sums;
     dem2d_rot axis = dem2d_rot_make(density.direction);
-    dem2di_tour walk = dem2di_tour_start(false);
+    dem2di_contact_iterator iterator = dem2di_first_contacts(false);
     memset(&sums, 0, sizeof sums);
-    for (; dem2di_tour_next(world, &walk); sums.count++) {
-        const dem2di_contact *contact = &walk.contact;
+    for (; dem2di_next_contact(world, &iterator); sums.count++) {
+        const dem2di_contact *contact = &iterator.contact;
         dem2d_vec n = contact->normal;
         double weight = 1 + density.coefficient * dem2di_cos_twice(n, axis);
-        double length = dem2di_dot(walk.branch, n);
+        double length = dem2di_dot(iterator.branch, n);
         weight = dem2di_max(weight, DEM2DI_DENSITY_LEAST);
         sums.branch += length;
         sums.force += contact->force;
         dem2di_tensor_add(&sums.normals, 1, n, n);
         dem2di_tensor_add(&sums.branches, length / weight, n, n);
-        dem2di_tensor_add(&sums.branch_tangents, dem2di_cross(n, walk.branch) / weight, n,
+        dem2di_tensor_add(&sums.branch_tangents, dem2di_cross(n, iterator.branch) / weight, n,
                           dem2di_perp(n));
         dem2di_tensor_add(&sums.normal_forces, contact->force / weight, n, n);
         dem2di_tensor_add(&sums.tangential_forces, contact->shear / weight, n, dem2di_perp(n));
@@ -15704,22 +15755,24 @@ static void dem2di_bin_orientation(const dem2d_world *world, int bins, dem2d_rot
 }
 
 /* What a contact adds to its two bins. */
-static double dem2di_binned(const dem2di_tour *walk, dem2d_histogram kind) {
-    if (kind == DEM2D_HISTOGRAM_BRANCH) return dem2di_dot(walk->branch, walk->contact.normal);
-    if (kind == DEM2D_HISTOGRAM_NORMAL_FORCE) return walk->contact.force;
-    return walk->contact.shear;
+static double dem2di_binned(const dem2di_contact_iterator *iterator, dem2d_histogram kind) {
+    if (kind == DEM2D_HISTOGRAM_BRANCH)
+        return dem2di_dot(iterator->branch, iterator->contact.normal);
+    if (kind == DEM2D_HISTOGRAM_NORMAL_FORCE) return iterator->contact.force;
+    return iterator->contact.shear;
 }
 
 static void dem2di_bin_contacts(const dem2d_world *world, dem2d_histogram kind, int bins,
                                 int *counts, double *sums) {
-    dem2di_tour walk = dem2di_tour_start(false);
-    while (dem2di_tour_next(world, &walk)) {
-        dem2d_vec along = kind == DEM2D_HISTOGRAM_ALONG_BRANCH ? walk.branch : walk.contact.normal;
+    dem2di_contact_iterator iterator = dem2di_first_contacts(false);
+    while (dem2di_next_contact(world, &iterator)) {
+        dem2d_vec along =
+            kind == DEM2D_HISTOGRAM_ALONG_BRANCH ? iterator.branch : iterator.contact.normal;
         const dem2d_vec ways[2] = {along, dem2di_negate(along)};
         for (int i = 0; i < 2; i++) {
             int bin = dem2di_bin(ways[i], 2 * DEM2DI_PI, bins);
             counts[bin]++;
-            if (kind > DEM2D_HISTOGRAM_ALONG_BRANCH) sums[bin] += dem2di_binned(&walk, kind);
+            if (kind > DEM2D_HISTOGRAM_ALONG_BRANCH) sums[bin] += dem2di_binned(&iterator, kind);
         }
     }
 }
@@ -15773,9 +15826,9 @@ static double dem2di_mean_contact_force(const dem2d_world *world) {
     double sum = 0;
     int count = 0;
     for (int wall = 0; wall < 2; wall++) {
-        dem2di_tour walk = dem2di_tour_start(wall == 1);
-        for (; dem2di_tour_next(world, &walk); count++)
-            sum += dem2di_length(dem2di_contact_force(&walk.contact));
+        dem2di_contact_iterator iterator = dem2di_first_contacts(wall == 1);
+        for (; dem2di_next_contact(world, &iterator); count++)
+            sum += dem2di_length(dem2di_contact_force(&iterator.contact));
     }
     return count > 0 ? sum / count : 0;
 }
@@ -16122,22 +16175,23 @@ static const void *dem2di_hashed_row(const dem2d_world *w, const dem2di_column *
 /* Row of a column of contacts for a closed one of the last force pass, by ids; NULL: it has none.
  */
 static const void *dem2di_contact_row(const dem2d_world *w, const dem2di_column *column,
-                                      const dem2di_tour *walk, dem2di_row *made) {
+                                      const dem2di_contact_iterator *iterator, dem2di_row *made) {
     const dem2di_list *list = &w->list;
-    const dem2di_key *key = &list->keys[walk->number];
-    if (column->fields == dem2di_arms_fields) return &walk->contact.arms; /* circles have none */
+    const dem2di_key *key = &list->keys[iterator->number];
+    if (column->fields == dem2di_arms_fields)
+        return &iterator->contact.arms; /* circles have none */
     if (column->treatment & DEM2DI_STORED) {
         int begin = dem2di_contacts_begin(&w->plan, list->discs, list->count, column->group);
         const char *start = (const char *)dem2di_column_get(w, column);
-        if (walk->number < begin) return NULL;
-        const char *row = start + (size_t)(walk->number - begin) * column->size;
+        if (iterator->number < begin) return NULL;
+        const char *row = start + (size_t)(iterator->number - begin) * column->size;
         if (column->fields != dem2di_finite_field) return row;
         memcpy(&made->number, row, sizeof made->number);
         made->number += 0; /* not -0: a spring may have been there or not */
         return made;
     }
     made->key.a = w->bodies[key->a].index;
-    made->key.b = walk->walls ? -1 - key->b : w->bodies[key->b].index;
+    made->key.b = iterator->walls ? -1 - key->b : w->bodies[key->b].index;
     return made;
 }
 
@@ -16146,9 +16200,9 @@ static void dem2di_hash_contacts(dem2di_hashing *hashing) {
     dem2di_row made;
     uint64_t place = 0;
     for (int walls = 0; walls < 2; walls++) {
-        dem2di_tour walk = dem2di_tour_start(walls == 1);
-        for (; dem2di_tour_next(w, &walk); place++) {
-            const void *row = dem2di_contact_row(w, hashing->column, &walk, &made);
+        dem2di_contact_iterator iterator = dem2di_first_contacts(walls == 1);
+        for (; dem2di_next_contact(w, &iterator); place++) {
+            const void *row = dem2di_contact_row(w, hashing->column, &iterator, &made);
             if (row != NULL) dem2di_hash_row(hashing, place, row);
         }
     }
@@ -16698,7 +16752,7 @@ static void dem2di_finish_list(dem2di_loader *loader) {
     if (!dem2di_load_good(loader)) return;
     size_t step = dem2di_step_cut(w, NULL, list->discs, list->pairs, list->count, &w->plan, false);
     dem2di_load_room(loader, dem2di_adjacency_reserve(w, list->pairs, list->count) &&
-                                 dem2di_tallies_reserve(w, list->discs, list->count) &&
+                                 dem2di_block_results_reserve(w, list->discs, list->count) &&
                                  dem2di_scratch_reserve(w, step));
     if (!dem2di_load_good(loader)) return;
     dem2di_adjacency_make(w);
@@ -17097,10 +17151,10 @@ static void dem2di_draw_walls(const dem2d_world *world, const dem2di_view *view,
 
 /* Radius in pixels of the smaller particle of a contact. */
 static double dem2di_drawn_radius(const dem2d_world *world, const dem2di_view *view,
-                                  const dem2di_tour *walk) {
-    const dem2di_key *key = &world->list.keys[walk->number];
+                                  const dem2di_contact_iterator *iterator) {
+    const dem2di_key *key = &world->list.keys[iterator->number];
     double radius = dem2di_equivalent(world, key->a);
-    if (!walk->walls) radius = dem2di_min(radius, dem2di_equivalent(world, key->b));
+    if (!iterator->walls) radius = dem2di_min(radius, dem2di_equivalent(world, key->b));
     return radius * view->factor;
 }
 
@@ -17111,26 +17165,26 @@ static void dem2di_draw_chains(const dem2d_world *world, const dem2di_view *view
                                dem2di_writer *writer) {
     double sum = 0, radii = 0;
     int open = 0;
-    dem2di_tour walk = dem2di_tour_start(false);
-    for (; dem2di_tour_next(world, &walk); open++) {
-        sum += walk.contact.force;
-        radii += dem2di_drawn_radius(world, view, &walk);
+    dem2di_contact_iterator iterator = dem2di_first_contacts(false);
+    for (; dem2di_next_contact(world, &iterator); open++) {
+        sum += iterator.contact.force;
+        radii += dem2di_drawn_radius(world, view, &iterator);
     }
     double usual = open > 0 ? dem2di_min(view->width / 400, radii / open / 4) : 0;
     double unit = sum > 0 ? usual * open / sum : 0;
     dem2di_print(writer, "<g stroke=\"#7a0019\" stroke-opacity=\"0.75\" "
                          "stroke-linecap=\"round\">\n");
     for (int wall = 0; wall < 2; wall++) {
-        walk = dem2di_tour_start(wall == 1);
-        while (dem2di_tour_next(world, &walk)) {
-            const dem2di_key *key = &world->list.keys[walk.number];
-            dem2d_vec start = world->before[key->a].x, end = dem2di_add(start, walk.branch);
-            double most = dem2di_drawn_radius(world, view, &walk);
+        iterator = dem2di_first_contacts(wall == 1);
+        while (dem2di_next_contact(world, &iterator)) {
+            const dem2di_key *key = &world->list.keys[iterator.number];
+            dem2d_vec start = world->before[key->a].x, end = dem2di_add(start, iterator.branch);
+            double most = dem2di_drawn_radius(world, view, &iterator);
             if (dem2di_off_view(world, view, key->a) &&
-                (walk.walls || dem2di_off_view(world, view, key->b)))
+                (iterator.walls || dem2di_off_view(world, view, key->b)))
                 continue;
             dem2di_draw_line(dem2di_pixel(view, start), dem2di_pixel(view, end),
-                             dem2di_min(walk.contact.force * unit, most), writer);
+                             dem2di_min(iterator.contact.force * unit, most), writer);
         }
     }
     dem2di_print(writer, "</g>\n");
@@ -17218,10 +17272,10 @@ DEM2D_API dem2d_result dem2d_world_write_svg(const dem2d_world *world, const dem
 typedef struct dem2di_item {
     dem2d_vtp_part part;
     int outline_points;
-    dem2d_box box;    /* of the scene, for walls */
-    int index;        /* the next particle or wall */
-    int slot;         /* of the particle, or number of the wall */
-    dem2di_tour walk; /* contacts of particles, then with walls */
+    dem2d_box box;                    /* of the scene, for walls */
+    int index;                        /* the next particle or wall */
+    int slot;                         /* of the particle, or number of the wall */
+    dem2di_contact_iterator iterator; /* contacts of particles, then with walls */
 } dem2di_item;
 
 static dem2di_item dem2di_item_start(const dem2d_world *world, const dem2d_vtp_desc *desc) {
@@ -17230,7 +17284,7 @@ static dem2di_item dem2di_item_start(const dem2d_world *world, const dem2d_vtp_d
     item.part = desc->part;
     item.outline_points = desc->outline_points;
     if (desc->part == DEM2D_VTP_WALLS) item.box = dem2di_scene_box(world, false);
-    item.walk = dem2di_tour_start(false);
+    item.iterator = dem2di_first_contacts(false);
     return item;
 }
 
@@ -17240,10 +17294,10 @@ static bool dem2di_item_next(const dem2d_world *world, dem2di_item *item) {
         return item->slot >= 0;
     }
     if (item->part == DEM2D_VTP_CONTACTS) {
-        if (dem2di_tour_next(world, &item->walk)) return true;
-        if (item->walk.walls) return false;
-        item->walk = dem2di_tour_start(true);
-        return dem2di_tour_next(world, &item->walk);
+        if (dem2di_next_contact(world, &item->iterator)) return true;
+        if (item->iterator.walls) return false;
+        item->iterator = dem2di_first_contacts(true);
+        return dem2di_next_contact(world, &item->iterator);
     }
     for (; item->index < world->wall_count; item->index++) {
         if (!world->walls[item->index].alive) continue;
@@ -17328,13 +17382,13 @@ static void dem2di_particle_numbers(const dem2d_world *world, int slot, double *
     memcpy(numbers, all, sizeof all);
 }
 
-static void dem2di_contact_numbers(const dem2d_world *world, const dem2di_tour *walk,
-                                   double *numbers) {
-    dem2d_contact_info info = dem2di_contact_of(world, walk);
-    dem2d_vec force = dem2di_contact_force(&walk->contact);
+static void dem2di_contact_numbers(const dem2d_world *world,
+                                   const dem2di_contact_iterator *iterator, double *numbers) {
+    dem2d_contact_info info = dem2di_contact_of(world, iterator);
+    dem2d_vec force = dem2di_contact_force(&iterator->contact);
     const double all[] = {(double)info.a.index,
-                          walk->walls ? -1 : (double)info.b.index,
-                          walk->walls ? (double)info.wall.index : -1,
+                          iterator->walls ? -1 : (double)info.b.index,
+                          iterator->walls ? (double)info.wall.index : -1,
                           (double)info.points,
                           info.normal.x,
                           info.normal.y,
@@ -17366,7 +17420,7 @@ static void dem2di_item_numbers(const dem2d_world *world, const dem2di_item *ite
     if (item->part == DEM2D_VTP_PARTICLES)
         dem2di_particle_numbers(world, item->slot, numbers);
     else if (item->part == DEM2D_VTP_CONTACTS)
-        dem2di_contact_numbers(world, &item->walk, numbers);
+        dem2di_contact_numbers(world, &item->iterator, numbers);
     else
         dem2di_wall_numbers(world, item->slot, numbers);
 }
@@ -17397,8 +17451,8 @@ static void dem2di_item_put_points(const dem2d_world *world, const dem2di_item *
         return;
     }
     if (item->part == DEM2D_VTP_CONTACTS) {
-        ends[0] = world->before[world->list.keys[item->walk.number].a].x;
-        ends[1] = dem2di_add(ends[0], item->walk.branch);
+        ends[0] = world->before[world->list.keys[item->iterator.number].a].x;
+        ends[1] = dem2di_add(ends[0], item->iterator.branch);
     } else {
         (void)dem2di_wall_line(world, item->slot, &item->box, ends);
     }

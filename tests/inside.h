@@ -9,6 +9,8 @@ int inside_slot(const dem2d_world *world, int index);
 void inside_scatter(dem2d_world *world, bool scattered);
 /* Renew the list of pairs in the next step. */
 void inside_renew_list(dem2d_world *world);
+/* Do the invariants at the head of the world's section hold? Prints the first that does not. */
+bool inside_holds(const dem2d_world *world);
 /* Write to a file that is open for reading only; the result of closing it. */
 dem2d_result inside_write_in_vain(const char *path, bool *good);
 
@@ -24,6 +26,77 @@ void inside_scatter(dem2d_world *world, bool scattered) {
 
 void inside_renew_list(dem2d_world *world) {
     world->list_stale = true;
+}
+
+static bool inside_fail(const char *what, int at) {
+    fprintf(stderr, "invariant: %s (%d)\n", what, at);
+    return false;
+}
+
+static bool inside_lives(const dem2d_world *w, int slot) {
+    return slot >= 0 && slot < w->body_count && w->bodies[slot].shape_index >= 0;
+}
+
+static bool inside_ids_hold(const dem2d_world *w) {
+    for (int i = 0; i < w->name_count; i++) {
+        const int slot = w->names[i].slot;
+        if (slot >= 0 && (!inside_lives(w, slot) || w->bodies[slot].index != i))
+            return inside_fail("an id leads to another slot", i);
+    }
+    for (int slot = 0; slot < w->body_count; slot++)
+        if (inside_lives(w, slot) && w->names[w->bodies[slot].index].slot != slot)
+            return inside_fail("a slot leads to another id", slot);
+    return true;
+}
+
+static bool inside_contact_holds(const dem2d_world *w, int i) {
+    const dem2di_list *list = &w->list;
+    const dem2di_key *key = &list->keys[i];
+    const bool closed = list->contacts.depth[i] > 0;
+    dem2di_contact contact;
+    if (key->a < 0)
+        return (w->list_stale && !closed) || inside_fail("a forgotten contact is closed", i);
+    if (!inside_lives(w, key->a)) return inside_fail("A of a contact is gone", i);
+    if (i >= list->pairs && !(key->b < w->wall_count && w->walls[key->b].alive))
+        return inside_fail("a wall of a contact is gone", i);
+    if (i < list->pairs &&
+        !(inside_lives(w, key->b) && w->bodies[key->a].index < w->bodies[key->b].index))
+        return inside_fail("B of a contact is gone, or has the lower id", i);
+    (void)dem2di_contact_get(w, &list->contacts, i, &contact);
+    if (!closed && (contact.force != 0 || contact.shear != 0))
+        return inside_fail("two that are apart have a force", i);
+    if (closed && fabs(dem2di_length(contact.normal) - 1) > 1e-12)
+        return inside_fail("a normal is not of unit length", i);
+    if (!closed && dem2di_ends_of(w, &list->contacts, i) != NULL)
+        return inside_fail("two that are apart have points", i);
+    return true;
+}
+
+/* Each contact is once among those of each of its particles, first those of which it is B. */
+static bool inside_adjacency_holds(const dem2d_world *w) {
+    const dem2di_list *list = &w->list;
+    int listed = 0, entries = 0;
+    for (int i = 0; i < list->count; i++)
+        listed += list->keys[i].a < 0 ? 0 : i < list->pairs ? 2 : 1;
+    for (int slot = 0; slot < w->body_count; slot++) {
+        for (int k = list->first[slot]; k < list->first[slot + 1]; k++) {
+            const int i = list->adjacent[k];
+            if (i < 0 || i >= list->count) return inside_fail("no such contact", i);
+            if (list->keys[i].a < 0) continue;
+            const bool as_b = k < list->own[slot];
+            if ((as_b ? list->keys[i].b : list->keys[i].a) != slot || (as_b && i >= list->pairs))
+                return inside_fail("a contact of another particle", slot);
+            entries++;
+        }
+    }
+    return entries == listed || inside_fail("contacts of particles", entries - listed);
+}
+
+bool inside_holds(const dem2d_world *world) {
+    if (!inside_ids_hold(world) || !inside_adjacency_holds(world)) return false;
+    for (int i = 0; i < world->list.count; i++)
+        if (!inside_contact_holds(world, i)) return false;
+    return true;
 }
 
 dem2d_result inside_write_in_vain(const char *path, bool *good) {

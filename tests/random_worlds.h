@@ -1322,6 +1322,7 @@ static int world_perform(world_run *run, world_sight sights[MOST_STEPS]) {
         if (v->saved && world_once_in(&run->random, 6)) world_interrupt(run);
         for (; next < s->event_count && s->events[next].step == step; next++)
             world_event_apply(run, &s->events[next]);
+        if (!inside_holds(run->world)) world_fault(run, "an invariant fails after edits");
         if (v->saved && world_once_in(&run->random, 6)) world_interrupt(run);
         if (v->asked && world_once_in(&run->random, 6)) world_ask_and_fail(run);
         if (v->disturbed) world_disturb(run);
@@ -1329,6 +1330,7 @@ static int world_perform(world_run *run, world_sight sights[MOST_STEPS]) {
         world_look_before(run, &before);
         sights[step].result = world_step(run);
         world_see(run, &sights[step]);
+        if (!inside_holds(run->world)) world_fault(run, "an invariant fails after a step");
         if (!v->sums || sights[step].result != DEM2D_OK) continue;
         run->longest_step = fmax(run->longest_step, run->time_step);
         world_check_sums(run, &before);

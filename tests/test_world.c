@@ -1,6 +1,7 @@
 /* The world: what it refuses, what its objects do, balances of force, stress and energy, runs that
    repeat bit for bit, and failures in the middle of a step. */
 #include "dem2d.h"
+#include "inside.h"
 #include "testing.h"
 #include "world_scene.h"
 
@@ -40,8 +41,10 @@ static dem2d_wall_desc wall_desc(const scene *s, double x, double y, double nx, 
 
 static void run(dem2d_world *world, int count) {
     int done = -1;
+    assert_true(inside_holds(world));
     assert_ok(dem2d_world_step(world, count, &done));
     assert_int_equal(done, count);
+    assert_true(inside_holds(world));
 }
 
 static dem2d_particle_info particle(const dem2d_world *world, dem2d_particle_id id) {
