@@ -14155,27 +14155,34 @@ static inline void dem2di_force(dem2d_world *world, int i, const dem2di_last *la
 }
 
 /* Where contact i has its points, beside it when there are two; B's centre is at d. A circle has
-   its point on the line of the normal: at the middle of an overlap, and on a wall at the foot. */
+   its point on the line of the normal: at the middle of an overlap, and on a wall at the foot. Both
+   arms are of one point, so that the two torques and the forces' moment add up to nothing. */
 static DEM2DI_INLINE void dem2di_contact_place(dem2d_world *world, int i, int count,
                                                const dem2d_contact_point points[2], dem2d_vec d,
                                                dem2di_contact *contact) {
     const dem2di_list *list = &world->list;
     const dem2di_key *key = &list->keys[i];
-    bool wall = i >= list->pairs, turns = world->plan.turns; /* circles have a lever of 0 */
+    const bool wall = i >= list->pairs, turns = world->plan.turns; /* circles have a lever of 0 */
+    const bool circle_a = !turns || world->lever[key->a] == 0;
+    const bool circle_b = !wall && (!turns || world->lever[key->b] == 0);
+    const double depth = contact->depth;
     dem2di_arms *arms = &contact->arms;
     dem2d_vec point = points[0].position;
     if (count == 2) point = dem2di_ends_set(points, &list->contacts.ends[i - list->discs], contact);
-    dem2d_vec from_b = dem2di_sub(point, d);
+    const double along = dem2di_dot(contact->normal, d), across = dem2di_cross(contact->normal, d);
     arms->a_n = dem2di_dot(contact->normal, point);
     arms->a_t = dem2di_cross(contact->normal, point);
-    arms->b_n = wall ? 0 : dem2di_dot(contact->normal, from_b);
-    arms->b_t = wall ? 0 : dem2di_cross(contact->normal, from_b);
-    if (!turns || world->lever[key->a] == 0) {
-        arms->a_n = world->now[key->a].radius - (wall ? contact->depth : contact->depth / 2);
+    if (circle_a) {
+        arms->a_n = world->now[key->a].radius - (wall ? depth : depth / 2);
         arms->a_t = 0;
+    } else if (circle_b) {
+        arms->a_n = along - (world->now[key->b].radius - depth / 2);
+        arms->a_t = across;
     }
-    if (!wall && (!turns || world->lever[key->b] == 0)) {
-        arms->b_n = -(world->now[key->b].radius - contact->depth / 2);
+    arms->b_n = wall ? 0 : arms->a_n - along;
+    arms->b_t = wall ? 0 : arms->a_t - across;
+    if (circle_a && circle_b && world->solver != DEM2D_GJK_EPA) { /* as in the kernel of circles */
+        arms->b_n = -(world->now[key->b].radius - depth / 2);
         arms->b_t = 0;
     }
 }
