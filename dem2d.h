@@ -15971,9 +15971,10 @@ static dem2d_result dem2di_writer_close(const dem2d_env *env, const char *path,
        name, number of rows, number of fields;
        of each field the name, and how many numbers it has, plus 256 if they are doubles;
        row by row the numbers.
-   Columns and fields that are 0 all over are left out. A name that is not known here is an error
-   that tells it: a later version has written it, and its state must not be lost in silence. The
-   number of the version changes only when these rules do. */
+   Columns and fields that are 0 all over are left out. How many rows a column has is known from the
+   records before it. A name that is not known here is an error that tells it: a later version has
+   written it, and its state must not be lost in silence. The number of the version changes only
+   when these rules do. */
 #define DEM2DI_SNAPSHOT_MARK 0x0A0D64326D65648Du /* 8D "dem2d" 0D 0A */
 #define DEM2DI_SNAPSHOT_VERSION 4u
 #define DEM2DI_SNAPSHOT_HEAD 24 /* bytes: mark, version, size */
@@ -16603,9 +16604,9 @@ static void dem2di_load_record(dem2di_loader *loader) {
     if (!dem2di_load_good(loader)) return;
     const dem2di_column *column = record.column;
     uint64_t left = (uint64_t)(loader->end - loader->next) / 8;
-    int expected = dem2di_rows(record.object, column);
+    int expected = dem2di_rows(record.object, column); /* as the records before it say */
     record.rows = rows;
-    if (expected < 0 || rows != (uint64_t)expected || record.width == 0 ||
+    if (expected <= 0 || rows != (uint64_t)expected || record.width == 0 ||
         rows > left / record.width)
         dem2di_load_refuse(loader, DEM2D_FORMAT, "another number of rows", column->name, NULL);
     dem2di_load_zeros(loader, column, record.given);

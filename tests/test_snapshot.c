@@ -1138,6 +1138,29 @@ static void test_later(void **state) {
     }
 }
 
+/* How many rows there are is told before they come: columns that come without rows first, and are
+   then said to have some, would have no memory. */
+static void test_order(void **state) {
+    (void)state;
+    scene_bytes bytes = small_snapshot(SCENE_FULL), moved = small_snapshot(SCENE_FULL);
+    size_t to = 24;
+    for (int last = 0; last < 2; last++)
+        for (size_t at = 24; at < bytes.size - 8; at = record_at(&bytes, at).end) {
+            const record r = record_at(&bytes, at);
+            const dem2di_column *column = dem2di_columns;
+            while (column->name == NULL || strcmp(column->name, bytes.bytes + at) != 0) column++;
+            const bool setting = column->group == DEM2DI_WORLD;
+            if (setting != (last == 1) || column->group >= DEM2DI_SHAPE) continue;
+            const size_t count = (setting ? r.end : r.rows_at) - at;
+            memcpy(moved.bytes + to, bytes.bytes + at, count);
+            if (!setting) put_word(moved.bytes + to + 24, 0);
+            to += count;
+        }
+    moved.size = to + 8;
+    free(bytes.bytes);
+    check_refused(&moved, DEM2D_FORMAT, "rows");
+}
+
 /* Any byte changed and the checksum made right: refused, or a world that can be stepped. */
 static void test_crafted(void **state) {
     (void)state;
@@ -1471,6 +1494,7 @@ int main(void) {
         cmocka_unit_test(test_appended),
         cmocka_unit_test(test_layout),
         cmocka_unit_test(test_tables),
+        cmocka_unit_test(test_order),
         cmocka_unit_test(test_earlier),
         cmocka_unit_test(test_needed),
         cmocka_unit_test(test_later),
