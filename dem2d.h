@@ -100,6 +100,7 @@ LIMITS
       -freciprocal-math, -funsafe-math-optimizations. The header does not compile with them where
       the compiler defines a macro for them: gcc does for all, clang for -ffast-math and
       -ffinite-math-only.
+
 QUICK START (examples/hello.c, the same bytes)
 
     // Thirty grains of three shapes fall into a box and come to rest.
@@ -205,10 +206,10 @@ CONCEPTS
     List        The neighbour list (Verlet list) holds the pairs that are nearer than the sum of
                 their skins. It is rebuilt when a particle has moved as far as its skin. Skins are
                 tuned to the motion: thick skins list more pairs that are apart, thin ones cause
-                more rebuilds. A fast particle gets a thicker skin. Edits keep the list, unless a
-                particle or a wall comes, goes or leaves its skin, a fixed particle is freed or a
-                free one fixed, or the first friction, dashpot or rolling friction comes or the
-                last goes.
+                more rebuilds. A fast particle gets a thicker skin. Edits keep the list, except: a
+                particle or a wall is added, removed or moved out of its skin; a particle becomes
+                fixed or free; friction, a dashpot or rolling friction is set where no materials had
+                it, or removed from the last ones.
     Step        Positions are at step n, velocities half a step earlier (leapfrog). Contacts,
                 forces, energies and stresses are those of the last force evaluation ("force pass"):
                 at the positions before the last move. Kinetic energy is the mean of the two half
@@ -295,6 +296,7 @@ HOW TO
                          and the compiler drops those you do not call. One pair query takes about a
                          second to compile and 50 kB (gcc 12, -O2).
     check the version    dem2d_version() == DEM2D_VERSION: header and implementation agree.
+
 DIFFERENCES FROM THE PAPERS (same: as printed; corrected: the printed form has an error; improved:
 the default does better, and the paper's method is available where it is named; chosen: the paper
 leaves it open)
