@@ -10267,6 +10267,16 @@ typedef struct dem2di_finds {
     dem2di_key *to[2]; /* or NULL */
 } dem2di_finds;
 
+/* One more partner; circles or not. */
+static inline void dem2di_find_pair(dem2di_finds *finds, int other, bool circles) {
+    int kind = !circles;
+    if (finds->to[kind] != NULL) {
+        finds->to[kind][finds->count[kind]].a = finds->own;
+        finds->to[kind][finds->count[kind]].b = other;
+    }
+    finds->count[kind]++;
+}
+
 /* Find partners among the sorted discs from begin to end. */
 static inline void dem2di_grid_range(const dem2di_grid *grid, int begin, int end, int level,
                                      dem2di_finds *finds) {
@@ -10278,12 +10288,7 @@ static inline void dem2di_grid_range(const dem2di_grid *grid, int begin, int end
         double both = own->reach + other->reach;
         if (!(dem2di_dot(d, d) < both * both) || other->level != level) continue;
         if (own->fixed && other->fixed) continue;
-        int kind = !(own->circle && other->circle);
-        if (finds->to[kind] != NULL) {
-            finds->to[kind][finds->count[kind]].a = finds->own;
-            finds->to[kind][finds->count[kind]].b = j;
-        }
-        finds->count[kind]++;
+        dem2di_find_pair(finds, j, own->circle && other->circle);
     }
 }
 
@@ -12706,7 +12711,7 @@ DEM2D_API dem2d_result dem2d_world_set_time_step(dem2d_world *world, double time
 
 /* ============================================================================================
    >>list  The list of contacts: particles in the order of space, partners, what they remember
-   uses: config, math, gjk, broad, law, motion, world, objects
+   uses: config, math, broad, law, motion, world, objects
    ============================================================================================ */
 
 /* Parallel work is cut into blocks of so many items: enough to pay for a call of the callback's,
@@ -12999,28 +13004,6 @@ static bool dem2di_plan_fits(const dem2di_plan *one, const dem2di_plan *other) {
     return one->full == other->full && one->faces == other->faces && one->turns == other->turns;
 }
 
-/* How far apart the bounding circles of a listed pair are now. */
-static double dem2di_gap_now(const dem2d_world *world, int contact) {
-    const dem2di_key *key = &world->list.keys[contact];
-    const dem2di_state *a = &world->now[key->a], *b = &world->now[key->b];
-    return dem2di_length(dem2di_centre_line(a->x, b->x)) - (a->radius + b->radius);
-}
-
-/* The skin of a particle, wide enough for its contacts with others in the last force pass: they
-   stay listed for the queries, however far apart by now. */
-static double dem2di_skin_make(const dem2d_world *world, int slot) {
-    const dem2di_list *list = &world->list;
-    const dem2di_state *now = &world->now[slot];
-    double skin = dem2di_skin_of(world, now->radius, now->v);
-    for (int k = list->first[slot]; k < list->first[slot + 1]; k++) {
-        int contact = list->adjacent[k];
-        if (contact >= list->pairs || !(list->contacts.depth[contact] > 0)) continue;
-        double gap = dem2di_gap_now(world, contact);
-        if (gap > skin) skin = gap * (1 + DEM2DI_ROUNDOFF);
-    }
-    return skin;
-}
-
 static void dem2di_disc_task(void *context, int begin, int end) {
     dem2di_build *build = (dem2di_build *)context;
     dem2d_world *world = build->world;
@@ -13030,8 +13013,8 @@ static void dem2di_disc_task(void *context, int begin, int end) {
         for (int i = first; i < dem2di_block_end(first, DEM2DI_BLOCK, world->body_count); i++) {
             const dem2di_body *body = &world->bodies[i];
             dem2di_disc *disc = &build->grid.discs[i];
-            double skin =
-                dem2di_max(dem2di_skin_make(world, i), DEM2DI_ROUNDOFF * world->now[i].radius);
+            double skin = dem2di_max(dem2di_skin_of(world, world->now[i].radius, world->now[i].v),
+                                     DEM2DI_ROUNDOFF * world->now[i].radius);
             world->wear[i] = 1 / (skin * skin);
             disc->centre = world->now[i].x;
             disc->reach = world->now[i].radius + skin;
@@ -13090,12 +13073,28 @@ static int dem2di_find_walls(const dem2d_world *world, const dem2di_disc *disc, 
     return count;
 }
 
+/* The partners of a particle: those within both skins, and those that it was in contact with in the
+   last force pass and has left since, which stay listed for the queries and the ledger. */
+static void dem2di_find_partners(const dem2di_build *build, dem2di_finds *finds) {
+    const dem2di_list *list = &build->world->list;
+    const dem2di_disc *discs = build->grid.discs, *own = &discs[finds->own];
+    dem2di_grid_partners(&build->grid, finds);
+    for (int k = list->own[finds->own]; k < list->first[finds->own + 1]; k++) {
+        int contact = list->adjacent[k], b = list->keys[contact].b;
+        if (contact >= list->pairs || !(list->contacts.depth[contact] > 0)) continue;
+        dem2d_vec d = dem2di_sub(discs[b].centre, own->centre);
+        double both = own->reach + discs[b].reach;
+        if (dem2di_dot(d, d) < both * both) continue; /* the grid has found it */
+        dem2di_find_pair(finds, b, own->circle && discs[b].circle);
+    }
+}
+
 static void dem2di_count_task(void *context, int begin, int end) {
     const dem2di_build *build = (const dem2di_build *)context;
     int last = dem2di_block_end((end - 1) * DEM2DI_BLOCK, DEM2DI_BLOCK, build->grid.count);
     for (int i = begin * DEM2DI_BLOCK; i < last; i++) {
         dem2di_finds finds = {i, {0, 0}, {NULL, NULL}};
-        dem2di_grid_partners(&build->grid, &finds);
+        dem2di_find_partners(build, &finds);
         build->count[DEM2DI_DISCS][i] = finds.count[0];
         build->count[DEM2DI_OTHERS][i] = finds.count[1];
         build->count[DEM2DI_WALL_CONTACTS][i] =
@@ -13192,7 +13191,7 @@ static void dem2di_fill_task(void *context, int begin, int end) {
             finds.own = i;
             finds.to[0] = build->keys + build->count[DEM2DI_DISCS][i];
             finds.to[1] = build->keys + build->total[DEM2DI_DISCS] + build->count[DEM2DI_OTHERS][i];
-            dem2di_grid_partners(&build->grid, &finds);
+            dem2di_find_partners(build, &finds);
             for (int kind = 0; kind < 2; kind++)
                 for (int k = 0; k < finds.count[kind]; k++) {
                     dem2di_key *key = &finds.to[kind][k];
