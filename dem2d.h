@@ -1249,13 +1249,13 @@ typedef struct dem2d_law_input {
     dem2d_particle_id b;  ///< particle B; generation 0 when B is a wall
     dem2d_wall_id wall;   ///< wall B; generation 0 when B is a particle
     dem2d_vec normal;     ///< unit, from A to B
-    double time_step;     ///< s, of the last step: slip times it is the distance slid
+    double time_step;     ///< s, of the last step: sliding times it is the distance slid
     double depth;         ///< m, > 0
-    double closing;       ///< m/s, approach speed of A and B along the normal
+    double approach;      ///< m/s, approach speed of A and B along the normal
     /// m/s, sliding velocity of B relative to A along the normal turned by +90 degrees: mean of the
     /// step, see Sliding in the manual.
-    double slip;
-    double turning;          ///< rad/s, spin of B relative to A
+    double sliding;
+    double spin;             ///< rad/s, spin of B relative to A
     double mass;             ///< kg/m, reduced; 0 when neither is free
     double radius;           ///< m, reduced, of the equivalent radii
     double tangential_force; ///< N/m, in the step before; 0 for a new contact
@@ -1407,31 +1407,31 @@ typedef struct dem2d_contact_info {
     double normal_force;     ///< N/m, on B along the normal; >= 0 but by a caller's law
     double tangential_force; ///< N/m, on B along the normal turned by +90 degrees
     double moment;           ///< N, on B, against rolling
-    int part_a;              ///< part of A that touches: 0, as every particle has one part
+    int part_a;              ///< part of A in contact: 0, since every particle has one part
     int part_b;              ///< part of B, likewise
-    int shift[2]; ///< cells from A to the image of B: {0, 0}, as no direction is periodic
-    int feature;  ///< tells contacts of the same two parts apart: 0, as they have one
-    int sign;     ///< 1 where the contact adds its force, -1 where it takes it away: 1
+    int shift[2]; ///< cells from A to the image of B: {0, 0}, since no direction is periodic
+    int feature;  ///< distinguishes contacts of the same two parts: 0, since they have one
+    int sign;     ///< 1 if the force of the contact is added, -1 if it is subtracted: 1
 } dem2d_contact_info;
 
 /// Counters of a world.
 typedef struct dem2d_stats {
     int64_t steps;         ///< done since creation
     double time;           ///< s, the sum of their time steps
-    int64_t list_rebuilds; ///< of the pair list
+    int64_t list_rebuilds; ///< of the neighbour list
     int64_t support_calls; ///< in all steps
     int64_t collisions;  ///< of pairs whose bounding circles overlap and are not skipped, all steps
     int64_t separations; ///< collisions that found the pair separated
     int64_t proofs[DEM2D_PROOF_COUNT]; ///< number of the other collisions, by their proof
-    int64_t not_converged;             ///< contacts whose search reached its cap, in all steps
+    int64_t not_converged;             ///< contacts whose search reached its limit, in all steps
     int64_t slow_time_step;            ///< checks that found the time step above the safe bound
     int64_t fast_motion;               ///< checks that found a particle fast enough to pass others
-    int particles;                     ///< alive
-    int walls;                         ///< alive
-    int pairs;                         ///< in the list, walls included
+    int particles;                     ///< number of particles
+    int walls;                         ///< number of walls
+    int pairs;                         ///< in the neighbour list, walls included
     int contacts;                      ///< between particles in the last force pass
     int wall_contacts;                 ///< with walls in the last force pass
-    double skin;                       ///< of the list of pairs, of the particle radius
+    double skin;                       ///< of the neighbour list, of the particle radius
     size_t bytes;                      ///< in use, all of the world
 } dem2d_stats;
 
@@ -10562,7 +10562,7 @@ static inline void dem2di_arms_shift(dem2di_arms *arms, double by) {
 
 /* How two that touch move against each other. */
 typedef struct dem2di_relative_velocity {
-    double closing, slip, turning, mass; /* as in dem2d_law_input */
+    double approach, sliding, spin, mass; /* as in dem2d_law_input */
 } dem2di_relative_velocity;
 
 /* Coefficient of the dashpot, N s/m. */
@@ -10582,7 +10582,7 @@ static void dem2di_ends_damp(const dem2d_pair_desc *law, const dem2di_relative_v
                              dem2di_contact *contact) {
     double dashpot = dem2di_dashpot(law, relative->mass);
     for (int i = 0; i < 2; i++) {
-        double closing = relative->closing + relative->turning * ends->offset[i], spring = force[i];
+        double closing = relative->approach + relative->spin * ends->offset[i], spring = force[i];
         force[i] = dem2di_damped(spring, ends->weight[i] * dashpot, closing);
         viscous[i] = force[i] - spring;
     }
@@ -14058,11 +14058,11 @@ static dem2di_relative_velocity dem2di_relative_velocity_of(const dem2d_world *w
     double inverse = dem2di_reduced_inverse(world, i);
     dem2di_relative_motion motion = dem2di_motion_of(world, i);
     dem2di_relative_velocity relative;
-    relative.turning = motion.wb - motion.wa;
-    relative.closing = -dem2di_velocity_n(contact, &motion);
-    relative.slip = 0;
+    relative.spin = motion.wb - motion.wa;
+    relative.approach = -dem2di_velocity_n(contact, &motion);
+    relative.sliding = 0;
     if (dem2di_law_of(world, i)->friction > 0 || world->law != NULL)
-        relative.slip = dem2di_slip(last, contact, &motion);
+        relative.sliding = dem2di_slip(last, contact, &motion);
     relative.mass = inverse > 0 ? 1 / inverse : 0;
     return relative;
 }
@@ -14085,9 +14085,9 @@ static void dem2di_ask_law(const dem2d_world *world, int i, const dem2di_last *l
     input.normal = normal;
     input.time_step = world->made_step;
     input.depth = depth;
-    input.closing = relative->closing;
-    input.slip = relative->slip;
-    input.turning = relative->turning;
+    input.approach = relative->approach;
+    input.sliding = relative->sliding;
+    input.spin = relative->spin;
     input.mass = relative->mass;
     input.radius = dem2di_reduced_radius(world, i);
     input.tangential_force = last->contact.shear;
@@ -14121,17 +14121,17 @@ static void dem2di_full_force(dem2d_world *world, int i, const dem2di_last *last
         double force[2];
         dem2di_ends_press(law, ends, force);
         dem2di_ends_damp(law, &relative, force, extra->viscous, ends, contact);
-        dem2di_law_apply_ends(law, relative.slip, dt, force, &last->contact, &last->ends, ends,
+        dem2di_law_apply_ends(law, relative.sliding, dt, force, &last->contact, &last->ends, ends,
                               contact);
     } else {
         double spring = law->normal_stiffness * contact->depth;
         contact->force =
-            dem2di_damped(spring, dem2di_dashpot(law, relative.mass), relative.closing);
-        dem2di_law_apply(law, relative.slip, dt, last->contact.shear, contact);
+            dem2di_damped(spring, dem2di_dashpot(law, relative.mass), relative.approach);
+        dem2di_law_apply(law, relative.sliding, dt, last->contact.shear, contact);
         extra->viscous[0] = contact->force - spring;
     }
     if (law->rolling_friction > 0)
-        extra->moment = dem2di_rolling(law, dem2di_reduced_radius(world, i), relative.turning, dt,
+        extra->moment = dem2di_rolling(law, dem2di_reduced_radius(world, i), relative.spin, dt,
                                        contact->force, last->extra.moment);
 }
 
@@ -14621,10 +14621,10 @@ static void dem2di_push_ask(const dem2d_world *world, int i, const dem2di_contac
     dem2di_last_from(world, &world->list.last, i, &last);
     dem2di_relative_velocity relative =
         dem2di_relative_velocity_of(world, i, &last.contact, contact);
-    double closing = relative.closing, deeper = contact->depth / 16;
+    double closing = relative.approach, deeper = contact->depth / 16;
     double faster = deeper / world->time_step;
     dem2d_law_output output;
-    relative.closing += faster;
+    relative.approach += faster;
     dem2di_ask_law(world, i, &last, &relative, contact->normal, contact->depth + deeper, &output);
     *impedance = dem2di_max((output.normal_force - contact->force) / faster, *impedance);
     *spring = contact->force - (*impedance - elastic) * closing;
@@ -17797,7 +17797,8 @@ DEM2D_API dem2d_result dem2d_world_write_csv(const dem2d_world *world, const dem
             Writers: an SVG picture has a view, shows half-planes beside the grains, marks fixed and
             driven grains, and draws no chain wider than the grains. Numbers have a decimal point in
             every locale. desc may be NULL where all of it may be zero.
-            Names: dem2d_stats.looks -> collisions, gaps -> separations.
+            Names: dem2d_stats.looks -> collisions, gaps -> separations; dem2d_law_input.closing ->
+            approach, slip -> sliding, turning -> spin.
             Contacts are stored: queries read what the last force pass wrote. After
             dem2d_world_set_pair energies and bounds of the time step use the new properties at
             once. dem2d_contact_info has part_a, part_b, shift, feature and sign.

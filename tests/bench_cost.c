@@ -118,7 +118,7 @@ static void spring_law(void *user, const dem2d_law_input *in, dem2d_law_output *
     (void)user;
     const double force = in->pair.normal_stiffness * in->depth;
     const double limit = in->pair.friction * force;
-    double along = in->tangential_force - in->pair.tangential_stiffness * in->slip * in->time_step;
+    double along = in->tangential_force - in->pair.tangential_stiffness * in->sliding * in->time_step;
     if (along > limit) along = limit;
     if (along < -limit) along = -limit;
     out->normal_force = force, out->tangential_force = along;

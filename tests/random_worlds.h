@@ -533,12 +533,12 @@ static void world_law(void *user, const dem2d_law_input *in, dem2d_law_output *o
     const double spring = in->pair.normal_stiffness * in->depth;
     const double drag = 0.25 * sqrt(in->mass * in->pair.normal_stiffness);
     const double limit = in->pair.friction * spring;
-    const double slid = in->pair.tangential_stiffness * (in->slip * in->time_step);
+    const double slid = in->pair.tangential_stiffness * (in->sliding * in->time_step);
     const double shear = in->tangential_force - slid;
     (void)user;
-    out->normal_force = spring + drag * in->closing;
+    out->normal_force = spring + drag * in->approach;
     out->tangential_force = shear > limit ? limit : shear < -limit ? -limit : shear;
-    out->moment = -0.125 * drag * in->radius * (in->turning * in->radius);
+    out->moment = -0.125 * drag * in->radius * (in->spin * in->radius);
     out->energy = spring * in->depth / 2;
     out->state[0] = in->state[0] + 1;
 }

@@ -78,10 +78,10 @@ static dem2d_custom_desc scene_custom_desc(void) {
    that no compiler fuses them with a sum. */
 static void scene_law(void *user, const dem2d_law_input *in, dem2d_law_output *out) {
     volatile double spring = in->pair.normal_stiffness * in->depth;
-    volatile double dashpot = 20 * (in->mass * in->closing);
+    volatile double dashpot = 20 * (in->mass * in->approach);
     volatile double limit = in->pair.friction * spring;
-    volatile double slid = in->pair.tangential_stiffness * (in->slip * in->time_step);
-    volatile double turn = 0.001 * (spring * in->turning) * in->radius;
+    volatile double slid = in->pair.tangential_stiffness * (in->sliding * in->time_step);
+    volatile double turn = 0.001 * (spring * in->spin) * in->radius;
     double shear = in->tangential_force - slid;
     (void)user;
     out->normal_force = spring + dashpot;

@@ -852,7 +852,7 @@ typedef struct press_scene {
 static void untold_law(void *user, const dem2d_law_input *in, dem2d_law_output *out) {
     (void)user;
     const double kn = 2 * in->pair.normal_stiffness;
-    out->normal_force = fmax(0, kn * in->depth + 2 * 0.4 * sqrt(in->mass * kn) * in->closing);
+    out->normal_force = fmax(0, kn * in->depth + 2 * 0.4 * sqrt(in->mass * kn) * in->approach);
 }
 
 /* From now on the servo walls hold the target, or so many times as much, at such a top speed. */

@@ -167,9 +167,9 @@ static void same_law(void *user, const dem2d_law_input *in, dem2d_law_output *ou
     seen->greatest = fmax(seen->greatest, in->depth);
     if (!(in->depth > 0) || in->state[0] != out->state[0]) seen->bad = 1;
     out->normal_force =
-        in->pair.normal_stiffness * in->depth + seen->dashpot * in->mass * in->closing;
+        in->pair.normal_stiffness * in->depth + seen->dashpot * in->mass * in->approach;
     out->tangential_force =
-        in->tangential_force - in->pair.tangential_stiffness * in->slip * in->time_step;
+        in->tangential_force - in->pair.tangential_stiffness * in->sliding * in->time_step;
     out->tangential_force = fmax(-limit, fmin(limit, out->tangential_force));
     out->energy = in->pair.normal_stiffness * in->depth * in->depth / 2;
     if (in->pair.tangential_stiffness > 0)

@@ -319,11 +319,11 @@ static void add_chain(run *r) {
 static void own_law(void *user, const dem2d_law_input *in, dem2d_law_output *out) {
     const double spring = in->pair.normal_stiffness * in->depth, limit = 0.3 * spring;
     const double shear =
-        in->tangential_force - in->pair.tangential_stiffness * in->slip * in->time_step;
+        in->tangential_force - in->pair.tangential_stiffness * in->sliding * in->time_step;
     (void)user;
-    out->normal_force = spring + 30 * in->mass * in->closing;
+    out->normal_force = spring + 30 * in->mass * in->approach;
     out->tangential_force = shear > limit ? limit : shear < -limit ? -limit : shear;
-    out->moment = -1e-3 * in->radius * in->radius * in->turning * in->mass + 1e-6 * in->state[0];
+    out->moment = -1e-3 * in->radius * in->radius * in->spin * in->mass + 1e-6 * in->state[0];
     out->energy = spring * in->depth / 2;
     out->state[0] = in->state[0] + in->depth, out->state[1] = in->moment;
 }

@@ -64,11 +64,11 @@ static dem2d_shape *make_shape(int kind, double f) {
 static void own_law(void *user, const dem2d_law_input *in, dem2d_law_output *out) {
     const double spring = in->pair.normal_stiffness * in->depth, limit = 0.3 * spring;
     const double shear =
-        in->tangential_force - in->pair.tangential_stiffness * in->slip * in->time_step;
+        in->tangential_force - in->pair.tangential_stiffness * in->sliding * in->time_step;
     (void)user;
-    out->normal_force = spring + 300 * in->mass * in->closing;
+    out->normal_force = spring + 300 * in->mass * in->approach;
     out->tangential_force = shear > limit ? limit : shear < -limit ? -limit : shear;
-    out->moment = -in->radius * in->radius * in->turning * in->mass;
+    out->moment = -in->radius * in->radius * in->spin * in->mass;
     out->energy = (spring + in->pair.normal_stiffness * in->state[0] / 128) * in->depth / 2;
     out->state[0] = in->state[0] + in->depth;
 }

@@ -893,7 +893,7 @@ static void check_press(const servo_case *c) {
 static void untold_law(void *user, const dem2d_law_input *in, dem2d_law_output *out) {
     (void)user;
     const double kn = 2 * in->pair.normal_stiffness;
-    out->normal_force = fmax(0, kn * in->depth + 2 * 0.4 * sqrt(in->mass * kn) * in->closing);
+    out->normal_force = fmax(0, kn * in->depth + 2 * 0.4 * sqrt(in->mass * kn) * in->approach);
 }
 
 /* The dashpots of the contacts answer to the wall's own speed: a wall that knows the springs alone

@@ -30,7 +30,7 @@ static double *pulling; /* ratio of a dashpot that may pull; NULL: the library's
 
 static void pulling_law(void *user, const dem2d_law_input *in, dem2d_law_output *out) {
     const double zeta = *(const double *)user, k = in->pair.normal_stiffness;
-    out->normal_force = k * in->depth + 2 * zeta * sqrt(in->mass * k) * in->closing;
+    out->normal_force = k * in->depth + 2 * zeta * sqrt(in->mass * k) * in->approach;
 }
 
 /* One body falls on another without gravity, so that the first touch is inside a step. */
