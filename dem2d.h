@@ -872,7 +872,7 @@ typedef struct dem2d_difference {
     double coverage;  ///< 1 - area / area of the reference ([F] percent coverage, [P] accuracy
                       ///< score, as a fraction); negative if they hardly overlap
     double area;      ///< m2, of the symmetric difference
-    double hausdorff; ///< m, greatest distance of a point of one from the other's boundary
+    double hausdorff; ///< m, greatest distance of a corner of one from the other's boundary
 } dem2d_difference;
 
 /// Otsu's threshold of a picture's region: grains (or the background) have values below it; 0 for a
