@@ -10394,21 +10394,21 @@ typedef struct dem2di_history {
 
 /* The points of a contact of two. The contact holds their sums, as its normal that of the sum of
    the normal forces, and as its point their centre. All zero for a contact of one point. */
-typedef struct dem2di_ends {
+typedef struct dem2di_point_pair {
     double weight[2], depth[2];
     double offset[2]; /* along the tangent from the contact's point */
     double shear[2];
     double energy; /* m2: that in the normal springs over kn */
     int corner[2]; /* as in dem2d_contact_point */
-} dem2di_ends;
+} dem2di_point_pair;
 
 /* What the full law keeps of a contact: dashpot, rolling, the caller's law. All zero for one that
    is apart. */
-typedef struct dem2di_extra {
+typedef struct dem2di_law_state {
     double viscous[2];       /* parts of the points' normal forces that are not the springs', N/m */
     double moment;           /* on B, N */
     double energy, state[2]; /* of the caller's law */
-} dem2di_extra;
+} dem2di_law_state;
 
 /* How the two of a contact moved against each other in the step that was made, half a step before
    its force. */
@@ -10475,57 +10475,58 @@ static inline void dem2di_law_apply(const dem2d_pair_desc *law, double slip, dou
 }
 
 /* Are there two? One of them may be without force: deep in a face it could only pull. */
-static inline bool dem2di_ends_two(const dem2di_ends *ends) {
-    return ends->weight[0] > 0 || ends->weight[1] > 0;
+static inline bool dem2di_has_two_points(const dem2di_point_pair *pair) {
+    return pair->weight[0] > 0 || pair->weight[1] > 0;
 }
 
 /* The springs of the last step's points, handed on to those of this step. Each stays at its end of
    the common part, whichever shape's corner that is by now; where one end's corner is now that of
    the other end, both have changed sides, as a grain tips over it. A spring of one point is shared
    out by the normal forces, and one point has the sum of two. */
-static void dem2di_ends_hand_on(const dem2di_contact *last, const dem2di_ends *last_ends,
-                                const dem2di_ends *ends, const double force[2], double shear[2]) {
-    if (!dem2di_ends_two(last_ends)) {
+static void dem2di_point_pair_carry(const dem2di_contact *last, const dem2di_point_pair *last_pair,
+                                    const dem2di_point_pair *pair, const double force[2],
+                                    double shear[2]) {
+    if (!dem2di_has_two_points(last_pair)) {
         double sum = force[0] + force[1]; /* 0 where dashpots leave nothing */
         shear[1] = last->shear * (sum > 0 ? force[1] / sum : 0.5);
         shear[0] = last->shear - shear[1];
         return;
     }
     bool crossed =
-        ends->corner[0] == last_ends->corner[1] || ends->corner[1] == last_ends->corner[0];
-    shear[0] = last_ends->shear[crossed ? 1 : 0];
-    shear[1] = last_ends->shear[crossed ? 0 : 1];
+        pair->corner[0] == last_pair->corner[1] || pair->corner[1] == last_pair->corner[0];
+    shear[0] = last_pair->shear[crossed ? 1 : 0];
+    shear[1] = last_pair->shear[crossed ? 0 : 1];
 }
 
 /* Normal forces of two points. */
-static void dem2di_ends_press(const dem2d_pair_desc *law, const dem2di_ends *ends,
-                              double force[2]) {
-    for (int i = 0; i < 2; i++) force[i] = law->normal_stiffness * ends->weight[i] * ends->depth[i];
+static void dem2di_point_pair_press(const dem2d_pair_desc *law, const dem2di_point_pair *pair,
+                                    double force[2]) {
+    for (int i = 0; i < 2; i++) force[i] = law->normal_stiffness * pair->weight[i] * pair->depth[i];
 }
 
 /* The law for two points whose normal forces are known, both with the contact's slip: it depends on
    the height along the normal alone. */
-static void dem2di_law_apply_ends(const dem2d_pair_desc *law, double slip, double time_step,
-                                  const double force[2], const dem2di_contact *last,
-                                  const dem2di_ends *last_ends, dem2di_ends *ends,
-                                  dem2di_contact *contact) {
+static void dem2di_law_apply_two(const dem2d_pair_desc *law, double slip, double time_step,
+                                 const double force[2], const dem2di_contact *last,
+                                 const dem2di_point_pair *last_pair, dem2di_point_pair *pair,
+                                 dem2di_contact *contact) {
     contact->force = force[0] + force[1];
     contact->shear = 0;
-    dem2di_ends_hand_on(last, last_ends, ends, force, ends->shear);
+    dem2di_point_pair_carry(last, last_pair, pair, force, pair->shear);
     for (int i = 0; i < 2; i++) {
         double limit = law->friction * force[i];
         double shear =
-            ends->shear[i] - law->tangential_stiffness * ends->weight[i] * slip * time_step;
-        ends->shear[i] = dem2di_max(-limit, dem2di_min(limit, shear));
-        contact->shear += ends->shear[i];
+            pair->shear[i] - law->tangential_stiffness * pair->weight[i] * slip * time_step;
+        pair->shear[i] = dem2di_max(-limit, dem2di_min(limit, shear));
+        contact->shear += pair->shear[i];
     }
 }
 
 /* Normal, point (from A's centre) and depths of a contact of two points into the contact: those of
    the normal springs' resultant, whose moment is theirs. The normals are nearly parallel: as
    springs along the resultant both keep their parts of it. */
-static dem2d_vec dem2di_ends_set(const dem2d_contact_point points[2], dem2di_ends *ends,
-                                 dem2di_contact *contact) {
+static dem2d_vec dem2di_point_pair_set(const dem2d_contact_point points[2], dem2di_point_pair *pair,
+                                       dem2di_contact *contact) {
     dem2d_vec force[2], sum, u;
     double part[2], moment = 0;
     for (int i = 0; i < 2; i++) {
@@ -10542,12 +10543,12 @@ static dem2d_vec dem2di_ends_set(const dem2d_contact_point points[2], dem2di_end
     dem2d_vec t = dem2di_perp(contact->normal);
     point = dem2di_along(point, -moment / total, t);
     for (int i = 0; i < 2; i++) {
-        ends->weight[i] = points[i].weight * (total / both);
-        ends->depth[i] = points[i].depth;
-        ends->corner[i] = points[i].corner;
-        ends->offset[i] = dem2di_dot(dem2di_sub(points[i].position, point), t);
+        pair->weight[i] = points[i].weight * (total / both);
+        pair->depth[i] = points[i].depth;
+        pair->corner[i] = points[i].corner;
+        pair->offset[i] = dem2di_dot(dem2di_sub(points[i].position, point), t);
     }
-    ends->energy = points[0].energy + points[1].energy;
+    pair->energy = points[0].energy + points[1].energy;
     return point;
 }
 
@@ -10577,20 +10578,21 @@ static double dem2di_damped(double spring, double dashpot, double closing) {
 
 /* Normal forces of two points, each with its own closing speed, what dashpots have of them, and
    their new centre. */
-static void dem2di_ends_damp(const dem2d_pair_desc *law, const dem2di_relative_velocity *relative,
-                             double force[2], double viscous[2], dem2di_ends *ends,
-                             dem2di_contact *contact) {
+static void dem2di_point_pair_damp(const dem2d_pair_desc *law,
+                                   const dem2di_relative_velocity *relative, double force[2],
+                                   double viscous[2], dem2di_point_pair *pair,
+                                   dem2di_contact *contact) {
     double dashpot = dem2di_dashpot(law, relative->mass);
     for (int i = 0; i < 2; i++) {
-        double closing = relative->approach + relative->spin * ends->offset[i], spring = force[i];
-        force[i] = dem2di_damped(spring, ends->weight[i] * dashpot, closing);
+        double closing = relative->approach + relative->spin * pair->offset[i], spring = force[i];
+        force[i] = dem2di_damped(spring, pair->weight[i] * dashpot, closing);
         viscous[i] = force[i] - spring;
     }
     double sum = force[0] + force[1];
     if (!(sum > 0)) return;
-    double move = force[0] / sum * ends->offset[0] + force[1] / sum * ends->offset[1];
+    double move = force[0] / sum * pair->offset[0] + force[1] / sum * pair->offset[1];
     dem2di_arms_shift(&contact->arms, move);
-    for (int i = 0; i < 2; i++) ends->offset[i] -= move;
+    for (int i = 0; i < 2; i++) pair->offset[i] -= move;
 }
 
 /* Stiffness of the spring against rolling. */
@@ -10883,10 +10885,10 @@ typedef struct dem2di_push {
 /* Contacts in columns, one element for each pair of the list. */
 typedef struct dem2di_contacts {
     double *normal_x, *normal_y, *depth, *force, *shear;
-    dem2di_arms *arms;       /* all but circles: of contact i at i - discs */
-    dem2di_history *history; /* likewise */
-    dem2di_ends *ends;       /* likewise, where contacts may have two points */
-    dem2di_extra *extras;    /* likewise, with the full law */
+    dem2di_arms *arms;              /* all but circles: of contact i at i - discs */
+    dem2di_history *history;        /* likewise */
+    dem2di_point_pair *point_pairs; /* likewise, where contacts may have two points */
+    dem2di_law_state *law_states;   /* likewise, with the full law */
 } dem2di_contacts;
 
 /* The listed pairs: of two circles, of two other particles, of particles and walls (in the order of
@@ -11003,9 +11005,9 @@ typedef enum dem2di_group {
     DEM2DI_STARTS,  /* of the contacts of bodies, and the end of the last */
     DEM2DI_WALLS,
     DEM2DI_KEYS,
-    DEM2DI_GENERAL, /* all but circles */
-    DEM2DI_ENDS,    /* of these, where plan.faces */
-    DEM2DI_EXTRAS,  /* where plan.full */
+    DEM2DI_GENERAL,     /* all but circles */
+    DEM2DI_POINT_PAIRS, /* of these, where plan.faces */
+    DEM2DI_LAW_STATES,  /* where plan.full */
     DEM2DI_ADJACENCY,
     DEM2DI_BLOCK_RESULTS,
     DEM2DI_SCRATCH, /* lines */
@@ -11301,20 +11303,20 @@ static const dem2di_field dem2di_history_fields[] = {
     DEM2DI_SAVED("feature", dem2di_history, feature.own, DEM2DI_TAG),
     DEM2DI_SAVED("corners", dem2di_history, feature.corner, DEM2DI_TAG)};
 
-static const dem2di_field dem2di_ends_fields[] = {
-    DEM2DI_SAVED("weights", dem2di_ends, weight, DEM2DI_FINITE),
-    DEM2DI_SAVED("depths", dem2di_ends, depth, DEM2DI_FINITE),
-    DEM2DI_SAVED("offsets", dem2di_ends, offset, DEM2DI_FINITE),
-    DEM2DI_SAVED("shears", dem2di_ends, shear, DEM2DI_FINITE),
-    DEM2DI_SAVED("energy", dem2di_ends, energy, DEM2DI_FINITE),
-    DEM2DI_SAVED("corners", dem2di_ends, corner, DEM2DI_TAG)};
+static const dem2di_field dem2di_point_pair_fields[] = {
+    DEM2DI_SAVED("weights", dem2di_point_pair, weight, DEM2DI_FINITE),
+    DEM2DI_SAVED("depths", dem2di_point_pair, depth, DEM2DI_FINITE),
+    DEM2DI_SAVED("offsets", dem2di_point_pair, offset, DEM2DI_FINITE),
+    DEM2DI_SAVED("shears", dem2di_point_pair, shear, DEM2DI_FINITE),
+    DEM2DI_SAVED("energy", dem2di_point_pair, energy, DEM2DI_FINITE),
+    DEM2DI_SAVED("corners", dem2di_point_pair, corner, DEM2DI_TAG)};
 
 /* Energy and state are the caller's: anything. */
-static const dem2di_field dem2di_extra_fields[] = {
-    DEM2DI_SAVED("viscous_forces", dem2di_extra, viscous, DEM2DI_FINITE),
-    DEM2DI_SAVED("moment", dem2di_extra, moment, DEM2DI_FINITE),
-    DEM2DI_SAVED("energy", dem2di_extra, energy, DEM2DI_ANY_NUMBER),
-    DEM2DI_SAVED("state", dem2di_extra, state, DEM2DI_ANY_NUMBER)};
+static const dem2di_field dem2di_law_state_fields[] = {
+    DEM2DI_SAVED("viscous_forces", dem2di_law_state, viscous, DEM2DI_FINITE),
+    DEM2DI_SAVED("moment", dem2di_law_state, moment, DEM2DI_FINITE),
+    DEM2DI_SAVED("energy", dem2di_law_state, energy, DEM2DI_ANY_NUMBER),
+    DEM2DI_SAVED("state", dem2di_law_state, state, DEM2DI_ANY_NUMBER)};
 
 static const dem2di_field dem2di_any_field[] = {DEM2DI_PLAIN("value", double, DEM2DI_ANY_NUMBER)};
 static const dem2di_field dem2di_finite_field[] = {DEM2DI_PLAIN("value", double, DEM2DI_FINITE)};
@@ -11440,8 +11442,8 @@ static const dem2di_column dem2di_columns[] = {
     DEM2DI_CONTACT_COLUMN("shear_force", KEYS, shear, finite_field),
     DEM2DI_CONTACT_COLUMN("arms", GENERAL, arms, arms_fields),
     DEM2DI_COLUMN("histories", GENERAL, list.contacts.history, DEM2DI_STORED, history_fields),
-    DEM2DI_CONTACT_COLUMN("two_points", ENDS, ends, ends_fields),
-    DEM2DI_CONTACT_COLUMN("law_states", EXTRAS, extras, extra_fields),
+    DEM2DI_CONTACT_COLUMN("two_points", POINT_PAIRS, point_pairs, point_pair_fields),
+    DEM2DI_CONTACT_COLUMN("law_states", LAW_STATES, law_states, law_state_fields),
     DEM2DI_UNSAVED(ADJACENCY, list.adjacent, 0),
     DEM2DI_UNSAVED(BLOCK_RESULTS, block_results, 0),
     {NULL, DEM2DI_SCRATCH, offsetof(dem2d_world, scratch), DEM2DI_LINE, 0, NULL, 0},
@@ -11572,16 +11574,16 @@ static bool dem2di_list_reserve(dem2d_world *world, const dem2di_plan *plan, int
     if (old > others) others = old; /* they are read once more */
     return dem2di_group_reserve(world, DEM2DI_KEYS, count > list->count ? count : list->count) &&
            dem2di_group_reserve(world, DEM2DI_GENERAL, others) &&
-           dem2di_group_reserve(world, DEM2DI_ENDS, plan->faces ? others : 0) &&
-           dem2di_group_reserve(world, DEM2DI_EXTRAS, plan->full ? others : 0);
+           dem2di_group_reserve(world, DEM2DI_POINT_PAIRS, plan->faces ? others : 0) &&
+           dem2di_group_reserve(world, DEM2DI_LAW_STATES, plan->full ? others : 0);
 }
 
 /* The first of so many contacts that has an element in the columns of a group, or none has. */
 static int dem2di_contacts_begin(const dem2di_plan *plan, int discs, int count,
                                  dem2di_group group) {
     if (group == DEM2DI_KEYS) return 0;
-    if (group == DEM2DI_ENDS && !plan->faces) return count;
-    return group == DEM2DI_EXTRAS && !plan->full ? count : discs;
+    if (group == DEM2DI_POINT_PAIRS && !plan->faces) return count;
+    return group == DEM2DI_LAW_STATES && !plan->full ? count : discs;
 }
 
 /* The column of list.last that is as this one of list.contacts. */
@@ -12015,8 +12017,8 @@ DEM2D_API dem2d_result dem2d_world_add_particle(dem2d_world *world, const dem2d_
 static inline void dem2di_clear_beside(dem2d_world *world, int i) {
     const dem2di_contacts *contacts = &world->list.contacts;
     int at = i - world->list.discs;
-    if (world->plan.faces) memset(&contacts->ends[at], 0, sizeof *contacts->ends);
-    if (world->plan.full) memset(&contacts->extras[at], 0, sizeof *contacts->extras);
+    if (world->plan.faces) memset(&contacts->point_pairs[at], 0, sizeof *contacts->point_pairs);
+    if (world->plan.full) memset(&contacts->law_states[at], 0, sizeof *contacts->law_states);
 }
 
 /* A contact ends: its pair is apart, and leaves with the next list. */
@@ -12173,44 +12175,44 @@ static inline void dem2di_contact_put(dem2di_list *list, int i, const dem2di_con
 }
 
 /* The points of a contact that has two, else NULL. */
-static const dem2di_ends *dem2di_ends_of(const dem2d_world *world, const dem2di_contacts *from,
-                                         int i) {
+static const dem2di_point_pair *dem2di_point_pair_of(const dem2d_world *world,
+                                                     const dem2di_contacts *from, int i) {
     if (!world->plan.faces || i < world->list.discs) return NULL;
-    const dem2di_ends *ends = &from->ends[i - world->list.discs];
-    return dem2di_ends_two(ends) ? ends : NULL;
+    const dem2di_point_pair *pair = &from->point_pairs[i - world->list.discs];
+    return dem2di_has_two_points(pair) ? pair : NULL;
 }
 
 /* What the full law keeps of a contact; NULL without it. */
-static const dem2di_extra *dem2di_extra_of(const dem2d_world *world, const dem2di_contacts *from,
-                                           int i) {
-    return world->plan.full ? &from->extras[i - world->list.discs] : NULL;
+static const dem2di_law_state *dem2di_law_state_of(const dem2d_world *world,
+                                                   const dem2di_contacts *from, int i) {
+    return world->plan.full ? &from->law_states[i - world->list.discs] : NULL;
 }
 
 /* Energy in the springs of a contact that is closed, by the law that its materials have now. */
 static dem2di_stored dem2di_stored_in(const dem2d_world *world, const dem2di_contacts *from, int i,
                                       const dem2di_contact *contact) {
     const dem2d_pair_desc *law = dem2di_law_of(world, i);
-    const dem2di_ends *ends = dem2di_ends_of(world, from, i);
-    const dem2di_extra *extra = dem2di_extra_of(world, from, i);
+    const dem2di_point_pair *pair = dem2di_point_pair_of(world, from, i);
+    const dem2di_law_state *law_state = dem2di_law_state_of(world, from, i);
     double kn = law->normal_stiffness, kt = law->tangential_stiffness, spring = contact->force;
     dem2di_stored stored = {0, 0, 0};
-    if (extra != NULL) {
-        stored.normal = extra->energy;
+    if (law_state != NULL) {
+        stored.normal = law_state->energy;
         if (world->law != NULL) return stored;
-        if (extra->moment != 0 && kt > 0) {
+        if (law_state->moment != 0 && kt > 0) {
             double kr = dem2di_rolling_stiffness(law, dem2di_reduced_radius(world, i));
-            stored.rolling = extra->moment * (extra->moment / kr) / 2;
+            stored.rolling = law_state->moment * (law_state->moment / kr) / 2;
         }
-        spring -= extra->viscous[0];
+        spring -= law_state->viscous[0];
     }
-    if (ends == NULL) {
+    if (pair == NULL) {
         stored.normal = spring * contact->depth / 2;
         if (kt > 0) stored.tangential = contact->shear * (contact->shear / kt) / 2;
         return stored;
     }
-    stored.normal = kn * ends->energy;
+    stored.normal = kn * pair->energy;
     for (int k = 0; k < 2 && kt > 0; k++) {
-        double weight = ends->weight[k], shear = ends->shear[k];
+        double weight = pair->weight[k], shear = pair->shear[k];
         if (weight > 0) stored.tangential += shear * (shear / (weight * kt)) / 2;
     }
     return stored;
@@ -12231,8 +12233,8 @@ static dem2di_load dem2di_load_of(const dem2d_world *world, int slot) {
         bool is_b = k < list->own[slot];
         dem2di_contact contact;
         if (!dem2di_contact_get(world, &list->contacts, i, &contact)) continue;
-        const dem2di_extra *extra = dem2di_extra_of(world, &list->contacts, i);
-        double moment = extra != NULL ? extra->moment : 0;
+        const dem2di_law_state *law_state = dem2di_law_state_of(world, &list->contacts, i);
+        double moment = law_state != NULL ? law_state->moment : 0;
         dem2d_vec force = dem2di_contact_force(&contact);
         sum.force = dem2di_along(sum.force, is_b ? 1 : -1, force);
         sum.torque += is_b ? dem2di_torque_b(&contact, moment) : dem2di_torque_a(&contact, moment);
@@ -13612,16 +13614,16 @@ static inline dem2di_relative_motion dem2di_motion_of(const dem2d_world *world, 
    depth: the force ends where it opens. */
 static double dem2di_dashpot_work(const dem2d_world *world, const dem2di_contacts *from, int i,
                                   double depth, double closing, double turning) {
-    const dem2di_extra *extra = dem2di_extra_of(world, from, i);
-    const dem2di_ends *ends = dem2di_ends_of(world, from, i);
+    const dem2di_law_state *law_state = dem2di_law_state_of(world, from, i);
+    const dem2di_point_pair *pair = dem2di_point_pair_of(world, from, i);
     double work = 0;
-    if (extra == NULL) return 0;
-    for (int k = 0; k < (ends != NULL ? 2 : 1); k++) {
-        double offset = ends != NULL ? ends->offset[k] : 0;
+    if (law_state == NULL) return 0;
+    for (int k = 0; k < (pair != NULL ? 2 : 1); k++) {
+        double offset = pair != NULL ? pair->offset[k] : 0;
         double way = (closing + turning * offset) * world->made_step;
-        if (ends != NULL) depth = ends->depth[k];
+        if (pair != NULL) depth = pair->depth[k];
         if (from == &world->list.last) way = dem2di_max(-depth, way);
-        work += extra->viscous[k] * way / 2;
+        work += law_state->viscous[k] * way / 2;
     }
     return work;
 }
@@ -13644,7 +13646,7 @@ static void dem2di_observe_contact(const dem2d_world *world, int i, dem2di_ledge
         closed[k] = dem2di_contact_get(world, pass[k], i, &contact);
         if (!closed[k]) continue;
         double closing = -dem2di_velocity_n(&contact, &motion);
-        const dem2di_extra *extra = dem2di_extra_of(world, pass[k], i);
+        const dem2di_law_state *law_state = dem2di_law_state_of(world, pass[k], i);
         dem2di_stored stored = dem2di_stored_in(world, pass[k], i, &contact);
         if (k == 1) dem2di_stored_add(&ledger->stored, stored, 1);
         dem2di_stored_add(&gained, stored, k == 1 ? 1 : -1);
@@ -13652,7 +13654,7 @@ static void dem2di_observe_contact(const dem2d_world *world, int i, dem2di_ledge
         shear += contact.shear / 2;
         force += contact.force / 2;
         deeper += k == 1 ? contact.depth : -contact.depth;
-        if (extra != NULL) moment += extra->moment / 2;
+        if (law_state != NULL) moment += law_state->moment / 2;
         ledger->sum[DEM2DI_DASHED] +=
             dem2di_dashpot_work(world, pass[k], i, contact.depth, closing, turning);
     }
@@ -14010,8 +14012,8 @@ static int dem2di_collide_pair(const dem2d_world *world, int a, int b, const dem
    another one that it took over from, across a joint of segments. */
 typedef struct dem2di_last {
     dem2di_contact contact;
-    dem2di_ends ends;   /* where contacts may have two points */
-    dem2di_extra extra; /* with the full law */
+    dem2di_point_pair pair;     /* where contacts may have two points */
+    dem2di_law_state law_state; /* with the full law */
 } dem2di_last;
 
 static inline void dem2di_last_from(const dem2d_world *world, const dem2di_contacts *from, int i,
@@ -14022,8 +14024,8 @@ static inline void dem2di_last_from(const dem2d_world *world, const dem2di_conta
     last->contact.depth = from->depth[i];
     last->contact.shear = from->shear[i];
     last->contact.arms = from->arms[at];
-    if (world->plan.faces) last->ends = from->ends[at];
-    if (world->plan.full) last->extra = from->extras[at];
+    if (world->plan.faces) last->pair = from->point_pairs[at];
+    if (world->plan.full) last->law_state = from->law_states[at];
 }
 
 static inline void dem2di_last_get(const dem2d_world *world, int i, dem2di_last *last) {
@@ -14040,11 +14042,11 @@ static inline void dem2di_spring_force(dem2d_world *world, int i, const dem2di_l
         slip = dem2di_slip(&last->contact, contact, &motion);
     }
     if (two) {
-        dem2di_ends *ends = &world->list.contacts.ends[i - world->list.discs];
+        dem2di_point_pair *pair = &world->list.contacts.point_pairs[i - world->list.discs];
         double force[2];
-        dem2di_ends_press(law, ends, force);
-        dem2di_law_apply_ends(law, slip, world->made_step, force, &last->contact, &last->ends, ends,
-                              contact);
+        dem2di_point_pair_press(law, pair, force);
+        dem2di_law_apply_two(law, slip, world->made_step, force, &last->contact, &last->pair, pair,
+                             contact);
         return;
     }
     contact->force = law->normal_stiffness * contact->depth;
@@ -14091,9 +14093,9 @@ static void dem2di_ask_law(const dem2d_world *world, int i, const dem2di_last *l
     input.mass = relative->mass;
     input.radius = dem2di_reduced_radius(world, i);
     input.tangential_force = last->contact.shear;
-    input.moment = last->extra.moment;
-    memcpy(input.state, last->extra.state, sizeof input.state);
-    memcpy(output->state, last->extra.state, sizeof output->state);
+    input.moment = last->law_state.moment;
+    memcpy(input.state, last->law_state.state, sizeof input.state);
+    memcpy(output->state, last->law_state.state, sizeof output->state);
     world->law(world->law_user, &input, output);
 }
 
@@ -14103,7 +14105,7 @@ static void dem2di_full_force(dem2d_world *world, int i, const dem2di_last *last
     const dem2di_list *list = &world->list;
     const dem2d_pair_desc *law = dem2di_law_of(world, i);
     const double dt = world->made_step;
-    dem2di_extra *extra = &list->contacts.extras[i - list->discs];
+    dem2di_law_state *law_state = &list->contacts.law_states[i - list->discs];
     dem2di_relative_velocity relative =
         dem2di_relative_velocity_of(world, i, &last->contact, contact);
     if (world->law != NULL) {
@@ -14111,28 +14113,28 @@ static void dem2di_full_force(dem2d_world *world, int i, const dem2di_last *last
         dem2di_ask_law(world, i, last, &relative, contact->normal, contact->depth, &output);
         contact->force = output.normal_force;
         contact->shear = output.tangential_force;
-        extra->moment = output.moment;
-        extra->energy = output.energy;
-        memcpy(extra->state, output.state, sizeof extra->state);
+        law_state->moment = output.moment;
+        law_state->energy = output.energy;
+        memcpy(law_state->state, output.state, sizeof law_state->state);
         return;
     }
     if (two) {
-        dem2di_ends *ends = &list->contacts.ends[i - list->discs];
+        dem2di_point_pair *pair = &list->contacts.point_pairs[i - list->discs];
         double force[2];
-        dem2di_ends_press(law, ends, force);
-        dem2di_ends_damp(law, &relative, force, extra->viscous, ends, contact);
-        dem2di_law_apply_ends(law, relative.sliding, dt, force, &last->contact, &last->ends, ends,
-                              contact);
+        dem2di_point_pair_press(law, pair, force);
+        dem2di_point_pair_damp(law, &relative, force, law_state->viscous, pair, contact);
+        dem2di_law_apply_two(law, relative.sliding, dt, force, &last->contact, &last->pair, pair,
+                             contact);
     } else {
         double spring = law->normal_stiffness * contact->depth;
         contact->force =
             dem2di_damped(spring, dem2di_dashpot(law, relative.mass), relative.approach);
         dem2di_law_apply(law, relative.sliding, dt, last->contact.shear, contact);
-        extra->viscous[0] = contact->force - spring;
+        law_state->viscous[0] = contact->force - spring;
     }
     if (law->rolling_friction > 0)
-        extra->moment = dem2di_rolling(law, dem2di_reduced_radius(world, i), relative.spin, dt,
-                                       contact->force, last->extra.moment);
+        law_state->moment = dem2di_rolling(law, dem2di_reduced_radius(world, i), relative.spin, dt,
+                                           contact->force, last->law_state.moment);
 }
 
 /* Force of contact i, whose geometry is known. */
@@ -14141,7 +14143,7 @@ static inline void dem2di_force(dem2d_world *world, int i, const dem2di_last *la
     double moment = 0;
     if (world->plan.full) {
         dem2di_full_force(world, i, last, two, contact);
-        moment = world->list.contacts.extras[i - world->list.discs].moment;
+        moment = world->list.contacts.law_states[i - world->list.discs].moment;
     } else {
         dem2di_spring_force(world, i, last, two, contact);
     }
@@ -14169,7 +14171,9 @@ static DEM2DI_INLINE void dem2di_contact_place(dem2d_world *world, int i, int co
     const double depth = contact->depth;
     dem2di_arms *arms = &contact->arms;
     dem2d_vec point = points[0].position;
-    if (count == 2) point = dem2di_ends_set(points, &list->contacts.ends[i - list->discs], contact);
+    if (count == 2)
+        point =
+            dem2di_point_pair_set(points, &list->contacts.point_pairs[i - list->discs], contact);
     const double along = dem2di_dot(contact->normal, d), across = dem2di_cross(contact->normal, d);
     arms->a_n = dem2di_dot(contact->normal, point);
     arms->a_t = dem2di_cross(contact->normal, point);
@@ -14291,7 +14295,7 @@ static int dem2di_collide_segment(const dem2d_world *world, int a, int wall,
 /* Force of a contact with a wall whose geometry is known. */
 static void dem2di_wall_force(dem2d_world *world, int i, const dem2di_last *last,
                               dem2di_contact *contact, dem2di_count *count) {
-    bool two = dem2di_ends_of(world, &world->list.contacts, i) != NULL;
+    bool two = dem2di_point_pair_of(world, &world->list.contacts, i) != NULL;
     if (world->faces == DEM2D_ONE_POINT) /* [P] fig. 4b: from the foot point to the middle */
         contact->arms.a_n += contact->depth / 2;
     dem2di_force(world, i, last, two, contact, count);
@@ -14340,13 +14344,13 @@ static int dem2di_segment_corner(const dem2d_world *world, int contact) {
 /* Which point of a contact is at a place, or -1. */
 static int dem2di_point_near(const dem2d_world *world, int i, dem2d_vec place) {
     const dem2di_list *list = &world->list;
-    const dem2di_ends *ends = dem2di_ends_of(world, &list->contacts, i);
+    const dem2di_point_pair *pair = dem2di_point_pair_of(world, &list->contacts, i);
     const dem2di_state *a = &world->now[list->keys[i].a];
     dem2di_contact contact;
     (void)dem2di_contact_get(world, &list->contacts, i, &contact);
     dem2d_vec from = dem2di_sub(place, dem2di_add(a->x, dem2di_arm_a(&contact)));
-    for (int k = 0; k < (ends != NULL ? 2 : 1); k++) {
-        double offset = ends != NULL ? ends->offset[k] : 0;
+    for (int k = 0; k < (pair != NULL ? 2 : 1); k++) {
+        double offset = pair != NULL ? pair->offset[k] : 0;
         dem2d_vec left = dem2di_along(from, -offset, dem2di_perp(contact.normal));
         if (dem2di_length(left) <= DEM2DI_JOINT * a->radius) return k;
     }
@@ -14362,10 +14366,10 @@ static bool dem2di_meets_segment(const dem2d_world *world, const dem2di_contacts
 static void dem2di_drop_point(dem2d_world *world, int i, int point) {
     const dem2di_list *list = &world->list;
     const dem2di_contacts *contacts = &list->contacts;
-    dem2di_ends *ends = &contacts->ends[i - list->discs];
-    contacts->depth[i] = ends->depth[1 - point];
-    dem2di_arms_shift(&contacts->arms[i - list->discs], ends->offset[1 - point]);
-    memset(ends, 0, sizeof *ends);
+    dem2di_point_pair *pair = &contacts->point_pairs[i - list->discs];
+    contacts->depth[i] = pair->depth[1 - point];
+    dem2di_arms_shift(&contacts->arms[i - list->discs], pair->offset[1 - point]);
+    memset(pair, 0, sizeof *pair);
 }
 
 /* Two contacts of a particle with segments a < b: the one at the end of its segment yields to one
@@ -14381,7 +14385,7 @@ static void dem2di_joint_yield(dem2d_world *world, int a, int b) {
     for (int k = 0; k < 2; k++) {
         int corner = dem2di_segment_corner(world, contact[k]);
         near[k] = dem2di_point_near(world, contact[k], at);
-        two[k] = dem2di_ends_of(world, &list->contacts, contact[k]) != NULL;
+        two[k] = dem2di_point_pair_of(world, &list->contacts, contact[k]) != NULL;
         ends[k] = corner == which[k];
         side[k] = corner < 0;
     }
@@ -14502,8 +14506,8 @@ static void dem2di_force_pass(dem2d_world *world, dem2di_count *count) {
 }
 
 /* Part of the normal stiffness that the two points carry together. */
-static double dem2di_ends_weight(const dem2di_ends *ends) {
-    return ends->weight[0] + ends->weight[1];
+static double dem2di_point_pair_weight(const dem2di_point_pair *pair) {
+    return pair->weight[0] + pair->weight[1];
 }
 
 /* Forces on the walls, in the order of the particles' ids. */
@@ -14635,21 +14639,21 @@ static dem2di_push dem2di_push_make(const dem2d_world *world, int i, const dem2d
                                     dem2d_vec normal, dem2di_backing *backing) {
     const dem2di_list *list = &world->list;
     const dem2d_pair_desc *law = dem2di_law_of(world, i);
-    const dem2di_ends *ends = dem2di_ends_of(world, &list->contacts, i);
-    const dem2di_extra *extra = dem2di_extra_of(world, &list->contacts, i);
+    const dem2di_point_pair *pair = dem2di_point_pair_of(world, &list->contacts, i);
+    const dem2di_law_state *law_state = dem2di_law_state_of(world, &list->contacts, i);
     int a = list->keys[i].a;
     double inverse = world->inverse[a].mass, mass = inverse > 0 ? 1 / inverse : 0;
     double weight = 1, spring = contact->force;
     dem2di_arms arms = contact->arms;
-    if (ends != NULL) { /* their springs act at the centre of the weights */
-        weight = dem2di_ends_weight(ends);
-        double offset = ends->weight[0] * ends->offset[0] + ends->weight[1] * ends->offset[1];
+    if (pair != NULL) { /* their springs act at the centre of the weights */
+        weight = dem2di_point_pair_weight(pair);
+        double offset = pair->weight[0] * pair->offset[0] + pair->weight[1] * pair->offset[1];
         dem2di_arms_shift(&arms, offset / weight);
     }
     double stiffness = weight * law->normal_stiffness;
     double elastic = stiffness * world->time_step;
     double impedance = elastic + weight * dem2di_dashpot(law, mass);
-    if (extra != NULL) spring -= extra->viscous[0] + extra->viscous[1];
+    if (law_state != NULL) spring -= law_state->viscous[0] + law_state->viscous[1];
     if (world->law != NULL) dem2di_push_ask(world, i, contact, elastic, &impedance, &spring);
     dem2di_state next = dem2di_foresee(world, a);
     double leaves = dem2di_dot(contact->normal, next.v) - arms.a_t * next.w;
@@ -14993,7 +14997,7 @@ static dem2di_stiffness dem2di_stiffness_sum(const dem2d_world *world, const dem
         if (!dem2di_contact_get(world, &list->contacts, i, &contact)) continue;
         const dem2di_key *key = &list->keys[i];
         const dem2d_pair_desc *law = dem2di_law_of(world, i);
-        const dem2di_ends *ends = dem2di_ends_of(world, &list->contacts, i);
+        const dem2di_point_pair *pair = dem2di_point_pair_of(world, &list->contacts, i);
         bool shared = i < list->pairs && world->bodies[key->a].motion == DEM2D_FREE &&
                       world->bodies[key->b].motion == DEM2D_FREE;
         bool sticks = world->law == NULL && fabs(contact.shear) < law->friction * contact.force;
@@ -15004,12 +15008,12 @@ static dem2di_stiffness dem2di_stiffness_sum(const dem2d_world *world, const dem
         double arm_t = side ? contact.arms.b_t : contact.arms.a_t;
         if (bound == 1 && law->rolling_friction > 0)
             sum.rr += f * dem2di_rolling_stiffness(law, dem2di_reduced_radius(world, i));
-        if (ends == NULL || bound == 1)
+        if (pair == NULL || bound == 1)
             sum.rr += f * (bound == 1 ? DEM2DI_ROCKING_SPARE : 1) *
                       dem2di_rocking(world, states, i, side, &contact, bound == 1);
-        for (int p = 0; p < (ends != NULL ? 2 : 1); p++) {
-            double w = ends != NULL ? ends->weight[p] : 1;
-            double at = ends != NULL ? arm_t + ends->offset[p] : arm_t;
+        for (int p = 0; p < (pair != NULL ? 2 : 1); p++) {
+            double w = pair != NULL ? pair->weight[p] : 1;
+            double at = pair != NULL ? arm_t + pair->offset[p] : arm_t;
             dem2di_stiffness_point(w * kn, w * slide, contact.normal, arm_n, at, &sum);
         }
     }
@@ -15333,12 +15337,14 @@ static dem2d_contact_info dem2di_contact_of(const dem2d_world *world,
     info.normal = contact->normal;
     info.point = dem2di_add(world->before[key->a].x, dem2di_arm_a(contact));
     info.branch = iterator->branch;
-    info.points = dem2di_ends_of(world, &world->list.contacts, iterator->number) != NULL ? 2 : 1;
+    info.points =
+        dem2di_point_pair_of(world, &world->list.contacts, iterator->number) != NULL ? 2 : 1;
     info.depth = contact->depth;
     info.normal_force = contact->force;
     info.tangential_force = contact->shear;
-    const dem2di_extra *extra = dem2di_extra_of(world, &world->list.contacts, iterator->number);
-    info.moment = extra != NULL ? extra->moment : 0;
+    const dem2di_law_state *law_state =
+        dem2di_law_state_of(world, &world->list.contacts, iterator->number);
+    info.moment = law_state != NULL ? law_state->moment : 0;
     return info;
 }
 
@@ -16089,8 +16095,8 @@ static int dem2di_rows(const void *object, const dem2di_column *column) {
     rows[DEM2DI_WALLS] = w->wall_count;
     rows[DEM2DI_KEYS] = w->list.count;
     rows[DEM2DI_GENERAL] = others;
-    rows[DEM2DI_ENDS] = w->plan.faces ? others : 0;
-    rows[DEM2DI_EXTRAS] = w->plan.full ? others : 0;
+    rows[DEM2DI_POINT_PAIRS] = w->plan.faces ? others : 0;
+    rows[DEM2DI_LAW_STATES] = w->plan.full ? others : 0;
     return rows[column->group];
 }
 

@@ -67,7 +67,7 @@ static bool inside_contact_holds(const dem2d_world *w, int i) {
         return inside_fail("two that are apart have a force", i);
     if (closed && fabs(dem2di_length(contact.normal) - 1) > 1e-12)
         return inside_fail("a normal is not of unit length", i);
-    if (!closed && dem2di_ends_of(w, &list->contacts, i) != NULL)
+    if (!closed && dem2di_point_pair_of(w, &list->contacts, i) != NULL)
         return inside_fail("two that are apart have points", i);
     return true;
 }
