@@ -2250,7 +2250,7 @@ typedef enum dem2di_type {
     DEM2DI_INT64 /* in snapshots only */
 } dem2di_type;
 
-/* Not low; not high; 0 as well; what is not finite, too: not checked. */
+/* Without low; without high; 0 as well; any number, also one that is not finite. */
 enum { DEM2DI_ABOVE = 1, DEM2DI_BELOW = 2, DEM2DI_OR_0 = 4, DEM2DI_ANY = 8 };
 
 typedef struct dem2di_field {
@@ -2293,30 +2293,37 @@ typedef struct dem2di_field {
 #define DEM2DI_ANY_NUMBER 0, 0, DEM2DI_ANY, DEM2DI_DOUBLE
 #define DEM2DI_MAY_OVERFLOW DEM2DI_NUMBER(0, HUGE_VAL, 0)
 
-/* A field's number, or a component of its vector. Where enums are short they take one byte. */
-static double dem2di_field_value(const dem2di_field *field, const void *of, int part) {
+/* The number at a place; 0 for what has no range. Where enums are short they take one byte. */
+static DEM2DI_INLINE double dem2di_number_at(const char *at, int type, size_t size) {
     static const char null[2 * sizeof(void *)] = {0};
-    const char *at = (const char *)of + field->offset;
-    double number = 0;
+    double number;
     int whole;
-    if (field->type == DEM2DI_DOUBLE || field->type == DEM2DI_VEC) {
-        memcpy(&number, at + (size_t)part * sizeof number, sizeof number);
-    } else if (field->type == DEM2DI_INT || field->type == DEM2DI_ENUM) {
-        if (field->size < sizeof whole) return *(const unsigned char *)at;
-        memcpy(&whole, at, sizeof whole);
-        number = whole;
-    } else if (field->type == DEM2DI_POINTER) {
-        number = memcmp(at, null, field->size) != 0;
-    }
-    return number;
+    if (type == DEM2DI_DOUBLE || type == DEM2DI_VEC)
+        return (memcpy(&number, at, sizeof number), number);
+    if (type == DEM2DI_POINTER) return memcmp(at, null, size) != 0;
+    if (type != DEM2DI_INT && type != DEM2DI_ENUM) return 0;
+    if (size < sizeof whole) return *(const unsigned char *)at;
+    return (memcpy(&whole, at, sizeof whole), whole);
 }
 
-/* What is not finite is in no range. */
+/* What is not finite is in no range but ANY. */
+static DEM2DI_INLINE bool dem2di_within(double value, double low, double high, int flags) {
+    if ((flags & DEM2DI_ANY) != 0 || ((flags & DEM2DI_OR_0) != 0 && value == 0)) return true;
+    return ((flags & DEM2DI_ABOVE) != 0 ? value > low : value >= low) &&
+           ((flags & DEM2DI_BELOW) != 0 ? value < high : value <= high);
+}
+
 static bool dem2di_in_range(const dem2di_field *field, double value) {
-    bool above = (field->flags & DEM2DI_ABOVE) != 0, below = (field->flags & DEM2DI_BELOW) != 0;
-    if (value == 0 && (field->flags & DEM2DI_OR_0) != 0) return true;
-    return (above ? value > field->low : value >= field->low) &&
-           (below ? value < field->high : value <= field->high);
+    return dem2di_within(value, field->low, field->high, field->flags);
+}
+
+/* Is a field in its range? With constants this is a comparison or two, without a table. */
+static DEM2DI_INLINE bool dem2di_is_good(const void *field, size_t size, double low, double high,
+                                         int flags, int type) {
+    const char *at = (const char *)field;
+    return dem2di_within(dem2di_number_at(at, type, size), low, high, flags) &&
+           (type != DEM2DI_VEC ||
+            dem2di_within(dem2di_number_at(at + size / 2, type, size), low, high, flags));
 }
 
 /* A range as text: "> 0", "in [0, 1)", "0 or 2 to 256". */
@@ -2332,10 +2339,10 @@ static void dem2di_range_text(const dem2di_field *field, char text[64]) {
         (void)snprintf(text, 64, "%s%.10g to %.10g", zero, field->low, field->high);
 }
 
-static dem2d_result dem2di_check_value(const dem2d_env *env, const dem2di_field *field,
-                                       double value) {
+/* A value that is out of its range. */
+static dem2d_result dem2di_fail_value(const dem2d_env *env, const dem2di_field *field,
+                                      double value) {
     char range[64];
-    if (dem2di_in_range(field, value)) return DEM2D_OK;
     if (field->type == DEM2DI_POINTER) return dem2di_fail_null(env, field->name);
     if (!dem2di_finite(value))
         return dem2di_fail(env, DEM2D_NOT_FINITE, -1, "%s = %g is not finite", field->name, value);
@@ -2348,11 +2355,14 @@ static dem2d_result dem2di_check_value(const dem2d_env *env, const dem2di_field 
 /* The error names the first field that is out of its range. */
 static dem2d_result dem2di_check_fields(const dem2d_env *env, const dem2di_field *fields, int count,
                                         const void *of) {
-    dem2d_result result = DEM2D_OK;
-    for (int i = 0; i < count && result == DEM2D_OK; i++)
-        for (int k = 0; k <= (fields[i].type == DEM2DI_VEC) && result == DEM2D_OK; k++)
-            result = dem2di_check_value(env, &fields[i], dem2di_field_value(&fields[i], of, k));
-    return result;
+    for (int i = 0; i < count; i++)
+        for (int k = 0; k <= (fields[i].type == DEM2DI_VEC); k++) {
+            const char *at = (const char *)of + fields[i].offset + k * (int)sizeof(double);
+            double value = dem2di_number_at(at, fields[i].type, fields[i].size);
+            if (!dem2di_in_range(&fields[i], value))
+                return dem2di_fail_value(env, &fields[i], value);
+        }
+    return DEM2D_OK;
 }
 
 /* A value for the field at this offset alone. */
@@ -2366,7 +2376,7 @@ static dem2d_result dem2di_check_one(const dem2d_env *env, const dem2di_field *f
 
 /* A number that is no field, or whose range follows from other fields: the last four. */
 static dem2d_result dem2di_check_number(const dem2d_env *env, const char *name, double value,
-                                        double low, double high, int flags, dem2di_type type) {
+                                        double low, double high, int flags, int type) {
     dem2di_field field;
     memset(&field, 0, sizeof field);
     field.name = name;
@@ -2374,7 +2384,7 @@ static dem2d_result dem2di_check_number(const dem2d_env *env, const char *name, 
     field.high = high;
     field.flags = (uint8_t)flags;
     field.type = (uint8_t)type;
-    return dem2di_check_value(env, &field, value);
+    return dem2di_in_range(&field, value) ? DEM2D_OK : dem2di_fail_value(env, &field, value);
 }
 
 static dem2d_result dem2di_check_vec(const dem2d_env *env, const char *name, dem2d_vec value) {
@@ -9979,13 +9989,24 @@ static bool dem2di_pair_sound(const dem2di_pair *pair) {
     return dem2di_finite(square) && square * DEM2DI_ROUNDOFF * DEM2DI_ROUNDOFF > DBL_MIN;
 }
 
-static const dem2di_field dem2di_contact_fields[] = {
-    DEM2DI_ROW(dem2d_contact_desc, tolerance, DEM2DI_FROM_0, "- 1e-10; of R_A + R_B + |d|"),
-    DEM2DI_ROW(dem2d_contact_desc, max_iterations, DEM2DI_COUNT, "- 128"),
-    DEM2DI_ROW(dem2d_contact_desc, start, DEM2DI_VECTOR, "- centres; any direction"),
-    DEM2DI_ROW(dem2d_contact_desc, solver, DEM2DI_CHOICE(DEM2D_SOLVER_COUNT), "- CERTIFIED"),
-    DEM2DI_ROW(dem2d_contact_desc, skip_points, DEM2DI_SWITCH, "- false"),
-};
+#define DEM2DI_CONTACT_ROWS(ROW)                                                           \
+    ROW(dem2d_contact_desc, tolerance, DEM2DI_FROM_0, "- 1e-10; of R_A + R_B + |d|"),      \
+        ROW(dem2d_contact_desc, max_iterations, DEM2DI_COUNT, "- 128"),                    \
+        ROW(dem2d_contact_desc, start, DEM2DI_VECTOR, "- centres; any direction"),         \
+        ROW(dem2d_contact_desc, solver, DEM2DI_CHOICE(DEM2D_SOLVER_COUNT), "- CERTIFIED"), \
+        ROW(dem2d_contact_desc, skip_points, DEM2DI_SWITCH, "- false")
+
+static const dem2di_field dem2di_contact_fields[] = {DEM2DI_CONTACT_ROWS(DEM2DI_ROW)};
+
+/* The table as code: a query is too short for a walk over it. */
+static bool dem2di_contact_desc_good(const dem2d_contact_desc *desc) {
+    bool good = true;
+#define DEM2DI_GOOD(of, field, range, text) \
+    good &= dem2di_is_good(&desc->field, sizeof desc->field, range)
+    (void)(DEM2DI_CONTACT_ROWS(DEM2DI_GOOD));
+#undef DEM2DI_GOOD
+    return good;
+}
 
 /* Checks of all pair queries; `used` gets the desc with its defaults. */
 static dem2d_result dem2di_query_prepare(const dem2d_shape *a, dem2d_pose *pose_a,
@@ -9998,8 +10019,8 @@ static dem2d_result dem2di_query_prepare(const dem2d_shape *a, dem2d_pose *pose_
     if (result != DEM2D_OK) return result;
     memset(used, 0, sizeof *used);
     if (desc != NULL) {
-        result = dem2di_check_fields(NULL, DEM2DI_ALL(dem2di_contact_fields), desc);
-        if (result != DEM2D_OK) return result;
+        if (!dem2di_contact_desc_good(desc))
+            return dem2di_check_fields(NULL, DEM2DI_ALL(dem2di_contact_fields), desc);
         *used = *desc;
     }
     if (used->tolerance == 0) used->tolerance = 1e-10;
@@ -16058,8 +16079,7 @@ static bool dem2di_number_fits(const dem2di_field *field, uint64_t all) {
     int64_t whole;
     memcpy(&value, &all, sizeof value);
     memcpy(&whole, &all, sizeof whole);
-    if (dem2di_is_real(field))
-        return (field->flags & DEM2DI_ANY) != 0 || dem2di_in_range(field, value);
+    if (dem2di_is_real(field)) return dem2di_in_range(field, value);
     if (field->type == DEM2DI_BOOL) return whole == 0 || whole == 1;
     if (field->type == DEM2DI_ID) return whole >= 0 && whole <= UINT32_MAX;
     return (field->type == DEM2DI_INT64 || (whole >= INT_MIN && whole <= INT_MAX)) &&
@@ -17803,6 +17823,8 @@ DEM2D_API dem2d_result dem2d_world_write_csv(const dem2d_world *world, const dem
             Writers: an SVG picture has a view, shows half-planes beside the grains, marks fixed and
             driven grains, and draws no chain wider than the grains. Numbers have a decimal point in
             every locale. desc may be NULL where all of it may be zero.
+            Errors of descs tell the field, its value and its range. dem2d_shape_create_bezier
+            returns OUT_OF_RANGE for too many arcs.
             Names: dem2d_stats.looks -> collisions, gaps -> separations; dem2d_law_input.closing ->
             approach, slip -> sliding, turning -> spin.
             Contacts are stored: queries read what the last force pass wrote. After
