@@ -10410,7 +10410,7 @@ typedef struct dem2di_contact {
 /* What the next search of a pair starts from. */
 typedef struct dem2di_history {
     dem2di_feature feature; /* of two polygons, that carried it: tried first in the next step */
-    double bound;           /* the pair is apart until both have travelled this far together */
+    double bound;           /* the pair is apart until both displacements together reach this */
 } dem2di_history;
 
 /* The points of a contact of two. The contact holds their sums, as its normal that of the sum of
@@ -10777,8 +10777,8 @@ static inline double dem2di_turned(double angle, double by) {
 /* Bound of how far a point of the support moves with a particle in a step: its path, by the
    octagon around the circle, and the turn times the greatest lever; rounded up. tan of half the
    angle, as dem2di_rotate takes it, is above half the angle. */
-static inline double dem2di_travel(const dem2di_state *state, double lever, double time_step,
-                                   double before) {
+static inline double dem2di_displaced(const dem2di_state *state, double lever, double time_step,
+                                      double before) {
     double x = fabs(state->v.x), y = fabs(state->v.y), turn = fabs(state->w) * time_step / 2;
     double path = dem2di_max(x, y) + 0.41421356237309515 * dem2di_min(x, y);
     double step = path * time_step + lever * (2 * turn * (1 + turn * turn * (1.0 / 3)));
@@ -10952,8 +10952,9 @@ typedef struct dem2di_block_result {
 typedef struct dem2di_plan {
     bool friction; /* some law between the materials in use has it */
     bool spin;     /* something turns, or may be turned */
-    bool turns; /* some particle is no circle: rotations matter, and pairs are skipped by travel */
-    bool one_law; /* all particles are of one material: */
+    bool turns;    /* some particle is no circle: rotations matter, and pairs are skipped by
+                      displacements */
+    bool one_law;  /* all particles are of one material: */
     int material;
     bool joints; /* two segments meet, or may */
     bool full;   /* some law has a dashpot or rolling friction, or is the caller's: what the
@@ -10990,10 +10991,10 @@ enum {
     DEM2DI_GRAVITY,
     DEM2DI_BY_WALLS,
     DEM2DI_DRIVING,
-    DEM2DI_DAMPED,
+    DEM2DI_BY_DAMPING,
     DEM2DI_HALVES,
-    DEM2DI_RUBBED = DEM2DI_HALVES,
-    DEM2DI_DASHED,
+    DEM2DI_BY_FRICTION = DEM2DI_HALVES,
+    DEM2DI_BY_DASHPOTS,
     DEM2DI_ACCOUNTS
 };
 
@@ -11021,9 +11022,9 @@ typedef enum dem2di_group {
     DEM2DI_LAWS, /* laws_side squared */
     DEM2DI_NAMES,
     DEM2DI_BODIES,
-    DEM2DI_TRAVELS, /* of bodies, where plan.turns */
-    DEM2DI_MADE,    /* of bodies, where some are redirected */
-    DEM2DI_STARTS,  /* of the contacts of bodies, and the end of the last */
+    DEM2DI_DISPLACEMENTS, /* of bodies, where plan.turns */
+    DEM2DI_MADE,          /* of bodies, where some are redirected */
+    DEM2DI_STARTS,        /* of the contacts of bodies, and the end of the last */
     DEM2DI_WALLS,
     DEM2DI_KEYS,
     DEM2DI_GENERAL,     /* all but circles */
@@ -11058,19 +11059,20 @@ struct dem2d_world {
 
     bool keeps_last; /* the force pass keeps the contacts of the last one */
     bool check_time_step;
-    bool check_due;  /* an edit since the last check of the time step and the speeds can matter */
-    int plan_due;    /* steps for which the features in use are found anew, see dem2di_prepare */
-    bool list_stale; /* the list must be built before the next force pass */
-    bool list_worn;  /* because something has left its skin */
-    bool skin_fixed; /* as the caller wants it */
-    bool scattered;  /* particles that meet are far from each other in memory */
-    double skin;     /* of the radius */
-    double interval; /* steps that a list is expected to last */
-    double worn;     /* part of the skins used up since the list was built */
-    double creep;    /* part of a skin that the rounding of a position may use up in a step */
-    double rounding; /* m, of a position */
-    dem2d_box box;   /* holds all centres while the list lasts */
-    bool bounded;    /* no state can become infinite while the list lasts */
+    bool check_due;    /* an edit since the last check of the time step and the speeds can matter */
+    int plan_due;      /* steps for which the features in use are found anew, see dem2di_prepare */
+    bool list_stale;   /* the list must be built before the next force pass */
+    bool list_used_up; /* because something has left its skin */
+    bool skin_fixed;   /* as the caller wants it */
+    bool scattered;    /* particles that meet are far from each other in memory */
+    double skin;       /* of the radius */
+    double interval;   /* steps that a list is expected to last */
+    double list_displacement;     /* part of the skins used up since the list was built */
+    double roundoff_displacement; /* part of a skin that the rounding of a position may use up in a
+                                     step */
+    double rounding;              /* m, of a position */
+    dem2d_box box;                /* holds all centres while the list lasts */
+    bool bounded;                 /* no state can become infinite while the list lasts */
     double softness; /* of the list: times the stiffness of a contact it bounds all eigenvalues */
     double spread;   /* mean distance in memory of two partners when last sorted */
     int64_t steps, rebuilds, slow_time_step, fast_motion, listed_at;
@@ -11091,8 +11093,9 @@ struct dem2d_world {
     dem2di_state *before, *now; /* at the last force pass, present; the next come over before */
     dem2di_body *bodies;
     dem2di_inverse *inverse;
-    double *wear; /* 1 / skin^2: the list holds until some path is as long as its skin */
-    double *travel, *next_travel; /* since the list was built, see dem2di_travel */
+    double *inverse_skin_squared; /* 1 / skin^2: the list holds until some path is as long as its
+                                     skin */
+    double *displacement, *next_displacement; /* since the list was built, see dem2di_displaced */
     double *lever;           /* a support value changes by at most this times the angle of a turn */
     dem2di_velocities *made; /* of the redirected: velocities in the step that was made */
     bool redirected;         /* some particles are */
@@ -11193,7 +11196,7 @@ static const dem2di_field dem2di_progress_fields[] = {
     DEM2DI_SAVED("law_tag", dem2d_world, law_tag, DEM2DI_TAG),
     DEM2DI_SAVED("redirected", dem2d_world, redirected, DEM2DI_SWITCH),
     DEM2DI_SAVED("list_stale", dem2d_world, list_stale, DEM2DI_SWITCH),
-    DEM2DI_SAVED("list_used_up", dem2d_world, list_worn, DEM2DI_SWITCH),
+    DEM2DI_SAVED("list_used_up", dem2d_world, list_used_up, DEM2DI_SWITCH),
     DEM2DI_SAVED("check_due", dem2d_world, check_due, DEM2DI_SWITCH),
     DEM2DI_SAVED("plan_due", dem2d_world, plan_due, DEM2DI_WHOLE(0, 2)),
     DEM2DI_SAVED("skin_fixed", dem2d_world, skin_fixed, DEM2DI_SWITCH),
@@ -11203,8 +11206,8 @@ static const dem2di_field dem2di_progress_fields[] = {
     DEM2DI_SAVED("skin", dem2d_world, skin, DEM2DI_POSITIVE),
     DEM2DI_SAVED("interval", dem2d_world, interval, DEM2DI_FROM_0),
     DEM2DI_SAVED("spread", dem2d_world, spread, DEM2DI_FROM_0),
-    DEM2DI_SAVED("list_displacement", dem2d_world, worn, DEM2DI_ANY_NUMBER),
-    DEM2DI_SAVED("rounding_displacement", dem2d_world, creep, DEM2DI_ANY_NUMBER),
+    DEM2DI_SAVED("list_displacement", dem2d_world, list_displacement, DEM2DI_ANY_NUMBER),
+    DEM2DI_SAVED("rounding_displacement", dem2d_world, roundoff_displacement, DEM2DI_ANY_NUMBER),
     DEM2DI_SAVED("rounding", dem2d_world, rounding, DEM2DI_ANY_NUMBER),
     DEM2DI_SAVED("lower", dem2d_world, box.lower, DEM2DI_ANY_NUMBER),
     DEM2DI_SAVED("upper", dem2d_world, box.upper, DEM2DI_ANY_NUMBER),
@@ -11251,10 +11254,10 @@ static const dem2di_field dem2di_ledger_fields[] = {
     DEM2DI_ACCOUNT("half_walls", half[DEM2DI_BY_WALLS]),
     DEM2DI_ACCOUNT("driving", sum[DEM2DI_DRIVING]),
     DEM2DI_ACCOUNT("half_driving", half[DEM2DI_DRIVING]),
-    DEM2DI_ACCOUNT("damping", sum[DEM2DI_DAMPED]),
-    DEM2DI_ACCOUNT("half_damping", half[DEM2DI_DAMPED]),
-    DEM2DI_ACCOUNT("friction", sum[DEM2DI_RUBBED]),
-    DEM2DI_ACCOUNT("dashpots", sum[DEM2DI_DASHED]),
+    DEM2DI_ACCOUNT("damping", sum[DEM2DI_BY_DAMPING]),
+    DEM2DI_ACCOUNT("half_damping", half[DEM2DI_BY_DAMPING]),
+    DEM2DI_ACCOUNT("friction", sum[DEM2DI_BY_FRICTION]),
+    DEM2DI_ACCOUNT("dashpots", sum[DEM2DI_BY_DASHPOTS]),
     DEM2DI_ACCOUNT("kinetic", kinetic),
     DEM2DI_ACCOUNT("given", given),
     DEM2DI_ACCOUNT("closure", closure),
@@ -11440,12 +11443,13 @@ static const dem2di_column dem2di_columns[] = {
     DEM2DI_COLUMN("last_states", BODIES, before, DEM2DI_MOVES | DEM2DI_SWAPS | DEM2DI_HASHED,
                   state_fields),
     DEM2DI_COLUMN("states", BODIES, now, DEM2DI_MOVES | DEM2DI_HASHED, state_fields),
-    DEM2DI_COLUMN("inverse_skins_squared", BODIES, wear, 0, any_field),
+    DEM2DI_COLUMN("inverse_skins_squared", BODIES, inverse_skin_squared, 0, any_field),
     DEM2DI_UNSAVED(BODIES, inverse, DEM2DI_MOVES),
     DEM2DI_UNSAVED(BODIES, list.own, 0),
-    DEM2DI_COLUMN("displacements", TRAVELS, travel, DEM2DI_MOVES | DEM2DI_SWAPS, way_field),
-    DEM2DI_UNSAVED(TRAVELS, next_travel, 0),
-    DEM2DI_UNSAVED(TRAVELS, lever, DEM2DI_MOVES),
+    DEM2DI_COLUMN("displacements", DISPLACEMENTS, displacement, DEM2DI_MOVES | DEM2DI_SWAPS,
+                  way_field),
+    DEM2DI_UNSAVED(DISPLACEMENTS, next_displacement, 0),
+    DEM2DI_UNSAVED(DISPLACEMENTS, lever, DEM2DI_MOVES),
     DEM2DI_COLUMN("last_velocities", MADE, made, DEM2DI_MOVES | DEM2DI_HASHED, velocity_fields),
     DEM2DI_UNSAVED(STARTS, list.first, 0),
     DEM2DI_COLUMN("wall_ids", WALLS, walls, DEM2DI_FIRST | DEM2DI_HASHED, wall_id_fields),
@@ -11585,7 +11589,7 @@ static bool dem2di_reserve_bodies(dem2d_world *world, int count) {
     return dem2di_group_reserve(world, DEM2DI_BODIES, count) &&
            dem2di_group_reserve(world, DEM2DI_STARTS, count + 1) &&
            dem2di_group_reserve(world, DEM2DI_NAMES, count) &&
-           (!world->plan.turns || dem2di_group_reserve(world, DEM2DI_TRAVELS, count)) &&
+           (!world->plan.turns || dem2di_group_reserve(world, DEM2DI_DISPLACEMENTS, count)) &&
            (!world->redirected || dem2di_group_reserve(world, DEM2DI_MADE, count));
 }
 
@@ -12310,8 +12314,8 @@ static void dem2di_moved(dem2d_world *world, int slot, dem2d_vec way) {
     }
     for (int k = list->first[slot]; k < list->first[slot + 1]; k++)
         dem2di_contact_end(world, list->adjacent[k]);
-    world->worn += dem2di_length(way) * sqrt(world->wear[slot]);
-    world->list_stale = !(world->worn <= 1 - DEM2DI_LIST_STEPS * DBL_EPSILON);
+    world->list_displacement += dem2di_length(way) * sqrt(world->inverse_skin_squared[slot]);
+    world->list_stale = !(world->list_displacement <= 1 - DEM2DI_LIST_STEPS * DBL_EPSILON);
 }
 
 DEM2D_API dem2d_result dem2d_world_move_particle(dem2d_world *world, dem2d_particle_id id,
@@ -12936,10 +12940,10 @@ static bool dem2di_arrange(dem2d_world *world) {
 #define DEM2DI_SKIN_LEAST (1.0 / 1024)
 #define DEM2DI_SKIN_MOST 0.5
 
-/* The skin for the next list, after one that was worn out. */
+/* The skin for the next list, after one that was used up. */
 static void dem2di_tune_skin(dem2d_world *world) {
     double steps = (double)(world->steps - world->listed_at);
-    if (world->skin_fixed || !world->list_worn || !(steps > 0)) return;
+    if (world->skin_fixed || !world->list_used_up || !(steps > 0)) return;
     double speed = world->skin / steps, best = sqrt(DEM2DI_SKIN_COST * speed);
     best = dem2di_max(world->skin / 2, dem2di_min(world->skin * 2, best));
     world->skin = dem2di_max(DEM2DI_SKIN_LEAST, dem2di_min(DEM2DI_SKIN_MOST, best));
@@ -13038,7 +13042,7 @@ static void dem2di_disc_task(void *context, int begin, int end) {
             dem2di_disc *disc = &build->grid.discs[i];
             double skin = dem2di_max(dem2di_skin_of(world, world->now[i].radius, world->now[i].v),
                                      DEM2DI_ROUNDOFF * world->now[i].radius);
-            world->wear[i] = 1 / (skin * skin);
+            world->inverse_skin_squared[i] = 1 / (skin * skin);
             disc->centre = world->now[i].x;
             disc->reach = world->now[i].radius + skin;
             disc->fixed = body->motion == DEM2D_FIXED;
@@ -13194,7 +13198,8 @@ static void dem2di_carry_others(const dem2di_build *build, int discs, int pairs)
     for (int i = discs; i < pairs; i++) {
         const dem2di_key *key = &build->keys[i];
         if (world->plan.turns)
-            contacts->history[i - discs].bound -= world->travel[key->a] + world->travel[key->b];
+            contacts->history[i - discs].bound -=
+                world->displacement[key->a] + world->displacement[key->b];
         if (build->old[i] < 0 || build->old[i] >= world->list.discs) continue;
         dem2di_arms *arms = &contacts->arms[i - discs];
         arms->a_n = world->now[key->a].radius - contacts->depth[i] / 2;
@@ -13258,11 +13263,11 @@ static double dem2di_lever_of(const dem2d_world *world, int slot) {
 }
 
 /* Travels count from here. */
-static void dem2di_travel_task(void *context, int begin, int end) {
+static void dem2di_displacement_task(void *context, int begin, int end) {
     dem2d_world *world = (dem2d_world *)context;
     int last = dem2di_block_end((end - 1) * DEM2DI_BLOCK, DEM2DI_BLOCK, world->body_count);
     for (int i = begin * DEM2DI_BLOCK; i < last; i++) {
-        world->travel[i] = 0;
+        world->displacement[i] = 0;
         world->lever[i] = dem2di_lever_of(world, i);
     }
 }
@@ -13315,7 +13320,7 @@ static bool dem2di_bounded(const dem2d_world *world, const dem2di_plan *plan, in
 /* How far the rounding of a position moves a particle in a step, and the box that holds all centres
    while the list lasts. */
 static void dem2di_extent_set(dem2d_world *world) {
-    double far = 0, size = 0, wear = 0, skin = 0;
+    double far = 0, size = 0, inverse = 0, skin = 0;
     dem2d_box *box = &world->box;
     for (int i = 0; i < world->body_count; i++) {
         dem2d_vec x = world->now[i].x;
@@ -13325,14 +13330,14 @@ static void dem2di_extent_set(dem2d_world *world) {
         box->upper.y = i == 0 ? x.y : dem2di_max(box->upper.y, x.y);
         far = dem2di_max(far, dem2di_size_of(x));
         size = dem2di_max(size, world->now[i].radius);
-        wear = dem2di_max(wear, world->wear[i]);
-        skin = dem2di_max(skin, 1 / sqrt(world->wear[i]));
+        inverse = dem2di_max(inverse, world->inverse_skin_squared[i]);
+        skin = dem2di_max(skin, 1 / sqrt(world->inverse_skin_squared[i]));
     }
     box->lower = dem2di_sub(box->lower, dem2di_vec(skin, skin));
     box->upper = dem2di_add(box->upper, dem2di_vec(skin, skin));
     world->rounding =
         2 * DBL_EPSILON * (far + size); /* half an ulp of both coordinates, and more */
-    world->creep = world->rounding * sqrt(wear);
+    world->roundoff_displacement = world->rounding * sqrt(inverse);
 }
 
 /* No eigenvalue of a particle is above the sum of the traces of its contacts. Of two circles a
@@ -13527,15 +13532,15 @@ static void dem2di_build_finish(dem2di_build *build) {
     dem2di_adjacency_make(world);
     if (world->plan.turns)
         dem2di_run(world, DEM2D_PHASE_LIST, dem2di_blocks(world->body_count, DEM2DI_BLOCK),
-                   dem2di_travel_task, world);
+                   dem2di_displacement_task, world);
     dem2di_extent_set(world);
     world->bounded = build->bounded;
     world->softness = build->softness;
     for (int j = 0; j < world->wall_count; j++)
         if (world->walls[j].alive) dem2di_wall_listed(world, j);
     world->listed_at = world->steps;
-    world->worn = 0;
-    world->list_stale = world->list_worn = false;
+    world->list_displacement = 0;
+    world->list_stale = world->list_used_up = false;
 }
 
 /* Particles twice as far from their partners in memory as when they were last sorted are worth
@@ -13570,7 +13575,8 @@ static dem2d_result dem2di_build_list(dem2d_world *world, const dem2di_plan *pla
         for (int j = 0; j < world->wall_count; j++)
             world->walls[j].skin = dem2di_skin_of(world, largest, dem2di_wall_velocity(world, j));
         build.plan = *plan;
-        room = !build.plan.turns || dem2di_group_reserve(world, DEM2DI_TRAVELS, world->body_count);
+        room = !build.plan.turns ||
+               dem2di_group_reserve(world, DEM2DI_DISPLACEMENTS, world->body_count);
     }
     if (!room || !dem2di_build_search(&build)) return dem2di_list_failed(world, skin, interval);
     int blocks = dem2di_blocks(world->body_count, DEM2DI_BLOCK);
@@ -13676,13 +13682,13 @@ static void dem2di_observe_contact(const dem2d_world *world, int i, dem2di_ledge
         force += contact.force / 2;
         deeper += k == 1 ? contact.depth : -contact.depth;
         if (law_state != NULL) moment += law_state->moment / 2;
-        ledger->sum[DEM2DI_DASHED] +=
+        ledger->sum[DEM2DI_BY_DASHPOTS] +=
             dem2di_dashpot_work(world, pass[k], i, contact.depth, closing, turning);
     }
     if (closed[0] && closed[1]) slide /= 2;
     double taken = -(shear * slide + moment * turning * world->made_step);
     if (world->law != NULL) taken += force * deeper - gained.normal;
-    ledger->sum[DEM2DI_RUBBED] += taken - gained.tangential - gained.rolling;
+    ledger->sum[DEM2DI_BY_FRICTION] += taken - gained.tangential - gained.rolling;
 }
 
 /* All contacts in the order of their ids, before the motion. */
@@ -13715,7 +13721,7 @@ static void dem2di_observe_particle(const dem2d_world *world, int slot, dem2di_l
         double pushed = dem2di_dot(load.force, half.v) + load.torque * half.w;
         if (is_free) {
             power[k][DEM2DI_GRAVITY] += dem2di_dot(weight, half.v);
-            power[k][DEM2DI_DAMPED] -= dem2di_dot(drag, half.v) + brake * half.w;
+            power[k][DEM2DI_BY_DAMPING] -= dem2di_dot(drag, half.v) + brake * half.w;
         } else {
             power[k][DEM2DI_DRIVING] -= pushed;
         }
@@ -13729,8 +13735,8 @@ static double dem2di_ledger_error(const dem2di_ledger *ledger) {
     const double *sum = ledger->sum;
     const dem2di_stored *stored = &ledger->stored;
     return ledger->kinetic + stored->normal + stored->tangential + stored->rolling +
-           sum[DEM2DI_RUBBED] + sum[DEM2DI_DASHED] + sum[DEM2DI_DAMPED] - sum[DEM2DI_GRAVITY] -
-           sum[DEM2DI_BY_WALLS] - sum[DEM2DI_DRIVING] - ledger->given;
+           sum[DEM2DI_BY_FRICTION] + sum[DEM2DI_BY_DASHPOTS] + sum[DEM2DI_BY_DAMPING] -
+           sum[DEM2DI_GRAVITY] - sum[DEM2DI_BY_WALLS] - sum[DEM2DI_DRIVING] - ledger->given;
 }
 
 /* What has gone from account to account since `last`. */
@@ -13937,7 +13943,7 @@ static double dem2di_gap_unsure(const dem2d_world *world, double size) {
 static double dem2di_separation_bound(const dem2d_world *world, int a, int b, double gap,
                                       double size) {
     if (world->solver == DEM2D_GJK_EPA) return 0;
-    return world->travel[a] + world->travel[b] + (gap - dem2di_gap_unsure(world, size));
+    return world->displacement[a] + world->displacement[b] + (gap - dem2di_gap_unsure(world, size));
 }
 
 /* The search of one pair. A contact goes on from its own last normal and feature. Other pairs start
@@ -14477,7 +14483,7 @@ static void dem2di_force_joints(dem2d_world *world, dem2di_count *count) {
 static inline bool dem2di_may_meet(const dem2d_world *world, int i) {
     const dem2di_key *key = &world->list.keys[i];
     double bound = world->list.contacts.history[i - world->list.discs].bound;
-    return !(world->travel[key->a] + world->travel[key->b] < bound);
+    return !(world->displacement[key->a] + world->displacement[key->b] < bound);
 }
 
 /* Blocks of the three kinds of contacts, one kind after the other. */
@@ -14821,10 +14827,10 @@ static DEM2DI_INLINE double dem2di_integrate_range(dem2d_world *world, int begin
     for (int i = begin; i < end; i++) {
         dem2di_state next = dem2di_integrate(world, i, &damping, heavy, damped, spin, turns);
         if (turns)
-            world->next_travel[i] = dem2di_travel(&next, world->lever[i], world->time_step,
-                                                  world->travel[i] + world->rounding);
+            world->next_displacement[i] = dem2di_displaced(
+                &next, world->lever[i], world->time_step, world->displacement[i] + world->rounding);
         world->before[i] = next;
-        most = dem2di_max(most, dem2di_dot(next.v, next.v) * world->wear[i]);
+        most = dem2di_max(most, dem2di_dot(next.v, next.v) * world->inverse_skin_squared[i]);
     }
     return most;
 }
@@ -14861,7 +14867,7 @@ static double dem2di_integrate_pass(dem2d_world *world) {
     world->plan.damped = world->local_damping > 0 || world->global_damping > 0;
     dem2di_run(world, DEM2D_PHASE_MOTION, blocks, dem2di_integrate_task, world);
     for (int k = 0; k < blocks; k++) most = dem2di_max(most, world->block_results[k].most);
-    return world->worn + sqrt(most) * world->time_step + world->creep;
+    return world->list_displacement + sqrt(most) * world->time_step + world->roundoff_displacement;
 }
 
 /* The rest of the ledger, after the motion: work at the velocities before and behind. */
@@ -15210,7 +15216,7 @@ static dem2d_result dem2di_check_states(const dem2d_world *world, const dem2di_c
    next states come over those of the last force pass: only the contacts have to be put back. */
 static dem2d_result dem2di_step(dem2d_world *world) {
     dem2di_count count = world->count;
-    bool slow = false, fast = false, worn = false, listed;
+    bool slow = false, fast = false, used_up = false, listed;
     dem2d_result result = dem2di_prepare(world, &listed);
     if (result != DEM2D_OK) return result;
     world->list_stale = listed; /* should the step fail, the next try begins with a list as well */
@@ -15222,7 +15228,7 @@ static dem2d_result dem2di_step(dem2d_world *world) {
     if (due) result = dem2di_check_step(world, &slow, &fast);
     if (result == DEM2D_OK) {
         dem2di_wall_sums(world);
-        worn = dem2di_control_pass(world);
+        used_up = dem2di_control_pass(world);
         result = dem2di_check_states(world, &count);
     }
     if (result != DEM2D_OK) {
@@ -15233,12 +15239,12 @@ static dem2d_result dem2di_step(dem2d_world *world) {
     if (ledger.kept) dem2di_observe_contacts(world); /* nothing fails from here on */
     double path = dem2di_integrate_pass(world);
     if (ledger.kept) dem2di_observe_motion(world, &ledger);
-    worn = worn || path > 1 - DEM2DI_LIST_STEPS * DBL_EPSILON ||
-           world->steps - world->listed_at >= DEM2DI_LIST_STEPS;
+    used_up = used_up || path > 1 - DEM2DI_LIST_STEPS * DBL_EPSILON ||
+              world->steps - world->listed_at >= DEM2DI_LIST_STEPS;
     world->plan.full_made = world->plan.full_now;
     if (world->plan_due > 0) world->plan_due--;
-    world->worn = path;
-    world->list_stale = world->list_worn = worn;
+    world->list_displacement = path;
+    world->list_stale = world->list_used_up = used_up;
     world->rebuilds += listed;
     world->count = count;
     world->slow_time_step += slow;
@@ -15429,9 +15435,9 @@ DEM2D_API dem2d_result dem2d_world_ledger(const dem2d_world *world, dem2d_ledger
     ledger->gravity = own->sum[DEM2DI_GRAVITY];
     ledger->walls = own->sum[DEM2DI_BY_WALLS];
     ledger->driven = own->sum[DEM2DI_DRIVING];
-    ledger->friction = own->sum[DEM2DI_RUBBED];
-    ledger->dashpot = own->sum[DEM2DI_DASHED];
-    ledger->damping = own->sum[DEM2DI_DAMPED];
+    ledger->friction = own->sum[DEM2DI_BY_FRICTION];
+    ledger->dashpot = own->sum[DEM2DI_BY_DASHPOTS];
+    ledger->damping = own->sum[DEM2DI_BY_DAMPING];
     ledger->given = own->given;
     ledger->closure = own->closure;
     ledger->turnover = own->turnover;
@@ -16110,7 +16116,7 @@ static int dem2di_rows(const void *object, const dem2di_column *column) {
     rows[DEM2DI_LAWS] = w->material_count * w->material_count;
     rows[DEM2DI_NAMES] = w->name_count;
     rows[DEM2DI_BODIES] = w->body_count;
-    rows[DEM2DI_TRAVELS] = w->plan.turns ? w->body_count : 0;
+    rows[DEM2DI_DISPLACEMENTS] = w->plan.turns ? w->body_count : 0;
     rows[DEM2DI_MADE] = w->redirected ? w->body_count : 0;
     rows[DEM2DI_WALLS] = w->wall_count;
     rows[DEM2DI_KEYS] = w->list.count;

@@ -218,12 +218,12 @@ static void test_resume(void **state) {
             dem2d_stats stats;
             int steps = i < 8 ? 1 : 41;
             check_resume(s.world, i % 2 == 1, 5);
-            for (; steps > 0 || (i % 4 == 3 && !s.world->list_worn); steps--) {
+            for (; steps > 0 || (i % 4 == 3 && !s.world->list_used_up); steps--) {
                 assert_true(steps > -5000);
                 assert_ok(dem2d_world_step(s.world, 1, NULL));
             }
             assert_ok(dem2d_world_stats(s.world, &stats));
-            worn += s.world->list_worn, lasting += !s.world->list_stale;
+            worn += s.world->list_used_up, lasting += !s.world->list_stale;
             contacts += stats.contacts + stats.wall_contacts;
         }
         check_resume(s.world, false, 500);
@@ -1069,15 +1069,16 @@ static void test_earlier(void **state) {
     scene_bytes bytes = small_snapshot(SCENE_FULL);
     dem2d_world *whole = load_with(&bytes, NULL, false);
     const int calls = COUNT_OF(whole->count.proofs);
-    assert_true(whole->wear[0] != 0 && whole->global_damping != 0 && whole->skin > 0);
+    assert_true(whole->inverse_skin_squared[0] != 0 && whole->global_damping != 0 &&
+                whole->skin > 0);
     whole->count.proofs[calls - 1] = 0;
     cut_column(&bytes, "inverse_skins_squared");
     cut_field(&bytes, "world", "global_damping", 0);
     cut_field(&bytes, "progress", "proofs", (uint64_t)calls - 1);
     dem2d_world *part = load_with(&bytes, NULL, false);
     for (int i = 0; i < part->body_count; i++) {
-        assert_true(part->wear[i] == 0);
-        part->wear[i] = whole->wear[i];
+        assert_true(part->inverse_skin_squared[i] == 0);
+        part->inverse_skin_squared[i] = whole->inverse_skin_squared[i];
     }
     assert_true(part->global_damping == 0);
     part->global_damping = whole->global_damping;
