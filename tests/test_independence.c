@@ -152,8 +152,7 @@ static void step_round(dem2d_world *world, const variant *v, uint64_t *random) {
         return;
     }
     for (int k = 0; k < EVERY; k++) {
-        *random = *random * 6364136223846793005u + 1442695040888963407u;
-        if (*random >> 33 < (uint64_t)(2147483648.0 / v->rebuild)) {
+        if (random_between(random, 0, 1) < 1.0 / v->rebuild) {
             inside_renew_list(world);
             inside_scatter(world, v->scatter);
         }
