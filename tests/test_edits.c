@@ -49,7 +49,7 @@ enum { FRICTION = 15, EDITS };
 /* Values differ a little from call to call. */
 static void edit(heap *h, int which, double by) {
     dem2d_world *w = h->s.world;
-    dem2d_pair_desc pair = {1e7, 8e6, 0.5, 0, 0};
+    dem2d_pair_desc pair = pair_desc(1e7, 8e6, 0.5);
     switch (which) {
     case 0: break;
     case 1: assert_ok(dem2d_world_set_gravity(w, vec(by, -9.81 - by))); break;
@@ -115,7 +115,10 @@ static void test_rebuilds(void **state) {
 /* What does need a new list gets it: dashpots that come, a wall or a grain beyond its skin. */
 static void test_rebuilt(void **state) {
     (void)state;
-    const dem2d_pair_desc dashed = {1e7, 8e6, 0.5, 0.1, 0};
+    const dem2d_pair_desc dashed = {.normal_stiffness = 1e7,
+                                    .tangential_stiffness = 8e6,
+                                    .friction = 0.5,
+                                    .damping_ratio = 0.1};
     for (int which = 0; which < 5; which++) {
         heap h = make_heap(100);
         dem2d_world *w = h.s.world;
