@@ -190,6 +190,8 @@ CONCEPTS
     Wall        A half-plane: its normal points into the grains. Or a segment, which has two sides.
                 Segments may form a chain: a particle at a joint of two segments has one contact.
                 A wall stands still, moves at a velocity, or is servo-controlled to a stress.
+    Immovable   Two particles that are fixed or driven have no contact with each other, nor with a
+                wall without servo control: they may overlap, and have no force, energy or stress.
     Force       On B, along the normal at each contact point: kn times depth, and a dashpot if the
                 materials have one; never attractive. Along the tangent an incremental spring kt,
                 limited to friction times the normal force ([F] eq. 8-10). A rolling spring resists
@@ -1256,7 +1258,7 @@ typedef struct dem2d_law_input {
     /// step, see Sliding in the manual.
     double sliding;
     double spin;             ///< rad/s, spin of B relative to A
-    double mass;             ///< kg/m, reduced; 0 when neither is free
+    double mass;             ///< kg/m, reduced; 0 for a servo wall and a particle that is not free
     double radius;           ///< m, reduced, of the equivalent radii
     double tangential_force; ///< N/m, in the step before; 0 for a new contact
     double moment;           ///< N, likewise
@@ -1303,7 +1305,8 @@ typedef struct dem2d_world_desc {
     const dem2d_env *env;            ///< memory and log, copied; NULL for malloc, free, silence
 } dem2d_world_desc;
 
-/// How a particle moves.
+/// How a particle moves. Two particles that are not free have no contact with each other, nor with
+/// a wall without servo control: no force can move the two against each other.
 typedef enum dem2d_motion {
     DEM2D_FREE,  ///< by the forces on it
     DEM2D_FIXED, ///< not at all
@@ -10956,6 +10959,7 @@ typedef struct dem2di_plan {
                       displacements */
     bool one_law;  /* all particles are of one material: */
     int material;
+    bool held;   /* some particles are not free: see dem2di_immovable */
     bool joints; /* two segments meet, or may */
     bool full;   /* some law has a dashpot or rolling friction, or is the caller's: what the
                     circles' batches do not know, so that all pairs have links and extras */
@@ -11237,6 +11241,7 @@ static const dem2di_field dem2di_plan_fields[] = {
     DEM2DI_SAVED("turns", dem2d_world, plan.turns, DEM2DI_SWITCH),
     DEM2DI_SAVED("one_law", dem2d_world, plan.one_law, DEM2DI_SWITCH),
     DEM2DI_SAVED("material", dem2d_world, plan.material, DEM2DI_WHOLE(0, DEM2DI_MATERIALS_MAX)),
+    DEM2DI_SAVED("held", dem2d_world, plan.held, DEM2DI_SWITCH),
     DEM2DI_SAVED("joints", dem2d_world, plan.joints, DEM2DI_SWITCH),
     DEM2DI_SAVED("full", dem2d_world, plan.full, DEM2DI_SWITCH),
     DEM2DI_SAVED("full_now", dem2d_world, plan.full_now, DEM2DI_SWITCH),
@@ -12063,20 +12068,6 @@ static void dem2di_forget(dem2d_world *world, int slot) {
     world->ledger.edited = true;
 }
 
-/* Contacts of a fixed particle with walls and with others that are fixed are forgotten: no list has
-   them. */
-static void dem2di_forget_fixed(dem2d_world *world, int slot) {
-    dem2di_list *list = &world->list;
-    for (int k = list->first[slot]; k < list->first[slot + 1]; k++) {
-        int contact = list->adjacent[k];
-        const dem2di_key *key = &list->keys[contact];
-        if (key->a < 0) continue;
-        if (contact >= list->pairs || (world->bodies[key->a].motion == DEM2D_FIXED &&
-                                       world->bodies[key->b].motion == DEM2D_FIXED))
-            dem2di_contact_forget(world, contact);
-    }
-}
-
 /* Contacts with a wall are forgotten. */
 static void dem2di_forget_wall(dem2d_world *world, int wall) {
     dem2di_list *list = &world->list;
@@ -12152,11 +12143,20 @@ static double dem2di_reduced_radius(const dem2d_world *world, int contact) {
     return radius * (other / (radius + other));
 }
 
-/* 1/m of the two of a listed contact; 0 when neither is free. */
+/* 1/m of the two of a listed contact; 0 when neither is free (at a servo wall). */
 static double dem2di_reduced_inverse(const dem2d_world *world, int contact) {
     const dem2di_key *key = &world->list.keys[contact];
     double inverse = world->inverse[key->a].mass;
     return contact >= world->list.pairs ? inverse : inverse + world->inverse[key->b].mass;
+}
+
+/* Can no force move the two of a listed pair against each other? Neither particle is free, and the
+   wall is no servo wall. Such a pair is no contact. */
+static inline bool dem2di_immovable(const dem2d_world *world, int i) {
+    const dem2di_key *key = &world->list.keys[i];
+    if (i < world->list.pairs)
+        return !(world->inverse[key->a].mass + world->inverse[key->b].mass > 0);
+    return !(world->inverse[key->a].mass > 0) && world->walls[key->b].desc.mode != DEM2D_WALL_SERVO;
 }
 
 /* Velocities of a particle in the step that was made. */
@@ -12367,14 +12367,12 @@ static bool dem2di_speeds_matter(const dem2d_world *world, int slot) {
            fabs(now->w) * world->time_step > DEM2DI_TURN_SURE;
 }
 
-/* Another kind of motion. Pairs of two fixed particles, and of those and walls, are not listed. */
+/* Another kind of motion. Of a fixed particle not all pairs are listed. */
 static void dem2di_set_motion(dem2d_world *world, int slot, dem2d_motion motion) {
     dem2di_body *body = &world->bodies[slot];
     if ((dem2d_motion)body->motion == motion) return;
-    if (motion == DEM2D_FIXED || (dem2d_motion)body->motion == DEM2D_FIXED)
-        world->list_stale = true;
+    if ((dem2d_motion)body->motion == DEM2D_FIXED) world->list_stale = true;
     body->motion = (uint8_t)motion;
-    if (motion == DEM2D_FIXED) dem2di_forget_fixed(world, slot);
     world->inverse[slot] = dem2di_inverse_of(world, body);
     world->check_due = world->ledger.edited = true;
     dem2di_edited(world);
@@ -12645,6 +12643,9 @@ DEM2D_API dem2d_result dem2d_world_set_wall(dem2d_world *world, dem2d_wall_id id
         dem2di_edited(world);
     }
     if (dem2di_wall_matters(world, &old, (int)id.index)) dem2di_edited(world);
+    if (desc->mode == DEM2D_WALL_SERVO && old.desc.mode != DEM2D_WALL_SERVO &&
+        (world->plan.held || world->plan_due > 0))
+        world->list_stale = true; /* fixed particles have pairs with servo walls alone */
     return DEM2D_OK;
 }
 
@@ -12999,6 +13000,7 @@ static dem2di_plan dem2di_plan_make(const dem2d_world *world) {
         used[body->material] = true;
         if (bodies++ == 0) plan.material = body->material;
         plan.one_law = plan.one_law && body->material == plan.material;
+        plan.held = plan.held || body->motion != DEM2D_FREE;
         plan.spin = plan.spin || world->now[i].w != 0;
         plan.turns = plan.turns || shape->type != DEM2D_CIRCLE;
         plan.faces = plan.faces || (shape->flat && world->faces == DEM2D_TWO_POINTS);
@@ -13067,10 +13069,11 @@ static void dem2di_grid_task(void *context, int begin, int end) {
     dem2di_grid_sort(&((dem2di_build *)context)->grid);
 }
 
-/* Is a wall within the skins of a particle? */
+/* Is a wall within the skins of a particle, and may be a contact? */
 static bool dem2di_wall_is_near(const dem2d_world *world, const dem2di_disc *disc, int wall) {
     const dem2di_wall *w = &world->walls[wall];
-    return w->alive && dem2di_wall_distance(world, wall, disc->centre) < disc->reach + w->skin;
+    return w->alive && (!disc->fixed || w->desc.mode == DEM2D_WALL_SERVO) &&
+           dem2di_wall_distance(world, wall, disc->centre) < disc->reach + w->skin;
 }
 
 static void dem2di_find_add(const dem2d_world *world, int slot, int wall, dem2di_order *to,
@@ -13088,7 +13091,6 @@ static int dem2di_find_walls(const dem2d_world *world, const dem2di_disc *disc, 
                              dem2di_order *to) {
     const dem2di_list *list = &world->list;
     int count = 0;
-    if (disc->fixed) return 0;
     for (int j = 0; j < world->wall_count; j++)
         if (dem2di_wall_is_near(world, disc, j)) dem2di_find_add(world, slot, j, to, &count);
     for (int k = list->first[slot]; k < list->first[slot + 1]; k++) {
@@ -13111,7 +13113,8 @@ static void dem2di_find_partners(const dem2di_build *build, dem2di_finds *finds)
         if (contact >= list->pairs || !(list->contacts.depth[contact] > 0)) continue;
         dem2d_vec d = dem2di_sub(discs[b].centre, own->centre);
         double both = own->reach + discs[b].reach;
-        if (dem2di_dot(d, d) < both * both) continue; /* the grid has found it */
+        bool fixed = own->fixed && discs[b].fixed;
+        if (!fixed && dem2di_dot(d, d) < both * both) continue; /* the grid has found it */
         dem2di_find_pair(finds, b, own->circle && discs[b].circle);
     }
 }
@@ -13808,6 +13811,12 @@ static void dem2di_batch_made(const dem2d_world *world, int first, int count, de
     }
 }
 
+/* Circles that no force moves against each other are apart: with radii of 0. */
+static void dem2di_batch_hold(const dem2d_world *world, int first, int count, dem2di_batch *batch) {
+    for (int k = 0; k < count; k++)
+        if (dem2di_immovable(world, first + k)) batch->radius_a[k] = batch->radius_b[k] = 0;
+}
+
 DEM2DI_VECTORS_BEGIN
 /* dem2di_slip for two circles. */
 static DEM2DI_INLINE double dem2di_batch_slip(const dem2di_batch *batch, int k,
@@ -13906,6 +13915,7 @@ static DEM2DI_INLINE int dem2di_disc_batch(dem2d_world *world, int first, int co
     if (friction) dem2di_batch_get(world, first, count, &batch);
     dem2di_batch_fetch(world, first, count, friction, !one_law, &batch);
     if (friction && world->redirected) dem2di_batch_made(world, first, count, &batch);
+    if (world->plan.held) dem2di_batch_hold(world, first, count, &batch);
     dem2di_batch_solve(&batch, count, world->made_step,
                        dem2di_law(world, world->plan.material, world->plan.material), &world->plan);
     dem2di_batch_put(world, first, count, friction, &batch);
@@ -14486,6 +14496,18 @@ static inline bool dem2di_may_meet(const dem2d_world *world, int i) {
     return !(world->displacement[key->a] + world->displacement[key->b] < bound);
 }
 
+/* A listed pair that is not of two circles. */
+static inline void dem2di_collide(dem2d_world *world, int i, dem2di_count *count) {
+    if (world->plan.held && dem2di_immovable(world, i)) {
+        dem2di_contact_end(world, i);
+        dem2di_no_load(world, i);
+    } else if (i >= world->list.pairs) {
+        dem2di_update_wall_contact(world, i, count);
+    } else if (dem2di_may_meet(world, i)) {
+        dem2di_update_pair(world, i, count);
+    }
+}
+
 /* Blocks of the three kinds of contacts, one kind after the other. */
 static void dem2di_force_task(void *context, int begin, int end) {
     dem2d_world *world = (dem2d_world *)context;
@@ -14503,11 +14525,7 @@ static void dem2di_force_task(void *context, int begin, int end) {
             dem2di_disc_range(world, first, last, count);
             continue;
         }
-        for (int i = first; i < last; i++)
-            if (i >= list->pairs)
-                dem2di_update_wall_contact(world, i, count);
-            else if (dem2di_may_meet(world, i))
-                dem2di_update_pair(world, i, count);
+        for (int i = first; i < last; i++) dem2di_collide(world, i, count);
     }
 }
 
@@ -16778,7 +16796,7 @@ static bool dem2di_plan_holds(const dem2d_world *w) {
     if (w->plan_due > 0) return true;
     dem2di_plan need = dem2di_plan_make(w);
     return dem2di_plan_fits(plan, &need) && plan->spin >= need.spin &&
-           plan->joints >= need.joints &&
+           plan->joints >= need.joints && plan->held >= need.held &&
            (!plan->one_law || (need.one_law && plan->material == need.material));
 }
 
@@ -17815,14 +17833,15 @@ DEM2D_API dem2d_result dem2d_world_write_csv(const dem2d_world *world, const dem
             Worlds: every saved snapshot can be loaded, also if joints of segments have changed
             since the list was built. Joints of segments are found in every step. A refused step
             changes no moment of a contact, and a servo wall never gets a speed that is not finite.
-            Circles have contacts only after a force pass; a particle that becomes fixed loses its
-            contacts with walls at once; if a law without tangential spring replaces one with it,
-            the tangential force becomes 0. dem2d_stats.time is the sum of the time steps.
+            Circles have contacts only after a force pass; if a law without tangential spring
+            replaces one with it, the tangential force becomes 0. dem2d_stats.time is the sum of the
+            time steps.
             Results and hashes do not depend on the neighbour list, its skin or the order in memory,
             for any shape. The time step is checked in the first step, after edits that can matter
             and in every 160th step. Edits no longer rebuild the list, unless they list other pairs.
             A wall that is set again keeps the history of its contacts, unless it turns by a right
-            angle or more.
+            angle or more. Pairs that no force can move against each other (fixed, driven, walls
+            without servo control) are no contacts.
             Pictures and outlines: two bytes per pixel, label masks, a region of interest,
             thresholds without frames, grains inside frames. Outlines that cross themselves are
             refused (DEM2D_CROSSING). The long axis of a template is exact for every model.

@@ -36,8 +36,9 @@ static heap make_heap(int steps) {
         dem2d_shape *shape = i % 3 == 0   ? make_disc(0.025)
                              : i % 3 == 1 ? make_ellipse(0.03, 0.02)
                                           : make_box(0.045, 0.04);
-        (void)add_shape(&h.s, shape, DEM2D_FREE, vec(0.035 + 0.065 * (i % 5), 0.03 + 0.065 * (i / 5)),
-                        0.4 * i, vec(0, 0), 0);
+        (void)add_shape(&h.s, shape, DEM2D_FREE,
+                        vec(0.035 + 0.065 * (i % 5), 0.03 + 0.065 * (i / 5)), 0.4 * i, vec(0, 0),
+                        0);
     }
     h.far = add_shape(&h.s, make_disc(0.03), DEM2D_DRIVEN, vec(0.15, 5), 0, vec(0.01, 0), 1);
     step(&h.s, steps);
@@ -51,17 +52,30 @@ static void edit(heap *h, int which, double by) {
     dem2d_world *w = h->s.world;
     dem2d_pair_desc pair = pair_desc(1e7, 8e6, 0.5);
     switch (which) {
-    case 0: break;
-    case 1: assert_ok(dem2d_world_set_gravity(w, vec(by, -9.81 - by))); break;
-    case 2: assert_ok(dem2d_world_set_damping(w, 0.7 + by, fabs(by))); break;
-    case 3: assert_ok(dem2d_world_set_time_step(w, 2e-5 * (1 + by))); break;
+    case 0:
+        break;
+    case 1:
+        assert_ok(dem2d_world_set_gravity(w, vec(by, -9.81 - by)));
+        break;
+    case 2:
+        assert_ok(dem2d_world_set_damping(w, 0.7 + by, fabs(by)));
+        break;
+    case 3:
+        assert_ok(dem2d_world_set_time_step(w, 2e-5 * (1 + by)));
+        break;
     case 4:
         pair.normal_stiffness *= 1 + by, pair.friction += by;
         assert_ok(dem2d_world_set_pair(w, h->s.material, h->s.material, &pair));
         break;
-    case 5: set_velocity(&h->s, h->far, DEM2D_DRIVEN, vec(0.01 + by, by), by); break;
-    case 6: set_velocity(&h->s, h->far, by > 0 ? DEM2D_FREE : DEM2D_DRIVEN, vec(0.01, 0), 0); break;
-    case 7: assert_ok(dem2d_world_set_wall(w, h->segment_id, &h->segment)); break;
+    case 5:
+        set_velocity(&h->s, h->far, DEM2D_DRIVEN, vec(0.01 + by, by), by);
+        break;
+    case 6:
+        set_velocity(&h->s, h->far, by > 0 ? DEM2D_FREE : DEM2D_DRIVEN, vec(0.01, 0), 0);
+        break;
+    case 7:
+        assert_ok(dem2d_world_set_wall(w, h->segment_id, &h->segment));
+        break;
     case 8: /* along itself: nothing moves */
         h->segment.point.x += by, h->segment.end.x += by;
         assert_ok(dem2d_world_set_wall(w, h->segment_id, &h->segment));
@@ -88,7 +102,9 @@ static void edit(heap *h, int which, double by) {
         assert_ok(dem2d_world_move_particle(w, h->far, vec(pose.position.x, 5 + by), 100 * by));
         break;
     }
-    case 14: set_velocity(&h->s, h->far, DEM2D_DRIVEN, vec(0, 0), 0); break;
+    case 14:
+        set_velocity(&h->s, h->far, DEM2D_DRIVEN, vec(0, 0), 0);
+        break;
     default: /* friction goes and comes */
         pair.friction = by > 0 ? 0 : 0.5;
         assert_ok(dem2d_world_set_pair(w, h->s.material, h->s.material, &pair));
@@ -213,12 +229,73 @@ static void test_moved(void **state) {
     }
 }
 
+/* --- pairs that no force can move --------------------------------------------------------------
+ */
+
+/* A grain of a motion overlaps another one, or a wall of a mode. Returns the number of contacts,
+   and whether there are forces, energy and stress of them. */
+static int count_held(const scene *s, bool *felt) {
+    const dem2d_stats n = stats_of(s);
+    const dem2d_energy e = energy_of(s);
+    const dem2d_packing p = packing_of(s);
+    dem2d_stress stress;
+    assert_ok(dem2d_world_stress(s->world, 1, &stress));
+    *felt = e.normal != 0 && p.max_overlap != 0 && stress.xx != 0;
+    assert_true(*felt || (e.normal == 0 && p.max_overlap == 0 && stress.xx == 0));
+    return n.contacts + n.wall_contacts;
+}
+
+static void test_immovable(void **state) {
+    (void)state;
+    const dem2d_motion motions[] = {DEM2D_FREE, DEM2D_FIXED, DEM2D_DRIVEN};
+    dem2d_world_desc desc = {0};
+    desc.time_step = 1e-6;
+    for (int shape = 0; shape < 3; shape++)
+        for (int a = 0; a < 3; a++)
+            for (int b = 0; b < 6; b++) { /* 3: a still, 4: a moving, 5: a servo wall */
+                dem2d_material_desc stone = stone_desc(8e6, 0.5);
+                stone.damping_ratio = shape == 1 ? 0.1 : 0; /* circles as other shapes */
+                const scene s = open_scene(&desc, &stone);
+                const bool contact = a == 0 || b == 0 || b == 5;
+                bool felt;
+                const dem2d_particle_id id =
+                    add_shape(&s, shape < 2 ? make_disc(0.1) : make_ellipse(0.1, 0.09), motions[a],
+                              vec(0, 0), 0, vec(0, 0), 0);
+                if (b < 3) {
+                    (void)add_shape(&s, shape < 2 ? make_disc(0.1) : make_box(0.2, 0.2), motions[b],
+                                    vec(0.19, 0), 0, vec(0, 0), 0);
+                } else {
+                    dem2d_wall_desc wall = plane_desc(&s, vec(0.09, 0), vec(-1, 0));
+                    wall.mode = (dem2d_wall_mode)(b - 3), wall.stress = 1;
+                    wall.max_speed = 1e-3, wall.length = 1;
+                    (void)add_wall(&s, &wall);
+                }
+                step(&s, 3);
+                assert_int_equal(count_held(&s, &felt), contact);
+                assert_int_equal(felt, contact);
+                assert_int_equal(grain_of(&s, id).force.x != 0, contact);
+                /* held and let go: what was of the last force pass stays until the next */
+                const int64_t rebuilds = stats_of(&s).list_rebuilds;
+                const dem2d_motion other = a == 2 ? DEM2D_FREE : DEM2D_DRIVEN;
+                const bool then = other == DEM2D_FREE || b == 0 || b == 5;
+                set_velocity(&s, id, other, vec(0, 0), 0);
+                assert_int_equal(count_held(&s, &felt), contact);
+                step(&s, 1);
+                assert_int_equal(count_held(&s, &felt), then);
+                assert_int_equal(stats_of(&s).list_rebuilds - rebuilds, motions[a] == DEM2D_FIXED);
+                set_velocity(&s, id, DEM2D_FIXED, vec(0, 0), 0);
+                assert_int_equal(count_held(&s, &felt), then);
+                step(&s, 1);
+                assert_int_equal(count_held(&s, &felt), b == 0 || b == 5);
+                close_scene(&s);
+            }
+}
+
 int main(void) {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(test_rebuilds),
-        cmocka_unit_test(test_rebuilt),
-        cmocka_unit_test(test_slope),
-        cmocka_unit_test(test_moved),
+        cmocka_unit_test(test_rebuilds),  cmocka_unit_test(test_rebuilt),
+        cmocka_unit_test(test_slope),     cmocka_unit_test(test_moved),
+        cmocka_unit_test(test_immovable),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -971,7 +971,7 @@ static void test_vtp_walls(void **state) {
     enum { count = 5 };
     make_scene(&s, NULL);
     grain.scale = 1, grain.shape = s.shapes[0], grain.material = s.base.material;
-    grain.motion = DEM2D_DRIVEN;
+    grain.motion = DEM2D_FREE;
     assert_ok(dem2d_world_add_particle(s.base.world, &grain, &id));
     const dem2d_wall_id gone = put_plane(&s, vec(0, 0), vec(1, 0)); /* leaves a gap among the ids */
     for (int i = 0; i < 4; i++)
