@@ -10825,8 +10825,8 @@ static bool dem2di_state_finite(const dem2di_state *state) {
      3. A contact is closed where its depth is above 0. Otherwise it has no force, points or law
         state. Two circles that are both of the disc kind have their arms from the depth.
      4. adjacent has each contact of a listed pair once for each of its particles, first as B.
-     5. before is where the last force pass was, with the contacts that it found: queries, writers
-   and the hash read these and compute nothing anew.
+     5. before is where the last force pass was, with the contacts that it found: queries, the
+        writers and the hash read these and compute nothing anew.
      6. Loads, list.last, and all else in scratch are valid during a step only, but for the zeros of
         contacts that are apart.
    Results depend on positions, velocities, laws, and the history of each contact since it closed;
