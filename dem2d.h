@@ -13761,7 +13761,7 @@ static double dem2di_ledger_turnover(const dem2di_ledger *ledger, const dem2di_l
    that compilers turn into vector instructions, and the forces are put where they belong. There is
    no branch but for what the scene has: the force is 0 where two are apart, and with it the limit
    of the tangential spring. */
-#define DEM2DI_BATCH 32 /* 4 kB of arrays, little of the innermost cache */
+#define DEM2DI_BATCH 32 /* 6 kB of arrays, little of the innermost cache */
 
 typedef struct dem2di_batch {
     double dx[DEM2DI_BATCH], dy[DEM2DI_BATCH]; /* from A to B */
