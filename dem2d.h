@@ -13069,11 +13069,16 @@ static void dem2di_grid_task(void *context, int begin, int end) {
     dem2di_grid_sort(&((dem2di_build *)context)->grid);
 }
 
-/* Is a wall within the skins of a particle, and may be a contact? */
-static bool dem2di_wall_is_near(const dem2d_world *world, const dem2di_disc *disc, int wall) {
+/* Is a wall within the skins of a particle, and may be a contact? A segment is within its length of
+   its start, which rules out most without a root. */
+static inline bool dem2di_wall_is_near(const dem2d_world *world, const dem2di_disc *disc,
+                                       int wall) {
     const dem2di_wall *w = &world->walls[wall];
-    return w->alive && (!disc->fixed || w->desc.mode == DEM2D_WALL_SERVO) &&
-           dem2di_wall_distance(world, wall, disc->centre) < disc->reach + w->skin;
+    double reach = disc->reach + w->skin, far = reach + w->extent;
+    if (!w->alive || (disc->fixed && w->desc.mode != DEM2D_WALL_SERVO)) return false;
+    dem2d_vec from = dem2di_sub(disc->centre, world->wall_now[wall].point);
+    if (w->desc.segment && dem2di_dot(from, from) > far * far * (1 + DEM2DI_ROUNDOFF)) return false;
+    return dem2di_wall_distance(world, wall, disc->centre) < reach;
 }
 
 static void dem2di_find_add(const dem2d_world *world, int slot, int wall, dem2di_order *to,
