@@ -14180,7 +14180,7 @@ static void dem2di_full_force(dem2d_world *world, int i, const dem2di_last *last
 }
 
 /* Force of contact i, whose geometry is known. */
-static inline void dem2di_force(dem2d_world *world, int i, const dem2di_last *last, bool two,
+static DEM2DI_INLINE void dem2di_force(dem2d_world *world, int i, const dem2di_last *last, bool two,
                                 dem2di_contact *contact, dem2di_count *count) {
     double moment = 0;
     if (world->plan.full) {
