@@ -10959,7 +10959,7 @@ typedef struct dem2di_plan {
                       displacements */
     bool one_law;  /* all particles are of one material: */
     int material;
-    bool held;   /* some particles are not free: see dem2di_immovable */
+    bool held;   /* some particles are not free */
     bool joints; /* two segments meet, or may */
     bool full;   /* some law has a dashpot or rolling friction, or is the caller's: what the
                     circles' batches do not know, so that all pairs have links and extras */
@@ -11065,6 +11065,7 @@ struct dem2d_world {
     bool check_time_step;
     bool check_due;    /* an edit since the last check of the time step and the speeds can matter */
     int plan_due;      /* steps for which the features in use are found anew, see dem2di_prepare */
+    bool immovable;    /* some listed pair is: see dem2di_immovable */
     bool list_stale;   /* the list must be built before the next force pass */
     bool list_used_up; /* because something has left its skin */
     bool skin_fixed;   /* as the caller wants it */
@@ -12159,6 +12160,15 @@ static inline bool dem2di_immovable(const dem2d_world *world, int i) {
     return !(world->inverse[key->a].mass > 0) && world->walls[key->b].desc.mode != DEM2D_WALL_SERVO;
 }
 
+/* Is there such a pair in the list? */
+static bool dem2di_some_immovable(const dem2d_world *world) {
+    const dem2di_list *list = &world->list;
+    if (!world->plan.held) return false;
+    for (int i = 0; i < list->count; i++)
+        if (list->keys[i].a >= 0 && dem2di_immovable(world, i)) return true;
+    return false;
+}
+
 /* Velocities of a particle in the step that was made. */
 static dem2di_velocities dem2di_velocities_made(const dem2d_world *world, int slot) {
     return world->redirected && world->bodies[slot].redirected
@@ -12642,7 +12652,8 @@ DEM2D_API dem2d_result dem2d_world_set_wall(dem2d_world *world, dem2d_wall_id id
         world->check_due = true;
         dem2di_edited(world);
     }
-    if (dem2di_wall_matters(world, &old, (int)id.index)) dem2di_edited(world);
+    if (old.desc.mode != desc->mode || dem2di_wall_matters(world, &old, (int)id.index))
+        dem2di_edited(world);
     if (desc->mode == DEM2D_WALL_SERVO && old.desc.mode != DEM2D_WALL_SERVO &&
         (world->plan.held || world->plan_due > 0))
         world->list_stale = true; /* fixed particles have pairs with servo walls alone */
@@ -13536,6 +13547,7 @@ static void dem2di_build_finish(dem2di_build *build) {
     if (count > 0) memcpy(list->keys, build->keys, (size_t)count * sizeof *list->keys);
     if (world->plan.turns != build->plan.turns) dem2di_reorient(world, build->plan.turns);
     world->plan = build->plan;
+    world->immovable = dem2di_some_immovable(world);
     dem2di_loads_clear(world);
     dem2di_adjacency_make(world);
     if (world->plan.turns)
@@ -13610,6 +13622,7 @@ static dem2d_result dem2di_prepare(dem2d_world *world, bool *listed) {
     if (world->plan_due == 0) return DEM2D_OK;
     if (world->plan.friction && !plan.friction) dem2di_loads_clear(world); /* torques of circles */
     world->plan = plan;
+    world->immovable = dem2di_some_immovable(world);
     world->bounded = dem2di_bounded(world, &plan, world->list.count);
     return DEM2D_OK;
 }
@@ -13920,7 +13933,7 @@ static DEM2DI_INLINE int dem2di_disc_batch(dem2d_world *world, int first, int co
     if (friction) dem2di_batch_get(world, first, count, &batch);
     dem2di_batch_fetch(world, first, count, friction, !one_law, &batch);
     if (friction && world->redirected) dem2di_batch_made(world, first, count, &batch);
-    if (world->plan.held) dem2di_batch_hold(world, first, count, &batch);
+    if (world->immovable) dem2di_batch_hold(world, first, count, &batch);
     dem2di_batch_solve(&batch, count, world->made_step,
                        dem2di_law(world, world->plan.material, world->plan.material), &world->plan);
     dem2di_batch_put(world, first, count, friction, &batch);
@@ -14503,7 +14516,7 @@ static inline bool dem2di_may_meet(const dem2d_world *world, int i) {
 
 /* A listed pair that is not of two circles. */
 static inline void dem2di_collide(dem2d_world *world, int i, dem2di_count *count) {
-    if (world->plan.held && dem2di_immovable(world, i)) {
+    if (world->immovable && dem2di_immovable(world, i)) {
         dem2di_contact_end(world, i);
         dem2di_no_load(world, i);
     } else if (i >= world->list.pairs) {
@@ -16821,6 +16834,7 @@ static void dem2di_finish_list(dem2di_loader *loader) {
     if (!dem2di_load_good(loader)) return;
     dem2di_adjacency_make(w);
     dem2di_loads_clear(w);
+    w->immovable = dem2di_some_immovable(w);
 }
 
 static void dem2di_finish_world(dem2di_loader *loader) {
