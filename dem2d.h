@@ -10961,8 +10961,8 @@ typedef struct dem2di_plan {
     int material;
     bool held;   /* some particles are not free */
     bool joints; /* two segments meet, or may */
-    bool full;   /* some law has a dashpot or rolling friction, or is the caller's: what the
-                    circles' batches do not know, so that all pairs have links and extras */
+    bool full;   /* some law has a dashpot or rolling friction, or is the caller's. The batches of
+                    circles do not know these: all pairs take the general path, with a law state */
     bool full_now, full_made; /* the laws need that now; they did in the last force pass */
     bool faces;         /* contacts may have two points: by the rule, and some particle has faces */
     bool heavy, damped; /* gravity, damping: as they are set at the step */
