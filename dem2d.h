@@ -1,4 +1,4 @@
-/* dem2d.h - two-dimensional discrete element method for smooth and irregular grains, version 0.6.0
+/* dem2d.h - two-dimensional discrete element method for smooth and irregular grains, version 0.7.0
 
    One C99 header, no dependency but the C standard library. MIT licence (end of file).
 
@@ -569,7 +569,7 @@ DETERMINISM
    ============================================================================================ */
 
 #define DEM2D_VERSION_MAJOR 0
-#define DEM2D_VERSION_MINOR 6
+#define DEM2D_VERSION_MINOR 7
 #define DEM2D_VERSION_PATCH 0
 #define DEM2D_VERSION \
     (DEM2D_VERSION_MAJOR * 10000 + DEM2D_VERSION_MINOR * 100 + DEM2D_VERSION_PATCH)
@@ -17824,6 +17824,7 @@ DEM2D_API dem2d_result dem2d_world_write_csv(const dem2d_world *world, const dem
    >>licence  Changes and licence
 
    CHANGES
+     0.7.0  Snapshots stay of version 4: those of 0.6.0 are read.
      0.6.0  Runs differ from those of 0.5.0 with friction between circles, dashpots, polybeziers,
             two contact points with friction, and servo walls. Snapshots (version 4) name their
             arrays and fields, so that later headers read them; earlier snapshots are refused. The
