@@ -10866,11 +10866,12 @@ static dem2di_velocities dem2di_velocities_of(const dem2di_state *state) {
     return velocities;
 }
 
-/* A particle's id: its slot, or where the next free id is: -2 - index, -1 at the end. */
-typedef struct dem2di_name {
+/* A row of the id table: the slot of a particle, or where the next free id is: -2 - index, -1 at
+   the end. */
+typedef struct dem2di_id_slot {
     int slot;
     uint32_t generation;
-} dem2di_name;
+} dem2di_id_slot;
 
 /* A wall as described, and where it is. */
 typedef struct dem2di_wall {
@@ -11024,7 +11025,7 @@ typedef enum dem2di_group {
     DEM2DI_TEMPLATES,
     DEM2DI_MATERIALS,
     DEM2DI_LAWS, /* laws_side squared */
-    DEM2DI_NAMES,
+    DEM2DI_IDS,
     DEM2DI_BODIES,
     DEM2DI_DISPLACEMENTS, /* of bodies, where plan.turns */
     DEM2DI_MADE,          /* of bodies, where some are redirected */
@@ -11093,8 +11094,8 @@ struct dem2d_world {
     int template_count, material_count, laws_side;
 
     int body_count; /* slots in use, holes too */
-    int holes, name_count, free_name;
-    dem2di_name *names;         /* by the index of an id */
+    int holes, id_count, free_id;
+    dem2di_id_slot *ids;        /* by the index of an id */
     dem2di_state *before, *now; /* at the last force pass, present; the next come over before */
     dem2di_body *bodies;
     dem2di_inverse *inverse;
@@ -11227,8 +11228,8 @@ static const dem2di_field dem2di_progress_fields[] = {
     DEM2DI_SAVED("proofs", dem2d_world, count.proofs, DEM2DI_COUNTER),
     DEM2DI_SAVED("shapes", dem2d_world, template_count, DEM2DI_WHOLE(0, 1 << 30)),
     DEM2DI_SAVED("materials", dem2d_world, material_count, DEM2DI_WHOLE(0, DEM2DI_MATERIALS_MAX)),
-    DEM2DI_SAVED("ids", dem2d_world, name_count, DEM2DI_WHOLE(0, 1 << 30)),
-    DEM2DI_SAVED("free_id", dem2d_world, free_name, DEM2DI_WHOLE(-1, 1 << 30)),
+    DEM2DI_SAVED("ids", dem2d_world, id_count, DEM2DI_WHOLE(0, 1 << 30)),
+    DEM2DI_SAVED("free_id", dem2d_world, free_id, DEM2DI_WHOLE(-1, 1 << 30)),
     DEM2DI_SAVED("particles", dem2d_world, body_count, DEM2DI_WHOLE(0, 1 << 30)),
     DEM2DI_SAVED("walls", dem2d_world, wall_count, DEM2DI_WHOLE(0, 1 << 30)),
     DEM2DI_SAVED("disc_pairs", dem2d_world, list.discs, DEM2DI_WHOLE(0, 1 << 30)),
@@ -11276,10 +11277,10 @@ static const dem2di_field dem2di_template_fields[] = {
     DEM2DI_SAVED("generation", dem2di_template, generation, DEM2DI_HANDLE)};
 
 static const dem2di_field dem2di_slot_fields[] = {
-    DEM2DI_SAVED("slot", dem2di_name, slot, DEM2DI_TAG)};
+    DEM2DI_SAVED("slot", dem2di_id_slot, slot, DEM2DI_TAG)};
 
-static const dem2di_field dem2di_name_fields[] = {
-    DEM2DI_SAVED("generation", dem2di_name, generation, DEM2DI_HANDLE)};
+static const dem2di_field dem2di_id_fields[] = {
+    DEM2DI_SAVED("generation", dem2di_id_slot, generation, DEM2DI_HANDLE)};
 
 static const dem2di_field dem2di_body_fields[] = {
     DEM2DI_SAVED("scale", dem2di_body, scale, DEM2DI_POSITIVE),
@@ -11442,8 +11443,8 @@ static const dem2di_column dem2di_columns[] = {
     DEM2DI_COLUMN("templates", TEMPLATES, templates, DEM2DI_FIRST | DEM2DI_HASHED, template_fields),
     DEM2DI_COLUMN("materials", MATERIALS, materials, DEM2DI_FIRST | DEM2DI_HASHED, material_fields),
     DEM2DI_COLUMN("laws", LAWS, laws, DEM2DI_FIRST | DEM2DI_HASHED, pair_fields),
-    DEM2DI_COLUMN("ids", NAMES, names, DEM2DI_FIRST | DEM2DI_HASHED, name_fields),
-    DEM2DI_COLUMN("slots", NAMES, names, DEM2DI_SHARES, slot_fields),
+    DEM2DI_COLUMN("ids", IDS, ids, DEM2DI_FIRST | DEM2DI_HASHED, id_fields),
+    DEM2DI_COLUMN("slots", IDS, ids, DEM2DI_SHARES, slot_fields),
     DEM2DI_COLUMN("particles", BODIES, bodies, DEM2DI_FIRST | DEM2DI_MOVES | DEM2DI_HASHED,
                   body_fields),
     DEM2DI_COLUMN("last_states", BODIES, before, DEM2DI_MOVES | DEM2DI_SWAPS | DEM2DI_HASHED,
@@ -11594,7 +11595,7 @@ static void dem2di_row_clear(dem2d_world *world, dem2di_group first, dem2di_grou
 static bool dem2di_reserve_bodies(dem2d_world *world, int count) {
     return dem2di_group_reserve(world, DEM2DI_BODIES, count) &&
            dem2di_group_reserve(world, DEM2DI_STARTS, count + 1) &&
-           dem2di_group_reserve(world, DEM2DI_NAMES, count) &&
+           dem2di_group_reserve(world, DEM2DI_IDS, count) &&
            (!world->plan.turns || dem2di_group_reserve(world, DEM2DI_DISPLACEMENTS, count)) &&
            (!world->redirected || dem2di_group_reserve(world, DEM2DI_MADE, count));
 }
@@ -11724,7 +11725,7 @@ DEM2D_API dem2d_result dem2d_world_create(const dem2d_world_desc *desc, dem2d_wo
     made->skin = made->skin_fixed ? desc->skin : DEM2DI_SKIN_FIRST;
     made->interval = DEM2DI_INTERVAL_FIRST;
     made->scattered = true;
-    made->free_name = -1;
+    made->free_id = -1;
     made->tolerance = desc->contact_tolerance == 0 ? 1e-8 : desc->contact_tolerance;
     made->max_iterations = desc->max_iterations == 0 ? 128 : desc->max_iterations;
     made->solver = desc->solver;
@@ -11758,9 +11759,9 @@ static bool dem2di_material_lives(const dem2d_world *w, dem2d_material_id id) {
 
 /* Slot of a particle, or -1 for a stale id. */
 static int dem2di_slot(const dem2d_world *w, dem2d_particle_id id) {
-    if ((int64_t)id.index >= w->name_count) return -1;
-    const dem2di_name *name = &w->names[id.index];
-    return name->slot >= 0 && name->generation == id.generation ? name->slot : -1;
+    if ((int64_t)id.index >= w->id_count) return -1;
+    const dem2di_id_slot *entry = &w->ids[id.index];
+    return entry->slot >= 0 && entry->generation == id.generation ? entry->slot : -1;
 }
 
 static bool dem2di_wall_lives(const dem2d_world *w, dem2d_wall_id id) {
@@ -11771,7 +11772,7 @@ static bool dem2di_wall_lives(const dem2d_world *w, dem2d_wall_id id) {
 static dem2d_particle_id dem2di_particle_id(const dem2d_world *world, int slot) {
     dem2d_particle_id id;
     id.index = (uint32_t)world->bodies[slot].index;
-    id.generation = world->names[id.index].generation;
+    id.generation = world->ids[id.index].generation;
     return id;
 }
 
@@ -11984,21 +11985,21 @@ static dem2d_rot dem2di_orientation(const dem2d_world *world, double angle) {
 }
 
 /* The index of the next id: one that is free again, or a new one. */
-static int dem2di_name_take(dem2d_world *world) {
-    int index = world->free_name;
+static int dem2di_id_take(dem2d_world *world) {
+    int index = world->free_id;
     if (index < 0) {
-        index = world->name_count++;
-        world->names[index].generation = 0;
+        index = world->id_count++;
+        world->ids[index].generation = 0;
     } else {
-        world->free_name = -2 - world->names[index].slot;
+        world->free_id = -2 - world->ids[index].slot;
     }
-    world->names[index].generation++;
+    world->ids[index].generation++;
     return index;
 }
 
-static void dem2di_name_give(dem2d_world *world, int index) {
-    world->names[index].slot = -2 - world->free_name;
-    world->free_name = index;
+static void dem2di_id_release(dem2d_world *world, int index) {
+    world->ids[index].slot = -2 - world->free_id;
+    world->free_id = index;
 }
 
 DEM2D_API dem2d_result dem2d_world_add_particle(dem2d_world *world, const dem2d_particle_desc *desc,
@@ -12021,8 +12022,8 @@ DEM2D_API dem2d_result dem2d_world_add_particle(dem2d_world *world, const dem2d_
         return dem2di_fail(&world->env, DEM2D_OUT_OF_RANGE, -1, "more than %d particles", slot);
     if (!dem2di_reserve_bodies(world, slot + 1)) return dem2di_out_of_memory(world, "a particle");
     dem2di_row_clear(world, DEM2DI_BODIES, DEM2DI_MADE, slot);
-    body.index = dem2di_name_take(world);
-    world->names[body.index].slot = slot;
+    body.index = dem2di_id_take(world);
+    world->ids[body.index].slot = slot;
     world->bodies[slot] = body;
     world->inverse[slot] = dem2di_inverse_of(world, &body);
     world->templates[desc->shape.index].users++;
@@ -12040,7 +12041,7 @@ DEM2D_API dem2d_result dem2d_world_add_particle(dem2d_world *world, const dem2d_
     world->ledger.edited = true;
     dem2di_edited(world);
     id->index = (uint32_t)body.index;
-    id->generation = world->names[body.index].generation;
+    id->generation = world->ids[body.index].generation;
     return DEM2D_OK;
 }
 
@@ -12088,7 +12089,7 @@ DEM2D_API dem2d_result dem2d_world_remove_particle(dem2d_world *world, dem2d_par
     world->holes++;
     dem2di_forget(world, slot);
     dem2di_edited(world);
-    dem2di_name_give(world, (int)id.index);
+    dem2di_id_release(world, (int)id.index);
     return DEM2D_OK;
 }
 
@@ -12913,7 +12914,7 @@ static void dem2di_arrange_task(void *context, int begin, int end) {
     (void)end;
     int n = w->body_count, count = dem2di_order_make(w, items, spare, to);
     dem2di_columns_move(w, to, n, count, room);
-    for (int i = 0; i < count; i++) w->names[w->bodies[i].index].slot = i;
+    for (int i = 0; i < count; i++) w->ids[w->bodies[i].index].slot = i;
     for (int i = 0; i < w->list.count; i++) {
         dem2di_key *key = &w->list.keys[i];
         if (key->a < 0) continue;
@@ -13716,8 +13717,8 @@ static void dem2di_observe_contact(const dem2d_world *world, int i, dem2di_ledge
 static void dem2di_observe_contacts(dem2d_world *world) {
     const dem2di_list *list = &world->list;
     memset(&world->ledger.stored, 0, sizeof world->ledger.stored);
-    for (int index = 0; index < world->name_count; index++) {
-        int slot = world->names[index].slot;
+    for (int index = 0; index < world->id_count; index++) {
+        int slot = world->ids[index].slot;
         if (slot < 0) continue;
         for (int k = list->own[slot]; k < list->first[slot + 1]; k++)
             dem2di_observe_contact(world, list->adjacent[k], &world->ledger);
@@ -14194,7 +14195,7 @@ static void dem2di_full_force(dem2d_world *world, int i, const dem2di_last *last
 
 /* Force of contact i, whose geometry is known. */
 static DEM2DI_INLINE void dem2di_force(dem2d_world *world, int i, const dem2di_last *last, bool two,
-                                dem2di_contact *contact, dem2di_count *count) {
+                                       dem2di_contact *contact, dem2di_count *count) {
     double moment = 0;
     if (world->plan.full) {
         dem2di_full_force(world, i, last, two, contact);
@@ -14911,8 +14912,8 @@ static void dem2di_observe_motion(dem2d_world *world, const dem2di_ledger *last)
     dem2di_ledger *ledger = &world->ledger;
     double power[2][DEM2DI_HALVES] = {{0}};
     ledger->kinetic = 0;
-    for (int index = 0; index < world->name_count; index++) {
-        int slot = world->names[index].slot;
+    for (int index = 0; index < world->id_count; index++) {
+        int slot = world->ids[index].slot;
         if (slot < 0) continue;
         dem2di_load load = dem2di_gather(world, slot, world->plan.spin);
         dem2di_observe_particle(world, slot, load, power, &ledger->kinetic);
@@ -15318,8 +15319,8 @@ typedef struct dem2di_contact_iterator {
 
 static bool dem2di_next_contact(const dem2d_world *world, dem2di_contact_iterator *iterator) {
     const dem2di_list *list = &world->list;
-    for (; iterator->index < world->name_count; iterator->index++, iterator->entry = 0) {
-        int slot = world->names[iterator->index].slot;
+    for (; iterator->index < world->id_count; iterator->index++, iterator->entry = 0) {
+        int slot = world->ids[iterator->index].slot;
         if (slot < 0) continue;
         while (list->own[slot] + iterator->entry < list->first[slot + 1]) {
             int i = list->adjacent[list->own[slot] + iterator->entry++];
@@ -15376,9 +15377,9 @@ DEM2D_API dem2d_result dem2d_world_particles(const dem2d_world *world, dem2d_par
     if (capacity < 0)
         return dem2di_fail(&world->env, DEM2D_OUT_OF_RANGE, -1, "capacity = %d", capacity);
     int alive = 0;
-    for (int i = 0; i < world->name_count; i++) {
-        if (world->names[i].slot < 0) continue;
-        if (alive < capacity) ids[alive] = dem2di_particle_id(world, world->names[i].slot);
+    for (int i = 0; i < world->id_count; i++) {
+        if (world->ids[i].slot < 0) continue;
+        if (alive < capacity) ids[alive] = dem2di_particle_id(world, world->ids[i].slot);
         alive++;
     }
     *count = alive;
@@ -15442,8 +15443,8 @@ static void dem2di_spring_energy(const dem2d_world *world, bool walls, dem2d_ene
 DEM2D_API dem2d_result dem2d_world_energy(const dem2d_world *world, dem2d_energy *energy) {
     if (world == NULL || energy == NULL) return DEM2D_NULL_ARGUMENT;
     memset(energy, 0, sizeof *energy);
-    for (int index = 0; index < world->name_count; index++) {
-        int i = world->names[index].slot;
+    for (int index = 0; index < world->id_count; index++) {
+        int i = world->ids[index].slot;
         if (i < 0) continue;
         const dem2di_body *body = &world->bodies[i];
         double mass = dem2di_body_mass(world, body), inertia = dem2di_body_inertia(world, body);
@@ -15575,8 +15576,8 @@ DEM2D_API dem2d_result dem2d_world_packing(const dem2d_world *world, dem2d_packi
     if (world == NULL || packing == NULL) return DEM2D_NULL_ARGUMENT;
     double ends = 0, loaded_ends = 0, overlap = 0, greatest = 0, area = 0;
     int alive = 0, loaded = 0, open = 0;
-    for (int index = 0; index < world->name_count; index++) {
-        int slot = world->names[index].slot;
+    for (int index = 0; index < world->id_count; index++) {
+        int slot = world->ids[index].slot;
         if (slot < 0) continue;
         const dem2di_body *body = &world->bodies[slot];
         int contacts = dem2di_contacts_of(world, slot);
@@ -15685,9 +15686,9 @@ DEM2D_API dem2d_result dem2d_world_porosity(const dem2d_world *world, const dem2
     dem2d_result result = dem2di_check_region(&world->env, region);
     if (result != DEM2D_OK) return result;
     double solid = 0;
-    for (int index = 0; index < world->name_count; index++)
-        if (world->names[index].slot >= 0)
-            solid += dem2di_area_inside(world, world->names[index].slot, region);
+    for (int index = 0; index < world->id_count; index++)
+        if (world->ids[index].slot >= 0)
+            solid += dem2di_area_inside(world, world->ids[index].slot, region);
     double width = region->upper.x - region->lower.x, height = region->upper.y - region->lower.y;
     *porosity = 1 - solid / (width * height);
     return DEM2D_OK;
@@ -15802,8 +15803,8 @@ static int dem2di_bin(dem2d_vec direction, double turn, int bins) {
 }
 
 static void dem2di_bin_coordination(const dem2d_world *world, int bins, int *counts) {
-    for (int index = 0; index < world->name_count; index++) {
-        int slot = world->names[index].slot;
+    for (int index = 0; index < world->id_count; index++) {
+        int slot = world->ids[index].slot;
         if (slot < 0) continue;
         int contacts = dem2di_contacts_of(world, slot);
         counts[contacts < bins ? contacts : bins - 1]++;
@@ -15820,8 +15821,8 @@ static void dem2di_bin_orientation(const dem2d_world *world, int bins, dem2d_rot
         axes[t] = dem2d_rot_make(angle);
         if (ratio == 1) axes[t].c = axes[t].s = 0;
     }
-    for (int index = 0; index < world->name_count; index++) {
-        int slot = world->names[index].slot;
+    for (int index = 0; index < world->id_count; index++) {
+        int slot = world->ids[index].slot;
         if (slot < 0) continue;
         dem2d_rot axis = axes[world->bodies[slot].shape_index];
         dem2d_pose pose = dem2di_pose_of(world, world->before, slot);
@@ -15924,8 +15925,8 @@ DEM2D_API dem2d_result dem2d_world_equilibrium(const dem2d_world *world,
     if (world == NULL || equilibrium == NULL) return DEM2D_NULL_ARGUMENT;
     double speeds = 0, most = 0, resultants = 0, force = dem2di_mean_contact_force(world);
     int moving = 0, unbound = 0;
-    for (int index = 0; index < world->name_count; index++) {
-        int slot = world->names[index].slot;
+    for (int index = 0; index < world->id_count; index++) {
+        int slot = world->ids[index].slot;
         if (slot < 0 || world->bodies[slot].motion == DEM2D_FIXED) continue;
         double speed = dem2di_length(dem2di_velocities_mean(world, slot).v);
         speeds += speed;
@@ -15954,8 +15955,8 @@ DEM2D_API dem2d_result dem2d_world_inertial_number(const dem2d_world *world, dou
     if (result != DEM2D_OK) return result;
     double diameters = 0, mass = 0, area = 0;
     int count = 0;
-    for (int index = 0; index < world->name_count; index++) {
-        int slot = world->names[index].slot;
+    for (int index = 0; index < world->id_count; index++) {
+        int slot = world->ids[index].slot;
         if (slot < 0) continue;
         diameters += 2 * dem2di_equivalent(world, slot);
         mass += dem2di_body_mass(world, &world->bodies[slot]);
@@ -16150,7 +16151,7 @@ static int dem2di_rows(const void *object, const dem2di_column *column) {
     rows[DEM2DI_TEMPLATES] = w->template_count;
     rows[DEM2DI_MATERIALS] = w->material_count;
     rows[DEM2DI_LAWS] = w->material_count * w->material_count;
-    rows[DEM2DI_NAMES] = w->name_count;
+    rows[DEM2DI_IDS] = w->id_count;
     rows[DEM2DI_BODIES] = w->body_count;
     rows[DEM2DI_DISPLACEMENTS] = w->plan.turns ? w->body_count : 0;
     rows[DEM2DI_MADE] = w->redirected ? w->body_count : 0;
@@ -16238,8 +16239,8 @@ static const void *dem2di_hashed_row(const dem2d_world *w, const dem2di_column *
     int slot = place;
     if (group == DEM2DI_WORLD) return w;
     const char *start = (const char *)dem2di_column_get(w, column);
-    if (group == DEM2DI_BODIES || group == DEM2DI_MADE) slot = w->names[place].slot;
-    if (slot < 0 || (group == DEM2DI_NAMES && w->names[place].slot < 0)) return NULL;
+    if (group == DEM2DI_BODIES || group == DEM2DI_MADE) slot = w->ids[place].slot;
+    if (slot < 0 || (group == DEM2DI_IDS && w->ids[place].slot < 0)) return NULL;
     if (group == DEM2DI_WALLS && !w->walls[place].alive) return NULL;
     if (group == DEM2DI_TEMPLATES && w->templates[place].shape == NULL) return NULL;
     const char *row = start + (size_t)slot * column->size;
@@ -16295,7 +16296,7 @@ static void dem2di_hash_column(void *context, const void *object, const dem2di_c
     bool contacts = group >= DEM2DI_KEYS && group < DEM2DI_SHAPE;
     bool by_id = group == DEM2DI_BODIES || group == DEM2DI_MADE;
     int rows = dem2di_rows(object, column);
-    if (by_id && rows > 0) rows = hashing->world->name_count;
+    if (by_id && rows > 0) rows = hashing->world->id_count;
     const char *row = (const char *)dem2di_rows_start(object, column);
     if (contacts) dem2di_hash_contacts(hashing);
     for (int i = 0; i < rows && !contacts; i++, row += column->size) {
@@ -16750,11 +16751,11 @@ static void dem2di_finish_body(dem2di_loader *loader, int slot) {
     if (w->plan.turns) w->lever[slot] = dem2di_lever_of(w, slot);
 }
 
-/* Living names and particles know each other, and the free ones are in one list. */
-static bool dem2di_names_agree(const dem2d_world *w) {
-    int unused = 0, index = w->free_name;
-    for (int i = 0; i < w->name_count; i++) {
-        int slot = w->names[i].slot;
+/* Ids in use and particles lead to each other, and the free ids are in one list. */
+static bool dem2di_ids_agree(const dem2d_world *w) {
+    int unused = 0, index = w->free_id;
+    for (int i = 0; i < w->id_count; i++) {
+        int slot = w->ids[i].slot;
         unused += slot < 0;
         if (slot < 0) continue;
         if (slot >= w->body_count || w->bodies[slot].index != i || w->bodies[slot].shape_index < 0)
@@ -16762,12 +16763,12 @@ static bool dem2di_names_agree(const dem2d_world *w) {
     }
     for (int slot = 0; slot < w->body_count; slot++) {
         const dem2di_body *body = &w->bodies[slot];
-        if (body->index >= w->name_count) return false;
-        if (body->shape_index >= 0 && w->names[body->index].slot != slot) return false;
+        if (body->index >= w->id_count) return false;
+        if (body->shape_index >= 0 && w->ids[body->index].slot != slot) return false;
     }
-    for (; unused > 0 && index >= 0 && index < w->name_count; unused--) {
-        if (w->names[index].slot >= 0) return false;
-        index = -2 - w->names[index].slot;
+    for (; unused > 0 && index >= 0 && index < w->id_count; unused--) {
+        if (w->ids[index].slot >= 0) return false;
+        index = -2 - w->ids[index].slot;
     }
     return unused == 0 && index == -1;
 }
@@ -16849,7 +16850,7 @@ static void dem2di_finish_world(dem2di_loader *loader) {
     dem2di_finish_shapes(loader);
     for (int i = 0; i < w->body_count && dem2di_load_good(loader); i++)
         dem2di_finish_body(loader, i);
-    if (dem2di_load_good(loader)) dem2di_load_expect(loader, dem2di_names_agree(w), "ids differ");
+    if (dem2di_load_good(loader)) dem2di_load_expect(loader, dem2di_ids_agree(w), "ids differ");
     dem2di_finish_walls(loader);
     dem2di_finish_list(loader);
 }
@@ -17033,8 +17034,8 @@ static int dem2di_drawn_points(const dem2d_shape *shape, int points) {
 
 /* Slot of the next particle in the order of ids, or -1; `index` starts at 0. */
 static int dem2di_next_particle(const dem2d_world *world, int *index) {
-    while (*index < world->name_count) {
-        int slot = world->names[(*index)++].slot;
+    while (*index < world->id_count) {
+        int slot = world->ids[(*index)++].slot;
         if (slot >= 0) return slot;
     }
     return -1;

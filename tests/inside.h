@@ -17,7 +17,7 @@ dem2d_result inside_write_in_vain(const char *path, bool *good);
 #ifdef DEM2D_IMPLEMENTATION
 
 int inside_slot(const dem2d_world *world, int index) {
-    return world->names[index].slot;
+    return world->ids[index].slot;
 }
 
 void inside_scatter(dem2d_world *world, bool scattered) {
@@ -38,13 +38,13 @@ static bool inside_lives(const dem2d_world *w, int slot) {
 }
 
 static bool inside_ids_hold(const dem2d_world *w) {
-    for (int i = 0; i < w->name_count; i++) {
-        const int slot = w->names[i].slot;
+    for (int i = 0; i < w->id_count; i++) {
+        const int slot = w->ids[i].slot;
         if (slot >= 0 && (!inside_lives(w, slot) || w->bodies[slot].index != i))
             return inside_fail("an id leads to another slot", i);
     }
     for (int slot = 0; slot < w->body_count; slot++)
-        if (inside_lives(w, slot) && w->names[w->bodies[slot].index].slot != slot)
+        if (inside_lives(w, slot) && w->ids[w->bodies[slot].index].slot != slot)
             return inside_fail("a slot leads to another id", slot);
     return true;
 }

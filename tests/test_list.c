@@ -48,9 +48,9 @@ static dem2d_particle_id add(const scene *s, int shape, double scale, double x, 
 
 static uint64_t state_hash(const dem2d_world *world) {
     uint64_t hash = 1469598103934665603u; /* FNV-1a */
-    for (int i = 0; i < world->name_count; i++) {
-        if (world->names[i].slot < 0) continue;
-        const unsigned char *byte = (const unsigned char *)&world->now[world->names[i].slot];
+    for (int i = 0; i < world->id_count; i++) {
+        if (world->ids[i].slot < 0) continue;
+        const unsigned char *byte = (const unsigned char *)&world->now[world->ids[i].slot];
         for (size_t k = 0; k < sizeof(dem2di_state); k++) hash = (hash ^ byte[k]) * 1099511628211u;
     }
     return hash;
