@@ -15307,17 +15307,26 @@ DEM2D_API dem2d_result dem2d_world_step(dem2d_world *world, int count, int *done
    uses: config, math, memory, fields, mass, shapes, broad, law, motion, world, objects
    ============================================================================================ */
 
+/* Slot of the next particle in the order of ids, or -1; `index` starts at 0. */
+static int dem2di_next_particle(const dem2d_world *world, int *index) {
+    while (*index < world->id_count) {
+        int slot = world->ids[(*index)++].slot;
+        if (slot >= 0) return slot;
+    }
+    return -1;
+}
+
 /* An iterator over the contacts of the last force pass in the order of their ids: those of
-   particles, or with `walls` those with walls. All else 0 at the start. */
+   particles, then, unless they are left out, those with walls. */
 typedef struct dem2di_contact_iterator {
-    bool walls;
-    int index, entry; /* where it goes on */
-    int number;       /* where it is, and the contact there */
+    bool pairs_only, walls; /* without walls; with walls now */
+    int index, entry;       /* where it goes on */
+    int number;             /* where it is, and the contact there */
     dem2di_contact contact;
     dem2d_vec branch; /* from A's centre to B's; to a wall: the contact point */
 } dem2di_contact_iterator;
 
-static bool dem2di_next_contact(const dem2d_world *world, dem2di_contact_iterator *iterator) {
+static bool dem2di_next_of_kind(const dem2d_world *world, dem2di_contact_iterator *iterator) {
     const dem2di_list *list = &world->list;
     for (; iterator->index < world->id_count; iterator->index++, iterator->entry = 0) {
         int slot = world->ids[iterator->index].slot;
@@ -15334,10 +15343,18 @@ static bool dem2di_next_contact(const dem2d_world *world, dem2di_contact_iterato
     return false;
 }
 
-static dem2di_contact_iterator dem2di_first_contacts(bool walls) {
+static bool dem2di_next_contact(const dem2d_world *world, dem2di_contact_iterator *iterator) {
+    if (dem2di_next_of_kind(world, iterator)) return true;
+    if (iterator->walls || iterator->pairs_only) return false;
+    iterator->walls = true;
+    iterator->index = iterator->entry = 0;
+    return dem2di_next_of_kind(world, iterator);
+}
+
+static dem2di_contact_iterator dem2di_contacts_start(bool pairs_only) {
     dem2di_contact_iterator iterator;
     memset(&iterator, 0, sizeof iterator);
-    iterator.walls = walls;
+    iterator.pairs_only = pairs_only;
     return iterator;
 }
 
@@ -15377,11 +15394,8 @@ DEM2D_API dem2d_result dem2d_world_particles(const dem2d_world *world, dem2d_par
     if (capacity < 0)
         return dem2di_fail(&world->env, DEM2D_OUT_OF_RANGE, -1, "capacity = %d", capacity);
     int alive = 0;
-    for (int i = 0; i < world->id_count; i++) {
-        if (world->ids[i].slot < 0) continue;
-        if (alive < capacity) ids[alive] = dem2di_particle_id(world, world->ids[i].slot);
-        alive++;
-    }
+    for (int index = 0, slot; (slot = dem2di_next_particle(world, &index)) >= 0; alive++)
+        if (alive < capacity) ids[alive] = dem2di_particle_id(world, slot);
     *count = alive;
     return DEM2D_OK;
 }
@@ -15419,33 +15433,17 @@ DEM2D_API dem2d_result dem2d_world_contacts(const dem2d_world *world, dem2d_cont
     if (capacity < 0)
         return dem2di_fail(&world->env, DEM2D_OUT_OF_RANGE, -1, "capacity = %d", capacity);
     int open = 0;
-    for (int wall = 0; wall < 2; wall++) {
-        dem2di_contact_iterator iterator = dem2di_first_contacts(wall == 1);
-        for (; dem2di_next_contact(world, &iterator); open++)
-            if (open < capacity) contacts[open] = dem2di_contact_of(world, &iterator);
-    }
+    dem2di_contact_iterator iterator = dem2di_contacts_start(false);
+    for (; dem2di_next_contact(world, &iterator); open++)
+        if (open < capacity) contacts[open] = dem2di_contact_of(world, &iterator);
     *count = open;
     return DEM2D_OK;
-}
-
-/* Energy in the springs of the contacts of particles, or with walls. */
-static void dem2di_spring_energy(const dem2d_world *world, bool walls, dem2d_energy *energy) {
-    dem2di_contact_iterator iterator = dem2di_first_contacts(walls);
-    while (dem2di_next_contact(world, &iterator)) {
-        dem2di_stored part =
-            dem2di_stored_in(world, &world->list.contacts, iterator.number, &iterator.contact);
-        energy->normal += part.normal;
-        energy->tangential += part.tangential;
-        energy->rolling += part.rolling;
-    }
 }
 
 DEM2D_API dem2d_result dem2d_world_energy(const dem2d_world *world, dem2d_energy *energy) {
     if (world == NULL || energy == NULL) return DEM2D_NULL_ARGUMENT;
     memset(energy, 0, sizeof *energy);
-    for (int index = 0; index < world->id_count; index++) {
-        int i = world->ids[index].slot;
-        if (i < 0) continue;
+    for (int index = 0, i; (i = dem2di_next_particle(world, &index)) >= 0;) {
         const dem2di_body *body = &world->bodies[i];
         double mass = dem2di_body_mass(world, body), inertia = dem2di_body_inertia(world, body);
         for (int k = 0; k < 2; k++) {
@@ -15456,8 +15454,14 @@ DEM2D_API dem2d_result dem2d_world_energy(const dem2d_world *world, dem2d_energy
         }
         energy->potential -= mass * dem2di_dot(world->gravity, world->before[i].x);
     }
-    dem2di_spring_energy(world, false, energy);
-    dem2di_spring_energy(world, true, energy);
+    dem2di_contact_iterator iterator = dem2di_contacts_start(false);
+    while (dem2di_next_contact(world, &iterator)) {
+        dem2di_stored part =
+            dem2di_stored_in(world, &world->list.contacts, iterator.number, &iterator.contact);
+        energy->normal += part.normal;
+        energy->tangential += part.tangential;
+        energy->rolling += part.rolling;
+    }
     return DEM2D_OK;
 }
 
@@ -15503,11 +15507,9 @@ DEM2D_API dem2d_result dem2d_world_stress(const dem2d_world *world, double area,
     dem2d_result result = dem2di_check_number(&world->env, "area", area, DEM2DI_POSITIVE);
     if (result != DEM2D_OK) return result;
     dem2d_stress sum = {0, 0, 0, 0};
-    for (int wall = 0; wall < 2; wall++) {
-        dem2di_contact_iterator iterator = dem2di_first_contacts(wall == 1);
-        while (dem2di_next_contact(world, &iterator))
-            dem2di_stress_add(&sum, iterator.branch, dem2di_contact_force(&iterator.contact));
-    }
+    dem2di_contact_iterator iterator = dem2di_contacts_start(false);
+    while (dem2di_next_contact(world, &iterator))
+        dem2di_stress_add(&sum, iterator.branch, dem2di_contact_force(&iterator.contact));
     *stress = dem2di_stress_over(&sum, area);
     return DEM2D_OK;
 }
@@ -15572,33 +15574,32 @@ static int dem2di_contacts_of(const dem2d_world *world, int slot) {
     return open;
 }
 
+/* Radius of the smaller particle of a contact. */
+static double dem2di_smaller_radius(const dem2d_world *world,
+                                    const dem2di_contact_iterator *iterator) {
+    const dem2di_key *key = &world->list.keys[iterator->number];
+    double radius = dem2di_equivalent(world, key->a);
+    return iterator->walls ? radius : dem2di_min(radius, dem2di_equivalent(world, key->b));
+}
+
 DEM2D_API dem2d_result dem2d_world_packing(const dem2d_world *world, dem2d_packing *packing) {
     if (world == NULL || packing == NULL) return DEM2D_NULL_ARGUMENT;
     double ends = 0, loaded_ends = 0, overlap = 0, greatest = 0, area = 0;
     int alive = 0, loaded = 0, open = 0;
-    for (int index = 0; index < world->id_count; index++) {
-        int slot = world->ids[index].slot;
-        if (slot < 0) continue;
-        const dem2di_body *body = &world->bodies[slot];
+    for (int index = 0, slot; (slot = dem2di_next_particle(world, &index)) >= 0; alive++) {
         int contacts = dem2di_contacts_of(world, slot);
-        alive++;
         ends += contacts;
         loaded += contacts >= 2;
         if (contacts >= 2) loaded_ends += contacts;
-        area += dem2di_body_area(world, body);
+        area += dem2di_body_area(world, &world->bodies[slot]);
     }
-    for (int wall = 0; wall < 2; wall++) {
-        dem2di_contact_iterator iterator = dem2di_first_contacts(wall == 1);
-        while (dem2di_next_contact(world, &iterator)) {
-            const dem2di_key *key = &world->list.keys[iterator.number];
-            double radius = dem2di_equivalent(world, key->a);
-            if (!wall) radius = dem2di_min(radius, dem2di_equivalent(world, key->b));
-            double relative = iterator.contact.depth / radius;
-            greatest = dem2di_max(greatest, relative);
-            if (wall) continue;
-            overlap += relative;
-            open++;
-        }
+    dem2di_contact_iterator iterator = dem2di_contacts_start(false);
+    while (dem2di_next_contact(world, &iterator)) {
+        double relative = iterator.contact.depth / dem2di_smaller_radius(world, &iterator);
+        greatest = dem2di_max(greatest, relative);
+        if (iterator.walls) continue;
+        overlap += relative;
+        open++;
     }
     packing->coordination = alive > 0 ? ends / alive : 0;
     packing->coordination_loaded = loaded > 0 ? loaded_ends / loaded : 0;
@@ -15686,9 +15687,8 @@ DEM2D_API dem2d_result dem2d_world_porosity(const dem2d_world *world, const dem2
     dem2d_result result = dem2di_check_region(&world->env, region);
     if (result != DEM2D_OK) return result;
     double solid = 0;
-    for (int index = 0; index < world->id_count; index++)
-        if (world->ids[index].slot >= 0)
-            solid += dem2di_area_inside(world, world->ids[index].slot, region);
+    for (int index = 0, slot; (slot = dem2di_next_particle(world, &index)) >= 0;)
+        solid += dem2di_area_inside(world, slot, region);
     double width = region->upper.x - region->lower.x, height = region->upper.y - region->lower.y;
     *porosity = 1 - solid / (width * height);
     return DEM2D_OK;
@@ -15733,7 +15733,7 @@ typedef struct dem2di_fabric_sums {
 static dem2di_fabric_sums dem2di_fabric_sum(const dem2d_world *world, dem2d_anisotropy density) {
     dem2di_fabric_sums sums;
     dem2d_rot axis = dem2d_rot_make(density.direction);
-    dem2di_contact_iterator iterator = dem2di_first_contacts(false);
+    dem2di_contact_iterator iterator = dem2di_contacts_start(true);
     memset(&sums, 0, sizeof sums);
     for (; dem2di_next_contact(world, &iterator); sums.count++) {
         const dem2di_contact *contact = &iterator.contact;
@@ -15803,9 +15803,7 @@ static int dem2di_bin(dem2d_vec direction, double turn, int bins) {
 }
 
 static void dem2di_bin_coordination(const dem2d_world *world, int bins, int *counts) {
-    for (int index = 0; index < world->id_count; index++) {
-        int slot = world->ids[index].slot;
-        if (slot < 0) continue;
+    for (int index = 0, slot; (slot = dem2di_next_particle(world, &index)) >= 0;) {
         int contacts = dem2di_contacts_of(world, slot);
         counts[contacts < bins ? contacts : bins - 1]++;
     }
@@ -15821,9 +15819,7 @@ static void dem2di_bin_orientation(const dem2d_world *world, int bins, dem2d_rot
         axes[t] = dem2d_rot_make(angle);
         if (ratio == 1) axes[t].c = axes[t].s = 0;
     }
-    for (int index = 0; index < world->id_count; index++) {
-        int slot = world->ids[index].slot;
-        if (slot < 0) continue;
+    for (int index = 0, slot; (slot = dem2di_next_particle(world, &index)) >= 0;) {
         dem2d_rot axis = axes[world->bodies[slot].shape_index];
         dem2d_pose pose = dem2di_pose_of(world, world->before, slot);
         if (axis.c == 0 && axis.s == 0) continue;
@@ -15842,7 +15838,7 @@ static double dem2di_binned(const dem2di_contact_iterator *iterator, dem2d_histo
 
 static void dem2di_bin_contacts(const dem2d_world *world, dem2d_histogram kind, int bins,
                                 int *counts, double *sums) {
-    dem2di_contact_iterator iterator = dem2di_first_contacts(false);
+    dem2di_contact_iterator iterator = dem2di_contacts_start(true);
     while (dem2di_next_contact(world, &iterator)) {
         dem2d_vec along =
             kind == DEM2D_HISTOGRAM_ALONG_BRANCH ? iterator.branch : iterator.contact.normal;
@@ -15903,11 +15899,9 @@ static dem2di_velocities dem2di_velocities_mean(const dem2d_world *world, int sl
 static double dem2di_mean_contact_force(const dem2d_world *world) {
     double sum = 0;
     int count = 0;
-    for (int wall = 0; wall < 2; wall++) {
-        dem2di_contact_iterator iterator = dem2di_first_contacts(wall == 1);
-        for (; dem2di_next_contact(world, &iterator); count++)
-            sum += dem2di_length(dem2di_contact_force(&iterator.contact));
-    }
+    dem2di_contact_iterator iterator = dem2di_contacts_start(false);
+    for (; dem2di_next_contact(world, &iterator); count++)
+        sum += dem2di_length(dem2di_contact_force(&iterator.contact));
     return count > 0 ? sum / count : 0;
 }
 
@@ -15925,9 +15919,8 @@ DEM2D_API dem2d_result dem2d_world_equilibrium(const dem2d_world *world,
     if (world == NULL || equilibrium == NULL) return DEM2D_NULL_ARGUMENT;
     double speeds = 0, most = 0, resultants = 0, force = dem2di_mean_contact_force(world);
     int moving = 0, unbound = 0;
-    for (int index = 0; index < world->id_count; index++) {
-        int slot = world->ids[index].slot;
-        if (slot < 0 || world->bodies[slot].motion == DEM2D_FIXED) continue;
+    for (int index = 0, slot; (slot = dem2di_next_particle(world, &index)) >= 0;) {
+        if (world->bodies[slot].motion == DEM2D_FIXED) continue;
         double speed = dem2di_length(dem2di_velocities_mean(world, slot).v);
         speeds += speed;
         most = dem2di_max(most, speed);
@@ -15955,13 +15948,10 @@ DEM2D_API dem2d_result dem2d_world_inertial_number(const dem2d_world *world, dou
     if (result != DEM2D_OK) return result;
     double diameters = 0, mass = 0, area = 0;
     int count = 0;
-    for (int index = 0; index < world->id_count; index++) {
-        int slot = world->ids[index].slot;
-        if (slot < 0) continue;
+    for (int index = 0, slot; (slot = dem2di_next_particle(world, &index)) >= 0; count++) {
         diameters += 2 * dem2di_equivalent(world, slot);
         mass += dem2di_body_mass(world, &world->bodies[slot]);
         area += dem2di_body_area(world, &world->bodies[slot]);
-        count++;
     }
     *number = 0;
     if (count > 0) *number = fabs(strain_rate) * (diameters / count) * sqrt(mass / area / pressure);
@@ -16277,12 +16267,10 @@ static void dem2di_hash_contacts(dem2di_hashing *hashing) {
     const dem2d_world *w = hashing->world;
     dem2di_row made;
     uint64_t place = 0;
-    for (int walls = 0; walls < 2; walls++) {
-        dem2di_contact_iterator iterator = dem2di_first_contacts(walls == 1);
-        for (; dem2di_next_contact(w, &iterator); place++) {
-            const void *row = dem2di_contact_row(w, hashing->column, &iterator, &made);
-            if (row != NULL) dem2di_hash_row(hashing, place, row);
-        }
+    dem2di_contact_iterator iterator = dem2di_contacts_start(false);
+    for (; dem2di_next_contact(w, &iterator); place++) {
+        const void *row = dem2di_contact_row(w, hashing->column, &iterator, &made);
+        if (row != NULL) dem2di_hash_row(hashing, place, row);
     }
 }
 
@@ -17032,15 +17020,6 @@ static int dem2di_drawn_points(const dem2d_shape *shape, int points) {
     return points == 0 ? 64 : points;
 }
 
-/* Slot of the next particle in the order of ids, or -1; `index` starts at 0. */
-static int dem2di_next_particle(const dem2d_world *world, int *index) {
-    while (*index < world->id_count) {
-        int slot = world->ids[(*index)++].slot;
-        if (slot >= 0) return slot;
-    }
-    return -1;
-}
-
 /* Extend the box to a half-plane beside it, if the distance is at most a third of its size: farther
    ones would make the rest of the picture small. */
 static void dem2di_box_reach(const dem2d_world *world, int j, double size, dem2d_box *all) {
@@ -17056,8 +17035,7 @@ static void dem2di_box_reach(const dem2d_world *world, int j, double size, dem2d
    margin of a twentieth of the larger side; a unit square if there are none. */
 static dem2d_box dem2di_scene_box(const dem2d_world *world, bool beside) {
     dem2d_box all = {{HUGE_VAL, HUGE_VAL}, {-HUGE_VAL, -HUGE_VAL}};
-    int index = 0;
-    for (int slot; (slot = dem2di_next_particle(world, &index)) >= 0;) {
+    for (int index = 0, slot; (slot = dem2di_next_particle(world, &index)) >= 0;) {
         dem2d_box box;
         dem2d_pose pose = dem2di_pose_of(world, world->before, slot);
         (void)dem2d_shape_aabb(dem2di_shape_of(world, &world->bodies[slot]), pose, &box);
@@ -17228,15 +17206,6 @@ static void dem2di_draw_walls(const dem2d_world *world, const dem2di_view *view,
     dem2di_print(writer, "</g>\n");
 }
 
-/* Radius in pixels of the smaller particle of a contact. */
-static double dem2di_drawn_radius(const dem2d_world *world, const dem2di_view *view,
-                                  const dem2di_contact_iterator *iterator) {
-    const dem2di_key *key = &world->list.keys[iterator->number];
-    double radius = dem2di_equivalent(world, key->a);
-    if (!iterator->walls) radius = dem2di_min(radius, dem2di_equivalent(world, key->b));
-    return radius * view->factor;
-}
-
 /* Force chains: lines from centre to centre, or to the contact point at a wall. The line of the
    mean force is as wide as a quarter of the mean radius, so that grains stay visible, or 1/400 of
    the picture if that is less. No line is wider than the radius of the smaller grain. */
@@ -17244,27 +17213,25 @@ static void dem2di_draw_chains(const dem2d_world *world, const dem2di_view *view
                                dem2di_writer *writer) {
     double sum = 0, radii = 0;
     int open = 0;
-    dem2di_contact_iterator iterator = dem2di_first_contacts(false);
+    dem2di_contact_iterator iterator = dem2di_contacts_start(true);
     for (; dem2di_next_contact(world, &iterator); open++) {
         sum += iterator.contact.force;
-        radii += dem2di_drawn_radius(world, view, &iterator);
+        radii += dem2di_smaller_radius(world, &iterator) * view->factor;
     }
     double usual = open > 0 ? dem2di_min(view->width / 400, radii / open / 4) : 0;
     double unit = sum > 0 ? usual * open / sum : 0;
     dem2di_print(writer, "<g stroke=\"#7a0019\" stroke-opacity=\"0.75\" "
                          "stroke-linecap=\"round\">\n");
-    for (int wall = 0; wall < 2; wall++) {
-        iterator = dem2di_first_contacts(wall == 1);
-        while (dem2di_next_contact(world, &iterator)) {
-            const dem2di_key *key = &world->list.keys[iterator.number];
-            dem2d_vec start = world->before[key->a].x, end = dem2di_add(start, iterator.branch);
-            double most = dem2di_drawn_radius(world, view, &iterator);
-            if (dem2di_off_view(world, view, key->a) &&
-                (iterator.walls || dem2di_off_view(world, view, key->b)))
-                continue;
-            dem2di_draw_line(dem2di_pixel(view, start), dem2di_pixel(view, end),
-                             dem2di_min(iterator.contact.force * unit, most), writer);
-        }
+    iterator = dem2di_contacts_start(false);
+    while (dem2di_next_contact(world, &iterator)) {
+        const dem2di_key *key = &world->list.keys[iterator.number];
+        dem2d_vec start = world->before[key->a].x, end = dem2di_add(start, iterator.branch);
+        double most = dem2di_smaller_radius(world, &iterator) * view->factor;
+        if (dem2di_off_view(world, view, key->a) &&
+            (iterator.walls || dem2di_off_view(world, view, key->b)))
+            continue;
+        dem2di_draw_line(dem2di_pixel(view, start), dem2di_pixel(view, end),
+                         dem2di_min(iterator.contact.force * unit, most), writer);
     }
     dem2di_print(writer, "</g>\n");
 }
@@ -17315,8 +17282,7 @@ static void dem2di_draw(const dem2d_world *world, const dem2d_svg_desc *desc,
                  "<svg width=\"%.2f\" height=\"%.2f\">\n"
                  "<g stroke=\"#333\" stroke-width=\"%.3f\">\n",
                  view.width, view.height, view.width / 1600);
-    int index = 0, slot;
-    while ((slot = dem2di_next_particle(world, &index)) >= 0 && writer->good)
+    for (int index = 0, slot; (slot = dem2di_next_particle(world, &index)) >= 0 && writer->good;)
         if (!dem2di_off_view(world, &view, slot))
             dem2di_draw_particle(world, &view, desc->outline_points, slot, writer);
     dem2di_print(writer, "</g>\n");
@@ -17363,7 +17329,7 @@ static dem2di_item dem2di_item_start(const dem2d_world *world, const dem2d_vtp_d
     item.part = desc->part;
     item.outline_points = desc->outline_points;
     if (desc->part == DEM2D_VTP_WALLS) item.box = dem2di_scene_box(world, false);
-    item.iterator = dem2di_first_contacts(false);
+    item.iterator = dem2di_contacts_start(false);
     return item;
 }
 
@@ -17372,12 +17338,7 @@ static bool dem2di_item_next(const dem2d_world *world, dem2di_item *item) {
         item->slot = dem2di_next_particle(world, &item->index);
         return item->slot >= 0;
     }
-    if (item->part == DEM2D_VTP_CONTACTS) {
-        if (dem2di_next_contact(world, &item->iterator)) return true;
-        if (item->iterator.walls) return false;
-        item->iterator = dem2di_first_contacts(true);
-        return dem2di_next_contact(world, &item->iterator);
-    }
+    if (item->part == DEM2D_VTP_CONTACTS) return dem2di_next_contact(world, &item->iterator);
     for (; item->index < world->wall_count; item->index++) {
         if (!world->walls[item->index].alive) continue;
         item->slot = item->index++;
