@@ -5259,10 +5259,10 @@ typedef struct dem2di_side {
    may touch itself, at points and along edges that it traverses twice, as outlines from pixels do.
    Winding numbers decide where edges meet at corners or lie on each other. A line sweeps over the
    plane by x, then y (Shamos and Hoey 1976). The edges that it cuts are kept in their order along
-   it, in a tree balanced by random priorities (a treap): O(n log n). Edges that become neighbours
-   are tested for a crossing inside both. At a point of the outline the edges through it are sorted
-   by their order after the point, which gives the winding numbers between them. Points within
-   rounding errors of an edge are on it: edges that touch do not cross. */
+   it, in a sorted array, which is short: an outline is cut by a line a few times. Edges that become
+   neighbours are tested for a crossing inside both. At a point of the outline the edges through it
+   are sorted by their order after the point, which gives the winding numbers between them. Points
+   within rounding errors of an edge are on it: edges that touch do not cross. */
 #define DEM2DI_SWEEP_ROUNDOFF (64 * DBL_EPSILON) /* of the coordinates: some products and sums */
 
 typedef struct dem2di_sweep_edge {
@@ -5271,9 +5271,6 @@ typedef struct dem2di_sweep_edge {
     int sign;              /* 1 if the outline goes from left to right, else -1 */
     int winding;           /* winding number just above the edge */
     int name;              /* index of the outline's point where the edge begins */
-    int below, above;      /* neighbours on the line, or -1 */
-    int parent, child[2];  /* in the tree, or -1 */
-    uint32_t priority;     /* random; a parent's is not less than its children's */
     bool cut;              /* by the sweep line */
 } dem2di_sweep_edge;
 
@@ -5286,11 +5283,11 @@ typedef struct dem2di_sweep_point {
 typedef struct dem2di_sweep {
     dem2di_sweep_edge *edges;   /* count */
     dem2di_sweep_point *points; /* count */
-    int count, room;            /* points that differ from the one before; all points */
+    int *line;                  /* cut edges, from the lowest to the highest */
+    int count, cut;             /* points that differ from the one before; edges in line */
     double roundoff;            /* of coordinates, which are relative to origin and size */
     dem2d_vec origin;
     double size;
-    int root, lowest;  /* edges, or -1 */
     int sense;         /* winding inside: 1, -1, 0 until it is known */
     int first, second; /* names of the edges that cross */
     dem2d_vec where;
@@ -5301,30 +5298,6 @@ static int dem2di_sweep_side(const dem2di_sweep *s, int edge, dem2d_vec p) {
     const dem2di_sweep_edge *e = &s->edges[edge];
     double turn = dem2di_cross(dem2di_sub(e->right, e->left), dem2di_sub(p, e->left));
     return (turn > e->slack) - (turn < -e->slack);
-}
-
-/* Rotate the tree: an edge takes its parent's place. */
-static void dem2di_sweep_rotate(dem2di_sweep *s, int edge) {
-    dem2di_sweep_edge *e = &s->edges[edge], *p = &s->edges[e->parent];
-    int parent = e->parent, grand = p->parent, k = p->child[1] == edge, inner = e->child[!k];
-    p->child[k] = inner;
-    if (inner >= 0) s->edges[inner].parent = parent;
-    e->child[!k] = parent;
-    p->parent = edge;
-    e->parent = grand;
-    if (grand < 0)
-        s->root = edge;
-    else
-        s->edges[grand].child[s->edges[grand].child[1] == parent] = edge;
-}
-
-/* Make two edges neighbours on the sweep line; -1 is an end of the line. */
-static void dem2di_sweep_link(dem2di_sweep *s, int below, int above) {
-    if (below >= 0)
-        s->edges[below].above = above;
-    else
-        s->lowest = above;
-    if (above >= 0) s->edges[above].below = below;
 }
 
 /* Is an edge that begins at the sweep line above another edge? Decided at its start or, if that is
@@ -5338,57 +5311,38 @@ static bool dem2di_sweep_goes_above(const dem2di_sweep *s, int edge, int other) 
     return dem2di_sweep_side(s, edge, o->right) <= 0;
 }
 
-static void dem2di_sweep_insert(dem2di_sweep *s, int edge) {
-    dem2di_sweep_edge *e = &s->edges[edge];
-    int parent = -1, next = s->root, k = 0;
-    while (next >= 0) {
-        parent = next;
-        k = dem2di_sweep_goes_above(s, edge, parent);
-        next = s->edges[parent].child[k];
+/* Put an edge on the sweep line; returns its place there. */
+static int dem2di_sweep_insert(dem2di_sweep *s, int edge) {
+    int low = 0, high = s->cut;
+    while (low < high) {
+        int middle = low + (high - low) / 2;
+        if (dem2di_sweep_goes_above(s, edge, s->line[middle]))
+            low = middle + 1;
+        else
+            high = middle;
     }
-    e->cut = true;
-    e->parent = parent;
-    e->child[0] = e->child[1] = -1;
-    int below = parent < 0 ? -1 : k ? parent : s->edges[parent].below;
-    int above = parent < 0 ? -1 : k ? s->edges[parent].above : parent;
-    dem2di_sweep_link(s, below, edge);
-    dem2di_sweep_link(s, edge, above);
-    if (parent < 0)
-        s->root = edge;
-    else
-        s->edges[parent].child[k] = edge;
-    while (e->parent >= 0 && s->edges[e->parent].priority < e->priority)
-        dem2di_sweep_rotate(s, edge);
+    memmove(&s->line[low + 1], &s->line[low], (size_t)(s->cut++ - low) * sizeof *s->line);
+    s->line[low] = edge;
+    s->edges[edge].cut = true;
+    return low;
 }
 
-static void dem2di_sweep_remove(dem2di_sweep *s, int edge) {
-    dem2di_sweep_edge *e = &s->edges[edge];
-    while (e->child[0] >= 0 || e->child[1] >= 0) { /* rotate it down to a leaf */
-        int low = e->child[0], high = e->child[1];
-        bool up = low < 0 || (high >= 0 && s->edges[high].priority > s->edges[low].priority);
-        dem2di_sweep_rotate(s, up ? high : low);
-    }
-    if (e->parent < 0)
-        s->root = -1;
-    else
-        s->edges[e->parent].child[s->edges[e->parent].child[1] == edge] = -1;
-    dem2di_sweep_link(s, e->below, e->above);
-    e->cut = false;
+static void dem2di_sweep_remove(dem2di_sweep *s, int place) {
+    s->edges[s->line[place]].cut = false;
+    memmove(&s->line[place], &s->line[place + 1], (size_t)(--s->cut - place) * sizeof *s->line);
 }
 
-/* The highest edge below a point, or -1. */
+/* Number of edges on the sweep line below a point. */
 static int dem2di_sweep_below(const dem2di_sweep *s, dem2d_vec p) {
-    int found = -1, next = s->root;
-    while (next >= 0) {
-        bool above = dem2di_sweep_side(s, next, p) > 0;
-        if (above) found = next;
-        next = s->edges[next].child[above];
+    int low = 0, high = s->cut;
+    while (low < high) {
+        int middle = low + (high - low) / 2;
+        if (dem2di_sweep_side(s, s->line[middle], p) > 0)
+            low = middle + 1;
+        else
+            high = middle;
     }
-    return found;
-}
-
-static int dem2di_sweep_after(const dem2di_sweep *s, int edge) {
-    return edge >= 0 ? s->edges[edge].above : s->lowest;
+    return low;
 }
 
 static bool dem2di_sweep_found(dem2di_sweep *s, int first, int second, dem2d_vec where) {
@@ -5399,9 +5353,11 @@ static bool dem2di_sweep_found(dem2di_sweep *s, int first, int second, dem2d_vec
     return false;
 }
 
-/* Test two neighbours (-1: no edge) for a crossing inside both; false if they cross. */
-static bool dem2di_sweep_pair(dem2di_sweep *s, int low, int high) {
-    if (low < 0 || high < 0) return true;
+/* Test the edge at a place on the sweep line and the next one, if there are both, for a crossing
+   inside both; false if they cross. */
+static bool dem2di_sweep_pair(dem2di_sweep *s, int place) {
+    if (place < 0 || place + 1 >= s->cut) return true;
+    int low = s->line[place], high = s->line[place + 1];
     const dem2di_sweep_edge *a = &s->edges[low], *b = &s->edges[high];
     if (dem2di_sweep_side(s, low, b->left) * dem2di_sweep_side(s, low, b->right) >= 0 ||
         dem2di_sweep_side(s, high, a->left) * dem2di_sweep_side(s, high, a->right) >= 0)
@@ -5409,18 +5365,6 @@ static bool dem2di_sweep_pair(dem2di_sweep *s, int low, int high) {
     dem2d_vec along = dem2di_sub(a->right, a->left), other = dem2di_sub(b->right, b->left);
     double t = dem2di_cross(dem2di_sub(b->left, a->left), other) / dem2di_cross(along, other);
     return dem2di_sweep_found(s, low, high, dem2di_along(a->left, t, along));
-}
-
-/* Test all neighbours from one edge on the sweep line (-1: below all) to another above it (-1:
-   above all). */
-static bool dem2di_sweep_pairs(dem2di_sweep *s, int from, int to) {
-    int next;
-    do {
-        next = dem2di_sweep_after(s, from);
-        if (!dem2di_sweep_pair(s, from, next)) return false;
-        from = next;
-    } while (next != to);
-    return true;
 }
 
 /* Do two edges through a point lie on each other after it? */
@@ -5431,19 +5375,18 @@ static bool dem2di_sweep_overlap(const dem2di_sweep *s, int a, int b) {
                : dem2di_sweep_side(s, a, f->right) == 0;
 }
 
-/* Winding numbers between the edges through p, which are those between `below` and `top`. */
+/* Winding numbers between the edges through p, which are at the places from `below` to `top`. */
 static bool dem2di_sweep_windings(dem2di_sweep *s, int below, int top, dem2d_vec p) {
-    int winding = below >= 0 ? s->edges[below].winding : 0, before = -1;
-    for (int e = dem2di_sweep_after(s, below); e != top && e >= 0; e = s->edges[e].above) {
-        int next = s->edges[e].above;
-        winding += s->edges[e].sign;
-        s->edges[e].winding = winding;
-        if (next == top || !dem2di_sweep_overlap(s, e, next)) {
-            if (s->sense == 0 && abs(winding) == 1) s->sense = winding;
-            if (winding != 0 && winding != s->sense)
-                return dem2di_sweep_found(s, before >= 0 ? before : next >= 0 ? next : below, e, p);
-        }
-        before = e;
+    int winding = below > 0 ? s->edges[s->line[below - 1]].winding : 0;
+    for (int i = below; i < top; i++) {
+        int edge = s->line[i];
+        winding += s->edges[edge].sign;
+        s->edges[edge].winding = winding;
+        if (i + 1 < top && dem2di_sweep_overlap(s, edge, s->line[i + 1])) continue;
+        if (s->sense == 0 && abs(winding) == 1) s->sense = winding;
+        if (winding == 0 || winding == s->sense) continue;
+        int beside = i > below ? i - 1 : i + 1 < s->cut ? i + 1 : i > 0 ? i - 1 : i;
+        return dem2di_sweep_found(s, s->line[beside], edge, p);
     }
     return true;
 }
@@ -5461,28 +5404,34 @@ static int dem2di_sweep_edge_at(const dem2di_sweep *s, int i) {
     return i % 2 == 0 ? index : index > 0 ? index - 1 : s->count - 1;
 }
 
-/* The sweep line reaches points [from, to) of the outline, which coincide. */
+/* The sweep line reaches points [from, to) of the outline, which coincide. The edges through them
+   are at the places from `below` to `top`. */
 static bool dem2di_sweep_event(dem2di_sweep *s, int from, int to) {
     dem2d_vec p = s->points[from].at;
-    int below = dem2di_sweep_below(s, p), top = dem2di_sweep_after(s, below);
-    while (top >= 0 && dem2di_sweep_side(s, top, p) == 0) {
-        int next = s->edges[top].above;
-        if (dem2di_sweep_same(s, s->edges[top].right, p)) dem2di_sweep_remove(s, top);
-        top = next;
-    }
+    int below = dem2di_sweep_below(s, p), top = below;
+    while (top < s->cut && dem2di_sweep_side(s, s->line[top], p) == 0)
+        if (dem2di_sweep_same(s, s->edges[s->line[top]].right, p))
+            dem2di_sweep_remove(s, top);
+        else
+            top++;
     for (int i = 2 * from; i < 2 * to; i++) { /* only rounding errors leave any */
-        int edge = dem2di_sweep_edge_at(s, i);
-        bool ends = dem2di_compare_points(&s->edges[edge].right, &p) == 0;
-        if (ends && s->edges[edge].cut && edge != below && edge != top)
-            dem2di_sweep_remove(s, edge);
+        int edge = dem2di_sweep_edge_at(s, i), k = 0;
+        if (dem2di_compare_points(&s->edges[edge].right, &p) != 0 || !s->edges[edge].cut) continue;
+        while (s->line[k] != edge) k++;
+        if (k == below - 1 || k == top) continue;
+        dem2di_sweep_remove(s, k);
+        below -= k < below;
+        top -= k < top;
     }
-    if (!dem2di_sweep_pairs(s, below, top)) return false;
+    for (int i = below - 1; i < top; i++)
+        if (!dem2di_sweep_pair(s, i)) return false;
     for (int i = 2 * from; i < 2 * to; i++) {
         int edge = dem2di_sweep_edge_at(s, i);
         if (dem2di_compare_points(&s->edges[edge].left, &p) != 0) continue;
-        dem2di_sweep_insert(s, edge);
-        if (!dem2di_sweep_pair(s, s->edges[edge].below, edge)) return false;
-        if (!dem2di_sweep_pair(s, edge, s->edges[edge].above)) return false;
+        int k = dem2di_sweep_insert(s, edge);
+        below += k < below;
+        top += k <= top;
+        if (!dem2di_sweep_pair(s, k - 1) || !dem2di_sweep_pair(s, k)) return false;
     }
     return dem2di_sweep_windings(s, below, top, p);
 }
@@ -5515,22 +5464,17 @@ static void dem2di_sweep_points(dem2di_sweep *s, const dem2d_vec *points, int co
         s->count--;
 }
 
-/* Edges from their points; priorities from splitmix64's mixing of their numbers. */
 static void dem2di_sweep_edges(dem2di_sweep *s) {
     for (int i = 0; i < s->count; i++) {
         dem2di_sweep_edge *e = &s->edges[i];
         dem2d_vec p = s->points[i].at, q = s->points[i + 1 < s->count ? i + 1 : 0].at;
         bool rises = dem2di_compare_points(&p, &q) < 0;
-        uint64_t mixed = ((uint64_t)i + 1) * 0x9E3779B97F4A7C15u;
-        mixed = (mixed ^ (mixed >> 30)) * 0xBF58476D1CE4E5B9u;
-        e->priority = (uint32_t)(mixed >> 32);
         e->left = rises ? p : q;
         e->right = rises ? q : p;
         e->sign = rises ? 1 : -1;
         e->slack = s->roundoff * dem2di_length(dem2di_sub(q, p));
         e->cut = false;
     }
-    s->root = s->lowest = -1;
 }
 
 /* Is the outline valid? If not, first, second and where describe a crossing. */
@@ -5551,16 +5495,16 @@ static bool dem2di_sweep_run(dem2di_sweep *s, const dem2d_vec *points, int count
 static dem2d_result dem2di_check_crossing(const dem2d_env *env, const char *name,
                                           const dem2d_vec *points, int count) {
     dem2di_sweep s;
-    size_t room = (size_t)count;
+    size_t room = (size_t)count, size = sizeof *s.edges + sizeof *s.points + sizeof *s.line;
     dem2d_result result = DEM2D_OK;
     memset(&s, 0, sizeof s);
-    s.edges = (dem2di_sweep_edge *)dem2di_allocate(env, room, sizeof *s.edges);
-    if (s.edges != NULL)
-        s.points = (dem2di_sweep_point *)dem2di_allocate(env, room, sizeof *s.points);
-    if (s.points == NULL) {
-        result =
-            dem2di_fail(env, DEM2D_OUT_OF_MEMORY, -1, "%s: no memory for %d points", name, count);
-    } else if (!dem2di_sweep_run(&s, points, count)) {
+    s.edges = (dem2di_sweep_edge *)dem2di_allocate(env, room, size);
+    if (s.edges == NULL)
+        return dem2di_fail(env, DEM2D_OUT_OF_MEMORY, -1, "%s: no memory for %d points", name,
+                           count);
+    s.points = (dem2di_sweep_point *)(void *)(s.edges + room);
+    s.line = (int *)(void *)(s.points + room);
+    if (!dem2di_sweep_run(&s, points, count)) {
         dem2d_vec where = dem2di_along(s.origin, s.size, s.where);
         result =
             dem2di_fail(env, DEM2D_CROSSING, s.first,
@@ -5568,8 +5512,7 @@ static dem2d_result dem2di_check_crossing(const dem2d_env *env, const char *name
                         "point i",
                         name, s.first, s.second, where.x, where.y);
     }
-    dem2di_release(env, s.points, room, sizeof *s.points);
-    dem2di_release(env, s.edges, room, sizeof *s.edges);
+    dem2di_release(env, s.edges, room, size);
     return result;
 }
 
