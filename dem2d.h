@@ -190,6 +190,13 @@ CONCEPTS
     Wall        A half-plane: its normal points into the grains. Or a segment, which has two sides.
                 Segments may form a chain: a particle at a joint of two segments has one contact.
                 A wall stands still, moves at a velocity, or is servo-controlled to a stress.
+    Name        Of the two of a pair, A is the one with the lower id, and sums over contacts and
+                particles go by ids, walls last. dem2d_particle_desc.name and dem2d_wall_desc.name
+                (64 bits, 0: none) replace this order: first by name, then by id. With the same
+                names, worlds that were built in another order, or that hold a part of a scene
+                each, get the same bits. Names need not be unique; they take 16 bytes a particle
+                in worlds that have some, and nothing in others. dem2d_world_particles keeps the
+                order of ids.
     Immovable   Two particles that are fixed or driven have no contact with each other, nor with a
                 wall without servo control: they may overlap, and have no force, energy or stress.
     Force       On B, along the normal at each contact point: kn times depth, and a dashpot if the
@@ -500,8 +507,8 @@ THREADS
     call at a time, queries included. A world starts no threads, but passes all work that takes time
     to desc.parallel_for, if there is one, in blocks of some hundred contacts or particles: any
     thread system will do (examples/threads_posix.c, threads_openmp.c). A block writes only its own
-    results, and sums are taken in the order of ids. So neither the number of threads nor the
-    distribution of the blocks can change a bit. One thread does the short loops over all particles
+    results, and sums are taken in the order of names and ids. So neither the number of threads nor
+the distribution of the blocks can change a bit. One thread does the short loops over all particles
     when the list is rebuilt, the sums of the forces on walls, and the speeds of servo walls. All
     threads call custom support functions and laws (the calling thread also calls a law for the
     speed of a servo wall); only the thread that called the step allocates and writes to the log.
@@ -546,7 +553,8 @@ DETERMINISM
     Same input, same bits: on gcc and clang, C and C++, -O0 to -O3, with or without FMA hardware
     (contraction is off inside this header). Steps use only + - * / and sqrt; sine, cosine and
     arctangent are the header's own. A pair is (lower id, higher id) and forces are summed in the
-    order of the partner's id, so neither addresses nor storage order can change a bit. Not
+    order of the partner's id, so neither addresses nor storage order can change a bit. With names
+    of your own (see Name in CONCEPTS) the bits do not depend on ids, either. Not
     covered: clang -ffp-contract=fast on the command line, and 80-bit x87 arithmetic. Compare two
     runs by dem2d_world_hash.
     Your own arithmetic (positions and velocities you compute, support functions, contact laws) is
@@ -1323,6 +1331,7 @@ typedef struct dem2d_particle_desc {
     double angle;               ///< rad
     dem2d_vec velocity;         ///< m/s, half a step before the position
     double angular_velocity;    ///< rad/s
+    uint64_t name;              ///< orders pairs and sums: see Name in the manual; 0: none
 } dem2d_particle_desc;
 
 /// State of a particle.
@@ -1339,6 +1348,7 @@ typedef struct dem2d_particle_info {
     double inertia;             ///< kg m, about the centroid
     double radius;              ///< m, bounding circle
     double equivalent;          ///< m, radius of the circle of equal area
+    uint64_t name;              ///< as given
 } dem2d_particle_info;
 
 /// How a wall moves.
@@ -1380,6 +1390,7 @@ typedef struct dem2d_wall_desc {
     double stress;              ///< Pa, for SERVO, compression positive
     double max_speed;           ///< m/s, for SERVO, > 0: greatest speed, taken before first contact
     dem2d_wall_id spans[2];     ///< the length is the distance between these walls; or both zero
+    uint64_t name;              ///< orders contacts and sums: see Name in the manual; 0: none
 } dem2d_wall_desc;
 
 /// State of a wall.
@@ -1395,6 +1406,7 @@ typedef struct dem2d_wall_info {
     double length;              ///< m, at the last force pass; 0 when neither length nor spans
     double stress;              ///< Pa, -force . normal / length; 0 when there is no length
     double target;              ///< Pa, for SERVO
+    uint64_t name;              ///< as given
 } dem2d_wall_info;
 
 /// One contact of the last force pass.
@@ -1641,9 +1653,9 @@ DEM2D_API dem2d_result dem2d_world_stats(const dem2d_world *world, dem2d_stats *
 /// capacity is 0); count gets the number of particles. Errors: OUT_OF_RANGE (capacity below 0).
 DEM2D_API dem2d_result dem2d_world_particles(const dem2d_world *world, dem2d_particle_id *ids,
                                              int capacity, int *count);
-/// Contacts of the last force pass, first of two particles, then with walls, each sorted by ids:
-/// the first `capacity` of them go into contacts (may be NULL if capacity is 0); count gets the
-/// number of contacts. Errors: OUT_OF_RANGE (capacity below 0).
+/// Contacts of the last force pass, first of two particles, then with walls, each sorted by A, then
+/// by B, in the order of names and ids: the first `capacity` of them go into contacts (may be NULL
+/// if capacity is 0); count gets the number of contacts. Errors: OUT_OF_RANGE (capacity below 0).
 DEM2D_API dem2d_result dem2d_world_contacts(const dem2d_world *world, dem2d_contact_info *contacts,
                                             int capacity, int *count);
 /// Energies at the last force pass, of springs as their materials are now.
@@ -2291,7 +2303,7 @@ typedef struct dem2di_field {
 #define DEM2DI_OPTIONAL 0, 1, 0, DEM2DI_POINTER
 #define DEM2DI_SWITCH 0, 0, 0, DEM2DI_BOOL
 #define DEM2DI_HANDLE 0, 0, 0, DEM2DI_ID
-#define DEM2DI_SEED 0, 0, 0, DEM2DI_UINT64
+#define DEM2DI_WORD 0, 0, 0, DEM2DI_UINT64
 #define DEM2DI_COUNTER 0, 4611686018427387904.0, 0, DEM2DI_INT64 /* 2^62: a sum may be made */
 #define DEM2DI_ANY_NUMBER 0, 0, DEM2DI_ANY, DEM2DI_DOUBLE
 #define DEM2DI_MAY_OVERFLOW DEM2DI_NUMBER(0, HUGE_VAL, 0)
@@ -7781,7 +7793,7 @@ static const dem2di_field dem2di_fit_fields[] = {
     DEM2DI_ROW(dem2d_fit_desc, max_radius, DEM2DI_NUMBER(1, DBL_MAX, DEM2DI_OR_0),
                "- 20; of the size"),
     DEM2DI_ROW(dem2d_fit_desc, unbounded, DEM2DI_SWITCH, "- false"),
-    DEM2DI_ROW(dem2d_fit_desc, seed, DEM2DI_SEED, "- 0"),
+    DEM2DI_ROW(dem2d_fit_desc, seed, DEM2DI_WORD, "- 0"),
     DEM2DI_ROW(dem2d_fit_desc, birds, DEM2DI_WHOLE_OR_0(2, DEM2DI_SWARM_BIRDS), "- 30"),
     DEM2DI_ROW(dem2d_fit_desc, moves, DEM2DI_WHOLE(0, 100000), "- 60"),
     DEM2DI_ROW(dem2d_fit_desc, pixels, DEM2DI_WHOLE_OR_0(8, 4096), "px 256"),
@@ -7918,7 +7930,7 @@ static const dem2di_field dem2di_virtual_fields[] = {
     DEM2DI_ROW(dem2d_virtual_desc, roughness, DEM2DI_FROM_0, "- 0"),
     DEM2DI_ROW(dem2d_virtual_desc, spectrum, DEM2DI_OPTIONAL, "- NULL; order + 1 values >= 0"),
     DEM2DI_ROW(dem2d_virtual_desc, min_radius, DEM2DI_FRACTION, "- 0.1; of a0/2"),
-    DEM2DI_ROW(dem2d_virtual_desc, seed, DEM2DI_SEED, "- 0"),
+    DEM2DI_ROW(dem2d_virtual_desc, seed, DEM2DI_WORD, "- 0"),
 };
 
 static dem2d_result dem2di_check_virtual(const dem2d_virtual_desc *desc, int order) {
@@ -10107,7 +10119,7 @@ DEM2D_API dem2d_result dem2d_wall_contact(const dem2d_shape *shape, dem2d_pose p
    uses: config, math
    ============================================================================================ */
 
-/* A pair: slots of two particles, the one with the lower id first; or a particle and a wall. */
+/* A pair: slots of two particles, the one of lower rank first; or a particle and a wall. */
 typedef struct dem2di_key {
     int a, b;
 } dem2di_key;
@@ -10754,7 +10766,7 @@ static bool dem2di_state_finite(const dem2di_state *state) {
      force      positions, velocities, last contacts, laws -> next contacts over the last, loads.
                 Of each pair first the geometry (collide), then the law; kernels of circles do both.
                 Where segments are joined, it is decided in between which contacts count (resolve)
-     gather     loads -> force and torque of each particle, in the order of its partners' ids
+     gather     loads -> force and torque of each particle, in the order of its partners' ranks
      control    forces on servo walls, next states of their particles -> velocities of walls
      check      contacts, loads -> may the step be taken? The last pass that may refuse it
      integrate  states, forces -> next states
@@ -10763,8 +10775,8 @@ static bool dem2di_state_finite(const dem2di_state *state) {
 
    Invariants between steps, which tests/inside.h checks:
      1. Ids and slots of particles lead to each other. Slots that are free have a shape of -1.
-     2. A key is of two particles that live, the one of lower id first, or of a particle and a wall
-        that live; or it is forgotten (a < 0), its contact is apart, and the list is stale.
+     2. A key is of two particles that live, the one of lower rank first, or of a particle and a
+   wall that live; or it is forgotten (a < 0), its contact is apart, and the list is stale.
      3. A contact is closed where its depth is above 0. Otherwise it has no force, points or law
         state. Two circles that are both of the disc kind have their arms from the depth.
      4. adjacent has each contact of a listed pair once for each of its particles, first as B.
@@ -10781,11 +10793,12 @@ typedef struct dem2di_template {
     int users;
 } dem2di_template;
 
-/* What does not change while a particle lives, but for its motion. */
+/* What does not change while a particle lives, but for its motion and its rank. */
 typedef struct dem2di_body {
     double scale;
     int shape_index; /* of the template; -1: removed, until the slots are put in order */
     int index;       /* of the particle's id */
+    int rank;        /* orders pairs and sums: the index, or place in the order of names */
     uint16_t material;
     uint8_t motion;  /* dem2d_motion */
     bool redirected; /* has been given other velocities since the last step */
@@ -10816,6 +10829,11 @@ typedef struct dem2di_id_slot {
     uint32_t generation;
 } dem2di_id_slot;
 
+/* A row of the order of names: the id at this place, and the place of the id of this index. */
+typedef struct dem2di_ranked {
+    int index, rank;
+} dem2di_ranked;
+
 /* A wall as described, and where it is. */
 typedef struct dem2di_wall {
     dem2d_wall_desc desc; /* normal of unit length */
@@ -10828,6 +10846,8 @@ typedef struct dem2di_wall {
     uint32_t generation;
     int users; /* walls that span to it */
     bool alive;
+    int rank;   /* place in the order of the walls' names and indices */
+    int placed; /* the wall at the place of this one's index */
 } dem2di_wall;
 
 /* What a servo wall pushes against: sums over its closed contacts. */
@@ -10859,15 +10879,15 @@ typedef struct dem2di_contacts {
     dem2di_law_state *law_states;   /* likewise, with the full law */
 } dem2di_contacts;
 
-/* The listed pairs: of two circles, of two other particles, of particles and walls (in the order of
-   the wall, then of the particle's id), and their contacts as the last force pass left them. */
+/* The listed pairs: of two circles, of two other particles, of particles and walls (by the rank of
+   the wall, then by that of the particle), and their contacts as the last force pass left them. */
 typedef struct dem2di_list {
     dem2di_key *keys;         /* count; a < 0 when the contact was forgotten: it is apart */
     int discs, pairs, count;  /* where the kinds end */
     dem2di_contacts contacts; /* at the last force pass; a force pass writes the next over them */
     dem2di_contacts last;     /* what they were before a step that looks back: in scratch */
-    int *adjacent; /* the contacts of each particle in the order of the partner's id, walls last:
-                      first those of which it is B, as A has the lower id, then as A */
+    int *adjacent; /* the contacts of each particle by the partner's rank, walls last: first those
+                      of which it is B, as A has the lower rank, then as A */
     int *first;    /* of a slot's in adjacent; bodies + 1 */
     int *own;      /* of a slot's as A */
 } dem2di_list;
@@ -10891,7 +10911,7 @@ typedef struct dem2di_block_result {
     dem2di_count count;
     dem2di_stiffest stiffest;
     double most;    /* greatest reach of the discs; greatest square of speed over skin */
-    int fast;       /* slot of the one of least id that may pass through others, or -1 */
+    int fast;       /* slot of the one of least rank that may pass through others, or -1 */
     int64_t spread; /* sum of the distances in memory of the partners found */
 } dem2di_block_result;
 
@@ -10969,7 +10989,9 @@ typedef enum dem2di_group {
     DEM2DI_MATERIALS,
     DEM2DI_LAWS, /* laws_side squared */
     DEM2DI_IDS,
+    DEM2DI_RANKS, /* of ids, where named */
     DEM2DI_BODIES,
+    DEM2DI_NAMES,         /* of bodies, where named */
     DEM2DI_DISPLACEMENTS, /* of bodies, where plan.turns */
     DEM2DI_MADE,          /* of bodies, where some are redirected */
     DEM2DI_STARTS,        /* of the contacts of bodies, and the end of the last */
@@ -11038,7 +11060,11 @@ struct dem2d_world {
 
     int body_count; /* slots in use, holes too */
     int holes, id_count, free_id;
-    dem2di_id_slot *ids;        /* by the index of an id */
+    dem2di_id_slot *ids;  /* by the index of an id */
+    bool named;           /* a particle has had a name: the next two are there */
+    bool order_due;       /* particles have come since the order of names was found */
+    dem2di_ranked *order; /* all ids, free ones too */
+    uint64_t *names;
     dem2di_state *before, *now; /* at the last force pass, present; the next come over before */
     dem2di_body *bodies;
     dem2di_inverse *inverse;
@@ -11112,6 +11138,7 @@ static const dem2di_field dem2di_wall_fields[] = {
     DEM2DI_ROW(dem2d_wall_desc, stress, DEM2DI_FINITE, "Pa 0; SERVO only"),
     DEM2DI_ROW(dem2d_wall_desc, max_speed, DEM2DI_FROM_0, "m/s none; > 0 for SERVO"),
     DEM2DI_ROW(dem2d_wall_desc, spans, DEM2DI_HANDLE, "- none; two walls, or both zero"),
+    DEM2DI_ROW(dem2d_wall_desc, name, DEM2DI_WORD, "- 0"),
 };
 
 /* --- columns ------------------------------------------------------------------------------------
@@ -11144,6 +11171,8 @@ static const dem2di_field dem2di_progress_fields[] = {
     DEM2DI_SAVED("has_law", dem2d_world, has_law, DEM2DI_SWITCH),
     DEM2DI_SAVED("law_tag", dem2d_world, law_tag, DEM2DI_TAG),
     DEM2DI_SAVED("redirected", dem2d_world, redirected, DEM2DI_SWITCH),
+    DEM2DI_SAVED("named", dem2d_world, named, DEM2DI_SWITCH),
+    DEM2DI_SAVED("order_due", dem2d_world, order_due, DEM2DI_SWITCH),
     DEM2DI_SAVED("list_stale", dem2d_world, list_stale, DEM2DI_SWITCH),
     DEM2DI_SAVED("list_used_up", dem2d_world, list_used_up, DEM2DI_SWITCH),
     DEM2DI_SAVED("check_due", dem2d_world, check_due, DEM2DI_SWITCH),
@@ -11224,6 +11253,11 @@ static const dem2di_field dem2di_slot_fields[] = {
 
 static const dem2di_field dem2di_id_fields[] = {
     DEM2DI_SAVED("generation", dem2di_id_slot, generation, DEM2DI_HANDLE)};
+
+static const dem2di_field dem2di_ranked_fields[] = {
+    DEM2DI_SAVED("id", dem2di_ranked, index, DEM2DI_WHOLE(0, 1 << 30))};
+
+static const dem2di_field dem2di_name_field[] = {DEM2DI_PLAIN("value", uint64_t, DEM2DI_WORD)};
 
 static const dem2di_field dem2di_body_fields[] = {
     DEM2DI_SAVED("scale", dem2di_body, scale, DEM2DI_POSITIVE),
@@ -11388,6 +11422,7 @@ static const dem2di_column dem2di_columns[] = {
     DEM2DI_COLUMN("laws", LAWS, laws, DEM2DI_FIRST | DEM2DI_HASHED, pair_fields),
     DEM2DI_COLUMN("ids", IDS, ids, DEM2DI_FIRST | DEM2DI_HASHED, id_fields),
     DEM2DI_COLUMN("slots", IDS, ids, DEM2DI_SHARES, slot_fields),
+    DEM2DI_COLUMN("order", RANKS, order, DEM2DI_FIRST, ranked_fields),
     DEM2DI_COLUMN("particles", BODIES, bodies, DEM2DI_FIRST | DEM2DI_MOVES | DEM2DI_HASHED,
                   body_fields),
     DEM2DI_COLUMN("last_states", BODIES, before, DEM2DI_MOVES | DEM2DI_SWAPS | DEM2DI_HASHED,
@@ -11396,6 +11431,7 @@ static const dem2di_column dem2di_columns[] = {
     DEM2DI_COLUMN("inverse_skins_squared", BODIES, inverse_skin_squared, 0, any_field),
     DEM2DI_UNSAVED(BODIES, inverse, DEM2DI_MOVES),
     DEM2DI_UNSAVED(BODIES, list.own, 0),
+    DEM2DI_COLUMN("names", NAMES, names, DEM2DI_FIRST | DEM2DI_MOVES | DEM2DI_HASHED, name_field),
     DEM2DI_COLUMN("displacements", DISPLACEMENTS, displacement, DEM2DI_MOVES | DEM2DI_SWAPS,
                   way_field),
     DEM2DI_UNSAVED(DISPLACEMENTS, next_displacement, 0),
@@ -11539,6 +11575,8 @@ static bool dem2di_reserve_bodies(dem2d_world *world, int count) {
     return dem2di_group_reserve(world, DEM2DI_BODIES, count) &&
            dem2di_group_reserve(world, DEM2DI_STARTS, count + 1) &&
            dem2di_group_reserve(world, DEM2DI_IDS, count) &&
+           (!world->named || (dem2di_group_reserve(world, DEM2DI_RANKS, count) &&
+                              dem2di_group_reserve(world, DEM2DI_NAMES, count))) &&
            (!world->plan.turns || dem2di_group_reserve(world, DEM2DI_DISPLACEMENTS, count)) &&
            (!world->redirected || dem2di_group_reserve(world, DEM2DI_MADE, count));
 }
@@ -11719,6 +11757,12 @@ static dem2d_particle_id dem2di_particle_id(const dem2d_world *world, int slot) 
     return id;
 }
 
+/* The slot of the particle at a place of the order of names and ids, -1 where there is none: sums
+   over particles go through all places. */
+static inline int dem2di_slot_at(const dem2d_world *world, int place) {
+    return world->ids[world->named ? world->order[place].index : place].slot;
+}
+
 static dem2d_wall_id dem2di_wall_id(const dem2d_world *world, int slot) {
     dem2d_wall_id id;
     id.index = (uint32_t)slot;
@@ -11864,6 +11908,7 @@ static const dem2di_field dem2di_particle_fields[] = {
     DEM2DI_ROW(dem2d_particle_desc, angle, DEM2DI_ANGLE, "rad 0"),
     DEM2DI_ROW(dem2d_particle_desc, velocity, DEM2DI_VECTOR, "m/s 0; 0 when FIXED"),
     DEM2DI_ROW(dem2d_particle_desc, angular_velocity, DEM2DI_FINITE, "rad/s 0; 0 when FIXED"),
+    DEM2DI_ROW(dem2d_particle_desc, name, DEM2DI_WORD, "- 0"),
 };
 
 /* A particle as it is described, but for its ids. */
@@ -11933,6 +11978,7 @@ static int dem2di_id_take(dem2d_world *world) {
     if (index < 0) {
         index = world->id_count++;
         world->ids[index].generation = 0;
+        if (world->named) world->order[index].index = world->order[index].rank = index;
     } else {
         world->free_id = -2 - world->ids[index].slot;
     }
@@ -11943,6 +11989,17 @@ static int dem2di_id_take(dem2d_world *world) {
 static void dem2di_id_release(dem2d_world *world, int index) {
     world->ids[index].slot = -2 - world->free_id;
     world->free_id = index;
+}
+
+/* Names of particles, when the first has one: so far all are in the order of ids. */
+static bool dem2di_names_begin(dem2d_world *world) {
+    if (world->named) return true;
+    if (!dem2di_group_reserve(world, DEM2DI_RANKS, world->body_count + 1) ||
+        !dem2di_group_reserve(world, DEM2DI_NAMES, world->body_count + 1))
+        return false;
+    for (int i = 0; i < world->id_count; i++) world->order[i].index = world->order[i].rank = i;
+    for (int i = 0; i < world->body_count; i++) world->names[i] = 0;
+    return world->named = true;
 }
 
 DEM2D_API dem2d_result dem2d_world_add_particle(dem2d_world *world, const dem2d_particle_desc *desc,
@@ -11963,9 +12020,13 @@ DEM2D_API dem2d_result dem2d_world_add_particle(dem2d_world *world, const dem2d_
     int slot = world->body_count;
     if (slot == 1 << 30)
         return dem2di_fail(&world->env, DEM2D_OUT_OF_RANGE, -1, "more than %d particles", slot);
-    if (!dem2di_reserve_bodies(world, slot + 1)) return dem2di_out_of_memory(world, "a particle");
+    if (!dem2di_reserve_bodies(world, slot + 1) || (desc->name != 0 && !dem2di_names_begin(world)))
+        return dem2di_out_of_memory(world, "a particle");
     dem2di_row_clear(world, DEM2DI_BODIES, DEM2DI_MADE, slot);
     body.index = dem2di_id_take(world);
+    body.rank = world->named ? world->order[body.index].rank : body.index;
+    if (world->named) world->names[slot] = desc->name;
+    world->order_due = world->named;
     world->ids[body.index].slot = slot;
     world->bodies[slot] = body;
     world->inverse[slot] = dem2di_inverse_of(world, &body);
@@ -12243,6 +12304,7 @@ DEM2D_API dem2d_result dem2d_world_get_particle(const dem2d_world *world, dem2d_
     info->inertia = dem2di_body_inertia(world, body);
     info->radius = now->radius;
     info->equivalent = dem2di_equivalent(world, slot);
+    info->name = world->named ? world->names[slot] : 0;
     return DEM2D_OK;
 }
 
@@ -12440,6 +12502,28 @@ static bool dem2di_line_make(dem2d_world *world, const dem2d_wall_desc *desc) {
     return true;
 }
 
+/* Does wall a come before b in the order of names, then of indices? */
+static bool dem2di_wall_precedes(const dem2di_wall *walls, int a, int b) {
+    return walls[a].desc.name < walls[b].desc.name ||
+           (walls[a].desc.name == walls[b].desc.name && a < b);
+}
+
+/* A wall whose name is new, from its place so far to its place in the order of `count` walls. */
+static void dem2di_wall_rank(dem2d_world *world, int slot, int count) {
+    dem2di_wall *walls = world->walls;
+    int place = walls[slot].rank, last = count - 1;
+    for (int way = -1; way <= 1; way += 2)
+        while (way < 0
+                   ? place > 0 && dem2di_wall_precedes(walls, slot, walls[place - 1].placed)
+                   : place < last && dem2di_wall_precedes(walls, walls[place + 1].placed, slot)) {
+            walls[place].placed = walls[place + way].placed;
+            walls[walls[place].placed].rank = place;
+            place += way;
+        }
+    walls[place].placed = slot;
+    walls[slot].rank = place;
+}
+
 static void dem2di_wall_unspan(dem2d_world *world, const dem2di_wall *wall) {
     for (int i = 0; i < 2; i++)
         if (wall->span[i] >= 0) world->walls[wall->span[i]].users--;
@@ -12497,15 +12581,20 @@ DEM2D_API dem2d_result dem2d_world_add_wall(dem2d_world *world, const dem2d_wall
     if (!dem2di_line_make(world, desc)) return DEM2D_OUT_OF_MEMORY;
     dem2di_wall *wall = &world->walls[slot];
     uint32_t generation = wall->generation + 1;
+    bool is_new = slot == world->wall_count;
+    int rank = is_new ? slot : wall->rank, placed = is_new ? slot : wall->placed;
     dem2di_row_clear(world, DEM2DI_WALLS, DEM2DI_WALLS, slot);
     wall->alive = true;
     wall->generation = generation;
+    wall->rank = rank;
+    wall->placed = placed;
     if (desc->mode == DEM2D_WALL_MOVING) world->wall_now[slot].velocity = desc->velocity;
     dem2di_wall_place(world, slot, desc);
     dem2di_wall_listed(world, slot);
     world->list_stale = world->check_due = true;
     dem2di_edited(world);
-    if (slot == world->wall_count) world->wall_count++;
+    world->wall_count += is_new;
+    dem2di_wall_rank(world, slot, world->wall_count);
     id->index = (uint32_t)slot;
     id->generation = wall->generation;
     return DEM2D_OK;
@@ -12592,6 +12681,8 @@ DEM2D_API dem2d_result dem2d_world_set_wall(dem2d_world *world, dem2d_wall_id id
     if (other_kind || !(dem2di_dot(old.desc.normal, normal) > 0))
         dem2di_forget_wall(world, (int)id.index);
     if (!(dem2di_wall_change(world, wall, desc->point) <= wall->skin)) world->list_stale = true;
+    if (old.desc.name != desc->name) world->list_stale = true; /* contacts go by the wall's rank */
+    dem2di_wall_rank(world, (int)id.index, world->wall_count);
     if (other_kind || old.desc.material.index != desc->material.index) {
         world->check_due = true;
         dem2di_edited(world);
@@ -12645,6 +12736,7 @@ DEM2D_API dem2d_result dem2d_world_get_wall(const dem2d_world *world, dem2d_wall
     info->stress = -dem2di_dot(now->force, wall->desc.normal);
     info->stress = info->length > 0 ? info->stress / info->length : 0;
     info->target = wall->desc.stress;
+    info->name = wall->desc.name;
     return DEM2D_OK;
 }
 
@@ -12751,13 +12843,60 @@ static bool dem2di_block_results_reserve(dem2d_world *world, int discs, int coun
     return dem2di_group_reserve(world, DEM2DI_BLOCK_RESULTS, blocks > bodies ? blocks : bodies);
 }
 
+/* --- the order of names ----------------------------------------------------------------------- */
+
+/* Ranks of the particles and of the free ids: their places in the order. */
+static void dem2di_ranks_set(dem2d_world *world) {
+    for (int place = 0; place < world->id_count; place++) {
+        int index = world->order[place].index, slot = world->ids[index].slot;
+        world->order[index].rank = place;
+        if (slot >= 0) world->bodies[slot].rank = place;
+    }
+}
+
+/* All ids by names, those of one name by indices; free ids behind. */
+static void dem2di_order_task(void *context, int begin, int end) {
+    dem2d_world *world = (dem2d_world *)context;
+    dem2di_cutter cutter = {world->scratch, 0};
+    size_t room = (size_t)world->id_count;
+    dem2di_order *items = (dem2di_order *)dem2di_cut(&cutter, room, sizeof *items);
+    dem2di_order *spare = (dem2di_order *)dem2di_cut(&cutter, room, sizeof *spare);
+    int count = 0, left = world->id_count;
+    (void)begin;
+    (void)end;
+    for (int index = world->id_count - 1; index >= 0; index--)
+        if (world->ids[index].slot < 0) world->order[--left].index = index;
+    for (int index = 0; index < world->id_count; index++) {
+        int slot = world->ids[index].slot;
+        if (slot < 0) continue;
+        items[count].key = world->names[slot];
+        items[count++].value = index;
+    }
+    dem2di_sort(items, spare, count);
+    for (int k = 0; k < count; k++) world->order[k].index = items[k].value;
+    dem2di_ranks_set(world);
+}
+
+/* The order of names when particles have come. Those that were there keep their order. */
+static bool dem2di_order_names(dem2d_world *world) {
+    dem2di_cutter cutter = {NULL, 0};
+    if (!world->order_due) return true;
+    for (int k = 0; k < 2; k++)
+        (void)dem2di_cut(&cutter, (size_t)world->id_count, sizeof(dem2di_order));
+    if (!dem2di_scratch_reserve(world, cutter.used)) return false;
+    dem2di_run(world, DEM2D_PHASE_LIST, 1, dem2di_order_task, world);
+    world->order_due = false;
+    return true;
+}
+
 /* --- the contacts of each particle ------------------------------------------------------------ */
 
-/* What the contacts of a particle are sorted by: their partners' ids, walls behind. */
+/* What the contacts of a particle are sorted by: their partners' ranks, walls behind. */
 static uint32_t dem2di_adjacency_rank(const dem2d_world *world, int slot, int contact) {
     const dem2di_key *key = &world->list.keys[contact];
-    if (contact >= world->list.pairs) return ((uint32_t)1 << 30) + (uint32_t)key->b;
-    return (uint32_t)world->bodies[key->a == slot ? key->b : key->a].index;
+    if (contact >= world->list.pairs)
+        return ((uint32_t)1 << 30) + (uint32_t)world->walls[key->b].rank;
+    return (uint32_t)world->bodies[key->a == slot ? key->b : key->a].rank;
 }
 
 /* Each particle's contacts in order, by Shell's sort (Ciura's gaps): most have a handful, one that
@@ -12929,7 +13068,7 @@ typedef struct dem2di_build {
     int total[DEM2DI_KINDS];
     dem2di_key *keys;                    /* as in the list, */
     int *old;                            /* and its contact in the old list, or -1 */
-    dem2di_order *wall_contacts, *spare; /* wall and id of particle; slot */
+    dem2di_order *wall_contacts, *spare; /* ranks of wall and particle; slot */
     char *column;                        /* room for a column of contacts, where the grid was */
     bool bounded, back; /* as in the world; whether the next step may look back on contacts */
     double softness;
@@ -13039,7 +13178,8 @@ static inline bool dem2di_wall_is_near(const dem2d_world *world, const dem2di_di
 static void dem2di_find_add(const dem2d_world *world, int slot, int wall, dem2di_order *to,
                             int *count) {
     if (to != NULL) {
-        to[*count].key = (uint64_t)wall << 32 | (uint64_t)world->bodies[slot].index;
+        to[*count].key =
+            (uint64_t)world->walls[wall].rank << 32 | (uint64_t)world->bodies[slot].rank;
         to[*count].value = slot;
     }
     (*count)++;
@@ -13188,7 +13328,7 @@ static void dem2di_fill_task(void *context, int begin, int end) {
                     dem2di_key *key = &finds.to[kind][k];
                     int a = key->a, b = key->b;
                     spread += a < b ? b - a : a - b;
-                    bool turned = bodies[a].index > bodies[b].index;
+                    bool turned = bodies[a].rank > bodies[b].rank;
                     key->a = turned ? b : a;
                     key->b = turned ? a : b;
                     build->old[key - build->keys] = dem2di_listed(world, key, false);
@@ -13203,7 +13343,7 @@ static void dem2di_fill_task(void *context, int begin, int end) {
     }
 }
 
-/* Contacts with walls, in the order of the walls and the particles' ids. */
+/* Contacts with walls, by the ranks of the walls and of the particles. */
 static void dem2di_wall_contacts_task(void *context, int begin, int end) {
     dem2di_build *build = (dem2di_build *)context;
     int count = build->total[DEM2DI_WALL_CONTACTS];
@@ -13212,8 +13352,9 @@ static void dem2di_wall_contacts_task(void *context, int begin, int end) {
     (void)end;
     dem2di_sort(build->wall_contacts, build->spare, count);
     for (int i = 0; i < count; i++) {
+        int place = (int)(build->wall_contacts[i].key >> 32);
         build->keys[pairs + i].a = build->wall_contacts[i].value;
-        build->keys[pairs + i].b = (int)(build->wall_contacts[i].key >> 32);
+        build->keys[pairs + i].b = build->world->walls[place].placed;
         build->old[pairs + i] = dem2di_listed(build->world, &build->keys[pairs + i], true);
     }
 }
@@ -13531,7 +13672,8 @@ static dem2d_result dem2di_build_list(dem2d_world *world, const dem2di_plan *pla
     build.world = world;
     double skin = world->skin, interval = world->interval, largest = 0;
     bool sorted = world->scattered;
-    bool room = dem2di_block_results_reserve(world, 0, 0) && dem2di_arrange(world);
+    bool room = dem2di_block_results_reserve(world, 0, 0) && dem2di_order_names(world) &&
+                dem2di_arrange(world);
     if (room) {
         dem2di_tune_skin(world);
         for (int i = 0; i < world->body_count; i++)
@@ -13656,12 +13798,12 @@ static void dem2di_observe_contact(const dem2d_world *world, int i, dem2di_ledge
     ledger->sum[DEM2DI_BY_FRICTION] += taken - gained.tangential - gained.rolling;
 }
 
-/* All contacts in the order of their ids, before the motion. */
+/* All contacts in the order of ranks, before the motion. */
 static void dem2di_observe_contacts(dem2d_world *world) {
     const dem2di_list *list = &world->list;
     memset(&world->ledger.stored, 0, sizeof world->ledger.stored);
-    for (int index = 0; index < world->id_count; index++) {
-        int slot = world->ids[index].slot;
+    for (int place = 0; place < world->id_count; place++) {
+        int slot = dem2di_slot_at(world, place);
         if (slot < 0) continue;
         for (int k = list->own[slot]; k < list->first[slot + 1]; k++)
             dem2di_observe_contact(world, list->adjacent[k], &world->ledger);
@@ -14517,7 +14659,7 @@ static double dem2di_point_pair_weight(const dem2di_point_pair *pair) {
     return pair->weight[0] + pair->weight[1];
 }
 
-/* Forces on the walls, in the order of the particles' ids. */
+/* Forces on the walls, in the order of the particles' ranks. */
 static void dem2di_wall_sums(dem2d_world *world) {
     const dem2di_list *list = &world->list;
     for (int j = 0; j < world->wall_count; j++) {
@@ -14532,7 +14674,7 @@ static void dem2di_wall_sums(dem2d_world *world) {
     }
 }
 
-/* Sum of the contact forces on a particle, one after the other in the order of the partners' ids:
+/* Sum of the contact forces on a particle, one after the other in the order of the partners' ranks:
    contacts that are apart add nothing, so that it does not matter which of them are listed. */
 static DEM2DI_INLINE dem2di_load dem2di_gather(const dem2d_world *world, int slot, bool spin) {
     const dem2di_list *list = &world->list;
@@ -14737,7 +14879,8 @@ static double dem2di_servo_alone(dem2di_wall_state *wall, double target, double 
 static double dem2di_servo_slides(const dem2d_world *world, int j) {
     dem2d_vec normal = world->walls[j].desc.normal;
     double sum = 0, weights = 0;
-    for (int i = 0; i < world->wall_count; i++) {
+    for (int place = 0; place < world->wall_count; place++) {
+        int i = world->walls[place].placed;
         const dem2di_wall *other = &world->walls[i];
         double faces = -dem2di_dot(normal, other->desc.normal);
         if (!other->alive || other->desc.mode != DEM2D_WALL_SERVO || !(faces > 0)) continue;
@@ -14774,17 +14917,18 @@ static double dem2di_servo_speed(dem2d_world *world, int j, int begin, int end) 
 }
 
 /* New wall velocities and points; true when one has left the reach of the list. Contacts with walls
-   are listed in the order of the walls. */
+   are listed in the order of the walls' ranks. */
 static bool dem2di_control_pass(dem2d_world *world) {
     const dem2di_list *list = &world->list;
     bool stale = false;
     int begin = list->pairs, end;
-    for (int j = 0; j < world->wall_count; j++) {
+    for (int place = 0; place < world->wall_count; place++) {
+        int j = world->walls[place].placed;
         const dem2di_wall *wall = &world->walls[j];
         dem2di_wall_state *next = &world->wall_next[j];
         if (!wall->alive) continue;
         if (wall->desc.mode == DEM2D_WALL_SERVO) {
-            while (begin < list->count && list->keys[begin].b < j) begin++;
+            while (begin < list->count && world->walls[list->keys[begin].b].rank < place) begin++;
             for (end = begin; end < list->count && list->keys[end].b == j;) end++;
             double speed = dem2di_servo_speed(world, j, begin, end);
             next->velocity = dem2di_scale(wall->desc.normal, speed);
@@ -14855,13 +14999,14 @@ static void dem2di_observe_motion(dem2d_world *world, const dem2di_ledger *last)
     dem2di_ledger *ledger = &world->ledger;
     double power[2][DEM2DI_HALVES] = {{0}};
     ledger->kinetic = 0;
-    for (int index = 0; index < world->id_count; index++) {
-        int slot = world->ids[index].slot;
+    for (int place = 0; place < world->id_count; place++) {
+        int slot = dem2di_slot_at(world, place);
         if (slot < 0) continue;
         dem2di_load load = dem2di_gather(world, slot, world->plan.spin);
         dem2di_observe_particle(world, slot, load, power, &ledger->kinetic);
     }
-    for (int j = 0; j < world->wall_count; j++) {
+    for (int place = 0; place < world->wall_count; place++) {
+        int j = world->walls[place].placed;
         const dem2di_wall_state *old = &world->wall_now[j], *made = &world->wall_next[j];
         if (!world->walls[j].alive) continue;
         power[0][DEM2DI_BY_WALLS] -= dem2di_dot(made->force, old->velocity);
@@ -15027,13 +15172,13 @@ static dem2di_stiffness dem2di_stiffness_sum(const dem2d_world *world, const dem
     return sum;
 }
 
-/* The greater of what is known and one more: of equal ones the lower id's, so that the order of the
-   particles in memory does not matter. */
+/* The greater of what is known and one more: of equal ones that of lower rank, so that the order of
+   the particles in memory does not matter. */
 static void dem2di_stiffest_meet(const dem2d_world *world, dem2di_stiffest *so_far, int bound,
                                  double value, int slot) {
     bool equal = value == so_far->value[bound] && slot >= 0 && so_far->at[bound] >= 0;
     if (!(value > so_far->value[bound]) &&
-        !(equal && world->bodies[slot].index < world->bodies[so_far->at[bound]].index))
+        !(equal && world->bodies[slot].rank < world->bodies[so_far->at[bound]].rank))
         return;
     so_far->value[bound] = value;
     so_far->at[bound] = slot;
@@ -15076,10 +15221,10 @@ static void dem2di_stiffest_range(const dem2d_world *world, const dem2di_state *
    Made in the first step, in the next step after an edit that can matter, and in every so many
    steps. It does not depend on when the list is rebuilt. */
 
-/* The one of lower id of two slots; -1 is none. */
+/* The one of lower rank of two slots; -1 is none. */
 static int dem2di_first_of(const dem2d_world *world, int one, int other) {
     if (one < 0 || other < 0) return one < 0 ? other : one;
-    return world->bodies[one].index < world->bodies[other].index ? one : other;
+    return world->bodies[one].rank < world->bodies[other].rank ? one : other;
 }
 
 static void dem2di_check_task(void *context, int begin, int end) {
@@ -15250,20 +15395,20 @@ DEM2D_API dem2d_result dem2d_world_step(dem2d_world *world, int count, int *done
    uses: config, math, memory, fields, mass, shapes, broad, law, motion, world, objects
    ============================================================================================ */
 
-/* Slot of the next particle in the order of ids, or -1; `index` starts at 0. */
-static int dem2di_next_particle(const dem2d_world *world, int *index) {
-    while (*index < world->id_count) {
-        int slot = world->ids[(*index)++].slot;
+/* Slot of the next particle in the order of ranks, or -1; `place` starts at 0. */
+static int dem2di_next_particle(const dem2d_world *world, int *place) {
+    while (*place < world->id_count) {
+        int slot = dem2di_slot_at(world, (*place)++);
         if (slot >= 0) return slot;
     }
     return -1;
 }
 
-/* An iterator over the contacts of the last force pass in the order of their ids: those of
-   particles, then, unless they are left out, those with walls. */
+/* An iterator over the contacts of the last force pass in the order of ranks: those of particles,
+   then, unless they are left out, those with walls. */
 typedef struct dem2di_contact_iterator {
     bool pairs_only, walls; /* without walls; with walls now */
-    int index, entry;       /* where it goes on */
+    int place, entry;       /* where it goes on */
     int number;             /* where it is, and the contact there */
     dem2di_contact contact;
     dem2d_vec branch; /* from A's centre to B's; to a wall: the contact point */
@@ -15271,8 +15416,8 @@ typedef struct dem2di_contact_iterator {
 
 static bool dem2di_next_of_kind(const dem2d_world *world, dem2di_contact_iterator *iterator) {
     const dem2di_list *list = &world->list;
-    for (; iterator->index < world->id_count; iterator->index++, iterator->entry = 0) {
-        int slot = world->ids[iterator->index].slot;
+    for (; iterator->place < world->id_count; iterator->place++, iterator->entry = 0) {
+        int slot = dem2di_slot_at(world, iterator->place);
         if (slot < 0) continue;
         while (list->own[slot] + iterator->entry < list->first[slot + 1]) {
             int i = list->adjacent[list->own[slot] + iterator->entry++];
@@ -15290,7 +15435,7 @@ static bool dem2di_next_contact(const dem2d_world *world, dem2di_contact_iterato
     if (dem2di_next_of_kind(world, iterator)) return true;
     if (iterator->walls || iterator->pairs_only) return false;
     iterator->walls = true;
-    iterator->index = iterator->entry = 0;
+    iterator->place = iterator->entry = 0;
     return dem2di_next_of_kind(world, iterator);
 }
 
@@ -15337,8 +15482,11 @@ DEM2D_API dem2d_result dem2d_world_particles(const dem2d_world *world, dem2d_par
     if (capacity < 0)
         return dem2di_fail(&world->env, DEM2D_OUT_OF_RANGE, -1, "capacity = %d", capacity);
     int alive = 0;
-    for (int index = 0, slot; (slot = dem2di_next_particle(world, &index)) >= 0; alive++)
-        if (alive < capacity) ids[alive] = dem2di_particle_id(world, slot);
+    for (int index = 0; index < world->id_count; index++) {
+        int slot = world->ids[index].slot;
+        if (slot >= 0 && alive < capacity) ids[alive] = dem2di_particle_id(world, slot);
+        alive += slot >= 0;
+    }
     *count = alive;
     return DEM2D_OK;
 }
@@ -15386,7 +15534,7 @@ DEM2D_API dem2d_result dem2d_world_contacts(const dem2d_world *world, dem2d_cont
 DEM2D_API dem2d_result dem2d_world_energy(const dem2d_world *world, dem2d_energy *energy) {
     if (world == NULL || energy == NULL) return DEM2D_NULL_ARGUMENT;
     memset(energy, 0, sizeof *energy);
-    for (int index = 0, i; (i = dem2di_next_particle(world, &index)) >= 0;) {
+    for (int place = 0, i; (i = dem2di_next_particle(world, &place)) >= 0;) {
         const dem2di_body *body = &world->bodies[i];
         double mass = dem2di_body_mass(world, body), inertia = dem2di_body_inertia(world, body);
         for (int k = 0; k < 2; k++) {
@@ -15529,7 +15677,7 @@ DEM2D_API dem2d_result dem2d_world_packing(const dem2d_world *world, dem2d_packi
     if (world == NULL || packing == NULL) return DEM2D_NULL_ARGUMENT;
     double ends = 0, loaded_ends = 0, overlap = 0, greatest = 0, area = 0;
     int alive = 0, loaded = 0, open = 0;
-    for (int index = 0, slot; (slot = dem2di_next_particle(world, &index)) >= 0; alive++) {
+    for (int place = 0, slot; (slot = dem2di_next_particle(world, &place)) >= 0; alive++) {
         int contacts = dem2di_contacts_of(world, slot);
         ends += contacts;
         loaded += contacts >= 2;
@@ -15630,7 +15778,7 @@ DEM2D_API dem2d_result dem2d_world_porosity(const dem2d_world *world, const dem2
     dem2d_result result = dem2di_check_region(&world->env, region);
     if (result != DEM2D_OK) return result;
     double solid = 0;
-    for (int index = 0, slot; (slot = dem2di_next_particle(world, &index)) >= 0;)
+    for (int place = 0, slot; (slot = dem2di_next_particle(world, &place)) >= 0;)
         solid += dem2di_area_inside(world, slot, region);
     double width = region->upper.x - region->lower.x, height = region->upper.y - region->lower.y;
     *porosity = 1 - solid / (width * height);
@@ -15746,7 +15894,7 @@ static int dem2di_bin(dem2d_vec direction, double turn, int bins) {
 }
 
 static void dem2di_bin_coordination(const dem2d_world *world, int bins, int *counts) {
-    for (int index = 0, slot; (slot = dem2di_next_particle(world, &index)) >= 0;) {
+    for (int place = 0, slot; (slot = dem2di_next_particle(world, &place)) >= 0;) {
         int contacts = dem2di_contacts_of(world, slot);
         counts[contacts < bins ? contacts : bins - 1]++;
     }
@@ -15762,7 +15910,7 @@ static void dem2di_bin_orientation(const dem2d_world *world, int bins, dem2d_rot
         axes[t] = dem2d_rot_make(angle);
         if (ratio == 1) axes[t].c = axes[t].s = 0;
     }
-    for (int index = 0, slot; (slot = dem2di_next_particle(world, &index)) >= 0;) {
+    for (int place = 0, slot; (slot = dem2di_next_particle(world, &place)) >= 0;) {
         dem2d_rot axis = axes[world->bodies[slot].shape_index];
         dem2d_pose pose = dem2di_pose_of(world, world->before, slot);
         if (axis.c == 0 && axis.s == 0) continue;
@@ -15862,7 +16010,7 @@ DEM2D_API dem2d_result dem2d_world_equilibrium(const dem2d_world *world,
     if (world == NULL || equilibrium == NULL) return DEM2D_NULL_ARGUMENT;
     double speeds = 0, most = 0, resultants = 0, force = dem2di_mean_contact_force(world);
     int moving = 0, unbound = 0;
-    for (int index = 0, slot; (slot = dem2di_next_particle(world, &index)) >= 0;) {
+    for (int place = 0, slot; (slot = dem2di_next_particle(world, &place)) >= 0;) {
         if (world->bodies[slot].motion == DEM2D_FIXED) continue;
         double speed = dem2di_length(dem2di_velocities_mean(world, slot).v);
         speeds += speed;
@@ -15891,7 +16039,7 @@ DEM2D_API dem2d_result dem2d_world_inertial_number(const dem2d_world *world, dou
     if (result != DEM2D_OK) return result;
     double diameters = 0, mass = 0, area = 0;
     int count = 0;
-    for (int index = 0, slot; (slot = dem2di_next_particle(world, &index)) >= 0; count++) {
+    for (int place = 0, slot; (slot = dem2di_next_particle(world, &place)) >= 0; count++) {
         diameters += 2 * dem2di_equivalent(world, slot);
         mass += dem2di_body_mass(world, &world->bodies[slot]);
         area += dem2di_body_area(world, &world->bodies[slot]);
@@ -16057,6 +16205,7 @@ static bool dem2di_number_fits(const dem2di_field *field, uint64_t all) {
     memcpy(&whole, &all, sizeof whole);
     if (dem2di_is_real(field)) return dem2di_in_range(field, value);
     if (field->type == DEM2DI_BOOL) return whole == 0 || whole == 1;
+    if (field->type == DEM2DI_UINT64) return true;
     if (field->type == DEM2DI_ID) return whole >= 0 && whole <= UINT32_MAX;
     return (field->type == DEM2DI_INT64 || (whole >= INT_MIN && whole <= INT_MAX)) &&
            dem2di_in_range(field, (double)whole);
@@ -16085,7 +16234,9 @@ static int dem2di_rows(const void *object, const dem2di_column *column) {
     rows[DEM2DI_MATERIALS] = w->material_count;
     rows[DEM2DI_LAWS] = w->material_count * w->material_count;
     rows[DEM2DI_IDS] = w->id_count;
+    rows[DEM2DI_RANKS] = w->named ? w->id_count : 0;
     rows[DEM2DI_BODIES] = w->body_count;
+    rows[DEM2DI_NAMES] = w->named ? w->body_count : 0;
     rows[DEM2DI_DISPLACEMENTS] = w->plan.turns ? w->body_count : 0;
     rows[DEM2DI_MADE] = w->redirected ? w->body_count : 0;
     rows[DEM2DI_WALLS] = w->wall_count;
@@ -16164,6 +16315,11 @@ typedef union dem2di_row {
     double number;
 } dem2di_row;
 
+/* Has a column a row for each body? */
+static bool dem2di_of_bodies(dem2di_group group) {
+    return group >= DEM2DI_BODIES && group <= DEM2DI_MADE;
+}
+
 /* Row of a hashed column for a place in the order of ids; NULL: nothing is there. Poses are as a
    caller sees them: a refused step may have changed how rotations are held. */
 static const void *dem2di_hashed_row(const dem2d_world *w, const dem2di_column *column, int place,
@@ -16172,7 +16328,7 @@ static const void *dem2di_hashed_row(const dem2d_world *w, const dem2di_column *
     int slot = place;
     if (group == DEM2DI_WORLD) return w;
     const char *start = (const char *)dem2di_column_get(w, column);
-    if (group == DEM2DI_BODIES || group == DEM2DI_MADE) slot = w->ids[place].slot;
+    if (dem2di_of_bodies(group)) slot = w->ids[place].slot;
     if (slot < 0 || (group == DEM2DI_IDS && w->ids[place].slot < 0)) return NULL;
     if (group == DEM2DI_WALLS && !w->walls[place].alive) return NULL;
     if (group == DEM2DI_TEMPLATES && w->templates[place].shape == NULL) return NULL;
@@ -16225,7 +16381,7 @@ static void dem2di_hash_column(void *context, const void *object, const dem2di_c
     hashing->column = column;
     memset(hashing->field, 0, sizeof hashing->field);
     bool contacts = group >= DEM2DI_KEYS && group < DEM2DI_SHAPE;
-    bool by_id = group == DEM2DI_BODIES || group == DEM2DI_MADE;
+    bool by_id = dem2di_of_bodies(group);
     int rows = dem2di_rows(object, column);
     if (by_id && rows > 0) rows = hashing->world->id_count;
     const char *row = (const char *)dem2di_rows_start(object, column);
@@ -16704,8 +16860,24 @@ static bool dem2di_ids_agree(const dem2d_world *w) {
     return unused == 0 && index == -1;
 }
 
+/* Ranks by the ids, or by the order of names, in which each id has to be once. */
+static void dem2di_finish_ranks(dem2di_loader *loader) {
+    dem2d_world *w = loader->world;
+    for (int slot = 0; slot < w->body_count; slot++) w->bodies[slot].rank = w->bodies[slot].index;
+    if (!w->named) return;
+    for (int i = 0; i < w->id_count; i++) w->order[i].rank = -1;
+    for (int i = 0; i < w->id_count && dem2di_load_good(loader); i++) {
+        int index = w->order[i].index;
+        bool once = index < w->id_count && w->order[index].rank < 0;
+        dem2di_load_expect(loader, once, "no order of ids");
+        if (once) w->order[index].rank = i;
+    }
+    if (dem2di_load_good(loader)) dem2di_ranks_set(w);
+}
+
 static void dem2di_finish_walls(dem2di_loader *loader) {
     dem2d_world *w = loader->world;
+    for (int j = 0; j < w->wall_count; j++) w->walls[j].rank = w->walls[j].placed = j;
     for (int j = 0; j < w->wall_count && dem2di_load_good(loader); j++) {
         dem2di_wall *wall = &w->walls[j];
         wall->span[0] = wall->span[1] = -1;
@@ -16723,6 +16895,7 @@ static void dem2di_finish_walls(dem2di_loader *loader) {
             w->walls[wall->span[i]].users++;
         }
     }
+    for (int j = 0; j < w->wall_count; j++) dem2di_wall_rank(w, j, j + 1);
 }
 
 /* A contact is of two that live, in the kind it is listed in; a forgotten one may be anything. */
@@ -16782,6 +16955,7 @@ static void dem2di_finish_world(dem2di_loader *loader) {
     for (int i = 0; i < w->body_count && dem2di_load_good(loader); i++)
         dem2di_finish_body(loader, i);
     if (dem2di_load_good(loader)) dem2di_load_expect(loader, dem2di_ids_agree(w), "ids differ");
+    if (dem2di_load_good(loader)) dem2di_finish_ranks(loader);
     dem2di_finish_walls(loader);
     dem2di_finish_list(loader);
 }
@@ -16978,7 +17152,7 @@ static void dem2di_box_reach(const dem2d_world *world, int j, double size, dem2d
    margin of a twentieth of the larger side; a unit square if there are none. */
 static dem2d_box dem2di_scene_box(const dem2d_world *world, bool beside) {
     dem2d_box all = {{HUGE_VAL, HUGE_VAL}, {-HUGE_VAL, -HUGE_VAL}};
-    for (int index = 0, slot; (slot = dem2di_next_particle(world, &index)) >= 0;) {
+    for (int place = 0, slot; (slot = dem2di_next_particle(world, &place)) >= 0;) {
         dem2d_box box;
         dem2d_pose pose = dem2di_pose_of(world, world->before, slot);
         (void)dem2d_shape_aabb(dem2di_shape_of(world, &world->bodies[slot]), pose, &box);
@@ -17225,7 +17399,7 @@ static void dem2di_draw(const dem2d_world *world, const dem2d_svg_desc *desc,
                  "<svg width=\"%.2f\" height=\"%.2f\">\n"
                  "<g stroke=\"#333\" stroke-width=\"%.3f\">\n",
                  view.width, view.height, view.width / 1600);
-    for (int index = 0, slot; (slot = dem2di_next_particle(world, &index)) >= 0 && writer->good;)
+    for (int place = 0, slot; (slot = dem2di_next_particle(world, &place)) >= 0 && writer->good;)
         if (!dem2di_off_view(world, &view, slot))
             dem2di_draw_particle(world, &view, desc->outline_points, slot, writer);
     dem2di_print(writer, "</g>\n");
@@ -17730,6 +17904,8 @@ DEM2D_API dem2d_result dem2d_world_write_csv(const dem2d_world *world, const dem
 
    CHANGES
      0.7.0  Snapshots stay of version 4: those of 0.6.0 are read.
+            Particles and walls may have a name of 64 bits, which orders pairs and sums in place of
+            the id (name in their descs and infos).
      0.6.0  Runs differ from those of 0.5.0 with friction between circles, dashpots, polybeziers,
             two contact points with friction, and servo walls. Snapshots (version 4) name their
             arrays and fields, so that later headers read them; earlier snapshots are refused. The

@@ -49,6 +49,28 @@ static bool inside_ids_hold(const dem2d_world *w) {
     return true;
 }
 
+/* Ranks of particles and walls are their places in the order; if the order is up to date, names
+   never fall along it. */
+static bool inside_ranks_hold(const dem2d_world *w) {
+    uint64_t last = 0;
+    for (int place = 0; place < w->id_count; place++) {
+        const int index = w->named ? w->order[place].index : place, slot = w->ids[index].slot;
+        if (w->named && w->order[index].rank != place) return inside_fail("rank of an id", index);
+        if (slot < 0) continue;
+        if (w->bodies[slot].rank != place) return inside_fail("rank of a particle", index);
+        if (!w->named || w->order_due) continue;
+        if (w->names[slot] < last) return inside_fail("names are out of order", index);
+        last = w->names[slot];
+    }
+    for (int place = 0; place < w->wall_count; place++) {
+        const int wall = w->walls[place].placed;
+        if (w->walls[wall].rank != place) return inside_fail("rank of a wall", wall);
+        if (place > 0 && dem2di_wall_precedes(w->walls, wall, w->walls[place - 1].placed))
+            return inside_fail("walls are out of order", wall);
+    }
+    return true;
+}
+
 static bool inside_contact_holds(const dem2d_world *w, int i) {
     const dem2di_list *list = &w->list;
     const dem2di_key *key = &list->keys[i];
@@ -60,8 +82,8 @@ static bool inside_contact_holds(const dem2d_world *w, int i) {
     if (i >= list->pairs && !(key->b < w->wall_count && w->walls[key->b].alive))
         return inside_fail("a wall of a contact is gone", i);
     if (i < list->pairs &&
-        !(inside_lives(w, key->b) && w->bodies[key->a].index < w->bodies[key->b].index))
-        return inside_fail("B of a contact is gone, or has the lower id", i);
+        !(inside_lives(w, key->b) && w->bodies[key->a].rank < w->bodies[key->b].rank))
+        return inside_fail("B of a contact is gone, or has the lower rank", i);
     (void)dem2di_contact_get(w, &list->contacts, i, &contact);
     if (!closed && (contact.force != 0 || contact.shear != 0))
         return inside_fail("two that are apart have a force", i);
@@ -93,7 +115,8 @@ static bool inside_adjacency_holds(const dem2d_world *w) {
 }
 
 bool inside_holds(const dem2d_world *world) {
-    if (!inside_ids_hold(world) || !inside_adjacency_holds(world)) return false;
+    if (!inside_ids_hold(world) || !inside_ranks_hold(world) || !inside_adjacency_holds(world))
+        return false;
     for (int i = 0; i < world->list.count; i++)
         if (!inside_contact_holds(world, i)) return false;
     return true;
