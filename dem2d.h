@@ -265,6 +265,10 @@ HOW TO
                          step in the first step, after edits that can matter, and in every 160th.
     lose energy          damping_ratio of the materials, from dem2d_damping_ratio(restitution);
                          rolling_friction for grains that should not roll; else friction, damping.
+    share a scene        Each world holds its own grains, and copies (ghosts) of the others' grains
+      out to processes   within reach, with the same names. dem2d_world_desc.gather gives each ghost
+                         the force that its owner has found: the worlds then move like one, to the
+                         bit. commit lets them agree whether a step is made (tests/test_exchange.c).
     use a law of yours   dem2d_world_desc.law: it gets the depth, the velocities at the contact and
                          the state it stored in the step before.
     change how two       dem2d_world_set_pair: stiffnesses, friction, damping ratio and rolling
@@ -1289,6 +1293,30 @@ typedef struct dem2d_law_output {
 /// of that answer.
 typedef void dem2d_law_fn(void *user, const dem2d_law_input *input, dem2d_law_output *output);
 
+/// Sums of the contact forces of a step, for a callback that may change them. Rows of particles are
+/// by the index of their id, those of walls by the index of the wall's; of free ids they are 0.
+typedef struct dem2d_sums {
+    int particles;         ///< rows of the next two
+    dem2d_vec *force;      ///< N/m, on each particle, without gravity
+    double *torque;        ///< N, likewise, about the centroid
+    int walls;             ///< rows of the next
+    dem2d_vec *wall_force; ///< N/m, of the particles on each wall
+} dem2d_sums;
+
+/// Called in each step when the contact forces are summed up, before anything moves, by the thread
+/// that called the step. What it leaves in the sums moves the particles, enters the ledger, and is
+/// the force on the walls; queries go on to describe the contacts. (A servo wall answers to its own
+/// contacts.) It must not call functions of this world. A step that is refused, or runs out of
+/// memory, may be tried again, with another call.
+typedef void dem2d_gather_fn(void *user, dem2d_sums *sums);
+
+/// Called once for each step that is tried, after all checks and before anything changes, with the
+/// result so far: an error when the step can't be made, maybe before the call of dem2d_gather_fn.
+/// Returns DEM2D_OK if the step is to be made, else what dem2d_world_step then returns: the world
+/// stays as it was before the step. An error that it gets is an error whatever it returns. It must
+/// not call functions of this world.
+typedef dem2d_result dem2d_commit_fn(void *user, dem2d_result result);
+
 /// A world. Only time_step has no default.
 typedef struct dem2d_world_desc {
     double time_step;          ///< s, > 0
@@ -1311,6 +1339,9 @@ typedef struct dem2d_world_desc {
     dem2d_parallel_fn *parallel_for; ///< distributes the work of a step; NULL: the calling thread
     void *parallel_user;             ///< passed to parallel_for
     const dem2d_env *env;            ///< memory and log, copied; NULL for malloc, free, silence
+    dem2d_gather_fn *gather;         ///< may change the sums of contact forces; NULL: none
+    dem2d_commit_fn *commit;         ///< may refuse a step; NULL: none
+    void *exchange_user;             ///< passed to gather and commit
 } dem2d_world_desc;
 
 /// How a particle moves. Two particles that are not free have no contact with each other, nor with
@@ -1530,7 +1561,8 @@ DEM2D_API dem2d_result dem2d_world_time_step_bounds(const dem2d_world *world, do
                                                     double *limit,
                                                     dem2d_particle_id *limit_particle);
 /// Take count >= 0 steps; done (may be NULL) gets the number taken, also on failure. Errors: STATE,
-/// TIME_STEP, OUT_OF_MEMORY, OUT_OF_RANGE; the world then is as it was before the step that failed.
+/// TIME_STEP, OUT_OF_MEMORY, OUT_OF_RANGE, what dem2d_world_desc.commit returns; the world then is
+/// as it was before the step that failed.
 DEM2D_API dem2d_result dem2d_world_step(dem2d_world *world, int count, int *done);
 
 /* ============================================================================================
@@ -1729,6 +1761,9 @@ typedef struct dem2d_load_desc {
     void *law_user;                  ///< passed to law
     int law_tag;                     ///< must be that of the world
     const dem2d_env *env;            ///< memory and log, copied; NULL for malloc, free, silence
+    dem2d_gather_fn *gather;         ///< of the world, as in dem2d_world_desc
+    dem2d_commit_fn *commit;         ///< likewise
+    void *exchange_user;             ///< passed to gather and commit
 } dem2d_load_desc;
 
 /// Hash of the state that the next step depends on: settings, steps, time, materials and their
@@ -10766,7 +10801,8 @@ static bool dem2di_state_finite(const dem2di_state *state) {
      force      positions, velocities, last contacts, laws -> next contacts over the last, loads.
                 Of each pair first the geometry (collide), then the law; kernels of circles do both.
                 Where segments are joined, it is decided in between which contacts count (resolve)
-     gather     loads -> force and torque of each particle, in the order of its partners' ranks
+     gather     loads -> force and torque of each particle, in the order of its partners' ranks:
+               part of integrate, unless the sums are kept because the caller may change them
      control    forces on servo walls, next states of their particles -> velocities of walls
      check      contacts, loads -> may the step be taken? The last pass that may refuse it
      integrate  states, forces -> next states
@@ -10994,7 +11030,10 @@ typedef enum dem2di_group {
     DEM2DI_NAMES,         /* of bodies, where named */
     DEM2DI_DISPLACEMENTS, /* of bodies, where plan.turns */
     DEM2DI_MADE,          /* of bodies, where some are redirected */
-    DEM2DI_STARTS,        /* of the contacts of bodies, and the end of the last */
+    DEM2DI_SUMS,          /* of bodies, where they are kept */
+    DEM2DI_EXCHANGED,     /* of ids, where the caller may change the sums */
+    DEM2DI_WALLS_EXCHANGED,
+    DEM2DI_STARTS, /* of the contacts of bodies, and the end of the last */
     DEM2DI_WALLS,
     DEM2DI_KEYS,
     DEM2DI_GENERAL,     /* all but circles */
@@ -11020,6 +11059,9 @@ struct dem2d_world {
     bool has_law; /* law is not NULL: for snapshots, which can't have the function */
     dem2d_parallel_fn *parallel_for;
     void *parallel_user;
+    dem2d_gather_fn *gather;
+    dem2d_commit_fn *commit;
+    void *exchange_user; /* of both */
     double time_step, local_damping, global_damping, tolerance;
     double made_step; /* time step of the step that was made; before the first as time_step */
     dem2d_vec gravity;
@@ -11028,6 +11070,7 @@ struct dem2d_world {
     dem2d_face_rule faces;
 
     bool keeps_last; /* the force pass keeps the contacts of the last one */
+    bool keeps_sums; /* the gather pass comes before the motion, with its sums in a column */
     bool check_time_step;
     bool check_due;    /* an edit since the last check of the time step and the speeds can matter */
     int plan_due;      /* steps for which the features in use are found anew, see dem2di_prepare */
@@ -11083,6 +11126,8 @@ struct dem2d_world {
     dem2di_list list;
     double *load_x, *load_y; /* force on the B of each contact, on A against it; in scratch, as: */
     double *load_a, *load_b; /* torques on A and on B */
+    dem2di_load *sums;       /* of the forces on each particle, where they are kept */
+    dem2d_sums exchange;     /* the same and those on walls for a caller, by ids */
     dem2di_push *pushes;     /* room for the contacts of a servo wall */
     char *scratch;           /* what only a step or only the building of the list needs */
     dem2di_block_result *block_results;
@@ -11437,6 +11482,10 @@ static const dem2di_column dem2di_columns[] = {
     DEM2DI_UNSAVED(DISPLACEMENTS, next_displacement, 0),
     DEM2DI_UNSAVED(DISPLACEMENTS, lever, DEM2DI_MOVES),
     DEM2DI_COLUMN("last_velocities", MADE, made, DEM2DI_MOVES | DEM2DI_HASHED, velocity_fields),
+    DEM2DI_UNSAVED(SUMS, sums, 0),
+    DEM2DI_UNSAVED(EXCHANGED, exchange.force, 0),
+    DEM2DI_UNSAVED(EXCHANGED, exchange.torque, 0),
+    DEM2DI_UNSAVED(WALLS_EXCHANGED, exchange.wall_force, 0),
     DEM2DI_UNSAVED(STARTS, list.first, 0),
     DEM2DI_COLUMN("wall_ids", WALLS, walls, DEM2DI_FIRST | DEM2DI_HASHED, wall_id_fields),
     DEM2DI_COLUMN("walls", WALLS, walls, DEM2DI_SHARES | DEM2DI_HASHED, wall_fields),
@@ -11675,6 +11724,9 @@ static const dem2di_field dem2di_world_fields[] = {
     DEM2DI_ROW(dem2d_world_desc, parallel_for, DEM2DI_OPTIONAL, "- NULL; one thread does all"),
     DEM2DI_ROW(dem2d_world_desc, parallel_user, DEM2DI_OPTIONAL, "- NULL"),
     DEM2DI_ROW(dem2d_world_desc, env, DEM2DI_OPTIONAL, "- NULL; copied"),
+    DEM2DI_ROW(dem2d_world_desc, gather, DEM2DI_OPTIONAL, "- NULL"),
+    DEM2DI_ROW(dem2d_world_desc, commit, DEM2DI_OPTIONAL, "- NULL"),
+    DEM2DI_ROW(dem2d_world_desc, exchange_user, DEM2DI_OPTIONAL, "- NULL"),
 };
 
 DEM2D_API dem2d_result dem2d_world_create(const dem2d_world_desc *desc, dem2d_world **world) {
@@ -11702,6 +11754,10 @@ DEM2D_API dem2d_result dem2d_world_create(const dem2d_world_desc *desc, dem2d_wo
     made->has_law = desc->law != NULL;
     made->parallel_for = desc->parallel_for;
     made->parallel_user = desc->parallel_user;
+    made->gather = desc->gather;
+    made->commit = desc->commit;
+    made->exchange_user = desc->exchange_user;
+    made->keeps_sums = desc->gather != NULL;
     made->skin_fixed = desc->skin > 0;
     made->skin = made->skin_fixed ? desc->skin : DEM2DI_SKIN_FIRST;
     made->interval = DEM2DI_INTERVAL_FIRST;
@@ -11993,8 +12049,9 @@ static void dem2di_id_release(dem2d_world *world, int index) {
 
 /* Names of particles, when the first has one: so far all are in the order of ids. */
 static bool dem2di_names_begin(dem2d_world *world) {
+    int ids = world->id_count > world->body_count ? world->id_count : world->body_count;
     if (world->named) return true;
-    if (!dem2di_group_reserve(world, DEM2DI_RANKS, world->body_count + 1) ||
+    if (!dem2di_group_reserve(world, DEM2DI_RANKS, ids + 1) ||
         !dem2di_group_reserve(world, DEM2DI_NAMES, world->body_count + 1))
         return false;
     for (int i = 0; i < world->id_count; i++) world->order[i].index = world->order[i].rank = i;
@@ -13117,7 +13174,7 @@ static dem2di_plan dem2di_plan_make(const dem2d_world *world) {
     plan.faces = plan.faces && world->law == NULL;
     plan.turns = plan.turns || !dem2di_has_disc_kernel(world, &plan);
     plan.turns = plan.turns || (world->plan.turns && bodies > 0);
-    plan.spin = plan.spin || plan.turns || plan.friction;
+    plan.spin = plan.spin || plan.turns || plan.friction || world->keeps_sums;
     return plan;
 }
 
@@ -13539,14 +13596,14 @@ static bool dem2di_is_soft(const dem2d_world *world, double softness) {
 }
 
 /* May the next step look back on the contacts of the last force pass once those of its own are
-   there? The ledger, joints and a caller's law do, and a step that may be refused: for a time step
-   that some particle may not stand, or a state that may become infinite. */
+   there? The ledger, joints and a caller's law do, and a step that may be refused: by the caller,
+   for a time step that some particle may not stand, or a state that may become infinite. */
 static bool dem2di_looks_back(const dem2d_world *world, const dem2di_plan *plan, bool bounded,
                               double softness) {
     bool soft = dem2di_is_soft(world, softness);
     bool checked = world->check_time_step && dem2di_check_is_due(world);
     return world->ledger.kept || plan->joints || world->law != NULL || !bounded ||
-           (checked && !soft);
+           world->gather != NULL || world->commit != NULL || (checked && !soft);
 }
 
 /* Scratch memory for the search and for what it finds. Contacts on their way come over the grid. */
@@ -14695,15 +14752,70 @@ static DEM2DI_INLINE dem2di_load dem2di_gather(const dem2d_world *world, int slo
     return sum;
 }
 
-/* A particle a step later. */
+/* Room for the sums, where these are kept. */
+static bool dem2di_sums_reserve(dem2d_world *world) {
+    if (!world->keeps_sums) return true;
+    if (!dem2di_group_reserve(world, DEM2DI_SUMS, world->body_count)) return false;
+    return world->gather == NULL ||
+           (dem2di_group_reserve(world, DEM2DI_EXCHANGED, world->id_count) &&
+            dem2di_group_reserve(world, DEM2DI_WALLS_EXCHANGED, world->wall_count));
+}
+
+static void dem2di_gather_task(void *context, int begin, int end) {
+    dem2d_world *world = (dem2d_world *)context;
+    int last = dem2di_block_end((end - 1) * DEM2DI_BLOCK, DEM2DI_BLOCK, world->body_count);
+    for (int i = begin * DEM2DI_BLOCK; i < last; i++)
+        world->sums[i] = dem2di_gather(world, i, true);
+}
+
+/* The caller's look at the sums, in the order of ids. */
+static void dem2di_exchange(dem2d_world *world) {
+    dem2d_sums *sums = &world->exchange;
+    sums->particles = world->id_count;
+    sums->walls = world->wall_count;
+    for (int back = 0; back < 2; back++) {
+        for (int index = 0; index < world->id_count; index++) {
+            const dem2di_load none = {{0, 0}, 0};
+            int slot = world->ids[index].slot;
+            if (back && slot >= 0) {
+                world->sums[slot].force = sums->force[index];
+                world->sums[slot].torque = sums->torque[index];
+            } else if (!back) {
+                sums->force[index] = slot >= 0 ? world->sums[slot].force : none.force;
+                sums->torque[index] = slot >= 0 ? world->sums[slot].torque : none.torque;
+            }
+        }
+        for (int j = 0; j < world->wall_count; j++)
+            if (back)
+                world->wall_next[j].force = sums->wall_force[j];
+            else
+                sums->wall_force[j] = world->wall_next[j].force;
+        if (!back) world->gather(world->exchange_user, sums);
+    }
+}
+
+/* The gather pass, where the sums are kept. */
+static void dem2di_gather_pass(dem2d_world *world) {
+    if (!world->keeps_sums) return;
+    dem2di_run(world, DEM2D_PHASE_MOTION, dem2di_blocks(world->body_count, DEM2DI_BLOCK),
+               dem2di_gather_task, world);
+    if (world->gather != NULL) dem2di_exchange(world);
+}
+
+/* The sum that moves a particle. */
+static dem2di_load dem2di_sum_of(const dem2d_world *world, int slot) {
+    return world->keeps_sums ? world->sums[slot] : dem2di_gather(world, slot, world->plan.spin);
+}
+
+/* A particle a step later: by its sum, if the sums are kept, or it is found here. */
 static DEM2DI_INLINE dem2di_state dem2di_integrate(const dem2d_world *world, int slot,
                                                    const dem2di_damping *damping, bool heavy,
-                                                   bool damped, bool spin, bool turns) {
+                                                   bool damped, bool spin, bool turns, bool kept) {
     const double time_step = world->time_step;
     const dem2di_inverse *inverse = &world->inverse[slot];
     dem2di_state next = world->now[slot];
     if (inverse->mass > 0) {
-        dem2di_load load = dem2di_gather(world, slot, spin);
+        dem2di_load load = kept ? world->sums[slot] : dem2di_gather(world, slot, spin);
         dem2d_vec a = dem2di_scale(load.force, inverse->mass);
         double turn = load.torque * inverse->inertia;
         if (heavy) a = dem2di_add(world->gravity, a);
@@ -14726,7 +14838,9 @@ static DEM2DI_INLINE dem2di_state dem2di_integrate(const dem2d_world *world, int
 static dem2di_state dem2di_foresee(const dem2d_world *world, int slot) {
     dem2di_damping damping =
         dem2di_damping_make(world->local_damping, world->global_damping, world->time_step);
-    return dem2di_integrate(world, slot, &damping, true, true, true, world->plan.turns);
+    if (world->keeps_sums)
+        return dem2di_integrate(world, slot, &damping, true, true, true, world->plan.turns, true);
+    return dem2di_integrate(world, slot, &damping, true, true, true, world->plan.turns, false);
 }
 
 /* --- servo walls --------------------------------------------------------------------------------
@@ -14944,12 +15058,13 @@ static bool dem2di_control_pass(dem2d_world *world) {
 /* New velocities and positions of the particles from begin to end, over the states of the last
    force pass. Returns the greatest square of speed over skin. */
 static DEM2DI_INLINE double dem2di_integrate_range(dem2d_world *world, int begin, int end,
-                                                   bool heavy, bool damped, bool spin, bool turns) {
+                                                   bool heavy, bool damped, bool spin, bool turns,
+                                                   bool kept) {
     dem2di_damping damping =
         dem2di_damping_make(world->local_damping, world->global_damping, world->time_step);
     double most = 0;
     for (int i = begin; i < end; i++) {
-        dem2di_state next = dem2di_integrate(world, i, &damping, heavy, damped, spin, turns);
+        dem2di_state next = dem2di_integrate(world, i, &damping, heavy, damped, spin, turns, kept);
         if (turns)
             world->next_displacement[i] = dem2di_displaced(
                 &next, world->lever[i], world->time_step, world->displacement[i] + world->rounding);
@@ -14962,11 +15077,14 @@ static DEM2DI_INLINE double dem2di_integrate_range(dem2d_world *world, int begin
 /* The loop for what the scene has. */
 static double dem2di_integrate_block(dem2d_world *w, int b, int e) {
     const dem2di_plan *p = &w->plan;
-#define DEM2DI_INTEGRATE(spin, turns)                                                    \
-    (p->heavy    ? p->damped ? dem2di_integrate_range(w, b, e, true, true, spin, turns)  \
-                             : dem2di_integrate_range(w, b, e, true, false, spin, turns) \
-        : p->damped ? dem2di_integrate_range(w, b, e, false, true, spin, turns)          \
-                 : dem2di_integrate_range(w, b, e, false, false, spin, turns))
+#define DEM2DI_INTEGRATE(spin, turns)                                                           \
+    (p->heavy    ? p->damped ? dem2di_integrate_range(w, b, e, true, true, spin, turns, false)  \
+                             : dem2di_integrate_range(w, b, e, true, false, spin, turns, false) \
+        : p->damped ? dem2di_integrate_range(w, b, e, false, true, spin, turns, false)          \
+                 : dem2di_integrate_range(w, b, e, false, false, spin, turns, false))
+    if (w->keeps_sums) /* one loop for all: what is 0 changes no bit */
+        return p->turns ? dem2di_integrate_range(w, b, e, true, true, true, true, true)
+                        : dem2di_integrate_range(w, b, e, true, true, true, false, true);
     if (p->turns) return DEM2DI_INTEGRATE(true, true);
     if (p->spin) return DEM2DI_INTEGRATE(true, false);
     return DEM2DI_INTEGRATE(false, false);
@@ -15002,7 +15120,7 @@ static void dem2di_observe_motion(dem2d_world *world, const dem2di_ledger *last)
     for (int place = 0; place < world->id_count; place++) {
         int slot = dem2di_slot_at(world, place);
         if (slot < 0) continue;
-        dem2di_load load = dem2di_gather(world, slot, world->plan.spin);
+        dem2di_load load = dem2di_sum_of(world, slot);
         dem2di_observe_particle(world, slot, load, power, &ledger->kinetic);
     }
     for (int place = 0; place < world->wall_count; place++) {
@@ -15323,57 +15441,76 @@ static void dem2di_commit(dem2d_world *world) {
 
 /* Would the step give a particle or a wall a state that is not finite? */
 static dem2d_result dem2di_check_states(const dem2d_world *world, const dem2di_count *count) {
-    bool known = world->bounded && count->unsound == world->count.unsound;
-    int slot = known || dem2di_surely_finite(world, count) ? -1 : dem2di_unsound(world);
+    bool free_hand = world->gather != NULL; /* the caller may have put anything into the sums */
+    bool known = !free_hand && world->bounded && count->unsound == world->count.unsound;
+    bool sure = known || (!free_hand && dem2di_surely_finite(world, count));
+    int slot = sure ? -1 : dem2di_unsound(world);
     if (slot >= 0)
         return dem2di_fail(&world->env, DEM2D_STATE, world->bodies[slot].index,
                            "particle %d would get a state that is not finite",
                            world->bodies[slot].index);
     for (int j = 0; j < world->wall_count; j++)
-        if (world->walls[j].alive && !(dem2di_vec_finite(world->wall_next[j].point) &&
-                                       dem2di_finite(world->wall_next[j].drift)))
+        if (world->walls[j].alive &&
+            !(dem2di_vec_finite(world->wall_next[j].point) &&
+              dem2di_finite(world->wall_next[j].drift) &&
+              (!free_hand || dem2di_vec_finite(world->wall_next[j].force))))
             return dem2di_fail(&world->env, DEM2D_STATE, j,
                                "wall %d would get a place or a speed that is not finite", j);
     return DEM2D_OK;
 }
 
+/* What a step has found before anything of it is kept. */
+typedef struct dem2di_trial {
+    dem2di_count count;
+    bool listed, back, slow, fast, used_up; /* back: the last contacts can be put back */
+} dem2di_trial;
+
+/* The passes that may be refused, up to the last check. */
+static dem2d_result dem2di_step_try(dem2d_world *world, dem2di_trial *trial) {
+    dem2d_result result = dem2di_prepare(world, &trial->listed);
+    if (result != DEM2D_OK) return result;
+    world->list_stale = trial->listed; /* if the step fails, the next try builds a list as well */
+    bool due = dem2di_check_is_due(world);
+    bool back = dem2di_looks_back(world, &world->plan, world->bounded, world->softness);
+    if (!dem2di_sums_reserve(world)) return dem2di_out_of_memory(world, "sums of forces");
+    if (back && !dem2di_keep_last(world)) return dem2di_out_of_memory(world, "contacts");
+    world->keeps_last = trial->back = back;
+    dem2di_force_pass(world, &trial->count);
+    if (due) result = dem2di_check_step(world, &trial->slow, &trial->fast);
+    if (result != DEM2D_OK) return result;
+    dem2di_wall_sums(world);
+    dem2di_gather_pass(world);
+    trial->used_up = dem2di_control_pass(world);
+    return dem2di_check_states(world, &trial->count);
+}
+
 /* One step, pass by pass: see the head of the world's section. What can be refused is so before the
    next states come over those of the last force pass: only the contacts have to be put back. */
 static dem2d_result dem2di_step(dem2d_world *world) {
-    dem2di_count count = world->count;
-    bool slow = false, fast = false, used_up = false, listed;
-    dem2d_result result = dem2di_prepare(world, &listed);
-    if (result != DEM2D_OK) return result;
-    world->list_stale = listed; /* should the step fail, the next try begins with a list as well */
-    bool due = dem2di_check_is_due(world);
-    bool back = dem2di_looks_back(world, &world->plan, world->bounded, world->softness);
-    if (back && !dem2di_keep_last(world)) return dem2di_out_of_memory(world, "contacts");
-    world->keeps_last = back;
-    dem2di_force_pass(world, &count);
-    if (due) result = dem2di_check_step(world, &slow, &fast);
-    if (result == DEM2D_OK) {
-        dem2di_wall_sums(world);
-        used_up = dem2di_control_pass(world);
-        result = dem2di_check_states(world, &count);
-    }
+    dem2di_trial trial;
+    memset(&trial, 0, sizeof trial);
+    trial.count = world->count;
+    dem2d_result result = dem2di_step_try(world, &trial), agreed = DEM2D_OK;
+    if (world->commit != NULL) agreed = world->commit(world->exchange_user, result);
+    if (result == DEM2D_OK) result = agreed;
     if (result != DEM2D_OK) {
-        if (back) dem2di_contacts_keep(world, 0, world->list.count, true);
+        if (trial.back) dem2di_contacts_keep(world, 0, world->list.count, true);
         return result;
     }
     const dem2di_ledger ledger = world->ledger;
     if (ledger.kept) dem2di_observe_contacts(world); /* nothing fails from here on */
     double path = dem2di_integrate_pass(world);
     if (ledger.kept) dem2di_observe_motion(world, &ledger);
-    used_up = used_up || path > 1 - DEM2DI_LIST_STEPS * DBL_EPSILON ||
-              world->steps - world->listed_at >= DEM2DI_LIST_STEPS;
+    bool used_up = trial.used_up || path > 1 - DEM2DI_LIST_STEPS * DBL_EPSILON ||
+                   world->steps - world->listed_at >= DEM2DI_LIST_STEPS;
     world->plan.full_made = world->plan.full_now;
     if (world->plan_due > 0) world->plan_due--;
     world->list_displacement = path;
     world->list_stale = world->list_used_up = used_up;
-    world->rebuilds += listed;
-    world->count = count;
-    world->slow_time_step += slow;
-    world->fast_motion += fast;
+    world->rebuilds += trial.listed;
+    world->count = trial.count;
+    world->slow_time_step += trial.slow;
+    world->fast_motion += trial.fast;
     world->check_due = false;
     dem2di_commit(world);
     return DEM2D_OK;
@@ -17046,6 +17183,9 @@ static dem2d_result dem2di_source_load(const dem2di_source *source, dem2d_world 
     empty.env = desc->env;
     empty.parallel_for = desc->parallel_for;
     empty.parallel_user = desc->parallel_user;
+    empty.gather = desc->gather;
+    empty.commit = desc->commit;
+    empty.exchange_user = desc->exchange_user;
     memset(&loader, 0, sizeof loader);
     dem2d_result result = dem2d_world_create(&empty, &loader.world);
     if (result != DEM2D_OK) return result;
@@ -17904,6 +18044,8 @@ DEM2D_API dem2d_result dem2d_world_write_csv(const dem2d_world *world, const dem
 
    CHANGES
      0.7.0  Snapshots stay of version 4: those of 0.6.0 are read.
+            Several processes: dem2d_world_desc.gather may change the sums of the contact forces in
+            each step, commit may refuse a step.
             Particles and walls may have a name of 64 bits, which orders pairs and sums in place of
             the id (name in their descs and infos).
      0.6.0  Runs differ from those of 0.5.0 with friction between circles, dashpots, polybeziers,

@@ -53,6 +53,9 @@ static const dem2di_field load_fields[] = {
     DEM2DI_ROW(dem2d_load_desc, law_user, DEM2DI_OPTIONAL, "- NULL"),
     DEM2DI_ROW(dem2d_load_desc, law_tag, DEM2DI_TAG, "- 0; as it was saved"),
     DEM2DI_ROW(dem2d_load_desc, env, DEM2DI_OPTIONAL, "- NULL; copied"),
+    DEM2DI_ROW(dem2d_load_desc, gather, DEM2DI_OPTIONAL, "- NULL"),
+    DEM2DI_ROW(dem2d_load_desc, commit, DEM2DI_OPTIONAL, "- NULL"),
+    DEM2DI_ROW(dem2d_load_desc, exchange_user, DEM2DI_OPTIONAL, "- NULL"),
 };
 
 bool fields_get(int number, field_row *row) {
@@ -88,7 +91,8 @@ bool fields_get(int number, field_row *row) {
     memset(row, 0, sizeof *row);
     row->of = tables[i].of, row->name = field->name, row->text = field->text;
     row->low = field->low, row->high = field->high;
-    row->above = (field->flags & DEM2DI_ABOVE) != 0, row->below = (field->flags & DEM2DI_BELOW) != 0;
+    row->above = (field->flags & DEM2DI_ABOVE) != 0,
+    row->below = (field->flags & DEM2DI_BELOW) != 0;
     row->or_0 = (field->flags & DEM2DI_OR_0) != 0;
     row->type = (field_type)field->type;
     row->offset = field->offset, row->size = field->size;

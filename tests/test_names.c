@@ -301,6 +301,24 @@ static void test_late_name(void **state) {
     close_scene(&p.s), close_scene(&q.s);
 }
 
+/* The first name when there are more ids than particles. */
+static void test_name_after_removals(void **state) {
+    (void)state;
+    pile p;
+    make_pile(&p, RUBBING, (order){0, false, 0});
+    step(&p.s, 10);
+    for (int i = 0; i < GRAINS - 3; i++)
+        assert_ok(dem2d_world_remove_particle(p.s.world, p.grains[i]));
+    step(&p.s, 10);
+    dem2d_particle_desc grain = grain_desc(&p.s, p.shapes[0], 1, vec(0.2, 0.2));
+    grain.name = 5;
+    (void)add_grain(&p.s, &grain);
+    assert_true(inside_holds(p.s.world));
+    step(&p.s, 10);
+    assert_true(inside_holds(p.s.world));
+    close_scene(&p.s);
+}
+
 /* In the middle, after an edit whose order is not found yet. */
 static void test_snapshot(void **state) {
     (void)state;
@@ -344,9 +362,12 @@ static void test_hash(void **state) {
 }
 
 int main(void) {
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(test_shuffled),   cmocka_unit_test(test_unnamed),
-        cmocka_unit_test(test_same_order), cmocka_unit_test(test_late_name),
-        cmocka_unit_test(test_snapshot),   cmocka_unit_test(test_hash)};
+    const struct CMUnitTest tests[] = {cmocka_unit_test(test_shuffled),
+                                       cmocka_unit_test(test_unnamed),
+                                       cmocka_unit_test(test_same_order),
+                                       cmocka_unit_test(test_late_name),
+                                       cmocka_unit_test(test_name_after_removals),
+                                       cmocka_unit_test(test_snapshot),
+                                       cmocka_unit_test(test_hash)};
     return cmocka_run_group_tests(tests, NULL, NULL);
 }
