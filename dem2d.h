@@ -10416,13 +10416,14 @@ typedef struct dem2di_point_pair {
     int corner[2]; /* as in dem2d_contact_point */
 } dem2di_point_pair;
 
-/* What the full law keeps of a contact: dashpot, rolling, the caller's law. All zero for one that
-   is apart. */
-typedef struct dem2di_law_state {
-    double viscous[2];       /* parts of the points' normal forces that are not the springs', N/m */
-    double moment;           /* on B, N */
-    double energy, state[2]; /* of the caller's law */
-} dem2di_law_state;
+/* Two numbers: of the points of a contact of two, or of a caller's law. */
+typedef struct dem2di_two {
+    double at[2];
+} dem2di_two;
+
+/* Terms of the law beside springs and friction, which some pair of materials in use has. With a
+   caller's law all of them are in use. */
+enum { DEM2DI_DASHPOT = 1, DEM2DI_ROLLING = 2, DEM2DI_CALLERS_LAW = 4, DEM2DI_TERMS = 8 };
 
 /* How the two of a contact moved against each other in the step that was made, half a step before
    its force. */
@@ -10479,15 +10480,6 @@ static DEM2DI_INLINE double dem2di_slip(const dem2di_contact *last, const dem2di
     return slip + (dem2di_velocity_t(last, motion) - slip) / 2;
 }
 
-/* [F] eq. 8-10 for a given normal force, with the tangential one held within both limits. The
-   spring is a scalar along perp(normal), so that it turns with the contact. */
-static inline void dem2di_law_apply(const dem2d_pair_desc *law, double slip, double time_step,
-                                    double last_shear, dem2di_contact *contact) {
-    double limit = law->friction * contact->force;
-    contact->shear = last_shear - law->tangential_stiffness * slip * time_step;
-    contact->shear = dem2di_max(-limit, dem2di_min(limit, contact->shear));
-}
-
 /* Are there two? One of them may be without force: deep in a face it could only pull. */
 static inline bool dem2di_has_two_points(const dem2di_point_pair *pair) {
     return pair->weight[0] > 0 || pair->weight[1] > 0;
@@ -10496,12 +10488,12 @@ static inline bool dem2di_has_two_points(const dem2di_point_pair *pair) {
 /* The springs of the last step's points, handed on to those of this step. Each stays at its end of
    the common part, whichever shape's corner that is by now; where one end's corner is now that of
    the other end, both have changed sides, as a grain tips over it. A spring of one point is shared
-   out by the normal forces, and one point has the sum of two. */
+   out by the forces of the normal springs, and one point has the sum of two. */
 static void dem2di_point_pair_carry(const dem2di_contact *last, const dem2di_point_pair *last_pair,
                                     const dem2di_point_pair *pair, const double force[2],
                                     double shear[2]) {
     if (!dem2di_has_two_points(last_pair)) {
-        double sum = force[0] + force[1]; /* 0 where dashpots leave nothing */
+        double sum = force[0] + force[1]; /* 0 where it is too small to be a number */
         shear[1] = last->shear * (sum > 0 ? force[1] / sum : 0.5);
         shear[0] = last->shear - shear[1];
         return;
@@ -10510,30 +10502,6 @@ static void dem2di_point_pair_carry(const dem2di_contact *last, const dem2di_poi
         pair->corner[0] == last_pair->corner[1] || pair->corner[1] == last_pair->corner[0];
     shear[0] = last_pair->shear[crossed ? 1 : 0];
     shear[1] = last_pair->shear[crossed ? 0 : 1];
-}
-
-/* Normal forces of two points. */
-static void dem2di_point_pair_press(const dem2d_pair_desc *law, const dem2di_point_pair *pair,
-                                    double force[2]) {
-    for (int i = 0; i < 2; i++) force[i] = law->normal_stiffness * pair->weight[i] * pair->depth[i];
-}
-
-/* The law for two points whose normal forces are known, both with the contact's slip: it depends on
-   the height along the normal alone. */
-static void dem2di_law_apply_two(const dem2d_pair_desc *law, double slip, double time_step,
-                                 const double force[2], const dem2di_contact *last,
-                                 const dem2di_point_pair *last_pair, dem2di_point_pair *pair,
-                                 dem2di_contact *contact) {
-    contact->force = force[0] + force[1];
-    contact->shear = 0;
-    dem2di_point_pair_carry(last, last_pair, pair, force, pair->shear);
-    for (int i = 0; i < 2; i++) {
-        double limit = law->friction * force[i];
-        double shear =
-            pair->shear[i] - law->tangential_stiffness * pair->weight[i] * slip * time_step;
-        pair->shear[i] = dem2di_max(-limit, dem2di_min(limit, shear));
-        contact->shear += pair->shear[i];
-    }
 }
 
 /* Normal, point (from A's centre) and depths of a contact of two points into the contact: those of
@@ -10575,52 +10543,14 @@ static inline void dem2di_arms_shift(dem2di_arms *arms, double by) {
 /* --- dashpot, rolling --------------------------------------------------------------------------
  */
 
-/* How two that touch move against each other. */
-typedef struct dem2di_relative_velocity {
-    double approach, sliding, spin, mass; /* as in dem2d_law_input */
-} dem2di_relative_velocity;
-
 /* Coefficient of the dashpot, N s/m. */
 static double dem2di_dashpot(const dem2d_pair_desc *law, double mass) {
     return 2 * law->damping_ratio * sqrt(mass * law->normal_stiffness);
 }
 
-/* Normal force of a spring and the dashpot, clipped where it would pull. */
-static double dem2di_damped(double spring, double dashpot, double closing) {
-    return dem2di_max(0, spring + dashpot * closing);
-}
-
-/* Normal forces of two points, each with its own closing speed, what dashpots have of them, and
-   their new centre. */
-static void dem2di_point_pair_damp(const dem2d_pair_desc *law,
-                                   const dem2di_relative_velocity *relative, double force[2],
-                                   double viscous[2], dem2di_point_pair *pair,
-                                   dem2di_contact *contact) {
-    double dashpot = dem2di_dashpot(law, relative->mass);
-    for (int i = 0; i < 2; i++) {
-        double closing = relative->approach + relative->spin * pair->offset[i], spring = force[i];
-        force[i] = dem2di_damped(spring, pair->weight[i] * dashpot, closing);
-        viscous[i] = force[i] - spring;
-    }
-    double sum = force[0] + force[1];
-    if (!(sum > 0)) return;
-    double move = force[0] / sum * pair->offset[0] + force[1] / sum * pair->offset[1];
-    dem2di_arms_shift(&contact->arms, move);
-    for (int i = 0; i < 2; i++) pair->offset[i] -= move;
-}
-
 /* Stiffness of the spring against rolling. */
 static double dem2di_rolling_stiffness(const dem2d_pair_desc *law, double radius) {
     return law->tangential_stiffness * radius * radius;
-}
-
-/* Moment of the spring against rolling, held within its limit (Ai et al. 2011, model C without the
-   dashpot). */
-static double dem2di_rolling(const dem2d_pair_desc *law, double radius, double turning,
-                             double time_step, double normal_force, double last) {
-    double limit = law->rolling_friction * radius * normal_force;
-    double moment = last - dem2di_rolling_stiffness(law, radius) * turning * time_step;
-    return dem2di_max(-limit, dem2di_min(limit, moment));
 }
 
 /* -ln e of a dashpot whose force is clipped: Schwager, Poeschel, Granular Matter 9 (2007) 465. */
@@ -10645,6 +10575,88 @@ DEM2D_API dem2d_result dem2d_damping_ratio(double restitution, double *damping_r
             high = middle;
     *damping_ratio = loss > 0 ? high : 0;
     return DEM2D_OK;
+}
+
+/* --- the law over contact points in arrays -------------------------------------------------------
+ */
+
+/* So many contact points or pairs of circles go through the law at once: 6 kB of arrays, little of
+   the innermost cache. */
+#define DEM2DI_BATCH 32
+
+/* Contact points of closed contacts on their way through the law; those of a contact of two are in
+   two rows, one after the other. Of terms that are not in use nothing is written or read. */
+typedef struct dem2di_law_rows {
+    int count;
+    int contact[DEM2DI_BATCH]; /* number in the list */
+    /* geometry, and how the two moved in the step that was made */
+    double depth[DEM2DI_BATCH], approach[DEM2DI_BATCH], sliding[DEM2DI_BATCH], spin[DEM2DI_BATCH];
+    /* of the pair of materials, here: the part of the point, the reduced mass and radius are in */
+    double stiffness[DEM2DI_BATCH], dashpot[DEM2DI_BATCH], friction[DEM2DI_BATCH];
+    double tangential_stiffness[DEM2DI_BATCH], rolling_stiffness[DEM2DI_BATCH];
+    double rolling_friction[DEM2DI_BATCH]; /* m: the limit of the moment over the normal force */
+    /* forces on B: of the springs in the step before, then those of this step. The moment of two
+       points is that of the first row */
+    double last_shear[DEM2DI_BATCH], last_moment[DEM2DI_BATCH];
+    double force[DEM2DI_BATCH], shear[DEM2DI_BATCH], moment[DEM2DI_BATCH];
+    dem2di_two state[DEM2DI_BATCH]; /* what the caller's law keeps */
+} dem2di_law_rows;
+
+/* A force held within its limit. */
+static DEM2DI_INLINE double dem2di_held(double limit, double force) {
+    force = limit < force ? limit : force;
+    return -limit > force ? -limit : force;
+}
+
+/* Normal force of a spring and the dashpot, clipped where it would pull. */
+static DEM2DI_INLINE double dem2di_damped(double spring, double dashpot, double approach) {
+    double force = spring + dashpot * approach;
+    return 0 > force ? 0 : force;
+}
+
+/* Normal force and friction of one point, [F] eq. 8-10. The tangential spring is a scalar along
+   perp(normal), so that it turns with the contact. */
+static DEM2DI_INLINE void dem2di_law_points(dem2di_law_rows *rows, double time_step, bool damped) {
+    for (int k = 0; k < rows->count; k++) {
+        double force = rows->stiffness[k] * rows->depth[k];
+        if (damped) force = dem2di_damped(force, rows->dashpot[k], rows->approach[k]);
+        double shear =
+            rows->last_shear[k] - rows->tangential_stiffness[k] * rows->sliding[k] * time_step;
+        rows->force[k] = force;
+        rows->shear[k] = dem2di_held(rows->friction[k] * force, shear);
+    }
+}
+
+/* Moments of the springs against rolling, held within their limits (Ai et al. 2011, model C without
+   the dashpot). The limit of two points is that of both normal forces. */
+static void dem2di_law_rolling(dem2di_law_rows *rows, double time_step) {
+    for (int k = 0; k < rows->count; k++) {
+        bool two = k + 1 < rows->count && rows->contact[k + 1] == rows->contact[k];
+        double force = two ? rows->force[k] + rows->force[k + 1] : rows->force[k];
+        double moment =
+            rows->last_moment[k] - rows->rolling_stiffness[k] * rows->spin[k] * time_step;
+        rows->moment[k] = dem2di_held(rows->rolling_friction[k] * force, moment);
+        if (two) rows->moment[++k] = 0;
+    }
+}
+
+DEM2DI_VECTORS_BEGIN
+static void dem2di_law_springs(dem2di_law_rows *rows, double time_step) {
+    dem2di_law_points(rows, time_step, false);
+}
+
+static void dem2di_law_dashpots(dem2di_law_rows *rows, double time_step) {
+    dem2di_law_points(rows, time_step, true);
+}
+DEM2DI_VECTORS_END
+
+/* The law for all rows, with the terms that are in use. */
+static void dem2di_law_solve(dem2di_law_rows *rows, double time_step, int terms) {
+    if (terms & DEM2DI_DASHPOT)
+        dem2di_law_dashpots(rows, time_step);
+    else
+        dem2di_law_springs(rows, time_step);
+    if (terms & DEM2DI_ROLLING) dem2di_law_rolling(rows, time_step);
 }
 
 /* --- forces on the two -------------------------------------------------------------------------
@@ -10912,7 +10924,11 @@ typedef struct dem2di_contacts {
     dem2di_arms *arms;              /* all but circles: of contact i at i - discs */
     dem2di_history *history;        /* likewise */
     dem2di_point_pair *point_pairs; /* likewise, where contacts may have two points */
-    dem2di_law_state *law_states;   /* likewise, with the full law */
+    /* of all contacts, where their terms of the law are in use: */
+    double *moment;            /* on B, N */
+    double *energy;            /* J/m, of the caller's law, */
+    dem2di_two *state;         /* and what it keeps */
+    dem2di_two *point_viscous; /* as point_pairs: parts of normal forces that dashpots have */
 } dem2di_contacts;
 
 /* The listed pairs: of two circles, of two other particles, of particles and walls (by the rank of
@@ -10959,11 +10975,10 @@ typedef struct dem2di_plan {
                       displacements */
     bool one_law;  /* all particles are of one material: */
     int material;
-    bool held;   /* some particles are not free */
-    bool joints; /* two segments meet, or may */
-    bool full;   /* some law has a dashpot or rolling friction, or is the caller's. The batches of
-                    circles do not know these: all pairs take the general path, with a law state */
-    bool full_now, full_made; /* the laws need that now; they did in the last force pass */
+    bool held;                 /* some particles are not free */
+    bool joints;               /* two segments meet, or may */
+    int terms;                 /* DEM2DI_DASHPOT ...: of the law, beside springs and friction */
+    int terms_now, terms_made; /* those that the laws have now, and had in the last force pass */
     bool faces;         /* contacts may have two points: by the rule, and some particle has faces */
     bool heavy, damped; /* gravity, damping: as they are set at the step */
 } dem2di_plan;
@@ -11036,9 +11051,11 @@ typedef enum dem2di_group {
     DEM2DI_STARTS, /* of the contacts of bodies, and the end of the last */
     DEM2DI_WALLS,
     DEM2DI_KEYS,
-    DEM2DI_GENERAL,     /* all but circles */
-    DEM2DI_POINT_PAIRS, /* of these, where plan.faces */
-    DEM2DI_LAW_STATES,  /* where plan.full */
+    DEM2DI_MOMENTS,       /* of all contacts, where plan.terms has DEM2DI_ROLLING, */
+    DEM2DI_CALLERS,       /* or DEM2DI_CALLERS_LAW */
+    DEM2DI_GENERAL,       /* of all but circles */
+    DEM2DI_POINT_PAIRS,   /* of these, where plan.faces, */
+    DEM2DI_POINT_VISCOUS, /* and plan.terms has DEM2DI_DASHPOT */
     DEM2DI_ADJACENCY,
     DEM2DI_BLOCK_RESULTS,
     DEM2DI_SCRATCH, /* lines */
@@ -11262,9 +11279,9 @@ static const dem2di_field dem2di_plan_fields[] = {
     DEM2DI_SAVED("material", dem2d_world, plan.material, DEM2DI_WHOLE(0, DEM2DI_MATERIALS_MAX)),
     DEM2DI_SAVED("held", dem2d_world, plan.held, DEM2DI_SWITCH),
     DEM2DI_SAVED("joints", dem2d_world, plan.joints, DEM2DI_SWITCH),
-    DEM2DI_SAVED("full", dem2d_world, plan.full, DEM2DI_SWITCH),
-    DEM2DI_SAVED("full_now", dem2d_world, plan.full_now, DEM2DI_SWITCH),
-    DEM2DI_SAVED("full_made", dem2d_world, plan.full_made, DEM2DI_SWITCH),
+    DEM2DI_SAVED("terms", dem2d_world, plan.terms, DEM2DI_WHOLE(0, DEM2DI_TERMS - 1)),
+    DEM2DI_SAVED("terms_now", dem2d_world, plan.terms_now, DEM2DI_WHOLE(0, DEM2DI_TERMS - 1)),
+    DEM2DI_SAVED("terms_made", dem2d_world, plan.terms_made, DEM2DI_WHOLE(0, DEM2DI_TERMS - 1)),
     DEM2DI_SAVED("faces", dem2d_world, plan.faces, DEM2DI_SWITCH)};
 
 #define DEM2DI_ACCOUNT(name, place) DEM2DI_SAVED(name, dem2d_world, ledger.place, DEM2DI_ANY_NUMBER)
@@ -11364,15 +11381,11 @@ static const dem2di_field dem2di_point_pair_fields[] = {
     DEM2DI_SAVED("energy", dem2di_point_pair, energy, DEM2DI_FINITE),
     DEM2DI_SAVED("corners", dem2di_point_pair, corner, DEM2DI_TAG)};
 
-/* Energy and state are the caller's: anything. */
-static const dem2di_field dem2di_law_state_fields[] = {
-    DEM2DI_SAVED("viscous_forces", dem2di_law_state, viscous, DEM2DI_FINITE),
-    DEM2DI_SAVED("moment", dem2di_law_state, moment, DEM2DI_FINITE),
-    DEM2DI_SAVED("energy", dem2di_law_state, energy, DEM2DI_ANY_NUMBER),
-    DEM2DI_SAVED("state", dem2di_law_state, state, DEM2DI_ANY_NUMBER)};
-
 static const dem2di_field dem2di_any_field[] = {DEM2DI_PLAIN("value", double, DEM2DI_ANY_NUMBER)};
 static const dem2di_field dem2di_finite_field[] = {DEM2DI_PLAIN("value", double, DEM2DI_FINITE)};
+static const dem2di_field dem2di_any_two[] = {
+    DEM2DI_PLAIN("values", dem2di_two, DEM2DI_ANY_NUMBER)};
+static const dem2di_field dem2di_finite_two[] = {DEM2DI_PLAIN("values", dem2di_two, DEM2DI_FINITE)};
 static const dem2di_field dem2di_way_field[] = {DEM2DI_PLAIN("value", double, DEM2DI_FROM_0)};
 
 /* A shape and its slot among the templates. */
@@ -11500,10 +11513,13 @@ static const dem2di_column dem2di_columns[] = {
     DEM2DI_CONTACT_COLUMN("depth", KEYS, depth, finite_field),
     DEM2DI_CONTACT_COLUMN("normal_force", KEYS, force, finite_field),
     DEM2DI_CONTACT_COLUMN("shear_force", KEYS, shear, finite_field),
+    DEM2DI_CONTACT_COLUMN("moment", MOMENTS, moment, finite_field),
+    DEM2DI_CONTACT_COLUMN("law_energy", CALLERS, energy, any_field), /* the caller's: anything */
+    DEM2DI_CONTACT_COLUMN("law_state", CALLERS, state, any_two),
     DEM2DI_CONTACT_COLUMN("arms", GENERAL, arms, arms_fields),
     DEM2DI_COLUMN("histories", GENERAL, list.contacts.history, DEM2DI_STORED, history_fields),
     DEM2DI_CONTACT_COLUMN("two_points", POINT_PAIRS, point_pairs, point_pair_fields),
-    DEM2DI_CONTACT_COLUMN("law_states", LAW_STATES, law_states, law_state_fields),
+    DEM2DI_CONTACT_COLUMN("point_viscous_forces", POINT_VISCOUS, point_viscous, finite_two),
     DEM2DI_UNSAVED(ADJACENCY, list.adjacent, 0),
     DEM2DI_UNSAVED(BLOCK_RESULTS, block_results, 0),
     {NULL, DEM2DI_SCRATCH, offsetof(dem2d_world, scratch), DEM2DI_LINE, 0, NULL, 0},
@@ -11630,22 +11646,31 @@ static bool dem2di_reserve_bodies(dem2d_world *world, int count) {
            (!world->redirected || dem2di_group_reserve(world, DEM2DI_MADE, count));
 }
 
-static bool dem2di_list_reserve(dem2d_world *world, const dem2di_plan *plan, int discs, int count) {
-    dem2di_list *list = &world->list;
-    int others = count - discs, old = list->count - list->discs;
-    if (old > others) others = old; /* they are read once more */
-    return dem2di_group_reserve(world, DEM2DI_KEYS, count > list->count ? count : list->count) &&
-           dem2di_group_reserve(world, DEM2DI_GENERAL, others) &&
-           dem2di_group_reserve(world, DEM2DI_POINT_PAIRS, plan->faces ? others : 0) &&
-           dem2di_group_reserve(world, DEM2DI_LAW_STATES, plan->full ? others : 0);
+/* Does the scene need the columns of a group of contacts? */
+static bool dem2di_plan_needs(const dem2di_plan *plan, dem2di_group group) {
+    const int terms = plan->terms;
+    if (group == DEM2DI_MOMENTS) return (terms & DEM2DI_ROLLING) != 0;
+    if (group == DEM2DI_CALLERS) return (terms & DEM2DI_CALLERS_LAW) != 0;
+    if (group == DEM2DI_POINT_PAIRS) return plan->faces;
+    if (group == DEM2DI_POINT_VISCOUS) return plan->faces && (terms & DEM2DI_DASHPOT);
+    return true;
 }
 
 /* The first of so many contacts that has an element in the columns of a group, or none has. */
 static int dem2di_contacts_begin(const dem2di_plan *plan, int discs, int count,
                                  dem2di_group group) {
-    if (group == DEM2DI_KEYS) return 0;
-    if (group == DEM2DI_POINT_PAIRS && !plan->faces) return count;
-    return group == DEM2DI_LAW_STATES && !plan->full ? count : discs;
+    if (!dem2di_plan_needs(plan, group)) return count;
+    return group < DEM2DI_GENERAL ? 0 : discs;
+}
+
+/* Room for so many contacts. */
+static bool dem2di_list_reserve(dem2d_world *world, const dem2di_plan *plan, int discs, int count) {
+    for (int k = DEM2DI_KEYS; k < DEM2DI_ADJACENCY; k++) {
+        dem2di_group group = (dem2di_group)k;
+        int begin = dem2di_contacts_begin(plan, discs, count, group);
+        if (!dem2di_group_reserve(world, group, count - begin)) return false;
+    }
+    return true;
 }
 
 /* The column of list.last that is as this one of list.contacts. */
@@ -12106,20 +12131,33 @@ DEM2D_API dem2d_result dem2d_world_add_particle(dem2d_world *world, const dem2d_
     return DEM2D_OK;
 }
 
-/* What contact i has beside it: nothing, until it is found or computed. */
-static inline void dem2di_clear_beside(dem2d_world *world, int i) {
+/* What terms of the law and two points keep of contact i: nothing. */
+static void dem2di_terms_clear(dem2d_world *world, int i) {
     const dem2di_contacts *contacts = &world->list.contacts;
-    int at = i - world->list.discs;
-    if (world->plan.faces) memset(&contacts->point_pairs[at], 0, sizeof *contacts->point_pairs);
-    if (world->plan.full) memset(&contacts->law_states[at], 0, sizeof *contacts->law_states);
+    const int terms = world->plan.terms, at = i - world->list.discs;
+    if (terms & DEM2DI_ROLLING) contacts->moment[i] = 0;
+    if (terms & DEM2DI_CALLERS_LAW) {
+        contacts->energy[i] = 0;
+        memset(&contacts->state[i], 0, sizeof *contacts->state);
+    }
+    if (!world->plan.faces || at < 0) return;
+    memset(&contacts->point_pairs[at], 0, sizeof *contacts->point_pairs);
+    if (terms & DEM2DI_DASHPOT)
+        memset(&contacts->point_viscous[at], 0, sizeof *contacts->point_viscous);
+}
+
+/* Contact i has no force and no history: the two are apart. */
+static inline void dem2di_contact_clear(dem2d_world *world, int i) {
+    world->list.contacts.force[i] = world->list.contacts.shear[i] = 0;
+    if (world->plan.terms != 0 || world->plan.faces) dem2di_terms_clear(world, i);
 }
 
 /* A contact ends: its pair is apart, and leaves with the next list. */
 static void dem2di_contact_forget(dem2d_world *world, int i) {
     dem2di_list *list = &world->list;
     list->keys[i].a = -1;
-    list->contacts.depth[i] = list->contacts.force[i] = list->contacts.shear[i] = 0;
-    if (i >= list->discs) dem2di_clear_beside(world, i);
+    list->contacts.depth[i] = 0;
+    dem2di_contact_clear(world, i);
 }
 
 /* Contacts of a particle are forgotten. */
@@ -12260,14 +12298,13 @@ static inline bool dem2di_contact_get(const dem2d_world *world, const dem2di_con
     return contact->depth > 0;
 }
 
-/* A contact into the columns of the list. Between two circles the arms follow from the rest. */
-static inline void dem2di_contact_put(dem2di_list *list, int i, const dem2di_contact *contact) {
+/* Geometry of a contact into the columns of the list. Between two circles the arms follow from the
+   rest. */
+static inline void dem2di_geometry_put(dem2di_list *list, int i, const dem2di_contact *contact) {
     const dem2di_contacts *to = &list->contacts;
     to->normal_x[i] = contact->normal.x;
     to->normal_y[i] = contact->normal.y;
     to->depth[i] = contact->depth;
-    to->force[i] = contact->force;
-    to->shear[i] = contact->shear;
     if (i >= list->discs) to->arms[i - list->discs] = contact->arms;
 }
 
@@ -12279,10 +12316,21 @@ static const dem2di_point_pair *dem2di_point_pair_of(const dem2d_world *world,
     return dem2di_has_two_points(pair) ? pair : NULL;
 }
 
-/* What the full law keeps of a contact; NULL without it. */
-static const dem2di_law_state *dem2di_law_state_of(const dem2d_world *world,
-                                                   const dem2di_contacts *from, int i) {
-    return world->plan.full ? &from->law_states[i - world->list.discs] : NULL;
+/* Moment of a contact. */
+static inline double dem2di_moment_of(const dem2d_world *world, const dem2di_contacts *from,
+                                      int i) {
+    return world->plan.terms & DEM2DI_ROLLING ? from->moment[i] : 0;
+}
+
+/* What the dashpot has of the normal force of a closed contact, or of its point k. With one point
+   this is what the spring has not. */
+static double dem2di_viscous_of(const dem2d_world *world, const dem2di_contacts *from, int i,
+                                int k) {
+    const int terms = world->plan.terms;
+    if (!(terms & DEM2DI_DASHPOT) || (terms & DEM2DI_CALLERS_LAW)) return 0;
+    if (dem2di_point_pair_of(world, from, i) != NULL)
+        return from->point_viscous[i - world->list.discs].at[k];
+    return k == 0 ? from->force[i] - dem2di_law_of(world, i)->normal_stiffness * from->depth[i] : 0;
 }
 
 /* Energy in the springs of a contact that is closed, by the law that its materials have now. */
@@ -12290,20 +12338,19 @@ static dem2di_stored dem2di_stored_in(const dem2d_world *world, const dem2di_con
                                       const dem2di_contact *contact) {
     const dem2d_pair_desc *law = dem2di_law_of(world, i);
     const dem2di_point_pair *pair = dem2di_point_pair_of(world, from, i);
-    const dem2di_law_state *law_state = dem2di_law_state_of(world, from, i);
-    double kn = law->normal_stiffness, kt = law->tangential_stiffness, spring = contact->force;
+    double kn = law->normal_stiffness, kt = law->tangential_stiffness;
+    double moment = dem2di_moment_of(world, from, i);
     dem2di_stored stored = {0, 0, 0};
-    if (law_state != NULL) {
-        stored.normal = law_state->energy;
-        if (world->law != NULL) return stored;
-        if (law_state->moment != 0 && kt > 0) {
-            double kr = dem2di_rolling_stiffness(law, dem2di_reduced_radius(world, i));
-            stored.rolling = law_state->moment * (law_state->moment / kr) / 2;
-        }
-        spring -= law_state->viscous[0];
+    if (world->law != NULL) {
+        stored.normal = from->energy[i];
+        return stored;
+    }
+    if (moment != 0 && kt > 0) {
+        double kr = dem2di_rolling_stiffness(law, dem2di_reduced_radius(world, i));
+        stored.rolling = moment * (moment / kr) / 2;
     }
     if (pair == NULL) {
-        stored.normal = spring * contact->depth / 2;
+        stored.normal = kn * contact->depth * contact->depth / 2;
         if (kt > 0) stored.tangential = contact->shear * (contact->shear / kt) / 2;
         return stored;
     }
@@ -12330,8 +12377,7 @@ static dem2di_load dem2di_load_of(const dem2d_world *world, int slot) {
         bool is_b = k < list->own[slot];
         dem2di_contact contact;
         if (!dem2di_contact_get(world, &list->contacts, i, &contact)) continue;
-        const dem2di_law_state *law_state = dem2di_law_state_of(world, &list->contacts, i);
-        double moment = law_state != NULL ? law_state->moment : 0;
+        double moment = dem2di_moment_of(world, &list->contacts, i);
         dem2d_vec force = dem2di_contact_force(&contact);
         sum.force = dem2di_along(sum.force, is_b ? 1 : -1, force);
         sum.torque += is_b ? dem2di_torque_b(&contact, moment) : dem2di_torque_a(&contact, moment);
@@ -12370,11 +12416,11 @@ DEM2D_API dem2d_result dem2d_world_get_particle(const dem2d_world *world, dem2d_
 static void dem2di_contact_end(dem2d_world *world, int i) {
     const dem2di_list *list = &world->list;
     const dem2di_contacts *contacts = &list->contacts;
-    contacts->normal_x[i] = contacts->normal_y[i] = contacts->force[i] = contacts->shear[i] = 0;
+    contacts->normal_x[i] = contacts->normal_y[i] = 0;
     contacts->depth[i] = -1;
+    dem2di_contact_clear(world, i);
     if (i < list->discs) return;
     memset(&contacts->history[i - list->discs], 0, sizeof *contacts->history);
-    dem2di_clear_beside(world, i);
 }
 
 /* A particle has been put elsewhere: all its contacts end, and as much of its skin is used up. */
@@ -13133,11 +13179,18 @@ typedef struct dem2di_build {
 
 /* Do two circles take the kernel of circles? It knows friction and the closed form, and no more. */
 static bool dem2di_has_disc_kernel(const dem2d_world *world, const dem2di_plan *plan) {
-    return world->solver == DEM2D_CERTIFIED && !plan->full;
+    return world->solver == DEM2D_CERTIFIED && plan->terms == 0;
 }
 
-/* The features in use. A full law that is no longer needed is still there in the first step after
-   an edit: what contacts had of it in the last force pass must outlast a step that is refused. */
+/* Terms of the law for two materials, beside springs and friction. */
+static int dem2di_terms_of(const dem2d_pair_desc *law) {
+    return (law->damping_ratio > 0 ? DEM2DI_DASHPOT : 0) |
+           (law->rolling_friction > 0 ? DEM2DI_ROLLING : 0);
+}
+
+/* The features in use. A term of the law that is no longer needed is still there in the first step
+   after an edit: what contacts had of it in the last force pass must outlast a step that is
+   refused. */
 static dem2di_plan dem2di_plan_make(const dem2d_world *world) {
     dem2di_plan plan;
     memset(&plan, 0, sizeof plan);
@@ -13166,11 +13219,11 @@ static dem2di_plan dem2di_plan_make(const dem2d_world *world) {
             const dem2d_pair_desc *law = dem2di_law(world, a, b);
             if (!used[a] || !(used[b] || met[b])) continue;
             plan.friction = plan.friction || law->friction > 0;
-            plan.full_now = plan.full_now || law->rolling_friction > 0 || law->damping_ratio > 0;
+            plan.terms_now |= dem2di_terms_of(law);
         }
-    plan.full_now = plan.full_now || world->law != NULL;
-    plan.full_made = world->plan.full_made;
-    plan.full = plan.full_now || plan.full_made;
+    if (world->law != NULL) plan.terms_now = DEM2DI_TERMS - 1;
+    plan.terms_made = world->plan.terms_made;
+    plan.terms = plan.terms_now | plan.terms_made;
     plan.faces = plan.faces && world->law == NULL;
     plan.turns = plan.turns || !dem2di_has_disc_kernel(world, &plan);
     plan.turns = plan.turns || (world->plan.turns && bodies > 0);
@@ -13181,7 +13234,7 @@ static dem2di_plan dem2di_plan_make(const dem2d_world *world) {
 /* May the list stay when the features in use change from those of one plan to another's? They have
    the same arrays and the same kinds of pairs. */
 static bool dem2di_plan_fits(const dem2di_plan *one, const dem2di_plan *other) {
-    return one->full == other->full && one->faces == other->faces && one->turns == other->turns;
+    return one->terms == other->terms && one->faces == other->faces && one->turns == other->turns;
 }
 
 static void dem2di_disc_task(void *context, int begin, int end) {
@@ -13472,7 +13525,7 @@ static bool dem2di_bounded(const dem2d_world *world, const dem2di_plan *plan, in
     speed +=
         2 * time * (dem2di_max(DEM2DI_SPEED_SURE, dem2di_size_of(world->gravity)) + force * light);
     spin += 2 * time * (force * 2 * size * (1 + rolling) * slender);
-    bool known = !plan->full || (circles && world->law == NULL);
+    bool known = plan->terms == 0 || (circles && world->law == NULL);
     return far + time * speed < 1e300 && force * heavy < 1e300 &&
            spin * world->time_step < 1e50 && /* its cube is finite */
            known && world->solver == DEM2D_CERTIFIED;
@@ -13509,7 +13562,8 @@ static double dem2di_softness_of(const dem2di_build *build, double *sums) {
     const dem2d_world *world = build->world;
     int pairs = build->total[DEM2DI_DISCS] + build->total[DEM2DI_OTHERS];
     double most = 0;
-    if (build->total[DEM2DI_OTHERS] > 0 || build->plan.full || build->plan.turns) return HUGE_VAL;
+    if (build->total[DEM2DI_OTHERS] > 0 || build->plan.terms != 0 || build->plan.turns)
+        return HUGE_VAL;
     for (int i = 0; i < world->body_count; i++) sums[i] = 0;
     for (int i = 0; i < pairs + build->total[DEM2DI_WALL_CONTACTS]; i++) {
         int partner[2];
@@ -13805,16 +13859,15 @@ static inline dem2di_relative_motion dem2di_motion_of(const dem2d_world *world, 
    depth: the force ends where it opens. */
 static double dem2di_dashpot_work(const dem2d_world *world, const dem2di_contacts *from, int i,
                                   double depth, double closing, double turning) {
-    const dem2di_law_state *law_state = dem2di_law_state_of(world, from, i);
     const dem2di_point_pair *pair = dem2di_point_pair_of(world, from, i);
     double work = 0;
-    if (law_state == NULL) return 0;
+    if (!(world->plan.terms & DEM2DI_DASHPOT)) return 0;
     for (int k = 0; k < (pair != NULL ? 2 : 1); k++) {
         double offset = pair != NULL ? pair->offset[k] : 0;
         double way = (closing + turning * offset) * world->made_step;
         if (pair != NULL) depth = pair->depth[k];
         if (from == &world->list.last) way = dem2di_max(-depth, way);
-        work += law_state->viscous[k] * way / 2;
+        work += dem2di_viscous_of(world, from, i, k) * way / 2;
     }
     return work;
 }
@@ -13837,7 +13890,6 @@ static void dem2di_observe_contact(const dem2d_world *world, int i, dem2di_ledge
         closed[k] = dem2di_contact_get(world, pass[k], i, &contact);
         if (!closed[k]) continue;
         double closing = -dem2di_velocity_n(&contact, &motion);
-        const dem2di_law_state *law_state = dem2di_law_state_of(world, pass[k], i);
         dem2di_stored stored = dem2di_stored_in(world, pass[k], i, &contact);
         if (k == 1) dem2di_stored_add(&ledger->stored, stored, 1);
         dem2di_stored_add(&gained, stored, k == 1 ? 1 : -1);
@@ -13845,7 +13897,7 @@ static void dem2di_observe_contact(const dem2d_world *world, int i, dem2di_ledge
         shear += contact.shear / 2;
         force += contact.force / 2;
         deeper += k == 1 ? contact.depth : -contact.depth;
-        if (law_state != NULL) moment += law_state->moment / 2;
+        moment += dem2di_moment_of(world, pass[k], i) / 2;
         ledger->sum[DEM2DI_BY_DASHPOTS] +=
             dem2di_dashpot_work(world, pass[k], i, contact.depth, closing, turning);
     }
@@ -13922,8 +13974,6 @@ static double dem2di_ledger_turnover(const dem2di_ledger *ledger, const dem2di_l
    that compilers turn into vector instructions, and the forces are put where they belong. There is
    no branch but for what the scene has: the force is 0 where two are apart, and with it the limit
    of the tangential spring. */
-#define DEM2DI_BATCH 32 /* 6 kB of arrays, little of the innermost cache */
-
 typedef struct dem2di_batch {
     double dx[DEM2DI_BATCH], dy[DEM2DI_BATCH]; /* from A to B */
     double radius_a[DEM2DI_BATCH], radius_b[DEM2DI_BATCH];
@@ -14206,73 +14256,155 @@ static int dem2di_collide_pair(const dem2d_world *world, int a, int b, const dem
     return found;
 }
 
-/* What a contact was in the last force pass; its shear force, points and law state may be those of
-   another one that it took over from, across a joint of segments. */
+/* What contact i was in the last force pass, before its geometry is written over. Its springs may
+   be those of another contact that it took over from, across a joint of segments. */
 typedef struct dem2di_last {
+    const dem2di_contacts *from; /* columns with the forces of the last force pass, */
+    int at;                      /* and the contact there */
     dem2di_contact contact;
-    dem2di_point_pair pair;     /* where contacts may have two points */
-    dem2di_law_state law_state; /* with the full law */
+    dem2di_point_pair pair; /* where contacts may have two points */
 } dem2di_last;
 
-static inline void dem2di_last_from(const dem2d_world *world, const dem2di_contacts *from, int i,
-                                    dem2di_last *last) {
+static inline void dem2di_last_get(const dem2d_world *world, const dem2di_contacts *from, int i,
+                                   dem2di_last *last) {
     int at = i - world->list.discs;
+    last->from = from;
+    last->at = i;
     last->contact.normal.x = from->normal_x[i];
     last->contact.normal.y = from->normal_y[i];
     last->contact.depth = from->depth[i];
     last->contact.shear = from->shear[i];
     last->contact.arms = from->arms[at];
     if (world->plan.faces) last->pair = from->point_pairs[at];
-    if (world->plan.full) last->law_state = from->law_states[at];
 }
 
-static inline void dem2di_last_get(const dem2d_world *world, int i, dem2di_last *last) {
-    dem2di_last_from(world, &world->list.contacts, i, last);
-}
-
-/* Forces of springs and friction. */
-static inline void dem2di_spring_force(dem2d_world *world, int i, const dem2di_last *last, bool two,
-                                       dem2di_contact *contact) {
+/* Terms of the law beside springs and friction, of the rows from first to before the end. */
+static void dem2di_law_add_terms(const dem2d_world *world, int i, const dem2di_last *last,
+                                 const dem2di_contact *contact,
+                                 const dem2di_relative_motion *motion, int first,
+                                 dem2di_law_rows *rows) {
     const dem2d_pair_desc *law = dem2di_law_of(world, i);
+    const double inverse = dem2di_reduced_inverse(world, i), spin = motion->wb - motion->wa;
+    const double approach = -dem2di_velocity_n(contact, motion);
+    const double dashpot = dem2di_dashpot(law, inverse > 0 ? 1 / inverse : 0);
+    rows->approach[first] = approach;
+    rows->dashpot[first] = dashpot;
+    for (int k = first; k < rows->count && rows->count - first == 2; k++) {
+        const dem2di_point_pair *pair = &world->list.contacts.point_pairs[i - world->list.discs];
+        rows->approach[k] = approach + spin * pair->offset[k - first];
+        rows->dashpot[k] = pair->weight[k - first] * dashpot;
+    }
+    if (!(world->plan.terms & DEM2DI_ROLLING)) return;
+    bool rolls = law->rolling_friction > 0;
+    double radius = rolls ? dem2di_reduced_radius(world, i) : 0;
+    rows->spin[first] = spin;
+    rows->rolling_stiffness[first] = dem2di_rolling_stiffness(law, radius);
+    rows->rolling_friction[first] = law->rolling_friction * radius;
+    rows->last_moment[first] = last->from->moment[last->at];
+    if (world->law != NULL) rows->state[first] = last->from->state[last->at];
+}
+
+/* One row of springs and friction. */
+static DEM2DI_INLINE void dem2di_law_add_row(const dem2d_pair_desc *law, int i, double weight,
+                                             double depth, double slip, double last_shear,
+                                             dem2di_law_rows *rows) {
+    int k = rows->count++;
+    rows->contact[k] = i;
+    rows->depth[k] = depth;
+    rows->sliding[k] = slip;
+    rows->stiffness[k] = law->normal_stiffness * weight;
+    rows->tangential_stiffness[k] = law->tangential_stiffness * weight;
+    rows->friction[k] = law->friction;
+    rows->last_shear[k] = last_shear;
+}
+
+/* The rows of two points, both with the contact's slip: it depends on the height along the normal
+   alone. */
+static void dem2di_law_add_two(const dem2d_world *world, int i, const dem2di_last *last,
+                               double slip, dem2di_law_rows *rows) {
+    const dem2d_pair_desc *law = dem2di_law_of(world, i);
+    const dem2di_point_pair *pair = &world->list.contacts.point_pairs[i - world->list.discs];
+    double force[2], shear[2];
+    for (int k = 0; k < 2; k++) force[k] = law->normal_stiffness * pair->weight[k] * pair->depth[k];
+    dem2di_point_pair_carry(&last->contact, &last->pair, pair, force, shear);
+    for (int k = 0; k < 2; k++)
+        dem2di_law_add_row(law, i, pair->weight[k], pair->depth[k], slip, shear[k], rows);
+}
+
+/* A contact whose geometry is known, as rows for the law. */
+static DEM2DI_INLINE void dem2di_law_add(const dem2d_world *world, int i, const dem2di_last *last,
+                                         bool two, const dem2di_contact *contact,
+                                         dem2di_law_rows *rows) {
+    const dem2d_pair_desc *law = dem2di_law_of(world, i);
+    const bool terms = world->plan.terms != 0;
+    const int first = rows->count;
+    dem2di_relative_motion motion;
     double slip = 0;
-    if (law->friction > 0) {
-        dem2di_relative_motion motion = dem2di_motion_of(world, i);
+    if (law->friction > 0 || terms) motion = dem2di_motion_of(world, i);
+    if (law->friction > 0 || world->law != NULL)
         slip = dem2di_slip(&last->contact, contact, &motion);
-    }
-    if (two) {
-        dem2di_point_pair *pair = &world->list.contacts.point_pairs[i - world->list.discs];
-        double force[2];
-        dem2di_point_pair_press(law, pair, force);
-        dem2di_law_apply_two(law, slip, world->made_step, force, &last->contact, &last->pair, pair,
-                             contact);
-        return;
-    }
-    contact->force = law->normal_stiffness * contact->depth;
-    dem2di_law_apply(law, slip, world->made_step, last->contact.shear, contact);
+    if (two)
+        dem2di_law_add_two(world, i, last, slip, rows);
+    else
+        dem2di_law_add_row(law, i, 1, contact->depth, slip, last->contact.shear, rows);
+    if (terms) dem2di_law_add_terms(world, i, last, contact, &motion, first, rows);
 }
 
-/* How the two of contact i meet. */
-static dem2di_relative_velocity dem2di_relative_velocity_of(const dem2d_world *world, int i,
-                                                            const dem2di_contact *last,
-                                                            const dem2di_contact *contact) {
-    double inverse = dem2di_reduced_inverse(world, i);
-    dem2di_relative_motion motion = dem2di_motion_of(world, i);
-    dem2di_relative_velocity relative;
-    relative.spin = motion.wb - motion.wa;
-    relative.approach = -dem2di_velocity_n(contact, &motion);
-    relative.sliding = 0;
-    if (dem2di_law_of(world, i)->friction > 0 || world->law != NULL)
-        relative.sliding = dem2di_slip(last, contact, &motion);
-    relative.mass = inverse > 0 ? 1 / inverse : 0;
-    return relative;
+/* Forces of a contact of two points into the columns. Dashpots may move its centre. */
+static void dem2di_law_put_two(dem2d_world *world, int i, const dem2di_law_rows *rows, int k,
+                               dem2di_contact *contact) {
+    const int at = i - world->list.discs;
+    dem2di_point_pair *pair = &world->list.contacts.point_pairs[at];
+    const double *force = rows->force + k;
+    contact->force = force[0] + force[1];
+    contact->shear = rows->shear[k] + rows->shear[k + 1];
+    for (int p = 0; p < 2; p++) pair->shear[p] = rows->shear[k + p];
+    if (!(world->plan.terms & DEM2DI_DASHPOT)) return;
+    for (int p = 0; p < 2; p++)
+        world->list.contacts.point_viscous[at].at[p] =
+            force[p] - rows->stiffness[k + p] * rows->depth[k + p];
+    if (!(contact->force > 0)) return;
+    double move =
+        force[0] / contact->force * pair->offset[0] + force[1] / contact->force * pair->offset[1];
+    dem2di_arms_shift(&contact->arms, move);
+    for (int p = 0; p < 2; p++) pair->offset[p] -= move;
+    world->list.contacts.arms[at] = contact->arms;
 }
 
-/* What the caller's law says of contact i at a depth. */
-static void dem2di_ask_law(const dem2d_world *world, int i, const dem2di_last *last,
-                           const dem2di_relative_velocity *relative, dem2d_vec normal, double depth,
-                           dem2d_law_output *output) {
+/* Forces of the contact of row k into the columns, and its loads. Returns the number of its rows.
+ */
+static DEM2DI_INLINE int dem2di_law_put(dem2d_world *world, const dem2di_law_rows *rows, int k,
+                                        dem2di_count *count) {
+    const dem2di_contacts *contacts = &world->list.contacts;
+    const int i = rows->contact[k];
+    const bool two = k + 1 < rows->count && rows->contact[k + 1] == i;
+    double moment = 0;
+    dem2di_contact contact;
+    (void)dem2di_contact_get(world, contacts, i, &contact);
+    contact.force = rows->force[k];
+    contact.shear = rows->shear[k];
+    if (two) dem2di_law_put_two(world, i, rows, k, &contact);
+    if (world->plan.terms & DEM2DI_ROLLING) contacts->moment[i] = moment = rows->moment[k];
+    contacts->force[i] = contact.force;
+    contacts->shear[i] = contact.shear;
+    dem2d_vec force = dem2di_contact_force(&contact);
+    world->load_x[i] = force.x;
+    world->load_y[i] = force.y;
+    world->load_a[i] = dem2di_torque_a(&contact, moment);
+    world->load_b[i] = dem2di_torque_b(&contact, moment);
+    double sum = fabs(force.x) + fabs(force.y) + fabs(world->load_a[i]) + fabs(world->load_b[i]);
+    count->unsound += !dem2di_finite(sum);
+    if (!world->bounded) count->load = dem2di_max(count->load, sum);
+    return two ? 2 : 1;
+}
+
+/* What the caller's law says of contact i, in row k, at a depth and an approach speed. */
+static void dem2di_ask_law(const dem2d_world *world, const dem2di_law_rows *rows, int k,
+                           double depth, double approach, dem2d_law_output *output) {
     const dem2di_list *list = &world->list;
+    const int i = rows->contact[k];
     const dem2di_key *key = &list->keys[i];
+    const double inverse = dem2di_reduced_inverse(world, i);
     dem2d_law_input input;
     memset(&input, 0, sizeof input);
     memset(output, 0, sizeof *output);
@@ -14282,77 +14414,48 @@ static void dem2di_ask_law(const dem2d_world *world, int i, const dem2di_last *l
         input.b = dem2di_particle_id(world, key->b);
     else
         input.wall = dem2di_wall_id(world, key->b);
-    input.normal = normal;
+    input.normal = dem2di_vec(list->contacts.normal_x[i], list->contacts.normal_y[i]);
     input.time_step = world->made_step;
     input.depth = depth;
-    input.approach = relative->approach;
-    input.sliding = relative->sliding;
-    input.spin = relative->spin;
-    input.mass = relative->mass;
+    input.approach = approach;
+    input.sliding = rows->sliding[k];
+    input.spin = rows->spin[k];
+    input.mass = inverse > 0 ? 1 / inverse : 0;
     input.radius = dem2di_reduced_radius(world, i);
-    input.tangential_force = last->contact.shear;
-    input.moment = last->law_state.moment;
-    memcpy(input.state, last->law_state.state, sizeof input.state);
-    memcpy(output->state, last->law_state.state, sizeof output->state);
+    input.tangential_force = rows->last_shear[k];
+    input.moment = rows->last_moment[k];
+    memcpy(input.state, &rows->state[k], sizeof input.state);
+    memcpy(output->state, input.state, sizeof output->state);
     world->law(world->law_user, &input, output);
 }
 
-/* The full law: dashpot and rolling as well, or the caller's. Two points may get another centre. */
-static void dem2di_full_force(dem2d_world *world, int i, const dem2di_last *last, bool two,
-                              dem2di_contact *contact) {
-    const dem2di_list *list = &world->list;
-    const dem2d_pair_desc *law = dem2di_law_of(world, i);
-    const double dt = world->made_step;
-    dem2di_law_state *law_state = &list->contacts.law_states[i - list->discs];
-    dem2di_relative_velocity relative =
-        dem2di_relative_velocity_of(world, i, &last->contact, contact);
-    if (world->law != NULL) {
+/* The caller's law for all rows. */
+static void dem2di_law_ask(dem2d_world *world, dem2di_law_rows *rows) {
+    const dem2di_contacts *contacts = &world->list.contacts;
+    for (int k = 0; k < rows->count; k++) {
         dem2d_law_output output;
-        dem2di_ask_law(world, i, last, &relative, contact->normal, contact->depth, &output);
-        contact->force = output.normal_force;
-        contact->shear = output.tangential_force;
-        law_state->moment = output.moment;
-        law_state->energy = output.energy;
-        memcpy(law_state->state, output.state, sizeof law_state->state);
-        return;
+        dem2di_ask_law(world, rows, k, rows->depth[k], rows->approach[k], &output);
+        rows->force[k] = output.normal_force;
+        rows->shear[k] = output.tangential_force;
+        rows->moment[k] = output.moment;
+        contacts->energy[rows->contact[k]] = output.energy;
+        memcpy(&contacts->state[rows->contact[k]], output.state, sizeof output.state);
     }
-    if (two) {
-        dem2di_point_pair *pair = &list->contacts.point_pairs[i - list->discs];
-        double force[2];
-        dem2di_point_pair_press(law, pair, force);
-        dem2di_point_pair_damp(law, &relative, force, law_state->viscous, pair, contact);
-        dem2di_law_apply_two(law, relative.sliding, dt, force, &last->contact, &last->pair, pair,
-                             contact);
-    } else {
-        double spring = law->normal_stiffness * contact->depth;
-        contact->force =
-            dem2di_damped(spring, dem2di_dashpot(law, relative.mass), relative.approach);
-        dem2di_law_apply(law, relative.sliding, dt, last->contact.shear, contact);
-        law_state->viscous[0] = contact->force - spring;
-    }
-    if (law->rolling_friction > 0)
-        law_state->moment = dem2di_rolling(law, dem2di_reduced_radius(world, i), relative.spin, dt,
-                                           contact->force, last->law_state.moment);
 }
 
-/* Force of contact i, whose geometry is known. */
-static DEM2DI_INLINE void dem2di_force(dem2d_world *world, int i, const dem2di_last *last, bool two,
-                                       dem2di_contact *contact, dem2di_count *count) {
-    double moment = 0;
-    if (world->plan.full) {
-        dem2di_full_force(world, i, last, two, contact);
-        moment = world->list.contacts.law_states[i - world->list.discs].moment;
-    } else {
-        dem2di_spring_force(world, i, last, two, contact);
-    }
-    dem2d_vec force = dem2di_contact_force(contact);
-    world->load_x[i] = force.x;
-    world->load_y[i] = force.y;
-    world->load_a[i] = dem2di_torque_a(contact, moment);
-    world->load_b[i] = dem2di_torque_b(contact, moment);
-    double sum = fabs(force.x) + fabs(force.y) + fabs(world->load_a[i]) + fabs(world->load_b[i]);
-    count->unsound += !dem2di_finite(sum);
-    if (!world->bounded) count->load = dem2di_max(count->load, sum);
+/* The law for the rows: their forces into the columns. */
+static void dem2di_law_apply(dem2d_world *world, dem2di_law_rows *rows, dem2di_count *count) {
+    if (world->law != NULL)
+        dem2di_law_ask(world, rows);
+    else
+        dem2di_law_solve(rows, world->made_step, world->plan.terms);
+    for (int k = 0; k < rows->count;) k += dem2di_law_put(world, rows, k, count);
+    rows->count = 0;
+}
+
+/* Makes room in the rows for one more contact. */
+static inline void dem2di_law_room(dem2d_world *world, dem2di_law_rows *rows, dem2di_count *count) {
+    if (rows->count > DEM2DI_BATCH - 2) dem2di_law_apply(world, rows, count);
 }
 
 /* Where contact i has its points, beside it when there are two; B's centre is at d. A circle has
@@ -14400,21 +14503,29 @@ static void dem2di_contact_apart(dem2d_world *world, int i, dem2d_vec normal) {
     memset(&contact, 0, sizeof contact);
     contact.normal = normal;
     contact.depth = -1;
-    dem2di_contact_put(&world->list, i, &contact);
+    dem2di_geometry_put(&world->list, i, &contact);
+    dem2di_contact_clear(world, i);
     dem2di_no_load(world, i);
 }
 
-/* Geometry and force of one listed pair that is not of two circles. */
-static void dem2di_update_pair(dem2d_world *world, int i, dem2di_count *count) {
+/* A contact whose points are to be found has none yet. */
+static inline void dem2di_points_clear(const dem2d_world *world, int i) {
+    dem2di_point_pair *pairs = world->list.contacts.point_pairs;
+    if (world->plan.faces) memset(&pairs[i - world->list.discs], 0, sizeof *pairs);
+}
+
+/* Geometry of one listed pair that is not of two circles, and its rows for the law. */
+static void dem2di_update_pair(dem2d_world *world, int i, dem2di_law_rows *rows,
+                               dem2di_count *count) {
     dem2di_list *list = &world->list;
     int a = list->keys[i].a, b = list->keys[i].b;
     dem2di_history *history = &list->contacts.history[i - list->discs];
     dem2di_last last;
     dem2di_contact contact;
     dem2d_contact_point points[2];
-    dem2di_last_get(world, i, &last);
+    dem2di_last_get(world, &list->contacts, i, &last);
     contact.normal = last.contact.normal;
-    dem2di_clear_beside(world, i);
+    dem2di_points_clear(world, i);
     int found = dem2di_collide_pair(world, a, b, &last.contact, history, &contact, points, count);
     if (found == 0) {
         dem2di_contact_apart(world, i, contact.normal);
@@ -14422,8 +14533,8 @@ static void dem2di_update_pair(dem2d_world *world, int i, dem2di_count *count) {
     }
     dem2d_vec d = dem2di_centre_line(world->now[a].x, world->now[b].x);
     dem2di_contact_place(world, i, found, points, d, &contact);
-    dem2di_force(world, i, &last, found == 2, &contact, count);
-    dem2di_contact_put(list, i, &contact);
+    dem2di_law_add(world, i, &last, found == 2, &contact, rows);
+    dem2di_geometry_put(list, i, &contact);
 }
 
 /* A particle at a half-plane: one support call, none for a circle. Returns the number of points. */
@@ -14490,18 +14601,20 @@ static int dem2di_collide_segment(const dem2d_world *world, int a, int wall,
     return found;
 }
 
-/* Force of a contact with a wall whose geometry is known. */
-static void dem2di_wall_force(dem2d_world *world, int i, const dem2di_last *last,
-                              dem2di_contact *contact, dem2di_count *count) {
+/* The rows of a contact with a wall whose geometry is known. */
+static void dem2di_wall_add(dem2d_world *world, int i, const dem2di_last *last,
+                            dem2di_contact *contact, dem2di_law_rows *rows) {
     bool two = dem2di_point_pair_of(world, &world->list.contacts, i) != NULL;
     if (world->faces == DEM2D_ONE_POINT) /* [P] fig. 4b: from the foot point to the middle */
         contact->arms.a_n += contact->depth / 2;
-    dem2di_force(world, i, last, two, contact, count);
+    dem2di_law_add(world, i, last, two, contact, rows);
+    dem2di_geometry_put(&world->list, i, contact);
 }
 
-/* The same as for a pair, for a particle and a wall. Where segments are joined, forces come after
+/* The same as for a pair, for a particle and a wall. Where segments are joined, the law comes after
    all of the geometry. */
-static void dem2di_update_wall_contact(dem2d_world *world, int i, dem2di_count *count) {
+static void dem2di_update_wall_contact(dem2d_world *world, int i, dem2di_law_rows *rows,
+                                       dem2di_count *count) {
     dem2di_list *list = &world->list;
     int a = list->keys[i].a, j = list->keys[i].b;
     bool segment = world->walls[j].desc.segment;
@@ -14509,9 +14622,9 @@ static void dem2di_update_wall_contact(dem2d_world *world, int i, dem2di_count *
     dem2di_last last;
     dem2di_contact contact;
     dem2d_contact_point points[2];
-    dem2di_last_get(world, i, &last);
+    dem2di_last_get(world, &list->contacts, i, &last);
     contact.normal = last.contact.normal;
-    dem2di_clear_beside(world, i);
+    dem2di_points_clear(world, i);
     int found = segment ? dem2di_collide_segment(world, a, j, &last.contact, history, &contact,
                                                  points, count)
                         : dem2di_collide_plane(world, a, j, &contact, points, count);
@@ -14520,9 +14633,10 @@ static void dem2di_update_wall_contact(dem2d_world *world, int i, dem2di_count *
         return;
     }
     dem2di_contact_place(world, i, found, points, dem2di_vec(0, 0), &contact);
-    contact.force = contact.shear = 0;
-    if (!segment || !world->plan.joints) dem2di_wall_force(world, i, &last, &contact, count);
-    dem2di_contact_put(list, i, &contact);
+    if (segment && world->plan.joints)
+        dem2di_geometry_put(list, i, &contact);
+    else
+        dem2di_wall_add(world, i, &last, &contact, rows);
 }
 
 /* --- joints of segments: of two contacts at the same place one is left -------------------------
@@ -14632,22 +14746,25 @@ static void dem2di_resolve_joints(dem2d_world *world) {
     }
 }
 
-/* The force pass of all contacts with segments, whose springs may be those of another contact. */
+/* The law for all contacts with segments, whose springs may be those of another contact. */
 static void dem2di_force_joints(dem2d_world *world, dem2di_count *count) {
     dem2di_list *list = &world->list;
+    dem2di_law_rows rows;
+    rows.count = 0;
     for (int i = list->pairs; i < list->count; i++) {
         dem2di_contact contact;
         dem2di_last last;
         if (!world->walls[list->keys[i].b].desc.segment) continue;
         if (!dem2di_contact_get(world, &list->contacts, i, &contact)) {
-            dem2di_clear_beside(world, i);
+            dem2di_contact_clear(world, i);
             dem2di_no_load(world, i);
             continue;
         }
-        dem2di_last_from(world, &list->last, dem2di_joint_source(world, i), &last);
-        dem2di_wall_force(world, i, &last, &contact, count);
-        dem2di_contact_put(list, i, &contact);
+        dem2di_law_room(world, &rows, count);
+        dem2di_last_get(world, &list->last, dem2di_joint_source(world, i), &last);
+        dem2di_wall_add(world, i, &last, &contact, &rows);
     }
+    dem2di_law_apply(world, &rows, count);
 }
 
 /* May the two of a listed pair that is not of two circles have met since they were found apart? */
@@ -14657,16 +14774,29 @@ static inline bool dem2di_may_meet(const dem2d_world *world, int i) {
     return !(world->displacement[key->a] + world->displacement[key->b] < bound);
 }
 
-/* A listed pair that is not of two circles. */
-static inline void dem2di_collide(dem2d_world *world, int i, dem2di_count *count) {
+/* A listed pair that is not of two circles; the rows have room. */
+static inline void dem2di_collide(dem2d_world *world, int i, dem2di_law_rows *rows,
+                                  dem2di_count *count) {
     if (world->immovable && dem2di_immovable(world, i)) {
         dem2di_contact_end(world, i);
         dem2di_no_load(world, i);
     } else if (i >= world->list.pairs) {
-        dem2di_update_wall_contact(world, i, count);
+        dem2di_update_wall_contact(world, i, rows, count);
     } else if (dem2di_may_meet(world, i)) {
-        dem2di_update_pair(world, i, count);
+        dem2di_update_pair(world, i, rows, count);
     }
+}
+
+/* The contacts of a block that are not of two circles: first their geometry, then the law, whenever
+   the rows are full. */
+static void dem2di_others_range(dem2d_world *world, int begin, int end, dem2di_count *count) {
+    dem2di_law_rows rows;
+    rows.count = 0;
+    for (int i = begin; i < end; i++) {
+        dem2di_law_room(world, &rows, count);
+        dem2di_collide(world, i, &rows, count);
+    }
+    dem2di_law_apply(world, &rows, count);
 }
 
 /* Blocks of the three kinds of contacts, one kind after the other. */
@@ -14682,11 +14812,10 @@ static void dem2di_force_task(void *context, int begin, int end) {
         int last = dem2di_block_end(first, size, round ? list->discs : list->count);
         memset(count, 0, sizeof *count);
         if (world->keeps_last) dem2di_contacts_keep(world, first, last, false);
-        if (round) {
+        if (round)
             dem2di_disc_range(world, first, last, count);
-            continue;
-        }
-        for (int i = first; i < last; i++) dem2di_collide(world, i, count);
+        else
+            dem2di_others_range(world, first, last, count);
     }
 }
 
@@ -14885,14 +15014,14 @@ static double dem2di_servo_forgets(const dem2di_backing *backing, double time_st
 static void dem2di_push_ask(const dem2d_world *world, int i, const dem2di_contact *contact,
                             double elastic, double *impedance, double *spring) {
     dem2di_last last;
-    dem2di_last_from(world, &world->list.last, i, &last);
-    dem2di_relative_velocity relative =
-        dem2di_relative_velocity_of(world, i, &last.contact, contact);
-    double closing = relative.approach, deeper = contact->depth / 16;
+    dem2di_law_rows rows;
+    rows.count = 0;
+    dem2di_last_get(world, &world->list.last, i, &last);
+    dem2di_law_add(world, i, &last, false, contact, &rows);
+    double closing = rows.approach[0], deeper = contact->depth / 16;
     double faster = deeper / world->time_step;
     dem2d_law_output output;
-    relative.approach += faster;
-    dem2di_ask_law(world, i, &last, &relative, contact->normal, contact->depth + deeper, &output);
+    dem2di_ask_law(world, &rows, 0, contact->depth + deeper, closing + faster, &output);
     *impedance = dem2di_max((output.normal_force - contact->force) / faster, *impedance);
     *spring = contact->force - (*impedance - elastic) * closing;
 }
@@ -14903,7 +15032,6 @@ static dem2di_push dem2di_push_make(const dem2d_world *world, int i, const dem2d
     const dem2di_list *list = &world->list;
     const dem2d_pair_desc *law = dem2di_law_of(world, i);
     const dem2di_point_pair *pair = dem2di_point_pair_of(world, &list->contacts, i);
-    const dem2di_law_state *law_state = dem2di_law_state_of(world, &list->contacts, i);
     int a = list->keys[i].a;
     double inverse = world->inverse[a].mass, mass = inverse > 0 ? 1 / inverse : 0;
     double weight = 1, spring = contact->force;
@@ -14916,7 +15044,9 @@ static dem2di_push dem2di_push_make(const dem2d_world *world, int i, const dem2d
     double stiffness = weight * law->normal_stiffness;
     double elastic = stiffness * world->time_step;
     double impedance = elastic + weight * dem2di_dashpot(law, mass);
-    if (law_state != NULL) spring -= law_state->viscous[0] + law_state->viscous[1];
+    if (world->plan.terms & DEM2DI_DASHPOT)
+        spring -= dem2di_viscous_of(world, &list->contacts, i, 0) +
+                  dem2di_viscous_of(world, &list->contacts, i, 1);
     if (world->law != NULL) dem2di_push_ask(world, i, contact, elastic, &impedance, &spring);
     dem2di_state next = dem2di_foresee(world, a);
     double leaves = dem2di_dot(contact->normal, next.v) - arms.a_t * next.w;
@@ -15184,7 +15314,7 @@ static void dem2di_stiffness_point(double kn, double kt, dem2d_vec normal, doubl
 static double dem2di_dashpot_lag(const dem2d_world *world, int slot) {
     const dem2di_list *list = &world->list;
     double lag = 0;
-    if (!world->plan.full || world->law != NULL) return 0;
+    if (!(world->plan.terms & DEM2DI_DASHPOT) || world->law != NULL) return 0;
     for (int k = list->first[slot]; k < list->first[slot + 1]; k++) {
         int i = list->adjacent[k];
         if (!(list->contacts.depth[i] > 0)) continue;
@@ -15503,7 +15633,7 @@ static dem2d_result dem2di_step(dem2d_world *world) {
     if (ledger.kept) dem2di_observe_motion(world, &ledger);
     bool used_up = trial.used_up || path > 1 - DEM2DI_LIST_STEPS * DBL_EPSILON ||
                    world->steps - world->listed_at >= DEM2DI_LIST_STEPS;
-    world->plan.full_made = world->plan.full_now;
+    world->plan.terms_made = world->plan.terms_now;
     if (world->plan_due > 0) world->plan_due--;
     world->list_displacement = path;
     world->list_stale = world->list_used_up = used_up;
@@ -15648,9 +15778,7 @@ static dem2d_contact_info dem2di_contact_of(const dem2d_world *world,
     info.depth = contact->depth;
     info.normal_force = contact->force;
     info.tangential_force = contact->shear;
-    const dem2di_law_state *law_state =
-        dem2di_law_state_of(world, &world->list.contacts, iterator->number);
-    info.moment = law_state != NULL ? law_state->moment : 0;
+    info.moment = dem2di_moment_of(world, &world->list.contacts, iterator->number);
     return info;
 }
 
@@ -16365,7 +16493,6 @@ static int dem2di_rows(const void *object, const dem2di_column *column) {
         return there ? rows[column->group] : 0;
     }
     const dem2d_world *w = (const dem2d_world *)object;
-    int others = w->list.count - w->list.discs;
     rows[DEM2DI_WORLD] = 1;
     rows[DEM2DI_TEMPLATES] = w->template_count;
     rows[DEM2DI_MATERIALS] = w->material_count;
@@ -16377,10 +16504,9 @@ static int dem2di_rows(const void *object, const dem2di_column *column) {
     rows[DEM2DI_DISPLACEMENTS] = w->plan.turns ? w->body_count : 0;
     rows[DEM2DI_MADE] = w->redirected ? w->body_count : 0;
     rows[DEM2DI_WALLS] = w->wall_count;
-    rows[DEM2DI_KEYS] = w->list.count;
-    rows[DEM2DI_GENERAL] = others;
-    rows[DEM2DI_POINT_PAIRS] = w->plan.faces ? others : 0;
-    rows[DEM2DI_LAW_STATES] = w->plan.full ? others : 0;
+    for (int k = DEM2DI_KEYS; k < DEM2DI_ADJACENCY; k++)
+        rows[k] = w->list.count -
+                  dem2di_contacts_begin(&w->plan, w->list.discs, w->list.count, (dem2di_group)k);
     return rows[column->group];
 }
 
@@ -18043,7 +18169,10 @@ DEM2D_API dem2d_result dem2d_world_write_csv(const dem2d_world *world, const dem
    >>licence  Changes and licence
 
    CHANGES
-     0.7.0  Snapshots stay of version 4: those of 0.6.0 are read.
+     0.7.0  Snapshots stay of version 4: those of 0.6.0 are read, unless they have dashpots, rolling
+            friction or a law: these are refused by the names of their arrays.
+            A tangential spring of one contact point is shared out to two by the forces of their
+            normal springs, without dashpots.
             Several processes: dem2d_world_desc.gather may change the sums of the contact forces in
             each step, commit may refuse a step.
             Particles and walls may have a name of 64 bits, which orders pairs and sums in place of
