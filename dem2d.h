@@ -8054,6 +8054,7 @@ typedef struct dem2di_search {
     dem2d_vec a, b;
     dem2d_proof proof;
     dem2di_feature feature;
+    bool alone; /* two polygons have no second contact point: see dem2di_corner_alone */
 } dem2di_search;
 
 /* From centre a to centre b: the only place that a periodic cell would change. */
@@ -8191,6 +8192,7 @@ static void dem2di_witness(dem2di_search *search, const dem2di_vertex *v0,
 
 static void dem2di_feature_clear(dem2di_search *search) {
     search->feature.own = search->feature.corner[0] = search->feature.corner[1] = -1;
+    search->alone = false;
 }
 
 /* The state of a resolved pair: the sign of the depth, outside rounding errors. */
@@ -8458,6 +8460,22 @@ static bool dem2di_has_core(const dem2d_shape *shape) {
     return shape->type == DEM2D_CIRCLE || shape->type == DEM2D_POLYGON;
 }
 
+/* The corners of a core; a circle is a core of one corner. */
+static inline const dem2d_vec *dem2di_core_corners(const dem2d_shape *shape) {
+    static const dem2d_vec centre = {0, 0};
+    return shape->type == DEM2D_CIRCLE ? &centre : shape->corners;
+}
+
+/* Corners of a core; 0 of shapes that have none. */
+static inline int dem2di_core_count(const dem2d_shape *shape) {
+    return shape->type == DEM2D_POLYGON ? shape->count : shape->type == DEM2D_CIRCLE;
+}
+
+/* The radius by which a core is grown. */
+static inline double dem2di_core_radius(const dem2d_shape *shape, double scale) {
+    return (shape->type == DEM2D_CIRCLE ? shape->a : shape->rounding) * scale;
+}
+
 /* The core of a shape. B is reflected through its centre: A minus B is then the sum of both cores,
    and the corners of both advance counter-clockwise with the direction. */
 typedef struct dem2di_core {
@@ -8471,16 +8489,14 @@ typedef struct dem2di_core {
 
 static void dem2di_core_set(const dem2d_shape *shape, dem2d_rot q, double scale, double sign,
                             dem2di_core *core) {
-    static const dem2d_vec centre = {0, 0};
-    bool circle = shape->type == DEM2D_CIRCLE;
-    core->corners = circle ? &centre : shape->corners;
+    core->corners = dem2di_core_corners(shape);
     core->tangents = shape->tangents;
-    core->count = circle ? 1 : shape->count;
+    core->count = dem2di_core_count(shape);
     core->q.c = q.c;
     core->q.s = q.s;
     core->scale = sign * scale;
     core->sign = sign;
-    core->radius = (circle ? shape->a : shape->rounding) * scale;
+    core->radius = dem2di_core_radius(shape, scale);
     core->behind = 0;
 }
 
@@ -8678,40 +8694,118 @@ static inline double dem2di_edge_near(const dem2di_core *core, int k, dem2d_vec 
     return dem2di_min(ahead, back);
 }
 
+/* Faces of polygons are edges whose normals are at most about 45 degrees (cosine) off a contact. An
+   edge this near (sine) to a contact counts for both sides of it: the contact is on this edge, up
+   to the tolerance of EPA. */
+#define DEM2DI_FACE_COSINE 0.7071
+#define DEM2DI_ALONG 1e-4
+
+/* A corner of one core at an edge of the other, in coordinates along the edge's normal and tangent.
+ */
+typedef struct dem2di_corner_at_edge {
+    double low, high; /* ends of the edge along its tangent, from the corner on */
+    double h, radii;  /* overlap of the cores, radii by which they are grown */
+    dem2d_vec v;      /* the normal, against the corner, in coordinates of the corner's shape */
+    double sine[2];   /* of the angles between the edge and the edges after and before the corner */
+} dem2di_corner_at_edge;
+
+/* Is there no second contact point between an edge and the one beside the corner that rests on it?
+   That one is given by its angle with the edge and the height `rise` of its far end above the
+   corner; the edge goes on for a length beyond the corner. A second point is where, in this order,
+   the far end of either edge is less than the radii away from the line of the other:
+   dem2di_second_place takes one of these ends, and finds no point if it is apart. Values within
+   `unsure` of 0 decide nothing, nor does an edge that may count for both sides. No short circuits:
+   branches could not be predicted. */
+static DEM2DI_INLINE bool dem2di_side_apart(const dem2di_corner_at_edge *at, double sine,
+                                            double cosine, double rise, double length,
+                                            double unsure) {
+    bool far_apart = rise - at->h - at->radii > unsure;
+    bool end_apart = length * sine - at->h * cosine - at->radii > unsure;
+    bool no_face = !(cosine > DEM2DI_FACE_COSINE);
+    return no_face | ((sine > 2 * DEM2DI_ALONG) & far_apart & end_apart);
+}
+
+/* Is it certain that two overlapping polygons, a corner k of one at an edge of the other, have no
+   second contact point? The computation of dem2di_pair_second then need not be made: the edge is
+   the face of its shape on both sides, and each edge beside the corner that of the other. Both
+   computations have errors of a few eps times the size of the pair, 64 eps together at most:
+   support values have ROUNDOFF, 16 eps, heights on a face at a slope below 1 twice that. The edges
+   of the first shape must not be parallel within rounding errors, so that its face is this edge. */
+static DEM2DI_INLINE bool dem2di_corner_alone(const dem2di_pair *pair, const dem2d_shape *own,
+                                              int edge, const dem2d_shape *other, double scale,
+                                              int k, const dem2di_corner_at_edge *at) {
+    const double unsure = 4 * DEM2DI_ROUNDOFF * pair->size;
+    if (other->type != DEM2D_POLYGON) return true; /* a circle */
+    int before = dem2di_around(other->count, k, -1), after = dem2di_around(other->count, k, 1);
+    dem2d_vec here = other->corners[k], v = at->v;
+    double rise_after = -dem2di_dot(dem2di_sub(other->corners[after], here), v) * scale;
+    double rise_before = -dem2di_dot(dem2di_sub(other->corners[before], here), v) * scale;
+    double cosine_after = dem2di_cross(v, other->tangents[k]);
+    double cosine_before = dem2di_cross(v, other->tangents[before]);
+    dem2d_vec last = own->tangents[dem2di_around(own->count, edge, -1)];
+    bool distinct = fabs(dem2di_cross(last, own->tangents[edge])) > 4 * DEM2DI_ROUNDOFF;
+    return distinct &
+           dem2di_side_apart(at, at->sine[0], cosine_after, rise_after, -at->low, unsure) &
+           dem2di_side_apart(at, at->sine[1], cosine_before, rise_before, at->high, unsure);
+}
+
 /* An edge of one core and the corner of the other that is farthest along its normal n. They are the
    answer if the origin's foot is on the edge and if the cores are separated, or the ends of the
    edge exclude all other directions within a right angle to each side of d (see
    dem2di_corners_exclude). In coordinates along n and the tangent t only the other core's corner
-   has to be rotated. With `check` the corner is checked first. */
-static bool dem2di_feature_holds(const dem2di_pair *pair, const dem2di_core core[2],
-                                 const dem2di_feature *feature, bool check, dem2di_search *search) {
-    int i = feature->own, edge = feature->corner[i], k = feature->corner[1 - i];
-    const dem2di_core *own = &core[i], *other = &core[1 - i];
-    dem2d_vec t, p, along = own->tangents[edge], c0 = own->corners[edge];
-    dem2d_vec c1 = own->corners[dem2di_around(own->count, edge, 1)];
-    dem2di_core_tangent(own, edge, 1, &t);
+   has to be rotated. With `check` the corner is checked first, and whether there is no second
+   contact point. */
+static DEM2DI_INLINE bool dem2di_feature_holds(const dem2di_pair *pair,
+                                               const dem2di_feature *feature, bool check,
+                                               dem2di_search *search) {
+    const bool of_a = feature->own == 0; /* B is reflected: its scale counts as negative */
+    const dem2d_shape *own = of_a ? pair->a : pair->b, *other = of_a ? pair->b : pair->a;
+    const dem2d_rot q = of_a ? pair->ra : pair->rb, turn = of_a ? pair->rb : pair->ra;
+    const double scale = of_a ? pair->scale_a : pair->scale_b, sign = of_a ? 1 : -1;
+    const double other_scale = of_a ? pair->scale_b : pair->scale_a;
+    const int edge = of_a ? feature->corner[0] : feature->corner[1];
+    const int k = of_a ? feature->corner[1] : feature->corner[0];
+    const dem2d_vec along = own->tangents[edge], c0 = own->corners[edge];
+    const dem2d_vec c1 = own->corners[dem2di_around(own->count, edge, 1)];
+    dem2di_corner_at_edge at;
+    dem2d_vec t = dem2di_turn(q, along);
+    t.x *= sign;
+    t.y *= sign;
     dem2d_vec n = dem2di_right(t);
-    if (check && other->count > 1) {
-        dem2d_vec v = dem2di_turn_back(other->q, dem2di_scale(n, other->sign));
-        bool ahead = dem2di_dot(other->tangents[k], v) <= 0;
-        if (!(ahead & (dem2di_dot(other->tangents[dem2di_around(other->count, k, -1)], v) >= 0)))
-            return false;
+    at.sine[0] = at.sine[1] = 0;
+    at.v = dem2di_turn_back(turn, dem2di_scale(n, -sign));
+    if (check && other->type == DEM2D_POLYGON) {
+        at.sine[0] = -dem2di_dot(other->tangents[k], at.v);
+        at.sine[1] = dem2di_dot(other->tangents[dem2di_around(other->count, k, -1)], at.v);
+        if (!((at.sine[0] >= 0) & (at.sine[1] >= 0))) return false;
     }
-    dem2di_core_corner(other, k, &p);
-    double scale = own->scale * own->sign, height = dem2di_cross(c0, along) * scale;
+    dem2d_vec p = dem2di_turn(turn, dem2di_core_corners(other)[k]);
+    p.x *= -sign * other_scale;
+    p.y *= -sign * other_scale;
+    double height = dem2di_cross(c0, along) * scale;
     double dn = dem2di_dot(pair->d, n), dt = dem2di_dot(pair->d, t);
     dem2d_vec from = dem2di_sub(pair->d, p); /* on the edge if the depth is 0 */
-    double at = dem2di_dot(from, t);
-    double low = dem2di_dot(c0, along) * scale - at, high = dem2di_dot(c1, along) * scale - at;
-    double h = height - dem2di_dot(from, n);
-    double radii = core[0].radius + core[1].radius;
+    double foot = dem2di_dot(from, t);
+    at.low = dem2di_dot(c0, along) * scale - foot;
+    at.high = dem2di_dot(c1, along) * scale - foot;
+    at.h = height - dem2di_dot(from, n);
+    double radius_a = dem2di_core_radius(pair->a, pair->scale_a);
+    double radius_b = dem2di_core_radius(pair->b, pair->scale_b);
+    at.radii = radius_a + radius_b;
     double inner = pair->a->inscribed * pair->scale_a + pair->b->inscribed * pair->scale_b;
-    double least = h * pair->distance, turned = h * dt;
-    bool ends = (dn > 0) & (dn * high - turned >= least) & (turned - dn * low >= least);
-    if (!((low <= 0) & (high >= 0) & ((h < 0) | (ends & (h + radii <= inner))))) return false;
-    dem2d_vec q = dem2di_along(dem2di_scale(n, height), at, t);
+    double least = at.h * pair->distance, turned = at.h * dt;
+    bool ends = (dn > 0) & (dn * at.high - turned >= least) & (turned - dn * at.low >= least);
+    if (!((at.low <= 0) & (at.high >= 0) & ((at.h < 0) | (ends & (at.h + at.radii <= inner)))))
+        return false;
+    dem2d_vec foot_own = dem2di_along(dem2di_scale(n, height), foot, t);
+    dem2d_vec on_a = of_a ? foot_own : p, on_b = of_a ? p : foot_own;
     search->feature = *feature;
-    dem2di_core_report(core, i == 0 ? q : p, i == 0 ? p : q, n, h, search);
+    search->normal.x = n.x;
+    search->normal.y = n.y;
+    search->upper = search->lower = at.h + at.radii;
+    search->a = dem2di_along(on_a, radius_a, n);
+    search->b = dem2di_negate(dem2di_along(on_b, radius_b, n));
+    search->alone = check && dem2di_corner_alone(pair, own, edge, other, other_scale, k, &at);
     return true;
 }
 
@@ -8730,16 +8824,23 @@ static bool dem2di_edge_warm(const dem2di_pair *pair, const dem2di_core core[2],
     near.corner[1 - i] = k[1 - i];
     /* a sine may be that of nearly half a turn */
     return dem2di_cross(v[i], core[i].tangents[edges[i]]) > 0 &&
-           dem2di_feature_holds(pair, core, &near, false, search);
+           dem2di_feature_holds(pair, &near, false, search);
 }
 
-/* Try the feature of the last step; false if it is not known to be the answer. */
-static bool dem2di_edge_last(const dem2di_pair *pair, const dem2di_core core[2],
-                             const dem2di_feature *last, dem2di_search *search) {
-    return last != NULL && (unsigned)last->own < 2 && core[last->own].count > 1 &&
-           (unsigned)last->corner[0] < (unsigned)core[0].count &&
-           (unsigned)last->corner[1] < (unsigned)core[1].count &&
-           dem2di_feature_holds(pair, core, last, true, search);
+/* Try the feature of the last step, which may be that of any pair; false if it is not known to be
+   the answer. */
+static DEM2DI_INLINE bool dem2di_edge_last(dem2di_pair *pair, const dem2di_feature *last,
+                                           dem2di_search *search) {
+    if (last == NULL || (unsigned)last->own > 1) return false;
+    int count_a = dem2di_core_count(pair->a), count_b = dem2di_core_count(pair->b);
+    if (!((unsigned)last->corner[0] < (unsigned)count_a &&
+          (unsigned)last->corner[1] < (unsigned)count_b &&
+          (last->own == 0 ? count_a : count_b) > 1 &&
+          dem2di_feature_holds(pair, last, true, search)))
+        return false;
+    pair->calls++;
+    search->proof = DEM2D_BY_FORM;
+    return true;
 }
 
 /* Edges passed to each side before branch and bound is cheaper, measured: 24 take as long as the 15
@@ -8796,10 +8897,10 @@ static bool dem2di_edges_solve(dem2di_pair *pair, const dem2di_feature *last, de
                                bool beside, dem2di_search *search) {
     dem2di_core core[2];
     dem2di_walk walk[2];
+    if (dem2di_edge_last(pair, last, search)) return true;
     dem2di_cores_set(pair, core);
     pair->calls++;
     search->proof = DEM2D_BY_FORM;
-    if (dem2di_edge_last(pair, core, last, search)) return true;
     /* from a start behind, both sides would seem to be past the cone */
     if (!(dem2di_dot(u, pair->d) > 0)) u = dem2di_centres(pair);
     int k[2] = {0, 0};
@@ -9537,7 +9638,7 @@ static void dem2di_certified(dem2di_pair *pair, const dem2di_feature *last, dem2
 
 /* ============================================================================================
    >>faces  Where two faces meet: the two points that carry the contact
-   uses: config, math, support, gjk
+   uses: config, math, support, gjk, edges
    ============================================================================================ */
 
 /* A face of a shape beside a contact along u, without the rounding radius: x is along perp(u),
@@ -9557,10 +9658,6 @@ typedef struct dem2di_face {
    of a radian is a tilted face, a third is another contact. */
 #define DEM2DI_FLAT_ANGLE 0.3
 
-/* An edge this near (sine) to a contact counts for both sides of it: the contact is on this edge,
-   up to the tolerance of EPA. */
-#define DEM2DI_ALONG 1e-4
-
 /* The edge beside corner k on a side (1: counter-clockwise), as a face of a contact along v; -1 if
    it is more than 45 degrees off. */
 static inline int dem2di_polygon_face(const dem2d_shape *shape, dem2d_vec v, int k, int side) {
@@ -9568,7 +9665,7 @@ static inline int dem2di_polygon_face(const dem2d_shape *shape, dem2d_vec v, int
     double sine[2];
     for (int i = 0; i < 2; i++) {
         dem2d_vec along = shape->tangents[edge[i]];
-        sine[i] = dem2di_cross(v, along) > 0.7071 ? fabs(dem2di_dot(v, along)) : 1;
+        sine[i] = dem2di_cross(v, along) > DEM2DI_FACE_COSINE ? fabs(dem2di_dot(v, along)) : 1;
     }
     if (dem2di_min(sine[0], sine[1]) < DEM2DI_ALONG) other = sine[1] < sine[0];
     return sine[other] < 1 ? edge[other] : -1;
@@ -9850,7 +9947,7 @@ static void dem2di_pair_second(const dem2di_pair *pair, const dem2di_search *sea
 static int dem2di_pair_points(const dem2di_pair *pair, const dem2di_search *search,
                               dem2d_contact_point points[2]) {
     dem2d_vec u = search->normal;
-    if (pair->a->flat && pair->b->flat) {
+    if (pair->a->flat && pair->b->flat && !search->alone) {
         dem2di_second_point second = dem2di_second_none();
         dem2di_pair_second(pair, search, &second);
         if (second.energy > 0) {
@@ -14185,6 +14282,16 @@ static void dem2di_pair_search(const dem2d_world *world, dem2di_pair *pair,
                          world->max_iterations, true, search);
 }
 
+/* Is a closed contact as it was: between the same edge and corner? The search would begin with this
+   question, and end with the same bits. */
+static DEM2DI_INLINE bool dem2di_pair_again(const dem2d_world *world, dem2di_pair *pair,
+                                            const dem2di_contact *last,
+                                            const dem2di_feature *feature, dem2di_search *search) {
+    if (!(last->depth > 0) || world->solver == DEM2D_GJK_EPA) return false;
+    pair->calls = 0;
+    return dem2di_edge_last(pair, feature, search);
+}
+
 /* A look at two shapes from the contact's normal and history on: its normal, depth and points, or
    their gap. Returns the number of points that carry the contact. */
 static int dem2di_collide_shapes(const dem2d_world *world, dem2di_pair *pair,
@@ -14193,7 +14300,8 @@ static int dem2di_collide_shapes(const dem2d_world *world, dem2di_pair *pair,
                                  double *gap, dem2di_count *count) {
     dem2di_search search;
     count->collisions++;
-    dem2di_pair_search(world, pair, last, &history->feature, &search);
+    if (!dem2di_pair_again(world, pair, last, &history->feature, &search))
+        dem2di_pair_search(world, pair, last, &history->feature, &search);
     count->calls += pair->calls;
     contact->normal.x = search.normal.x; /* not as one: it has just been stored in two */
     contact->normal.y = search.normal.y;
@@ -14205,8 +14313,9 @@ static int dem2di_collide_shapes(const dem2d_world *world, dem2di_pair *pair,
     }
     count->proofs[search.proof]++;
     contact->depth = search.upper;
-    if (world->plan.faces) return dem2di_pair_points(pair, &search, points);
-    points[0].position = dem2di_scale(dem2di_add(search.a, dem2di_add(search.b, pair->d)), 0.5);
+    if (world->plan.faces && !search.alone) return dem2di_pair_points(pair, &search, points);
+    points[0].position.x = (search.a.x + (search.b.x + pair->d.x)) * 0.5;
+    points[0].position.y = (search.a.y + (search.b.y + pair->d.y)) * 0.5;
     return 1;
 }
 
@@ -18177,6 +18286,7 @@ DEM2D_API dem2d_result dem2d_world_write_csv(const dem2d_world *world, const dem
             each step, commit may refuse a step.
             Particles and walls may have a name of 64 bits, which orders pairs and sums in place of
             the id (name in their descs and infos).
+            Polygons in contact at one point take a third less time.
      0.6.0  Runs differ from those of 0.5.0 with friction between circles, dashpots, polybeziers,
             two contact points with friction, and servo walls. Snapshots (version 4) name their
             arrays and fields, so that later headers read them; earlier snapshots are refused. The
