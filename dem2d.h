@@ -44,7 +44,8 @@ CONTENTS (search for the anchor, ">>" and the word)
                     spring, friction, critical time step                    >>law
                     leapfrog motion                                         >>motion
                     what a world holds: structs, fields, columns            >>world
-                    shapes, materials, particles, walls, by their ids       >>objects
+                    shapes, materials, particles, by their ids              >>objects
+                    walls, their parts and places                           >>walls
                     the neighbour list, particles sorted in space           >>list
                     the ledger of energies                                  >>ledger
                     contacts, sums, motion; the stable time step            >>step
@@ -1454,7 +1455,7 @@ typedef struct dem2d_contact_info {
     double tangential_force; ///< N/m, on B along the normal turned by +90 degrees
     double moment;           ///< N, on B, against rolling
     int part_a;              ///< part of A in contact: 0, since every particle has one part
-    int part_b;              ///< part of B, likewise
+    int part_b;              ///< part of B: of a wall by its number, of a particle 0
     int shift[2]; ///< cells from A to the image of B: {0, 0}, since no direction is periodic
     int feature;  ///< distinguishes contacts of the same two parts: 0, since they have one
     int sign;     ///< 1 if the force of the contact is added, -1 if it is subtracted: 1
@@ -10964,10 +10965,11 @@ static bool dem2di_state_finite(const dem2di_state *state) {
 /* HOW THE DATA LIVE AND FLOW
 
    Bodies (particles, by slots; walls) have states at the last force pass (before), now, and those
-   of the next step, which come over before. Pairs are near each other: the list has their keys,
-   sorted by kind (circles, others, walls), and where the contacts of each particle are. A contact
-   is what the last force pass found of a pair and what the next step starts from. Each of these is
-   a column, an array with one line in the table dem2di_columns.
+   of the next step, which come over before. Walls have parts, which move with them. Pairs are near
+   each other: the list has their keys, sorted by kind (circles, others, walls), and where the
+   contacts of each particle are. A contact is what the last force pass found of a pair and what the
+   next step starts from. Each of these is a column, an array with one line in the table
+   dem2di_columns.
 
    Passes of a step, each in a function that changes only what it is named for:
      list       positions -> keys, contacts carried over, adjacency; only when the list is used up
@@ -10984,14 +10986,16 @@ static bool dem2di_state_finite(const dem2di_state *state) {
 
    Invariants between steps, which tests/inside.h checks:
      1. Ids and slots of particles lead to each other. Slots that are free have a shape of -1.
-     2. A key is of two particles that live, the one of lower rank first, or of a particle and a
-   wall that live; or it is forgotten (a < 0), its contact is apart, and the list is stale.
+     2. A key is of two particles that live, the one of lower rank first, or of a particle that
+   lives and a part of a wall; or it is forgotten (a < 0), its contact is apart, the list is stale.
      3. A contact is closed where its depth is above 0. Otherwise it has no force, points or law
         state. Two circles that are both of the disc kind have their arms from the depth.
      4. adjacent has each contact of a listed pair once for each of its particles, first as B.
      5. before is where the last force pass was, with the contacts that it found: queries, the
         writers and the hash read these and compute nothing anew.
-     6. Loads, list.last, and all else in scratch are valid during a step only, but for the zeros of
+     6. The parts of walls are in the order of the walls' ranks, free slots have none; surfaces are
+        where the walls' states of now put them.
+     7. Loads, list.last, and all else in scratch are valid during a step only, but for the zeros of
         contacts that are apart.
    Results depend on positions, velocities, laws, and the history of each contact since it closed;
    not on which pairs are listed, the order in memory, or how work is shared out. */
@@ -11043,21 +11047,35 @@ typedef struct dem2di_ranked {
     int index, rank;
 } dem2di_ranked;
 
-/* A wall as described, and where it is. */
+/* A wall as described. */
 typedef struct dem2di_wall {
     dem2d_wall_desc desc; /* normal of unit length */
     int span[2];          /* indices, or -1 */
+    int first, count;     /* its parts; a free slot has none */
     dem2d_vec listed[3];  /* point, end (segments) and normal when the list was built */
     bool reshaped;        /* has been turned, or become longer or shorter, since */
     double skin;          /* how far it may move before the next time */
-    dem2d_rot along;      /* of a segment: direction from point to end, */
-    double extent;        /* and length */
     uint32_t generation;
     int users; /* walls that span to it */
     bool alive;
     int rank;   /* place in the order of the walls' names and indices */
     int placed; /* the wall at the place of this one's index */
 } dem2di_wall;
+
+/* What collides of a wall: a half-plane or a segment. The parts of all walls are in one array, in
+   the order of the walls' ranks, so that sums go by the numbers of parts. */
+typedef struct dem2di_part {
+    dem2d_vec start; /* m, from the wall's point: of a segment the start, else on the surface */
+    dem2d_rot along; /* direction of the surface, whose normal is to the left */
+    double extent;   /* m, length of a segment; 0 of a half-plane */
+    int wall;
+} dem2di_part;
+
+/* Where the surface of a part is: start and along in the plane. Follows from the wall's state. */
+typedef struct dem2di_surface {
+    dem2d_vec point;
+    dem2d_rot along;
+} dem2di_surface;
 
 /* What a servo wall pushes against: sums over its closed contacts. */
 typedef struct dem2di_backing {
@@ -11092,8 +11110,9 @@ typedef struct dem2di_contacts {
     dem2di_two *point_viscous; /* as point_pairs: parts of normal forces that dashpots have */
 } dem2di_contacts;
 
-/* The listed pairs: of two circles, of two other particles, of particles and walls (by the rank of
-   the wall, then by that of the particle), and their contacts as the last force pass left them. */
+/* The listed pairs: of two circles, of two other particles, of particles and parts of walls (in the
+   order of the part, then of the particle's rank), and their contacts as the last force pass left
+   them. */
 typedef struct dem2di_list {
     dem2di_key *keys;         /* count; a < 0 when the contact was forgotten: it is apart */
     int discs, pairs, count;  /* where the kinds end */
@@ -11211,6 +11230,7 @@ typedef enum dem2di_group {
     DEM2DI_WALLS_EXCHANGED,
     DEM2DI_STARTS, /* of the contacts of bodies, and the end of the last */
     DEM2DI_WALLS,
+    DEM2DI_PARTS,
     DEM2DI_KEYS,
     DEM2DI_MOMENTS,       /* of all contacts, where plan.terms has DEM2DI_ROLLING, */
     DEM2DI_CALLERS,       /* or DEM2DI_CALLERS_LAW */
@@ -11299,7 +11319,9 @@ struct dem2d_world {
     dem2d_shape *line; /* a polygon of two corners, of length 1: what segments are, scaled */
     dem2di_wall *walls;
     dem2di_wall_state *wall_before, *wall_now, *wall_next;
-    int wall_count;
+    dem2di_part *parts;
+    dem2di_surface *surfaces; /* of the parts now */
+    int wall_count, part_count;
 
     dem2di_list list;
     double *load_x, *load_y; /* force on the B of each contact, on A against it; in scratch, as: */
@@ -11427,6 +11449,7 @@ static const dem2di_field dem2di_progress_fields[] = {
     DEM2DI_SAVED("free_id", dem2d_world, free_id, DEM2DI_WHOLE(-1, 1 << 30)),
     DEM2DI_SAVED("particles", dem2d_world, body_count, DEM2DI_WHOLE(0, 1 << 30)),
     DEM2DI_SAVED("walls", dem2d_world, wall_count, DEM2DI_WHOLE(0, 1 << 30)),
+    DEM2DI_SAVED("wall_parts", dem2d_world, part_count, DEM2DI_WHOLE(0, 1 << 30)),
     DEM2DI_SAVED("disc_pairs", dem2d_world, list.discs, DEM2DI_WHOLE(0, 1 << 30)),
     DEM2DI_SAVED("pairs", dem2d_world, list.pairs, DEM2DI_WHOLE(0, 1 << 30)),
     DEM2DI_SAVED("contacts", dem2d_world, list.count, DEM2DI_WHOLE(0, 1 << 30))};
@@ -11509,6 +11532,12 @@ static const dem2di_field dem2di_wall_list_fields[] = {
     DEM2DI_SAVED("listed", dem2di_wall, listed, DEM2DI_VECTOR),
     DEM2DI_SAVED("reshaped", dem2di_wall, reshaped, DEM2DI_SWITCH),
     DEM2DI_SAVED("skin", dem2di_wall, skin, DEM2DI_FROM_0)};
+
+static const dem2di_field dem2di_part_fields[] = {
+    DEM2DI_SAVED("wall", dem2di_part, wall, DEM2DI_WHOLE(0, 1 << 30)),
+    DEM2DI_SAVED("start", dem2di_part, start, DEM2DI_VECTOR),
+    DEM2DI_SAVED("along", dem2di_part, along, DEM2DI_VECTOR),
+    DEM2DI_SAVED("extent", dem2di_part, extent, DEM2DI_FROM_0)};
 
 static const dem2di_field dem2di_wall_state_fields[] = {
     DEM2DI_SAVED("point", dem2di_wall_state, point, DEM2DI_VECTOR),
@@ -11668,6 +11697,8 @@ static const dem2di_column dem2di_columns[] = {
                   wall_state_fields),
     DEM2DI_COLUMN("wall_states", WALLS, wall_now, DEM2DI_SWAPS | DEM2DI_HASHED, wall_state_fields),
     DEM2DI_UNSAVED(WALLS, wall_next, 0),
+    DEM2DI_COLUMN("wall_parts", PARTS, parts, DEM2DI_FIRST | DEM2DI_HASHED, part_fields),
+    DEM2DI_UNSAVED(PARTS, surfaces, 0),
     DEM2DI_COLUMN("pairs", KEYS, list.keys, DEM2DI_FIRST | DEM2DI_HASHED, key_fields),
     DEM2DI_CONTACT_COLUMN("normal_x", KEYS, normal_x, finite_field),
     DEM2DI_CONTACT_COLUMN("normal_y", KEYS, normal_y, finite_field),
@@ -11876,7 +11907,7 @@ static dem2d_result dem2di_out_of_memory(const dem2d_world *world, const char *w
 }
 
 /* ============================================================================================
-   >>objects  Objects with ids: shapes, materials, particles, walls, and what queries read of them
+   >>objects  Objects with ids: shapes, materials, particles, and what queries read of them
    uses: config, math, memory, fields, shapes, gjk, broad, law, motion, world
    ============================================================================================ */
 
@@ -12082,11 +12113,17 @@ static void dem2di_law_set(dem2d_world *world, int a, int b, const dem2d_pair_de
     *dem2di_law(world, a, b) = *dem2di_law(world, b, a) = law;
 }
 
+/* The wall whose part a listed contact is with. */
+static inline int dem2di_wall_of(const dem2d_world *world, int contact) {
+    return world->parts[world->list.keys[contact].b].wall;
+}
+
 /* How the two of a listed contact meet; B is a particle or a wall. */
 static inline const dem2d_pair_desc *dem2di_law_of(const dem2d_world *world, int contact) {
     const dem2di_key *key = &world->list.keys[contact];
-    int material = contact >= world->list.pairs ? (int)world->walls[key->b].desc.material.index
-                                                : world->bodies[key->b].material;
+    int material = contact >= world->list.pairs
+                       ? (int)world->walls[dem2di_wall_of(world, contact)].desc.material.index
+                       : world->bodies[key->b].material;
     return dem2di_law(world, world->bodies[key->a].material, material);
 }
 
@@ -12330,15 +12367,6 @@ static void dem2di_forget(dem2d_world *world, int slot) {
     world->ledger.edited = true;
 }
 
-/* Contacts with a wall are forgotten. */
-static void dem2di_forget_wall(dem2d_world *world, int wall) {
-    dem2di_list *list = &world->list;
-    for (int i = list->pairs; i < list->count; i++)
-        if (list->keys[i].b == wall) dem2di_contact_forget(world, i);
-    world->list_stale = true;
-    world->ledger.edited = true;
-}
-
 DEM2D_API dem2d_result dem2d_world_remove_particle(dem2d_world *world, dem2d_particle_id id) {
     if (world == NULL) return DEM2D_NULL_ARGUMENT;
     int slot = dem2di_slot(world, id);
@@ -12418,7 +12446,8 @@ static inline bool dem2di_immovable(const dem2d_world *world, int i) {
     const dem2di_key *key = &world->list.keys[i];
     if (i < world->list.pairs)
         return !(world->inverse[key->a].mass + world->inverse[key->b].mass > 0);
-    return !(world->inverse[key->a].mass > 0) && world->walls[key->b].desc.mode != DEM2D_WALL_SERVO;
+    return !(world->inverse[key->a].mass > 0) &&
+           world->walls[dem2di_wall_of(world, i)].desc.mode != DEM2D_WALL_SERVO;
 }
 
 /* Is there such a pair in the list? */
@@ -12681,329 +12710,6 @@ DEM2D_API dem2d_result dem2d_world_drive_particle(dem2d_world *world, dem2d_part
     return DEM2D_OK;
 }
 
-static dem2d_result dem2di_check_spans(const dem2d_world *world, const dem2d_wall_desc *desc) {
-    int given = 0;
-    for (int i = 0; i < 2; i++) {
-        if (desc->spans[i].generation == 0) continue;
-        if (!dem2di_wall_lives(world, desc->spans[i]))
-            return dem2di_stale(world, "wall in spans", desc->spans[i].index);
-        given++;
-    }
-    if (given == 1)
-        return dem2di_fail(&world->env, DEM2D_OUT_OF_RANGE, -1, "spans: one wall of two given");
-    if (desc->mode == DEM2D_WALL_SERVO && given == 0 && !desc->segment)
-        return dem2di_check_number(&world->env, "length", desc->length, DEM2DI_POSITIVE);
-    return DEM2D_OK;
-}
-
-static dem2d_result dem2di_check_segment(const dem2d_world *world, const dem2d_wall_desc *desc) {
-    const dem2d_env *env = &world->env;
-    double length = dem2di_length(dem2di_sub(desc->end, desc->point));
-    if (length > 0 && dem2di_finite(length)) return DEM2D_OK;
-    return dem2di_fail(env, DEM2D_OUT_OF_RANGE, -1, "end: segment of length %g", length);
-}
-
-static dem2d_result dem2di_check_wall(const dem2d_world *world, const dem2d_wall_desc *desc) {
-    const dem2d_env *env = &world->env;
-    dem2d_vec unit;
-    if (!dem2di_material_lives(world, desc->material))
-        return dem2di_stale(world, "material", desc->material.index);
-    dem2d_result result = dem2di_check_fields(env, DEM2DI_ALL(dem2di_wall_fields), desc);
-    if (result == DEM2D_OK && desc->mode == DEM2D_WALL_SERVO)
-        result = dem2di_check_number(env, "max_speed", desc->max_speed, DEM2DI_POSITIVE);
-    if (result != DEM2D_OK) return result;
-    if (desc->segment) result = dem2di_check_segment(world, desc);
-    if (result != DEM2D_OK) return result;
-    if (!desc->segment && !dem2di_unit(desc->normal, &unit))
-        return dem2di_fail(env, DEM2D_OUT_OF_RANGE, -1, "normal is 0");
-    return dem2di_check_spans(world, desc);
-}
-
-/* What follows of a segment's description. */
-static void dem2di_segment_set(dem2di_wall *wall) {
-    dem2d_vec chord = dem2di_sub(wall->desc.end, wall->desc.point), along;
-    (void)dem2di_unit(chord, &along);
-    wall->along.c = along.x;
-    wall->along.s = along.y;
-    wall->extent = dem2di_length(chord);
-    wall->desc.normal = dem2di_perp(along);
-}
-
-/* A checked description into a slot; users of its spans are counted. */
-static void dem2di_wall_place(dem2d_world *world, int slot, const dem2d_wall_desc *desc) {
-    dem2di_wall *wall = &world->walls[slot];
-    wall->desc = *desc;
-    if (desc->segment)
-        dem2di_segment_set(wall);
-    else
-        (void)dem2di_unit(desc->normal, &wall->desc.normal);
-    for (int i = 0; i < 2; i++) {
-        wall->span[i] = desc->spans[i].generation != 0 ? (int)desc->spans[i].index : -1;
-        if (wall->span[i] >= 0) world->walls[wall->span[i]].users++;
-    }
-    dem2di_wall_state *now = &world->wall_now[slot];
-    now->point = desc->point; /* the velocity stays that of the step that was made */
-    if (desc->mode != DEM2D_WALL_SERVO) {
-        now->drift = 0;
-        memset(&now->backing, 0, sizeof now->backing);
-    }
-    world->wall_before[slot] = *now;
-    world->ledger.edited = true;
-}
-
-/* The line that segments are made of, when the first comes. The log knows if there is no memory. */
-static bool dem2di_line_make(dem2d_world *world, const dem2d_wall_desc *desc) {
-    if (!desc->segment || world->line != NULL) return true;
-    dem2d_shape *line = dem2di_shape_allocate(&world->env, DEM2D_POLYGON, 2, 2);
-    if (line == NULL) return false;
-    for (int k = 0; k < 2; k++) {
-        line->corners[k] = dem2di_vec(k - 0.5, 0);
-        line->tangents[k] = dem2di_vec(1 - 2 * k, 0);
-    }
-    line->flat = true;
-    line->circumscribed = 0.5;
-    world->line = line;
-    return true;
-}
-
-/* Does wall a come before b in the order of names, then of indices? */
-static bool dem2di_wall_precedes(const dem2di_wall *walls, int a, int b) {
-    return walls[a].desc.name < walls[b].desc.name ||
-           (walls[a].desc.name == walls[b].desc.name && a < b);
-}
-
-/* A wall whose name is new, from its place so far to its place in the order of `count` walls. */
-static void dem2di_wall_rank(dem2d_world *world, int slot, int count) {
-    dem2di_wall *walls = world->walls;
-    int place = walls[slot].rank, last = count - 1;
-    for (int way = -1; way <= 1; way += 2)
-        while (way < 0
-                   ? place > 0 && dem2di_wall_precedes(walls, slot, walls[place - 1].placed)
-                   : place < last && dem2di_wall_precedes(walls, walls[place + 1].placed, slot)) {
-            walls[place].placed = walls[place + way].placed;
-            walls[walls[place].placed].rank = place;
-            place += way;
-        }
-    walls[place].placed = slot;
-    walls[slot].rank = place;
-}
-
-static void dem2di_wall_unspan(dem2d_world *world, const dem2di_wall *wall) {
-    for (int i = 0; i < 2; i++)
-        if (wall->span[i] >= 0) world->walls[wall->span[i]].users--;
-}
-
-/* The end of a segment now. */
-static dem2d_vec dem2di_segment_end(const dem2di_wall *wall, dem2d_vec point) {
-    return dem2di_along(point, wall->extent, dem2di_vec(wall->along.c, wall->along.s));
-}
-
-/* How far a wall has moved, as far as contacts can tell. */
-static double dem2di_wall_way(const dem2di_wall *wall, dem2d_vec moved) {
-    return wall->desc.segment ? dem2di_length(moved) : fabs(dem2di_dot(moved, wall->desc.normal));
-}
-
-/* The list is built with a wall as it is now. */
-static void dem2di_wall_listed(dem2d_world *world, int slot) {
-    dem2di_wall *wall = &world->walls[slot];
-    wall->listed[0] = world->wall_now[slot].point;
-    wall->listed[1] = dem2di_segment_end(wall, wall->listed[0]);
-    wall->listed[2] = wall->desc.normal;
-    wall->reshaped = false;
-}
-
-/* Bound of how far the distance of any particle from a wall has changed since the list was built,
-   with the wall's point now: of a segment the greater way of its ends; of a half-plane that is
-   turned, the change at the corners of the box that holds all particles. */
-static double dem2di_wall_change(const dem2d_world *world, const dem2di_wall *wall,
-                                 dem2d_vec point) {
-    const dem2d_box *box = &world->box;
-    dem2d_vec moved = dem2di_sub(point, wall->listed[0]);
-    if (!wall->reshaped) return dem2di_wall_way(wall, moved);
-    dem2d_vec end = dem2di_sub(dem2di_segment_end(wall, point), wall->listed[1]);
-    if (wall->desc.segment) return dem2di_max(dem2di_length(moved), dem2di_length(end));
-    dem2d_vec turned = dem2di_sub(wall->desc.normal, wall->listed[2]);
-    double most = 0, way = dem2di_dot(moved, wall->desc.normal);
-    for (int k = 0; k < 4; k++) {
-        dem2d_vec corner =
-            dem2di_vec(k & 1 ? box->upper.x : box->lower.x, k & 2 ? box->upper.y : box->lower.y);
-        double change = dem2di_dot(dem2di_sub(corner, wall->listed[0]), turned) - way;
-        most = dem2di_max(most, fabs(change));
-    }
-    return most;
-}
-
-DEM2D_API dem2d_result dem2d_world_add_wall(dem2d_world *world, const dem2d_wall_desc *desc,
-                                            dem2d_wall_id *id) {
-    if (world == NULL || desc == NULL || id == NULL) return DEM2D_NULL_ARGUMENT;
-    dem2d_result result = dem2di_check_wall(world, desc);
-    if (result != DEM2D_OK) return result;
-    int slot = 0;
-    while (slot < world->wall_count && world->walls[slot].alive) slot++;
-    if (!dem2di_group_reserve(world, DEM2DI_WALLS, slot + 1))
-        return dem2di_out_of_memory(world, "a wall");
-    if (!dem2di_line_make(world, desc)) return DEM2D_OUT_OF_MEMORY;
-    dem2di_wall *wall = &world->walls[slot];
-    uint32_t generation = wall->generation + 1;
-    bool is_new = slot == world->wall_count;
-    int rank = is_new ? slot : wall->rank, placed = is_new ? slot : wall->placed;
-    dem2di_row_clear(world, DEM2DI_WALLS, DEM2DI_WALLS, slot);
-    wall->alive = true;
-    wall->generation = generation;
-    wall->rank = rank;
-    wall->placed = placed;
-    if (desc->mode == DEM2D_WALL_MOVING) world->wall_now[slot].velocity = desc->velocity;
-    dem2di_wall_place(world, slot, desc);
-    dem2di_wall_listed(world, slot);
-    world->list_stale = world->check_due = true;
-    dem2di_edited(world);
-    world->wall_count += is_new;
-    dem2di_wall_rank(world, slot, world->wall_count);
-    id->index = (uint32_t)slot;
-    id->generation = wall->generation;
-    return DEM2D_OK;
-}
-
-/* Velocity of a wall from now on; a servo's until its forces are known. */
-static dem2d_vec dem2di_wall_velocity(const dem2d_world *world, int wall) {
-    const dem2d_wall_desc *desc = &world->walls[wall].desc;
-    if (desc->mode == DEM2D_WALL_SERVO) return world->wall_now[wall].velocity;
-    return desc->mode == DEM2D_WALL_MOVING ? desc->velocity : dem2di_vec(0, 0);
-}
-
-/* Distance of a point from a wall; behind a half-plane negative. */
-static double dem2di_wall_distance(const dem2d_world *world, int wall, dem2d_vec x) {
-    const dem2di_wall *w = &world->walls[wall];
-    dem2d_vec from = dem2di_sub(x, world->wall_now[wall].point);
-    if (!w->desc.segment) return dem2di_dot(from, w->desc.normal);
-    dem2d_vec along = dem2di_vec(w->along.c, w->along.s);
-    double place = dem2di_max(0, dem2di_min(w->extent, dem2di_dot(from, along)));
-    return dem2di_length(dem2di_along(from, -place, along));
-}
-
-/* Ends this near are a joint, of the shorter segment; and a contact point is at one, of the radius:
-   a gap that no grain can tell, far above the rounding of walls that move together. */
-#define DEM2DI_JOINT 1e-6
-
-/* The ends of two segments that are a joint: numbers of 0 (start) and 1 (end) in `which`; false
-   when there is none. */
-static bool dem2di_segments_meet(const dem2d_world *world, int a, int b, int which[2],
-                                 dem2d_vec *at) {
-    const dem2di_wall *w[2] = {&world->walls[a], &world->walls[b]};
-    int slot[2] = {a, b};
-    dem2d_vec end[2][2];
-    for (int k = 0; k < 2; k++) {
-        if (!w[k]->alive || !w[k]->desc.segment) return false;
-        end[k][0] = world->wall_now[slot[k]].point;
-        end[k][1] = dem2di_segment_end(w[k], end[k][0]);
-    }
-    double near = DEM2DI_JOINT * dem2di_min(w[0]->extent, w[1]->extent);
-    for (which[0] = 0; which[0] < 2; which[0]++)
-        for (which[1] = 0; which[1] < 2; which[1]++) {
-            *at = end[0][which[0]];
-            if (dem2di_length(dem2di_sub(*at, end[1][which[1]])) <= near) return true;
-        }
-    return false;
-}
-
-/* Is a wall a segment that meets another, or may, when one of the two moves? */
-static bool dem2di_may_join(const dem2d_world *world, int wall) {
-    const dem2di_wall *w = world->walls;
-    int which[2];
-    dem2d_vec at;
-    for (int i = 0; i < world->wall_count && w[wall].desc.segment; i++) {
-        if (i == wall || !w[i].alive || !w[i].desc.segment) continue;
-        bool still = w[i].desc.mode == DEM2D_WALL_STILL && w[wall].desc.mode == DEM2D_WALL_STILL;
-        if (!still || dem2di_segments_meet(world, wall, i, which, &at)) return true;
-    }
-    return false;
-}
-
-/* May a wall that was set again change the features in use, or the bounds of the motion? */
-static bool dem2di_wall_matters(const dem2d_world *world, const dem2di_wall *old, int slot) {
-    const dem2d_wall_desc *desc = &world->walls[slot].desc;
-    double speed = dem2di_size_of(desc->velocity) + desc->max_speed;
-    return (!world->plan.joints && dem2di_may_join(world, slot)) || speed > DEM2DI_SPEED_SURE ||
-           fabs(desc->stress) > fabs(old->desc.stress) || desc->length > old->desc.length;
-}
-
-DEM2D_API dem2d_result dem2d_world_set_wall(dem2d_world *world, dem2d_wall_id id,
-                                            const dem2d_wall_desc *desc) {
-    if (world == NULL || desc == NULL) return DEM2D_NULL_ARGUMENT;
-    if (!dem2di_wall_lives(world, id)) return dem2di_stale(world, "wall", id.index);
-    dem2d_result result = dem2di_check_wall(world, desc);
-    if (result != DEM2D_OK) return result;
-    if (!dem2di_line_make(world, desc)) return DEM2D_OUT_OF_MEMORY;
-    dem2di_wall *wall = &world->walls[id.index];
-    const dem2di_wall old = *wall;
-    dem2di_wall_unspan(world, wall);
-    dem2di_wall_place(world, (int)id.index, desc);
-    dem2d_vec normal = wall->desc.normal;
-    bool other_kind = old.desc.segment != desc->segment;
-    wall->reshaped = old.reshaped || old.extent != wall->extent || old.desc.normal.x != normal.x ||
-                     old.desc.normal.y != normal.y;
-    if (other_kind || !(dem2di_dot(old.desc.normal, normal) > 0))
-        dem2di_forget_wall(world, (int)id.index);
-    if (!(dem2di_wall_change(world, wall, desc->point) <= wall->skin)) world->list_stale = true;
-    if (old.desc.name != desc->name) world->list_stale = true; /* contacts go by the wall's rank */
-    dem2di_wall_rank(world, (int)id.index, world->wall_count);
-    if (other_kind || old.desc.material.index != desc->material.index) {
-        world->check_due = true;
-        dem2di_edited(world);
-    }
-    if (old.desc.mode != desc->mode || dem2di_wall_matters(world, &old, (int)id.index))
-        dem2di_edited(world);
-    if (desc->mode == DEM2D_WALL_SERVO && old.desc.mode != DEM2D_WALL_SERVO &&
-        (world->plan.held || world->plan_due > 0))
-        world->list_stale = true; /* fixed particles have pairs with servo walls alone */
-    return DEM2D_OK;
-}
-
-DEM2D_API dem2d_result dem2d_world_remove_wall(dem2d_world *world, dem2d_wall_id id) {
-    if (world == NULL) return DEM2D_NULL_ARGUMENT;
-    if (!dem2di_wall_lives(world, id)) return dem2di_stale(world, "wall", id.index);
-    dem2di_wall *wall = &world->walls[id.index];
-    int self = (wall->span[0] == (int)id.index) + (wall->span[1] == (int)id.index);
-    if (wall->users > self)
-        return dem2di_fail(&world->env, DEM2D_IN_USE, (int)id.index, "wall in %d spans",
-                           wall->users);
-    dem2di_wall_unspan(world, wall);
-    wall->alive = false;
-    dem2di_forget_wall(world, (int)id.index);
-    dem2di_edited(world);
-    return DEM2D_OK;
-}
-
-/* Length that carries a wall's stress: between its spans, or as given. */
-static double dem2di_wall_length(const dem2d_world *world, const dem2di_wall_state *states, int i) {
-    const dem2di_wall *wall = &world->walls[i];
-    if (wall->span[0] < 0) return wall->desc.segment ? wall->extent : wall->desc.length;
-    dem2d_vec across = dem2di_sub(states[wall->span[1]].point, states[wall->span[0]].point);
-    return fabs(dem2di_dot(across, world->walls[wall->span[0]].desc.normal));
-}
-
-DEM2D_API dem2d_result dem2d_world_get_wall(const dem2d_world *world, dem2d_wall_id id,
-                                            dem2d_wall_info *info) {
-    if (world == NULL || info == NULL) return DEM2D_NULL_ARGUMENT;
-    if (!dem2di_wall_lives(world, id)) return dem2di_stale(world, "wall", id.index);
-    const dem2di_wall *wall = &world->walls[id.index];
-    const dem2di_wall_state *now = &world->wall_now[id.index];
-    info->mode = wall->desc.mode;
-    info->material = wall->desc.material;
-    info->point = now->point;
-    info->normal = wall->desc.normal;
-    info->segment = wall->desc.segment;
-    info->end = info->segment ? dem2di_segment_end(wall, now->point) : now->point;
-    info->velocity = dem2di_wall_velocity(world, (int)id.index);
-    info->force = now->force;
-    info->length = dem2di_wall_length(world, world->wall_before, (int)id.index);
-    info->stress = -dem2di_dot(now->force, wall->desc.normal);
-    info->stress = info->length > 0 ? info->stress / info->length : 0;
-    info->target = wall->desc.stress;
-    info->name = wall->desc.name;
-    return DEM2D_OK;
-}
-
 DEM2D_API dem2d_result dem2d_world_set_gravity(dem2d_world *world, dem2d_vec gravity) {
     if (world == NULL) return DEM2D_NULL_ARGUMENT;
     dem2d_result result = dem2di_check_one(&world->env, dem2di_world_fields,
@@ -13049,8 +12755,435 @@ DEM2D_API dem2d_result dem2d_world_set_time_step(dem2d_world *world, double time
 }
 
 /* ============================================================================================
+   >>walls  Walls: their descs, parts and places
+   uses: config, math, memory, fields, shapes, world, objects
+   ============================================================================================ */
+
+static dem2d_result dem2di_check_spans(const dem2d_world *world, const dem2d_wall_desc *desc) {
+    int given = 0;
+    for (int i = 0; i < 2; i++) {
+        if (desc->spans[i].generation == 0) continue;
+        if (!dem2di_wall_lives(world, desc->spans[i]))
+            return dem2di_stale(world, "wall in spans", desc->spans[i].index);
+        given++;
+    }
+    if (given == 1)
+        return dem2di_fail(&world->env, DEM2D_OUT_OF_RANGE, -1, "spans: one wall of two given");
+    if (desc->mode == DEM2D_WALL_SERVO && given == 0 && !desc->segment)
+        return dem2di_check_number(&world->env, "length", desc->length, DEM2DI_POSITIVE);
+    return DEM2D_OK;
+}
+
+static dem2d_result dem2di_check_segment(const dem2d_world *world, const dem2d_wall_desc *desc) {
+    const dem2d_env *env = &world->env;
+    double length = dem2di_length(dem2di_sub(desc->end, desc->point));
+    if (length > 0 && dem2di_finite(length)) return DEM2D_OK;
+    return dem2di_fail(env, DEM2D_OUT_OF_RANGE, -1, "end: segment of length %g", length);
+}
+
+static dem2d_result dem2di_check_wall(const dem2d_world *world, const dem2d_wall_desc *desc) {
+    const dem2d_env *env = &world->env;
+    dem2d_vec unit;
+    if (!dem2di_material_lives(world, desc->material))
+        return dem2di_stale(world, "material", desc->material.index);
+    dem2d_result result = dem2di_check_fields(env, DEM2DI_ALL(dem2di_wall_fields), desc);
+    if (result == DEM2D_OK && desc->mode == DEM2D_WALL_SERVO)
+        result = dem2di_check_number(env, "max_speed", desc->max_speed, DEM2DI_POSITIVE);
+    if (result != DEM2D_OK) return result;
+    if (desc->segment) result = dem2di_check_segment(world, desc);
+    if (result != DEM2D_OK) return result;
+    if (!desc->segment && !dem2di_unit(desc->normal, &unit))
+        return dem2di_fail(env, DEM2D_OUT_OF_RANGE, -1, "normal is 0");
+    return dem2di_check_spans(world, desc);
+}
+
+/* Does wall a come before b in the order of names, then of indices? */
+static bool dem2di_wall_precedes(const dem2di_wall *walls, int a, int b) {
+    return walls[a].desc.name < walls[b].desc.name ||
+           (walls[a].desc.name == walls[b].desc.name && a < b);
+}
+
+/* A wall whose name is new, from its place so far to its place in the order of `count` walls. */
+static void dem2di_wall_rank(dem2d_world *world, int slot, int count) {
+    dem2di_wall *walls = world->walls;
+    int place = walls[slot].rank, last = count - 1;
+    for (int way = -1; way <= 1; way += 2)
+        while (way < 0
+                   ? place > 0 && dem2di_wall_precedes(walls, slot, walls[place - 1].placed)
+                   : place < last && dem2di_wall_precedes(walls, walls[place + 1].placed, slot)) {
+            walls[place].placed = walls[place + way].placed;
+            walls[walls[place].placed].rank = place;
+            place += way;
+        }
+    walls[place].placed = slot;
+    walls[slot].rank = place;
+}
+
+/* A wall gets so many parts, for which there is room: those of the walls after it move, and with
+   them the keys of their contacts. */
+static void dem2di_parts_resize(dem2d_world *world, int slot, int count) {
+    dem2di_wall *wall = &world->walls[slot];
+    int end = wall->first + wall->count, more = count - wall->count;
+    const dem2di_list *list = &world->list;
+    if (more == 0) return;
+    size_t moved = (size_t)(world->part_count - end);
+    memmove(world->parts + end + more, world->parts + end, moved * sizeof *world->parts);
+    memmove(world->surfaces + end + more, world->surfaces + end, moved * sizeof *world->surfaces);
+    for (int i = list->pairs; i < list->count; i++)
+        if (list->keys[i].b >= end) list->keys[i].b += more;
+    wall->count = count;
+    world->part_count += more;
+    for (int place = wall->rank + 1; place < world->wall_count; place++)
+        world->walls[world->walls[place].placed].first += more;
+}
+
+/* Where a part is when its wall is in one of its states. */
+static dem2di_surface dem2di_surface_of(const dem2d_world *world, const dem2di_wall_state *states,
+                                        int part) {
+    const dem2di_part *own = &world->parts[part];
+    dem2di_surface surface;
+    surface.point = dem2di_add(states[own->wall].point, own->start);
+    surface.along = own->along;
+    return surface;
+}
+
+/* The parts of a wall whose name is new to their places in the order of ranks, one by one; keys go
+   with them. */
+static void dem2di_parts_rank(dem2d_world *world, int slot) {
+    dem2di_part *parts = world->parts;
+    const dem2di_list *list = &world->list;
+    dem2di_wall *wall = &world->walls[slot];
+    int old = wall->first, first = 0;
+    dem2di_wall_rank(world, slot, world->wall_count);
+    for (int place = 0; place < world->wall_count; place++) {
+        dem2di_wall *placed = &world->walls[world->walls[place].placed];
+        placed->first = first;
+        first += placed->count;
+    }
+    int by = wall->first - old, count = wall->count, low = by < 0 ? wall->first : old;
+    int high = low + count + abs(by);
+    for (int i = list->pairs; i < list->count && by != 0; i++) {
+        int *part = &list->keys[i].b;
+        if (*part < low || *part >= high) continue;
+        *part += *part >= old && *part < old + count ? by : by < 0 ? count : -count;
+    }
+    for (int k = 0; k < count && by != 0; k++) { /* the last first, or the first last */
+        int from = by > 0 ? old : old + count - 1, to = by > 0 ? high - 1 : low;
+        const dem2di_part part = parts[from];
+        memmove(parts + (by > 0 ? from : to + 1), parts + (by > 0 ? from + 1 : to),
+                (size_t)abs(to - from) * sizeof *parts);
+        parts[to] = part;
+    }
+    for (int k = low; k < high && by != 0; k++)
+        world->surfaces[k] = dem2di_surface_of(world, world->wall_now, k);
+}
+
+/* The part of a wall that has one, by its desc with a normal of unit length; a segment's follows.
+ */
+static void dem2di_part_describe(dem2di_wall *wall, dem2di_part *part) {
+    dem2d_vec chord = dem2di_sub(wall->desc.end, wall->desc.point), along;
+    part->start = dem2di_vec(0, 0);
+    part->extent = 0;
+    if (wall->desc.segment) {
+        (void)dem2di_unit(chord, &along);
+        part->extent = dem2di_length(chord);
+        wall->desc.normal = dem2di_perp(along);
+    } else {
+        along = dem2di_vec(wall->desc.normal.y, -wall->desc.normal.x);
+    }
+    part->along.c = along.x;
+    part->along.s = along.y;
+}
+
+static void dem2di_surfaces_set(dem2d_world *world, int wall) {
+    int first = world->walls[wall].first;
+    for (int k = first; k < first + world->walls[wall].count; k++)
+        world->surfaces[k] = dem2di_surface_of(world, world->wall_now, k);
+}
+
+/* Out of the wall, towards the grains. */
+static inline dem2d_vec dem2di_surface_normal(const dem2di_surface *surface) {
+    return dem2di_vec(-surface->along.s, surface->along.c);
+}
+
+/* The end of a segment of a length. */
+static dem2d_vec dem2di_surface_end(const dem2di_surface *surface, double extent) {
+    return dem2di_along(surface->point, extent, dem2di_vec(surface->along.c, surface->along.s));
+}
+
+/* A checked description into a slot, for whose parts there is room; users of its spans are counted.
+ */
+static void dem2di_wall_place(dem2d_world *world, int slot, const dem2d_wall_desc *desc) {
+    dem2di_wall *wall = &world->walls[slot];
+    wall->desc = *desc;
+    if (!desc->segment) (void)dem2di_unit(desc->normal, &wall->desc.normal);
+    dem2di_parts_rank(world, slot);
+    dem2di_parts_resize(world, slot, 1);
+    world->parts[wall->first].wall = slot;
+    dem2di_part_describe(wall, &world->parts[wall->first]);
+    for (int i = 0; i < 2; i++) {
+        wall->span[i] = desc->spans[i].generation != 0 ? (int)desc->spans[i].index : -1;
+        if (wall->span[i] >= 0) world->walls[wall->span[i]].users++;
+    }
+    dem2di_wall_state *now = &world->wall_now[slot];
+    now->point = desc->point; /* the velocity stays that of the step that was made */
+    if (desc->mode != DEM2D_WALL_SERVO) {
+        now->drift = 0;
+        memset(&now->backing, 0, sizeof now->backing);
+    }
+    world->wall_before[slot] = *now;
+    dem2di_surfaces_set(world, slot);
+    world->ledger.edited = true;
+}
+
+/* The line that segments are made of, when the first comes. The log knows if there is no memory. */
+static bool dem2di_line_make(dem2d_world *world, const dem2d_wall_desc *desc) {
+    if (!desc->segment || world->line != NULL) return true;
+    dem2d_shape *line = dem2di_shape_allocate(&world->env, DEM2D_POLYGON, 2, 2);
+    if (line == NULL) return false;
+    for (int k = 0; k < 2; k++) {
+        line->corners[k] = dem2di_vec(k - 0.5, 0);
+        line->tangents[k] = dem2di_vec(1 - 2 * k, 0);
+    }
+    line->flat = true;
+    line->circumscribed = 0.5;
+    world->line = line;
+    return true;
+}
+
+static void dem2di_wall_unspan(dem2d_world *world, const dem2di_wall *wall) {
+    for (int i = 0; i < 2; i++)
+        if (wall->span[i] >= 0) world->walls[wall->span[i]].users--;
+}
+
+/* Contacts with a wall are forgotten. */
+static void dem2di_forget_wall(dem2d_world *world, int wall) {
+    dem2di_list *list = &world->list;
+    for (int i = list->pairs; i < list->count; i++)
+        if (dem2di_wall_of(world, i) == wall) dem2di_contact_forget(world, i);
+    world->list_stale = true;
+    world->ledger.edited = true;
+}
+
+/* How far a wall has moved, as far as contacts can tell. */
+static double dem2di_wall_way(const dem2di_wall *wall, dem2d_vec moved) {
+    return wall->desc.segment ? dem2di_length(moved) : fabs(dem2di_dot(moved, wall->desc.normal));
+}
+
+/* The list is built with a wall as it is now. */
+static void dem2di_wall_listed(dem2d_world *world, int slot) {
+    dem2di_wall *wall = &world->walls[slot];
+    const dem2di_surface *surface = &world->surfaces[wall->first];
+    wall->listed[0] = world->wall_now[slot].point;
+    wall->listed[1] = dem2di_surface_end(surface, world->parts[wall->first].extent);
+    wall->listed[2] = wall->desc.normal;
+    wall->reshaped = false;
+}
+
+/* Bound of how far the distance of any particle from a wall has changed since the list was built,
+   with the wall in one of its states: of a segment the greater way of its ends; of a half-plane
+   that is turned, the change at the corners of the box that holds all particles. */
+static double dem2di_wall_change(const dem2d_world *world, const dem2di_wall_state *states,
+                                 int slot) {
+    const dem2di_wall *wall = &world->walls[slot];
+    const dem2d_box *box = &world->box;
+    dem2d_vec moved = dem2di_sub(states[slot].point, wall->listed[0]);
+    if (!wall->reshaped) return dem2di_wall_way(wall, moved);
+    const dem2di_surface surface = dem2di_surface_of(world, states, wall->first);
+    dem2d_vec end = dem2di_surface_end(&surface, world->parts[wall->first].extent);
+    end = dem2di_sub(end, wall->listed[1]);
+    if (wall->desc.segment) return dem2di_max(dem2di_length(moved), dem2di_length(end));
+    dem2d_vec turned = dem2di_sub(wall->desc.normal, wall->listed[2]);
+    double most = 0, way = dem2di_dot(moved, wall->desc.normal);
+    for (int k = 0; k < 4; k++) {
+        dem2d_vec corner =
+            dem2di_vec(k & 1 ? box->upper.x : box->lower.x, k & 2 ? box->upper.y : box->lower.y);
+        double change = dem2di_dot(dem2di_sub(corner, wall->listed[0]), turned) - way;
+        most = dem2di_max(most, fabs(change));
+    }
+    return most;
+}
+
+DEM2D_API dem2d_result dem2d_world_add_wall(dem2d_world *world, const dem2d_wall_desc *desc,
+                                            dem2d_wall_id *id) {
+    if (world == NULL || desc == NULL || id == NULL) return DEM2D_NULL_ARGUMENT;
+    dem2d_result result = dem2di_check_wall(world, desc);
+    if (result != DEM2D_OK) return result;
+    int slot = 0;
+    while (slot < world->wall_count && world->walls[slot].alive) slot++;
+    if (!dem2di_group_reserve(world, DEM2DI_WALLS, slot + 1) ||
+        !dem2di_group_reserve(world, DEM2DI_PARTS, world->part_count + 1))
+        return dem2di_out_of_memory(world, "a wall");
+    if (!dem2di_line_make(world, desc)) return DEM2D_OUT_OF_MEMORY;
+    dem2di_wall *wall = &world->walls[slot];
+    uint32_t generation = wall->generation + 1;
+    bool is_new = slot == world->wall_count;
+    int rank = is_new ? slot : wall->rank, placed = is_new ? slot : wall->placed;
+    dem2di_row_clear(world, DEM2DI_WALLS, DEM2DI_WALLS, slot);
+    wall->alive = true;
+    wall->generation = generation;
+    wall->rank = rank;
+    wall->placed = placed;
+    world->wall_count += is_new;
+    if (desc->mode == DEM2D_WALL_MOVING) world->wall_now[slot].velocity = desc->velocity;
+    dem2di_wall_place(world, slot, desc);
+    dem2di_wall_listed(world, slot);
+    world->list_stale = world->check_due = true;
+    dem2di_edited(world);
+    id->index = (uint32_t)slot;
+    id->generation = wall->generation;
+    return DEM2D_OK;
+}
+
+/* Velocity of a wall from now on; a servo's until its forces are known. */
+static dem2d_vec dem2di_wall_velocity(const dem2d_world *world, int wall) {
+    const dem2d_wall_desc *desc = &world->walls[wall].desc;
+    if (desc->mode == DEM2D_WALL_SERVO) return world->wall_now[wall].velocity;
+    return desc->mode == DEM2D_WALL_MOVING ? desc->velocity : dem2di_vec(0, 0);
+}
+
+/* Distance of a point from a part; behind a half-plane negative. */
+static double dem2di_part_distance(const dem2d_world *world, int part, dem2d_vec x) {
+    const dem2di_surface *surface = &world->surfaces[part];
+    double extent = world->parts[part].extent;
+    dem2d_vec from = dem2di_sub(x, surface->point);
+    if (!(extent > 0)) return dem2di_dot(from, dem2di_surface_normal(surface));
+    dem2d_vec along = dem2di_vec(surface->along.c, surface->along.s);
+    double place = dem2di_max(0, dem2di_min(extent, dem2di_dot(from, along)));
+    return dem2di_length(dem2di_along(from, -place, along));
+}
+
+/* Ends this near are a joint, of the shorter segment; and a contact point is at one, of the radius:
+   a gap that no grain can tell, far above the rounding of walls that move together. */
+#define DEM2DI_JOINT 1e-6
+
+/* The ends of two parts that are a joint: numbers of 0 (start) and 1 (end) in `which`; false when
+   there is none. */
+static bool dem2di_segments_meet(const dem2d_world *world, int a, int b, int which[2],
+                                 dem2d_vec *at) {
+    const int part[2] = {a, b};
+    dem2d_vec end[2][2];
+    for (int k = 0; k < 2; k++) {
+        double extent = world->parts[part[k]].extent;
+        if (!(extent > 0)) return false;
+        end[k][0] = world->surfaces[part[k]].point;
+        end[k][1] = dem2di_surface_end(&world->surfaces[part[k]], extent);
+    }
+    double near = DEM2DI_JOINT * dem2di_min(world->parts[a].extent, world->parts[b].extent);
+    for (which[0] = 0; which[0] < 2; which[0]++)
+        for (which[1] = 0; which[1] < 2; which[1]++) {
+            *at = end[0][which[0]];
+            if (dem2di_length(dem2di_sub(*at, end[1][which[1]])) <= near) return true;
+        }
+    return false;
+}
+
+/* Has a wall a segment that meets another, or may, when one of the two moves? */
+static bool dem2di_may_join(const dem2d_world *world, int wall) {
+    const dem2di_wall *own = &world->walls[wall];
+    int which[2];
+    dem2d_vec at;
+    if (own->count > 1) return true;
+    for (int i = 0; i < world->part_count && own->desc.segment; i++) {
+        const dem2di_wall *other = &world->walls[world->parts[i].wall];
+        if (other == own || !other->desc.segment) continue;
+        bool still = other->desc.mode == DEM2D_WALL_STILL && own->desc.mode == DEM2D_WALL_STILL;
+        if (!still || dem2di_segments_meet(world, own->first, i, which, &at)) return true;
+    }
+    return false;
+}
+
+/* May a wall that was set again change the features in use, or the bounds of the motion? */
+static bool dem2di_wall_matters(const dem2d_world *world, const dem2di_wall *old, int slot) {
+    const dem2d_wall_desc *desc = &world->walls[slot].desc;
+    double speed = dem2di_size_of(desc->velocity) + desc->max_speed;
+    return (!world->plan.joints && dem2di_may_join(world, slot)) || speed > DEM2DI_SPEED_SURE ||
+           fabs(desc->stress) > fabs(old->desc.stress) || desc->length > old->desc.length;
+}
+
+DEM2D_API dem2d_result dem2d_world_set_wall(dem2d_world *world, dem2d_wall_id id,
+                                            const dem2d_wall_desc *desc) {
+    if (world == NULL || desc == NULL) return DEM2D_NULL_ARGUMENT;
+    if (!dem2di_wall_lives(world, id)) return dem2di_stale(world, "wall", id.index);
+    dem2d_result result = dem2di_check_wall(world, desc);
+    if (result != DEM2D_OK) return result;
+    if (!dem2di_line_make(world, desc)) return DEM2D_OUT_OF_MEMORY;
+    dem2di_wall *wall = &world->walls[id.index];
+    const dem2di_wall old = *wall;
+    double extent = world->parts[wall->first].extent;
+    if (old.desc.name != desc->name) world->list_stale = true; /* contacts go by the wall's rank */
+    dem2di_wall_unspan(world, wall);
+    dem2di_wall_place(world, (int)id.index, desc);
+    dem2d_vec normal = wall->desc.normal;
+    bool other_kind = old.desc.segment != desc->segment;
+    wall->reshaped = old.reshaped || extent != world->parts[wall->first].extent ||
+                     old.desc.normal.x != normal.x || old.desc.normal.y != normal.y;
+    if (other_kind || !(dem2di_dot(old.desc.normal, normal) > 0))
+        dem2di_forget_wall(world, (int)id.index);
+    if (!(dem2di_wall_change(world, world->wall_now, (int)id.index) <= wall->skin))
+        world->list_stale = true;
+    if (other_kind || old.desc.material.index != desc->material.index) {
+        world->check_due = true;
+        dem2di_edited(world);
+    }
+    if (old.desc.mode != desc->mode || dem2di_wall_matters(world, &old, (int)id.index))
+        dem2di_edited(world);
+    if (desc->mode == DEM2D_WALL_SERVO && old.desc.mode != DEM2D_WALL_SERVO &&
+        (world->plan.held || world->plan_due > 0))
+        world->list_stale = true; /* fixed particles have pairs with servo walls alone */
+    return DEM2D_OK;
+}
+
+DEM2D_API dem2d_result dem2d_world_remove_wall(dem2d_world *world, dem2d_wall_id id) {
+    if (world == NULL) return DEM2D_NULL_ARGUMENT;
+    if (!dem2di_wall_lives(world, id)) return dem2di_stale(world, "wall", id.index);
+    dem2di_wall *wall = &world->walls[id.index];
+    int self = (wall->span[0] == (int)id.index) + (wall->span[1] == (int)id.index);
+    if (wall->users > self)
+        return dem2di_fail(&world->env, DEM2D_IN_USE, (int)id.index, "wall in %d spans",
+                           wall->users);
+    dem2di_wall_unspan(world, wall);
+    wall->alive = false;
+    dem2di_forget_wall(world, (int)id.index);
+    dem2di_parts_resize(world, (int)id.index, 0);
+    dem2di_edited(world);
+    return DEM2D_OK;
+}
+
+/* Length that carries a wall's stress: between its spans, or as given. */
+static double dem2di_wall_length(const dem2d_world *world, const dem2di_wall_state *states, int i) {
+    const dem2di_wall *wall = &world->walls[i];
+    if (wall->span[0] < 0)
+        return wall->desc.segment ? world->parts[wall->first].extent : wall->desc.length;
+    dem2d_vec across = dem2di_sub(states[wall->span[1]].point, states[wall->span[0]].point);
+    return fabs(dem2di_dot(across, world->walls[wall->span[0]].desc.normal));
+}
+
+DEM2D_API dem2d_result dem2d_world_get_wall(const dem2d_world *world, dem2d_wall_id id,
+                                            dem2d_wall_info *info) {
+    if (world == NULL || info == NULL) return DEM2D_NULL_ARGUMENT;
+    if (!dem2di_wall_lives(world, id)) return dem2di_stale(world, "wall", id.index);
+    const dem2di_wall *wall = &world->walls[id.index];
+    const dem2di_wall_state *now = &world->wall_now[id.index];
+    info->name = wall->desc.name;
+    info->mode = wall->desc.mode;
+    info->material = wall->desc.material;
+    info->point = now->point;
+    info->normal = wall->desc.normal;
+    info->segment = wall->desc.segment;
+    info->end = dem2di_surface_end(&world->surfaces[wall->first], world->parts[wall->first].extent);
+    info->velocity = dem2di_wall_velocity(world, (int)id.index);
+    info->force = now->force;
+    info->length = dem2di_wall_length(world, world->wall_before, (int)id.index);
+    info->stress = -dem2di_dot(now->force, wall->desc.normal);
+    info->stress = info->length > 0 ? info->stress / info->length : 0;
+    info->target = wall->desc.stress;
+    return DEM2D_OK;
+}
+
+/* ============================================================================================
    >>list  The list of contacts: particles in the order of space, partners, what they remember
-   uses: config, math, broad, law, motion, world, objects
+   uses: config, math, broad, law, motion, world, objects, walls
    ============================================================================================ */
 
 /* Parallel work is cut into blocks of so many items: enough to pay for a call of the callback's,
@@ -13158,8 +13291,7 @@ static bool dem2di_order_names(dem2d_world *world) {
 /* What the contacts of a particle are sorted by: their partners' ranks, walls behind. */
 static uint32_t dem2di_adjacency_rank(const dem2d_world *world, int slot, int contact) {
     const dem2di_key *key = &world->list.keys[contact];
-    if (contact >= world->list.pairs)
-        return ((uint32_t)1 << 30) + (uint32_t)world->walls[key->b].rank;
+    if (contact >= world->list.pairs) return ((uint32_t)1 << 30) + (uint32_t)key->b;
     return (uint32_t)world->bodies[key->a == slot ? key->b : key->a].rank;
 }
 
@@ -13332,7 +13464,7 @@ typedef struct dem2di_build {
     int total[DEM2DI_KINDS];
     dem2di_key *keys;                    /* as in the list, */
     int *old;                            /* and its contact in the old list, or -1 */
-    dem2di_order *wall_contacts, *spare; /* ranks of wall and particle; slot */
+    dem2di_order *wall_contacts, *spare; /* part, rank of particle; slot */
     char *column;                        /* room for a column of contacts, where the grid was */
     bool bounded, back; /* as in the world; whether the next step may look back on contacts */
     double softness;
@@ -13434,40 +13566,41 @@ static void dem2di_grid_task(void *context, int begin, int end) {
     dem2di_grid_sort(&((dem2di_build *)context)->grid);
 }
 
-/* Is a wall within the skins of a particle, and may be a contact? A segment is within its length of
-   its start, which rules out most without a root. */
-static inline bool dem2di_wall_is_near(const dem2d_world *world, const dem2di_disc *disc,
-                                       int wall) {
-    const dem2di_wall *w = &world->walls[wall];
-    double reach = disc->reach + w->skin, far = reach + w->extent;
-    if (!w->alive || (disc->fixed && w->desc.mode != DEM2D_WALL_SERVO)) return false;
-    dem2d_vec from = dem2di_sub(disc->centre, world->wall_now[wall].point);
-    if (w->desc.segment && dem2di_dot(from, from) > far * far * (1 + DEM2DI_ROUNDOFF)) return false;
-    return dem2di_wall_distance(world, wall, disc->centre) < reach;
+/* Is a part of a wall within the skins of a particle, and may be a contact? A segment is within its
+   length of its start, which rules out most without a root. */
+static inline bool dem2di_part_is_near(const dem2d_world *world, const dem2di_disc *disc,
+                                       int part) {
+    const dem2di_wall *wall = &world->walls[world->parts[part].wall];
+    double extent = world->parts[part].extent, reach = disc->reach + wall->skin;
+    double far = reach + extent;
+    if (disc->fixed && wall->desc.mode != DEM2D_WALL_SERVO) return false;
+    dem2d_vec from = dem2di_sub(disc->centre, world->surfaces[part].point);
+    if (extent > 0 && dem2di_dot(from, from) > far * far * (1 + DEM2DI_ROUNDOFF)) return false;
+    return dem2di_part_distance(world, part, disc->centre) < reach;
 }
 
-static void dem2di_find_add(const dem2d_world *world, int slot, int wall, dem2di_order *to,
+static void dem2di_find_add(const dem2d_world *world, int slot, int part, dem2di_order *to,
                             int *count) {
     if (to != NULL) {
-        to[*count].key =
-            (uint64_t)world->walls[wall].rank << 32 | (uint64_t)world->bodies[slot].rank;
+        to[*count].key = (uint64_t)part << 32 | (uint64_t)world->bodies[slot].rank;
         to[*count].value = slot;
     }
     (*count)++;
 }
 
-/* The walls near a particle, and those that it had a contact with in the last force pass, wherever
-   they are now: these stay listed for the queries. Counted, and written where there is room. */
+/* The parts of walls near a particle, and those that it had a contact with in the last force pass,
+   wherever they are now: these stay listed for the queries. Counted, and written where there is
+   room. */
 static int dem2di_find_walls(const dem2d_world *world, const dem2di_disc *disc, int slot,
                              dem2di_order *to) {
     const dem2di_list *list = &world->list;
     int count = 0;
-    for (int j = 0; j < world->wall_count; j++)
-        if (dem2di_wall_is_near(world, disc, j)) dem2di_find_add(world, slot, j, to, &count);
+    for (int j = 0; j < world->part_count; j++)
+        if (dem2di_part_is_near(world, disc, j)) dem2di_find_add(world, slot, j, to, &count);
     for (int k = list->first[slot]; k < list->first[slot + 1]; k++) {
         int contact = list->adjacent[k];
         if (contact < list->pairs || !(list->contacts.depth[contact] > 0)) continue;
-        if (!dem2di_wall_is_near(world, disc, list->keys[contact].b))
+        if (!dem2di_part_is_near(world, disc, list->keys[contact].b))
             dem2di_find_add(world, slot, list->keys[contact].b, to, &count);
     }
     return count;
@@ -13614,7 +13747,7 @@ static void dem2di_fill_task(void *context, int begin, int end) {
     }
 }
 
-/* Contacts with walls, by the ranks of the walls and of the particles. */
+/* Contacts with walls, in the order of the parts and of the particles' ranks. */
 static void dem2di_wall_contacts_task(void *context, int begin, int end) {
     dem2di_build *build = (dem2di_build *)context;
     int count = build->total[DEM2DI_WALL_CONTACTS];
@@ -13623,9 +13756,8 @@ static void dem2di_wall_contacts_task(void *context, int begin, int end) {
     (void)end;
     dem2di_sort(build->wall_contacts, build->spare, count);
     for (int i = 0; i < count; i++) {
-        int place = (int)(build->wall_contacts[i].key >> 32);
         build->keys[pairs + i].a = build->wall_contacts[i].value;
-        build->keys[pairs + i].b = build->world->walls[place].placed;
+        build->keys[pairs + i].b = (int)(build->wall_contacts[i].key >> 32);
         build->old[pairs + i] = dem2di_listed(build->world, &build->keys[pairs + i], true);
     }
 }
@@ -13997,7 +14129,7 @@ static inline dem2di_relative_motion dem2di_motion_of(const dem2d_world *world, 
     const bool wall = contact >= world->list.pairs;
     dem2d_vec a = world->now[key->a].v, b;
     dem2di_relative_motion motion;
-    b = wall ? world->wall_now[key->b].velocity : world->now[key->b].v;
+    b = wall ? world->wall_now[dem2di_wall_of(world, contact)].velocity : world->now[key->b].v;
     motion.wa = world->now[key->a].w;
     motion.wb = wall ? 0 : world->now[key->b].w;
     if (world->redirected) {
@@ -14128,7 +14260,7 @@ static double dem2di_ledger_turnover(const dem2di_ledger *ledger, const dem2di_l
 /* ============================================================================================
    >>step  Contacts, their sums, walls, motion; the stable time step
    uses: config, math, memory, fields, support, shapes, gjk, faces, contact, broad, law, motion,
-         world, objects, list, ledger
+         world, objects, walls, list, ledger
    ============================================================================================ */
 
 /* Contacts of circles are taken in batches: what they need is fetched, all are computed by a loop
@@ -14581,7 +14713,7 @@ static void dem2di_ask_law(const dem2d_world *world, const dem2di_law_rows *rows
     if (i < list->pairs)
         input.b = dem2di_particle_id(world, key->b);
     else
-        input.wall = dem2di_wall_id(world, key->b);
+        input.wall = dem2di_wall_id(world, dem2di_wall_of(world, i));
     input.normal = dem2di_vec(list->contacts.normal_x[i], list->contacts.normal_y[i]);
     input.time_step = world->made_step;
     input.depth = depth;
@@ -14706,13 +14838,13 @@ static void dem2di_update_pair(dem2d_world *world, int i, dem2di_law_rows *rows,
 }
 
 /* A particle at a half-plane: one support call, none for a circle. Returns the number of points. */
-static int dem2di_collide_plane(const dem2d_world *world, int a, int wall, dem2di_contact *contact,
+static int dem2di_collide_plane(const dem2d_world *world, int a, int part, dem2di_contact *contact,
                                 dem2d_contact_point points[2], dem2di_count *count) {
     const dem2di_body *body = &world->bodies[a];
     const dem2d_shape *shape = dem2di_shape_of(world, body);
     const dem2di_state *state = &world->now[a];
-    dem2d_vec point = world->wall_now[wall].point;
-    dem2d_vec u = dem2di_negate(world->walls[wall].desc.normal);
+    dem2d_vec point = world->surfaces[part].point;
+    dem2d_vec u = dem2di_negate(dem2di_surface_normal(&world->surfaces[part]));
     dem2d_vec support = dem2di_scale(u, state->radius);
     contact->normal.x = u.x;
     contact->normal.y = u.y;
@@ -14737,24 +14869,25 @@ static int dem2di_collide_plane(const dem2d_world *world, int a, int wall, dem2d
 
 /* A particle at a segment: a pair, of which only what is near the particle counts, so that the
    search is as exact as for its neighbours. Points are on the segment. */
-static int dem2di_collide_segment(const dem2d_world *world, int a, int wall,
+static int dem2di_collide_segment(const dem2d_world *world, int a, int part,
                                   const dem2di_contact *last, dem2di_history *history,
                                   dem2di_contact *contact, dem2d_contact_point points[2],
                                   dem2di_count *count) {
-    const dem2di_wall *w = &world->walls[wall];
+    const dem2di_surface *surface = &world->surfaces[part];
     const dem2di_body *body = &world->bodies[a];
     const dem2di_state *state = &world->now[a];
     const dem2d_rot none = {1, 0};
-    if (!(dem2di_wall_distance(world, wall, state->x) < state->radius)) return 0;
-    dem2d_vec along = dem2di_vec(w->along.c, w->along.s);
-    dem2d_vec start = dem2di_sub(world->wall_now[wall].point, state->x);
+    if (!(dem2di_part_distance(world, part, state->x) < state->radius)) return 0;
+    dem2d_vec along = dem2di_vec(surface->along.c, surface->along.s);
+    dem2d_vec start = dem2di_sub(surface->point, state->x);
     double foot = -dem2di_dot(start, along), reach = 2 * state->radius, gap;
-    double from = dem2di_max(0, foot - reach), to = dem2di_min(w->extent, foot + reach);
+    double from = dem2di_max(0, foot - reach),
+           to = dem2di_min(world->parts[part].extent, foot + reach);
     dem2di_pair pair;
     pair.a = dem2di_shape_of(world, body);
     pair.b = world->line;
     pair.ra = pair.a->type == DEM2D_CIRCLE ? none : state->q;
-    pair.rb = w->along;
+    pair.rb = surface->along;
     pair.scale_a = body->scale;
     pair.scale_b = to - from;
     pair.d = dem2di_along(start, from + (to - from) / 2, along);
@@ -14785,7 +14918,7 @@ static void dem2di_update_wall_contact(dem2d_world *world, int i, dem2di_law_row
                                        dem2di_count *count) {
     dem2di_list *list = &world->list;
     int a = list->keys[i].a, j = list->keys[i].b;
-    bool segment = world->walls[j].desc.segment;
+    bool segment = world->parts[j].extent > 0;
     dem2di_history *history = &list->contacts.history[i - list->discs];
     dem2di_last last;
     dem2di_contact contact;
@@ -14815,7 +14948,7 @@ static void dem2di_update_wall_contact(dem2d_world *world, int i, dem2di_law_row
 
 /* Which end of its segment a contact is at, or -1: along the side. */
 static int dem2di_segment_corner(const dem2d_world *world, int contact) {
-    dem2d_rot along = world->walls[world->list.keys[contact].b].along;
+    dem2d_rot along = world->surfaces[world->list.keys[contact].b].along;
     const dem2di_contacts *contacts = &world->list.contacts;
     double sine = contacts->normal_x[contact] * along.c + contacts->normal_y[contact] * along.s;
     return fabs(sine) <= DEM2DI_CORNER ? -1 : sine < 0;
@@ -14839,7 +14972,7 @@ static int dem2di_point_near(const dem2d_world *world, int i, dem2d_vec place) {
 
 static bool dem2di_meets_segment(const dem2d_world *world, const dem2di_contacts *from, int i) {
     const dem2di_list *list = &world->list;
-    return i >= list->pairs && world->walls[list->keys[i].b].desc.segment && from->depth[i] > 0;
+    return i >= list->pairs && world->parts[list->keys[i].b].extent > 0 && from->depth[i] > 0;
 }
 
 /* A contact of two points keeps the other one. */
@@ -14857,11 +14990,11 @@ static void dem2di_drop_point(dem2d_world *world, int i, int point) {
    both sides of the joint both. Segments in line are one face, which has no point at the joint. */
 static void dem2di_joint_yield(dem2d_world *world, int a, int b) {
     const dem2di_list *list = &world->list;
-    const int contact[2] = {a, b}, wall[2] = {list->keys[a].b, list->keys[b].b};
+    const int contact[2] = {a, b}, part[2] = {list->keys[a].b, list->keys[b].b};
     int which[2], near[2];
     bool two[2], ends[2], side[2];
     dem2d_vec at;
-    if (!dem2di_segments_meet(world, wall[0], wall[1], which, &at)) return;
+    if (!dem2di_segments_meet(world, part[0], part[1], which, &at)) return;
     for (int k = 0; k < 2; k++) {
         int corner = dem2di_segment_corner(world, contact[k]);
         near[k] = dem2di_point_near(world, contact[k], at);
@@ -14869,7 +15002,7 @@ static void dem2di_joint_yield(dem2d_world *world, int a, int b) {
         ends[k] = corner == which[k];
         side[k] = corner < 0;
     }
-    dem2d_rot one = world->walls[wall[0]].along, other = world->walls[wall[1]].along;
+    dem2d_rot one = world->surfaces[part[0]].along, other = world->surfaces[part[1]].along;
     bool flat = fabs(one.c * other.s - one.s * other.c) <= DEM2DI_CORNER;
     bool both = side[0] && side[1] && near[0] >= 0 && near[1] >= 0;
     if (ends[0] || ends[1])
@@ -14922,7 +15055,7 @@ static void dem2di_force_joints(dem2d_world *world, dem2di_count *count) {
     for (int i = list->pairs; i < list->count; i++) {
         dem2di_contact contact;
         dem2di_last last;
-        if (!world->walls[list->keys[i].b].desc.segment) continue;
+        if (!(world->parts[list->keys[i].b].extent > 0)) continue;
         if (!dem2di_contact_get(world, &list->contacts, i, &contact)) {
             dem2di_contact_clear(world, i);
             dem2di_no_load(world, i);
@@ -15023,7 +15156,7 @@ static void dem2di_wall_sums(dem2d_world *world) {
     for (int i = list->pairs; i < list->count; i++) {
         dem2di_contact contact;
         if (!dem2di_contact_get(world, &list->contacts, i, &contact)) continue;
-        dem2di_wall_state *wall = &world->wall_next[list->keys[i].b];
+        dem2di_wall_state *wall = &world->wall_next[dem2di_wall_of(world, i)];
         wall->force = dem2di_add(wall->force, dem2di_contact_force(&contact));
     }
 }
@@ -15329,7 +15462,7 @@ static double dem2di_servo_speed(dem2d_world *world, int j, int begin, int end) 
 }
 
 /* New wall velocities and points; true when one has left the reach of the list. Contacts with walls
-   are listed in the order of the walls' ranks. */
+   are listed in the order of the parts, and so of the walls. */
 static bool dem2di_control_pass(dem2d_world *world) {
     const dem2di_list *list = &world->list;
     bool stale = false;
@@ -15340,15 +15473,15 @@ static bool dem2di_control_pass(dem2d_world *world) {
         dem2di_wall_state *next = &world->wall_next[j];
         if (!wall->alive) continue;
         if (wall->desc.mode == DEM2D_WALL_SERVO) {
-            while (begin < list->count && world->walls[list->keys[begin].b].rank < place) begin++;
-            for (end = begin; end < list->count && list->keys[end].b == j;) end++;
+            while (begin < list->count && list->keys[begin].b < wall->first) begin++;
+            for (end = begin; end < list->count && dem2di_wall_of(world, end) == j;) end++;
             double speed = dem2di_servo_speed(world, j, begin, end);
             next->velocity = dem2di_scale(wall->desc.normal, speed);
         } else {
             next->velocity = dem2di_wall_velocity(world, j);
         }
         next->point = dem2di_along(next->point, world->time_step, next->velocity);
-        stale = stale || !(dem2di_wall_change(world, wall, next->point) <= wall->skin);
+        stale = stale || !(dem2di_wall_change(world, world->wall_next, j) <= wall->skin);
     }
     return stale;
 }
@@ -15733,6 +15866,8 @@ static void dem2di_made(dem2d_world *world) {
 /* Everything new becomes the present; the present becomes the state of the last force pass. */
 static void dem2di_commit(dem2d_world *world) {
     dem2di_columns_swap(world);
+    for (int j = 0; j < world->wall_count; j++)
+        if (world->walls[j].desc.mode != DEM2D_WALL_STILL) dem2di_surfaces_set(world, j);
     dem2di_made(world);
     world->steps++;
 }
@@ -15933,10 +16068,13 @@ static dem2d_contact_info dem2di_contact_of(const dem2d_world *world,
     dem2d_contact_info info;
     memset(&info, 0, sizeof info);
     info.a = dem2di_particle_id(world, key->a);
-    if (iterator->walls)
-        info.wall = dem2di_wall_id(world, key->b);
-    else
+    if (iterator->walls) {
+        int wall = dem2di_wall_of(world, iterator->number);
+        info.wall = dem2di_wall_id(world, wall);
+        info.part_b = key->b - world->walls[wall].first;
+    } else {
         info.b = dem2di_particle_id(world, key->b);
+    }
     info.sign = 1;
     info.normal = contact->normal;
     info.point = dem2di_add(world->before[key->a].x, dem2di_arm_a(contact));
@@ -16540,8 +16678,8 @@ static dem2d_result dem2di_writer_close(const dem2d_env *env, const char *path,
 
 /* ============================================================================================
    >>snapshot  State hash, snapshots: both follow the tables of columns and fields
-   uses: config, memory, fields, support, shapes, broad, motion, world, objects, list, measures,
-         output
+   uses: config, memory, fields, support, shapes, broad, motion, world, objects, walls, list,
+   measures, output
    ============================================================================================ */
 
 /* To save, load, check and hash one number more, give it a line in the table of fields of its
@@ -16672,6 +16810,7 @@ static int dem2di_rows(const void *object, const dem2di_column *column) {
     rows[DEM2DI_DISPLACEMENTS] = w->plan.turns ? w->body_count : 0;
     rows[DEM2DI_MADE] = w->redirected ? w->body_count : 0;
     rows[DEM2DI_WALLS] = w->wall_count;
+    rows[DEM2DI_PARTS] = w->part_count;
     for (int k = DEM2DI_KEYS; k < DEM2DI_ADJACENCY; k++)
         rows[k] = w->list.count -
                   dem2di_contacts_begin(&w->plan, w->list.discs, w->list.count, (dem2di_group)k);
@@ -16762,6 +16901,8 @@ static const void *dem2di_hashed_row(const dem2d_world *w, const dem2di_column *
     if (dem2di_of_bodies(group)) slot = w->ids[place].slot;
     if (slot < 0 || (group == DEM2DI_IDS && w->ids[place].slot < 0)) return NULL;
     if (group == DEM2DI_WALLS && !w->walls[place].alive) return NULL;
+    if (group == DEM2DI_PARTS && w->walls[w->parts[place].wall].count == 1)
+        return NULL; /* follows from the wall's desc */
     if (group == DEM2DI_TEMPLATES && w->templates[place].shape == NULL) return NULL;
     const char *row = start + (size_t)slot * column->size;
     if (column->fields != dem2di_state_fields) return row;
@@ -16789,7 +16930,10 @@ static const void *dem2di_contact_row(const dem2d_world *w, const dem2di_column 
         return made;
     }
     made->key.a = w->bodies[key->a].index;
-    made->key.b = iterator->walls ? -1 - key->b : w->bodies[key->b].index;
+    made->key.b = w->bodies[iterator->walls ? key->a : key->b].index;
+    if (!iterator->walls) return made;
+    int wall = dem2di_wall_of(w, iterator->number); /* its first part as a wall of one part */
+    made->key.b = -1 - wall - (key->b - w->walls[wall].first);
     return made;
 }
 
@@ -17306,27 +17450,65 @@ static void dem2di_finish_ranks(dem2di_loader *loader) {
     if (dem2di_load_good(loader)) dem2di_ranks_set(w);
 }
 
+/* A wall of one part has that of its desc, of which snapshots before 0.7 say no more. */
+static void dem2di_finish_wall(dem2di_loader *loader, int slot, int first) {
+    dem2d_world *w = loader->world;
+    dem2di_wall *wall = &w->walls[slot];
+    wall->first = first;
+    wall->span[0] = wall->span[1] = -1;
+    if (!wall->alive) return;
+    dem2d_vec n = wall->desc.normal;
+    dem2di_load_check(loader, dem2di_check_wall(w, &wall->desc));
+    dem2di_load_expect(loader, dem2di_is_unit(n.x, n.y), "a normal is not of unit length");
+    if (dem2di_load_good(loader) && !dem2di_line_make(w, &wall->desc))
+        loader->result = DEM2D_OUT_OF_MEMORY; /* the log knows */
+    dem2di_load_expect(loader, wall->first < w->part_count && w->parts[wall->first].wall == slot,
+                       "a wall without a part");
+    if (!dem2di_load_good(loader)) return;
+    wall->count = 1;
+    dem2di_part_describe(wall, &w->parts[wall->first]);
+    dem2di_surfaces_set(w, slot);
+    for (int i = 0; i < 2; i++) {
+        if (wall->desc.spans[i].generation == 0) continue;
+        wall->span[i] = (int)wall->desc.spans[i].index;
+        w->walls[wall->span[i]].users++;
+    }
+}
+
+/* Snapshots before 0.7 have no parts: each wall gets one, and contacts are with this. */
+static void dem2di_load_parts(dem2di_loader *loader) {
+    dem2d_world *w = loader->world;
+    int count = 0;
+    if (w->part_count > 0) return;
+    for (int j = 0; j < w->wall_count; j++) count += w->walls[j].alive;
+    dem2di_load_room(loader, dem2di_group_reserve(w, DEM2DI_PARTS, count));
+    if (!dem2di_load_good(loader)) return;
+    for (int place = 0; place < w->wall_count; place++) {
+        int j = w->walls[place].placed;
+        w->walls[j].first = w->part_count;
+        if (w->walls[j].alive) w->parts[w->part_count++].wall = j;
+    }
+    for (int i = w->list.pairs; i < w->list.count; i++) {
+        dem2di_key *key = &w->list.keys[i];
+        if (key->a < 0) continue;
+        bool there = key->b < w->wall_count && w->walls[key->b].alive;
+        dem2di_load_expect(loader, there, "no such contact");
+        if (there) key->b = w->walls[key->b].first;
+    }
+}
+
 static void dem2di_finish_walls(dem2di_loader *loader) {
     dem2d_world *w = loader->world;
+    int parts = 0;
     for (int j = 0; j < w->wall_count; j++) w->walls[j].rank = w->walls[j].placed = j;
-    for (int j = 0; j < w->wall_count && dem2di_load_good(loader); j++) {
-        dem2di_wall *wall = &w->walls[j];
-        wall->span[0] = wall->span[1] = -1;
-        if (!wall->alive || !dem2di_load_good(loader)) continue;
-        dem2d_vec n = wall->desc.normal;
-        dem2di_load_check(loader, dem2di_check_wall(w, &wall->desc));
-        dem2di_load_expect(loader, dem2di_is_unit(n.x, n.y), "a normal is not of unit length");
-        if (dem2di_load_good(loader) && !dem2di_line_make(w, &wall->desc))
-            loader->result = DEM2D_OUT_OF_MEMORY; /* the log knows */
-        if (!dem2di_load_good(loader)) return;
-        if (wall->desc.segment) dem2di_segment_set(wall);
-        for (int i = 0; i < 2; i++) {
-            if (wall->desc.spans[i].generation == 0) continue;
-            wall->span[i] = (int)wall->desc.spans[i].index;
-            w->walls[wall->span[i]].users++;
-        }
-    }
     for (int j = 0; j < w->wall_count; j++) dem2di_wall_rank(w, j, j + 1);
+    dem2di_load_parts(loader);
+    for (int place = 0; place < w->wall_count && dem2di_load_good(loader); place++) {
+        int j = w->walls[place].placed;
+        dem2di_finish_wall(loader, j, parts);
+        parts += w->walls[j].count;
+    }
+    dem2di_load_expect(loader, parts == w->part_count, "parts without a wall");
 }
 
 /* A contact is of two that live, in the kind it is listed in; a forgotten one may be anything. */
@@ -17334,7 +17516,7 @@ static bool dem2di_key_sound(const dem2d_world *w, int contact) {
     const dem2di_key *key = &w->list.keys[contact];
     if (key->a < 0) return w->list_stale && !(w->list.contacts.depth[contact] > 0);
     if (key->a >= w->body_count || w->bodies[key->a].shape_index < 0) return false;
-    if (contact >= w->list.pairs) return key->b < w->wall_count && w->walls[key->b].alive;
+    if (contact >= w->list.pairs) return key->b < w->part_count;
     if (key->b >= w->body_count || w->bodies[key->b].shape_index < 0) return false;
     const dem2di_body *a = &w->bodies[key->a], *b = &w->bodies[key->b];
     bool round = dem2di_shape_of(w, a)->type == DEM2D_CIRCLE &&
@@ -17522,7 +17704,8 @@ DEM2D_API dem2d_result dem2d_world_load(const dem2d_load_desc *desc, const char 
 
 /* ============================================================================================
    >>writers  Pictures, files for ParaView, histories
-   uses: config, math, memory, fields, mass, shapes, broad, law, world, objects, measures, output
+   uses: config, math, memory, fields, mass, shapes, broad, law, world, objects, walls, measures,
+   output
    ============================================================================================ */
 
 /* Write text without formatting, of any length. */
@@ -17573,11 +17756,12 @@ static int dem2di_drawn_points(const dem2d_shape *shape, int points) {
 
 /* Extend the box to a half-plane beside it, if the distance is at most a third of its size: farther
    ones would make the rest of the picture small. */
-static void dem2di_box_reach(const dem2d_world *world, int j, double size, dem2d_box *all) {
-    dem2d_vec n = world->walls[j].desc.normal, nearest;
+static void dem2di_box_reach(const dem2d_world *world, int part, double size, dem2d_box *all) {
+    const dem2di_surface surface = dem2di_surface_of(world, world->wall_before, part);
+    dem2d_vec n = dem2di_surface_normal(&surface), nearest;
     nearest.x = n.x > 0 ? all->lower.x : all->upper.x;
     nearest.y = n.y > 0 ? all->lower.y : all->upper.y;
-    double gap = dem2di_dot(n, dem2di_sub(nearest, world->wall_before[j].point));
+    double gap = dem2di_dot(n, dem2di_sub(nearest, surface.point));
     if (!(gap > 0 && gap <= size / 3)) return;
     dem2di_box_add(all, dem2di_along(nearest, -gap, n));
 }
@@ -17593,20 +17777,20 @@ static dem2d_box dem2di_scene_box(const dem2d_world *world, bool beside) {
         dem2di_box_add(&all, box.lower);
         dem2di_box_add(&all, box.upper);
     }
-    for (int j = 0; j < world->wall_count; j++) {
-        if (!world->walls[j].alive || !world->walls[j].desc.segment) continue;
-        dem2d_vec point = world->wall_before[j].point;
-        dem2di_box_add(&all, point);
-        dem2di_box_add(&all, dem2di_segment_end(&world->walls[j], point));
+    for (int k = 0; k < world->part_count; k++) {
+        const dem2di_surface surface = dem2di_surface_of(world, world->wall_before, k);
+        if (!(world->parts[k].extent > 0)) continue;
+        dem2di_box_add(&all, surface.point);
+        dem2di_box_add(&all, dem2di_surface_end(&surface, world->parts[k].extent));
     }
     if (all.lower.x > all.upper.x) { /* none: a unit square */
         all.lower = dem2di_vec(0, 0);
         all.upper = dem2di_vec(1, 1);
     }
     dem2d_vec size = dem2di_sub(all.upper, all.lower);
-    for (int j = 0; beside && j < world->wall_count; j++)
-        if (world->walls[j].alive && !world->walls[j].desc.segment)
-            dem2di_box_reach(world, j, dem2di_max(size.x, size.y), &all);
+    for (int k = 0; beside && k < world->part_count; k++)
+        if (!(world->parts[k].extent > 0))
+            dem2di_box_reach(world, k, dem2di_max(size.x, size.y), &all);
     size = dem2di_sub(all.upper, all.lower);
     double margin = dem2di_max(size.x, size.y) / 20;
     all.lower = dem2di_sub(all.lower, dem2di_vec(margin, margin));
@@ -17625,19 +17809,20 @@ static void dem2di_line_cut(double start, double rate, double low, double high, 
     t[1] = dem2di_min(t[1], dem2di_max(a, b));
 }
 
-/* The part of a wall's line inside a box. If the line misses the box: the part beside it, and
-   false. */
-static bool dem2di_wall_line(const dem2d_world *world, int j, const dem2d_box *box,
+/* What of the line of a wall's part is inside a box. If the line misses the box: what is beside it,
+   and false. */
+static bool dem2di_part_line(const dem2d_world *world, int part, const dem2d_box *box,
                              dem2d_vec ends[2]) {
-    if (world->walls[j].desc.segment) {
-        ends[0] = world->wall_before[j].point;
-        ends[1] = dem2di_segment_end(&world->walls[j], ends[0]);
+    const dem2di_surface surface = dem2di_surface_of(world, world->wall_before, part);
+    if (world->parts[part].extent > 0) {
+        ends[0] = surface.point;
+        ends[1] = dem2di_surface_end(&surface, world->parts[part].extent);
         return true;
     }
-    dem2d_vec along = dem2di_perp(world->walls[j].desc.normal);
+    dem2d_vec along = dem2di_perp(dem2di_surface_normal(&surface));
     dem2d_vec size = dem2di_sub(box->upper, box->lower);
     dem2d_vec centre = dem2di_along(box->lower, 0.5, size);
-    dem2d_vec foot = world->wall_before[j].point; /* of the centre */
+    dem2d_vec foot = surface.point; /* of the centre */
     foot = dem2di_along(foot, dem2di_dot(dem2di_sub(centre, foot), along), along);
     double reach = (size.x * fabs(along.x) + size.y * fabs(along.y)) / 2;
     double cut[2] = {-reach, reach};
@@ -17748,9 +17933,9 @@ static void dem2di_draw_line(dem2d_vec p, dem2d_vec q, double width, dem2di_writ
 static void dem2di_draw_walls(const dem2d_world *world, const dem2di_view *view,
                               dem2di_writer *writer) {
     dem2di_print(writer, "<g stroke=\"#444\">\n");
-    for (int j = 0; j < world->wall_count; j++) {
+    for (int k = 0; k < world->part_count; k++) {
         dem2d_vec ends[2];
-        if (world->walls[j].alive && dem2di_wall_line(world, j, &view->box, ends))
+        if (dem2di_part_line(world, k, &view->box, ends))
             dem2di_draw_line(dem2di_pixel(view, ends[0]), dem2di_pixel(view, ends[1]),
                              view->width / 400, writer);
     }
@@ -17869,8 +18054,8 @@ typedef struct dem2di_item {
     dem2d_vtp_part part;
     int outline_points;
     dem2d_box box;                    /* of the scene, for walls */
-    int index;                        /* the next particle or wall */
-    int slot;                         /* of the particle, or number of the wall */
+    int index;                        /* the next particle or part of a wall */
+    int slot;                         /* of the particle, or number of the part */
     dem2di_contact_iterator iterator; /* contacts of particles, then with walls */
 } dem2di_item;
 
@@ -17890,12 +18075,8 @@ static bool dem2di_item_next(const dem2d_world *world, dem2di_item *item) {
         return item->slot >= 0;
     }
     if (item->part == DEM2D_VTP_CONTACTS) return dem2di_next_contact(world, &item->iterator);
-    for (; item->index < world->wall_count; item->index++) {
-        if (!world->walls[item->index].alive) continue;
-        item->slot = item->index++;
-        return true;
-    }
-    return false;
+    item->slot = item->index++;
+    return item->slot < world->part_count;
 }
 
 static int dem2di_item_points(const dem2d_world *world, const dem2di_item *item) {
@@ -17997,7 +18178,8 @@ static void dem2di_contact_numbers(const dem2d_world *world,
     memcpy(numbers, all, sizeof all);
 }
 
-static void dem2di_wall_numbers(const dem2d_world *world, int j, double *numbers) {
+static void dem2di_wall_numbers(const dem2d_world *world, int part, double *numbers) {
+    int j = world->parts[part].wall;
     dem2d_wall_info info;
     (void)dem2d_world_get_wall(world, dem2di_wall_id(world, j), &info);
     dem2d_vec v = dem2di_add(world->wall_before[j].velocity, world->wall_now[j].velocity);
@@ -18045,7 +18227,7 @@ static void dem2di_item_put_points(const dem2d_world *world, const dem2di_item *
         ends[0] = world->before[world->list.keys[item->iterator.number].a].x;
         ends[1] = dem2di_add(ends[0], item->iterator.branch);
     } else {
-        (void)dem2di_wall_line(world, item->slot, &item->box, ends);
+        (void)dem2di_part_line(world, item->slot, &item->box, ends);
     }
     for (int i = 0; i < 2; i++) dem2di_vtp_point(writer, ends[i]);
 }

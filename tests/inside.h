@@ -79,7 +79,7 @@ static bool inside_contact_holds(const dem2d_world *w, int i) {
     if (key->a < 0)
         return (w->list_stale && !closed) || inside_fail("a forgotten contact is closed", i);
     if (!inside_lives(w, key->a)) return inside_fail("A of a contact is gone", i);
-    if (i >= list->pairs && !(key->b < w->wall_count && w->walls[key->b].alive))
+    if (i >= list->pairs && !(key->b >= 0 && key->b < w->part_count))
         return inside_fail("a wall of a contact is gone", i);
     if (i < list->pairs &&
         !(inside_lives(w, key->b) && w->bodies[key->a].rank < w->bodies[key->b].rank))
@@ -114,9 +114,28 @@ static bool inside_adjacency_holds(const dem2d_world *w) {
     return entries == listed || inside_fail("contacts of particles", entries - listed);
 }
 
+/* Walls have their parts one after the other, which are where their states put them. */
+static bool inside_parts_hold(const dem2d_world *w) {
+    int parts = 0;
+    for (int place = 0; place < w->wall_count; place++) {
+        const int j = w->walls[place].placed;
+        const dem2di_wall *wall = &w->walls[j];
+        if (wall->first != parts || wall->alive != (wall->count > 0))
+            return inside_fail("parts of a wall", j);
+        for (int k = 0; k < wall->count; k++, parts++) {
+            const dem2di_surface is = dem2di_surface_of(w, w->wall_now, parts);
+            if (w->parts[parts].wall != j) return inside_fail("a part of another wall", parts);
+            if (memcmp(&is, &w->surfaces[parts], sizeof is) != 0)
+                return inside_fail("a part is elsewhere", parts);
+        }
+    }
+    return parts == w->part_count || inside_fail("parts without a wall", parts);
+}
+
 bool inside_holds(const dem2d_world *world) {
     if (!inside_ids_hold(world) || !inside_ranks_hold(world) || !inside_adjacency_holds(world))
         return false;
+    if (!inside_parts_hold(world)) return false;
     for (int i = 0; i < world->list.count; i++)
         if (!inside_contact_holds(world, i)) return false;
     return true;
