@@ -2278,6 +2278,14 @@ static bool dem2di_reserve(const dem2d_env *env, void **array, int *capacity, in
     return true;
 }
 
+/* The next of several arrays in one block of memory, those of the largest types first; NULL if it
+   has no elements. */
+static void *dem2di_next_array(char **next, size_t count, size_t size) {
+    char *array = *next;
+    *next += count * size;
+    return count > 0 ? array : NULL;
+}
+
 /* ============================================================================================
    >>fields  Fields of structs as data: name, place, type, range; one check for all of them
    uses: config, math, memory
@@ -2733,7 +2741,7 @@ static dem2di_bounds dem2di_series_minimum(const dem2di_series *s, double tolera
 
 /* ============================================================================================
    >>support  The template in memory and its support point in a unit direction
-   uses: config, math
+   uses: config, math, memory
    ============================================================================================ */
 
 /* Up to this many corners a loop over all of them is as fast as the sector table: 4.9 against 6.3
@@ -2796,34 +2804,20 @@ static int dem2di_block_count(int order) {
 /* Place the arrays of a shape after the struct; bytes is the size of all. */
 static void dem2di_shape_layout(dem2d_shape *shape) {
     char *next = (char *)(shape + 1);
-    size_t n = (size_t)shape->parts;
-    if (shape->type == DEM2D_POLYGON) {
-        shape->corners = (dem2d_vec *)(void *)next;
-        next += n * sizeof(dem2d_vec);
-    }
-    if (shape->type == DEM2D_BEZIER) {
-        shape->arcs = (dem2di_arc *)(void *)next;
-        next += n * sizeof(dem2di_arc);
-        shape->given = (dem2di_arc *)(void *)next;
-        next += (size_t)shape->count * sizeof(dem2di_arc);
-        shape->edges_beside = (dem2di_edges_beside *)(void *)next;
-        next += n * sizeof(dem2di_edges_beside);
-    }
-    if (shape->type == DEM2D_POLYGON || shape->type == DEM2D_BEZIER) {
-        shape->tangents = (dem2d_vec *)(void *)next;
-        next += n * sizeof(dem2d_vec);
-    }
-    if (shape->type == DEM2D_FOURIER) {
-        shape->blocks = (dem2di_block *)(void *)next;
-        next += (size_t)dem2di_block_count(shape->count) * sizeof(dem2di_block);
-    }
-    if (shape->type == DEM2D_ELLIPSE || shape->type == DEM2D_BEZIER ||
-        shape->type == DEM2D_FOURIER) {
-        shape->least_rho = (double *)(void *)next;
-        next += DEM2DI_RHO_SECTORS * sizeof(double);
-    }
-    shape->sector = (int *)(void *)next;
-    next += (size_t)shape->sectors * sizeof(int);
+    bool bezier = shape->type == DEM2D_BEZIER, fourier = shape->type == DEM2D_FOURIER;
+    size_t parts = (size_t)shape->parts, given = bezier ? (size_t)shape->count : 0;
+    size_t corners = shape->type == DEM2D_POLYGON ? parts : 0, arcs = bezier ? parts : 0;
+    size_t blocks = fourier ? (size_t)dem2di_block_count(shape->count) : 0;
+    size_t least = bezier || fourier || shape->type == DEM2D_ELLIPSE ? DEM2DI_RHO_SECTORS : 0;
+    shape->corners = (dem2d_vec *)dem2di_next_array(&next, corners, sizeof(dem2d_vec));
+    shape->arcs = (dem2di_arc *)dem2di_next_array(&next, arcs, sizeof(dem2di_arc));
+    shape->given = (dem2di_arc *)dem2di_next_array(&next, given, sizeof(dem2di_arc));
+    shape->edges_beside =
+        (dem2di_edges_beside *)dem2di_next_array(&next, arcs, sizeof(dem2di_edges_beside));
+    shape->tangents = (dem2d_vec *)dem2di_next_array(&next, corners + arcs, sizeof(dem2d_vec));
+    shape->blocks = (dem2di_block *)dem2di_next_array(&next, blocks, sizeof(dem2di_block));
+    shape->least_rho = (double *)dem2di_next_array(&next, least, sizeof(double));
+    shape->sector = (int *)dem2di_next_array(&next, (size_t)shape->sectors, sizeof(int));
     shape->bytes = (size_t)(next - (char *)shape);
 }
 
@@ -6016,29 +6010,7 @@ typedef struct dem2di_slabs {
     int *ends;            /* of sorted runs */
     dem2di_strand *strands;
     int count; /* of rises */
-    size_t room;
 } dem2di_slabs;
-
-static void dem2di_slabs_release(const dem2d_env *env, dem2di_slabs *slabs) {
-    dem2di_release(env, slabs->rises, slabs->room, sizeof *slabs->rises);
-    dem2di_release(env, slabs->levels, 2 * slabs->room, sizeof *slabs->levels);
-    dem2di_release(env, slabs->ends, slabs->room, sizeof *slabs->ends);
-    dem2di_release(env, slabs->strands, slabs->room, sizeof *slabs->strands);
-}
-
-static bool dem2di_slabs_make(const dem2d_env *env, size_t room, dem2di_slabs *slabs) {
-    memset(slabs, 0, sizeof *slabs);
-    slabs->room = room;
-    slabs->rises = (dem2di_rise *)dem2di_allocate(env, room, sizeof *slabs->rises);
-    if (slabs->rises != NULL)
-        slabs->levels = (dem2di_level *)dem2di_allocate(env, 2 * room, sizeof *slabs->levels);
-    if (slabs->levels != NULL) slabs->ends = (int *)dem2di_allocate(env, room, sizeof *slabs->ends);
-    if (slabs->ends != NULL)
-        slabs->strands = (dem2di_strand *)dem2di_allocate(env, room, sizeof *slabs->strands);
-    if (slabs->strands != NULL) return true;
-    dem2di_slabs_release(env, slabs);
-    return false;
-}
 
 /* Add the rises of an outline. A side that both outlines have gives the same numbers, whatever
    their orientation. */
@@ -6171,8 +6143,8 @@ static void dem2di_strands_order(const dem2di_slabs *slabs, int count, double y)
     }
 }
 
-/* Area inside exactly one of the outlines. Between the levels of neighbouring corners all sides are
-   straight, so the area of each slab is exact. */
+/* Area of all slabs. Between the levels of neighbouring corners all sides are straight, so the area
+   of each slab is exact. */
 static double dem2di_slabs_area(dem2di_slabs *slabs) {
     const dem2di_level *levels = dem2di_levels_sort(slabs->levels, slabs->count, slabs->ends);
     double area = 0;
@@ -6196,6 +6168,26 @@ static double dem2di_slabs_area(dem2di_slabs *slabs) {
         count = dem2di_strands_advance(slabs, count, y);
     }
     return area;
+}
+
+/* Area inside exactly one of two outlines. */
+static bool dem2di_difference_area(const dem2d_env *env, const dem2d_vec *a, int a_count,
+                                   const dem2d_vec *b, int b_count, double *area) {
+    dem2di_slabs slabs;
+    size_t room = (size_t)a_count + (size_t)b_count, size = sizeof *slabs.rises;
+    size += 2 * sizeof *slabs.levels + sizeof *slabs.strands + sizeof *slabs.ends;
+    char *memory = (char *)dem2di_allocate(env, room, size), *next = memory;
+    if (memory == NULL) return false;
+    slabs.rises = (dem2di_rise *)dem2di_next_array(&next, room, sizeof *slabs.rises);
+    slabs.levels = (dem2di_level *)dem2di_next_array(&next, 2 * room, sizeof *slabs.levels);
+    slabs.strands = (dem2di_strand *)dem2di_next_array(&next, room, sizeof *slabs.strands);
+    slabs.ends = (int *)dem2di_next_array(&next, room, sizeof *slabs.ends);
+    slabs.count = 0;
+    dem2di_slabs_add(&slabs, a, a_count, a[0], 0);
+    dem2di_slabs_add(&slabs, b, b_count, a[0], 1);
+    *area = dem2di_slabs_area(&slabs);
+    dem2di_release(env, memory, room, size);
+    return true;
 }
 
 /* --- Hausdorff distance ----------------------------------------------------------------------- */
@@ -6271,54 +6263,43 @@ static bool dem2di_hausdorff(const dem2d_env *env, const dem2d_vec *a, int a_cou
                              const dem2d_vec *b, int b_count, double *distance) {
     dem2di_side_groups grouped[2];
     size_t room = (size_t)a_count + (size_t)b_count;
-    size_t groups = 2 * (room / DEM2DI_GROUP + 2); /* two corners each; the last may not be full */
-    dem2di_side *sides = (dem2di_side *)dem2di_allocate(env, room, sizeof *sides);
-    dem2d_vec *boxes = NULL;
-    if (sides != NULL) boxes = (dem2d_vec *)dem2di_allocate(env, groups, sizeof *boxes);
-    if (boxes != NULL) {
-        grouped[0].sides = sides;
-        grouped[0].boxes = boxes;
-        grouped[0].count = dem2di_sides_make(a, a_count, a[0], sides);
-        grouped[1].sides = sides + a_count;
-        grouped[1].boxes = boxes + 2 * ((a_count - 1) / DEM2DI_GROUP + 1);
-        grouped[1].count = dem2di_sides_make(b, b_count, a[0], grouped[1].sides);
-        for (int i = 0; i < 2; i++) dem2di_side_groups_boxes(&grouped[i]);
-        double most =
-            dem2di_side_groups_farthest(&grouped[1], grouped[0].sides, grouped[0].count, 0);
-        most = dem2di_side_groups_farthest(&grouped[0], grouped[1].sides, grouped[1].count, most);
-        *distance = sqrt(most);
-    }
-    dem2di_release(env, boxes, groups, sizeof *boxes);
-    dem2di_release(env, sides, room, sizeof *sides);
-    return boxes != NULL;
+    size_t size = sizeof(dem2di_side) + sizeof(dem2d_vec); /* fewer boxes than sides */
+    dem2di_side *sides = (dem2di_side *)dem2di_allocate(env, room, size);
+    if (sides == NULL) return false;
+    dem2d_vec *boxes = (dem2d_vec *)(void *)(sides + room);
+    grouped[0].sides = sides;
+    grouped[0].boxes = boxes;
+    grouped[0].count = dem2di_sides_make(a, a_count, a[0], sides);
+    grouped[1].sides = sides + a_count;
+    grouped[1].boxes = boxes + 2 * ((a_count - 1) / DEM2DI_GROUP + 1);
+    grouped[1].count = dem2di_sides_make(b, b_count, a[0], grouped[1].sides);
+    for (int i = 0; i < 2; i++) dem2di_side_groups_boxes(&grouped[i]);
+    double most = dem2di_side_groups_farthest(&grouped[1], grouped[0].sides, grouped[0].count, 0);
+    most = dem2di_side_groups_farthest(&grouped[0], grouped[1].sides, grouped[1].count, most);
+    *distance = sqrt(most);
+    dem2di_release(env, sides, room, size);
+    return true;
 }
 
 DEM2D_API dem2d_result dem2d_outline_compare(const dem2d_env *env, const dem2d_vec *reference,
                                              int reference_count, const dem2d_vec *other,
                                              int other_count, dem2d_difference *difference) {
     dem2d_mass mass, unused;
-    dem2di_slabs slabs;
     dem2d_difference found = {0, 0, 0};
     if (difference == NULL) return dem2di_fail_null(env, "difference");
     dem2d_result result = dem2di_check_outline(env, "reference", reference, reference_count, &mass);
+    if (result == DEM2D_OK)
+        result = dem2di_check_outline(env, "other", other, other_count, &unused);
     if (result != DEM2D_OK) return result;
-    result = dem2di_check_outline(env, "other", other, other_count, &unused);
-    if (result != DEM2D_OK) return result;
-    bool room = other_count < INT_MAX - reference_count &&
-                dem2di_slabs_make(env, (size_t)reference_count + (size_t)other_count, &slabs);
-    if (room) {
-        dem2di_slabs_add(&slabs, reference, reference_count, reference[0], 0);
-        dem2di_slabs_add(&slabs, other, other_count, reference[0], 1);
-        found.area = dem2di_slabs_area(&slabs);
-        dem2di_slabs_release(env, &slabs);
-        found.coverage = 1 - found.area / mass.area;
-        room =
-            dem2di_hausdorff(env, reference, reference_count, other, other_count, &found.hausdorff);
-    }
+    bool room =
+        other_count < INT_MAX - reference_count &&
+        dem2di_difference_area(env, reference, reference_count, other, other_count, &found.area) &&
+        dem2di_hausdorff(env, reference, reference_count, other, other_count, &found.hausdorff);
     if (!room)
         return dem2di_fail(env, DEM2D_OUT_OF_MEMORY, -1,
                            "no memory for the difference of %d and %d points", reference_count,
                            other_count);
+    found.coverage = 1 - found.area / mass.area;
     *difference = found;
     return DEM2D_OK;
 }
