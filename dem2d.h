@@ -6322,8 +6322,9 @@ static void dem2di_outline_release(const dem2d_env *env, dem2di_outline *outline
     dem2di_release(env, outline->points, 2 * (size_t)outline->count, sizeof(dem2d_vec));
 }
 
+/* With `simple` an outline that crosses itself is refused. */
 static dem2d_result dem2di_outline_make(const dem2d_env *env, const dem2d_vec *points, int count,
-                                        dem2di_outline *outline) {
+                                        bool simple, dem2di_outline *outline) {
     dem2d_result result = dem2di_check_points(env, "points", points, count, 3);
     if (result != DEM2D_OK) return result;
     size_t n = (size_t)count;
@@ -6332,6 +6333,7 @@ static dem2d_result dem2di_outline_make(const dem2d_env *env, const dem2d_vec *p
     if (outline->points == NULL) return dem2di_fail_memory(env, count, "points of an outline");
     outline->hull = outline->points + count;
     result = dem2d_polygon_hull(env, points, count, outline->hull, &outline->hull_count);
+    if (result == DEM2D_OK && simple) result = dem2di_check_crossing(env, "points", points, count);
     if (result != DEM2D_OK) {
         dem2di_outline_release(env, outline);
         return result;
@@ -6379,7 +6381,7 @@ DEM2D_API dem2d_result dem2d_fourier_fit(const dem2d_env *env, const dem2d_vec *
     if (result != DEM2D_OK) return result;
     if (samples == 0) samples = 16 * order + 64;
     dem2di_outline outline;
-    result = dem2di_outline_make(env, points, count, &outline);
+    result = dem2di_outline_make(env, points, count, false, &outline);
     if (result != DEM2D_OK) return result;
     for (int n = 0; n <= order; n++) a[n] = b[n] = 0;
     int k = dem2di_hull_start(&outline);
@@ -6677,9 +6679,24 @@ typedef struct dem2di_cubic {
     double start, q0, q1, q2;
 } dem2di_cubic;
 
+/* Of the line through p across a vector, times the vector's length. */
+static dem2di_cubic dem2di_cubic_of(const dem2di_arc *arc, dem2d_vec p, dem2d_vec across) {
+    dem2di_cubic f;
+    f.start = dem2di_dot(across, dem2di_sub(arc->start, p));
+    f.q0 = dem2di_dot(across, arc->d0);
+    f.q1 = dem2di_dot(across, arc->d1);
+    f.q2 = dem2di_dot(across, arc->d2);
+    return f;
+}
+
 static double dem2di_cubic_value(const dem2di_cubic *f, double t) {
     return f->start + t * (3 - t * (3 - t)) * f->q0 + t * t * (3 - 2 * t) * f->q1 +
            t * t * t * f->q2;
+}
+
+static double dem2di_cubic_slope(const dem2di_cubic *f, double t) {
+    double s = 1 - t;
+    return 3 * (s * s * f->q0 + 2 * s * t * f->q1 + t * t * f->q2);
 }
 
 /* The zero between low and high, where the values have different signs: Newton's steps, or halving
@@ -6688,13 +6705,12 @@ static double dem2di_cubic_zero(const dem2di_cubic *f, double low, double high) 
     bool rising = dem2di_cubic_value(f, low) < 0;
     double t = (low + high) / 2;
     for (int i = 0; i < 60 && high - low > 1e-12; i++) {
-        double value = dem2di_cubic_value(f, t), s = 1 - t;
-        double slope = 3 * (s * s * f->q0 + 2 * s * t * f->q1 + t * t * f->q2);
+        double value = dem2di_cubic_value(f, t);
         if ((value < 0) == rising)
             low = t;
         else
             high = t;
-        double next = t - value / slope;
+        double next = t - value / dem2di_cubic_slope(f, t);
         bool inside = next > low && next < high; /* false for a NaN */
         if (inside && fabs(next - t) < 1e-12) return next;
         t = inside ? next : (low + high) / 2;
@@ -6705,18 +6721,14 @@ static double dem2di_cubic_zero(const dem2di_cubic *f, double low, double high) 
 /* Parameters where an arc crosses the segment p + [0, 1) edge, in the segment's order: at most two,
    as the arc is convex. The arc's point farthest along the segment's normal is between them. */
 static int dem2di_arc_crossings(const dem2di_arc *arc, dem2d_vec p, dem2d_vec edge, double t[2]) {
-    dem2di_cubic f;
-    f.start = dem2di_cross(edge, dem2di_sub(arc->start, p));
-    f.q0 = dem2di_cross(edge, arc->d0);
-    f.q1 = dem2di_cross(edge, arc->d1);
-    f.q2 = dem2di_cross(edge, arc->d2);
+    dem2d_vec normal = dem2di_perp(edge);
+    dem2di_cubic f = dem2di_cubic_of(arc, p, normal);
     double square = dem2di_dot(edge, edge), place[2];
     double side[4] = {f.start, f.start + f.q0, f.start + f.q0 + f.q1, f.start + f.q0 + f.q1 + f.q2};
     bool above = side[0] > 0 && side[1] > 0 && side[2] > 0 && side[3] > 0;
     bool below = side[0] < 0 && side[1] < 0 && side[2] < 0 && side[3] < 0;
     if (above || below || square == 0) return 0;
     /* the edge's left normal if the arc bulges to the left, else the right one */
-    dem2d_vec normal = dem2di_perp(edge);
     if (f.q0 < 0 || f.q2 > 0) normal = dem2di_negate(normal);
     double split = dem2di_arc_parameter(dem2di_dot(arc->d0, normal), dem2di_dot(arc->d1, normal),
                                         dem2di_dot(arc->d2, normal));
@@ -6767,16 +6779,11 @@ typedef struct dem2di_foot {
 
 static dem2di_foot dem2di_arc_foot(const dem2di_arc *arc, dem2d_vec chord, dem2d_vec p, double t) {
     dem2di_foot foot = {false, t, 0};
-    dem2di_cubic f;
-    f.start = dem2di_dot(chord, dem2di_sub(arc->start, p));
-    f.q0 = dem2di_dot(chord, arc->d0);
-    f.q1 = dem2di_dot(chord, arc->d1);
-    f.q2 = dem2di_dot(chord, arc->d2);
+    dem2di_cubic f = dem2di_cubic_of(arc, p, chord);
     double end = f.start + f.q0 + f.q1 + f.q2;
     if (f.q0 < 0 || f.q1 < 0 || f.q2 < 0 || f.start > 0 || end < 0) return foot;
     for (int i = 0; i < 8 && !foot.level; i++) {
-        double s = 1 - t, value = dem2di_cubic_value(&f, t);
-        double slope = 3 * (s * s * f.q0 + 2 * s * t * f.q1 + t * t * f.q2);
+        double value = dem2di_cubic_value(&f, t), slope = dem2di_cubic_slope(&f, t);
         double next = dem2di_max(0, dem2di_min(1, t - value / slope));
         foot.level = fabs(next - t) < 1e-6; /* the error is its square: below rounding errors */
         t = next;
@@ -6975,12 +6982,6 @@ static double dem2di_random(uint64_t *state) {
     return (double)((x ^ (x >> 31)) >> 11) / 9007199254740992.0; /* 2^53 */
 }
 
-/* Settings of the swarm. */
-typedef struct dem2di_swarm {
-    int birds, moves, pixels;
-    uint64_t seed;
-} dem2di_swarm;
-
 /* A picture of one section: pixels inside its outline, which the chord closes. */
 typedef struct dem2di_raster {
     dem2d_vec lower;     /* corner of pixel (0, 0) */
@@ -7029,7 +7030,7 @@ static int dem2di_raster_cost(const dem2di_raster *raster, const dem2di_arc *arc
 /* The birds share their best place; inertia and attractions by M. Clerc and J. Kennedy's
    constriction for 2.05 + 2.05. */
 static void dem2di_swarm_search(const dem2di_section *section, const dem2di_raster *raster,
-                                const dem2di_swarm *swarm, uint64_t *random, double f[2]) {
+                                const dem2d_fit_desc *swarm, uint64_t *random, double f[2]) {
     const double inertia = 0.7298437881283576, pull = 1.4961797656631331;
     struct {
         double x[2], v[2], best[2];
@@ -7063,7 +7064,7 @@ static void dem2di_swarm_search(const dem2di_section *section, const dem2di_rast
 /* [P] sec. 4 step 4 for one section. *arc is replaced unless the new arc is flatter than both the
    bound and *arc. iterations counts moves of the swarm. */
 static dem2d_result dem2di_swarm_section(const dem2d_env *env, const dem2di_section *section,
-                                         const dem2di_swarm *swarm, uint64_t *random,
+                                         const dem2d_fit_desc *swarm, uint64_t *random,
                                          dem2di_arc *arc, int *iterations) {
     int inner = dem2di_section_count(section);
     dem2d_vec corner = dem2di_scale(section->from->tangent, section->l1);
@@ -7216,8 +7217,8 @@ static void dem2di_plan_search(dem2di_bezier_plan *plan, dem2di_bezier_plan *spa
 /* [P] sec. 4 on a prepared outline, relative to its centre, by a swarm or (NULL) by exact area.
    rho_max bounds the radius of curvature; HUGE_VAL for none. */
 static dem2d_result dem2di_bezier_fit(const dem2d_env *env, const dem2di_outline *outline, int arcs,
-                                      double rho_max, const dem2di_swarm *swarm, dem2d_vec *control,
-                                      int *iterations) {
+                                      double rho_max, const dem2d_fit_desc *swarm,
+                                      dem2d_vec *control, int *iterations) {
     size_t count = (size_t)arcs;
     size_t size = sizeof(dem2di_joint) + sizeof(dem2di_straight) + 2 * sizeof(double);
     dem2di_joint *memory = (dem2di_joint *)dem2di_allocate(env, 2 * count, size);
@@ -7263,12 +7264,10 @@ DEM2D_API dem2d_result dem2d_bezier_fit(const dem2d_env *env, const dem2d_vec *p
     if (result != DEM2D_OK) return result;
     dem2di_outline outline;
     int iterations = 0;
-    result = dem2di_outline_make(env, points, count, &outline);
+    result = dem2di_outline_make(env, points, count, true, &outline);
     if (result != DEM2D_OK) return result;
-    result = dem2di_check_crossing(env, "points", points, count);
-    if (result == DEM2D_OK)
-        result = dem2di_bezier_fit(env, &outline, arcs, DEM2DI_FIT_RHO_MAX * outline.radius, NULL,
-                                   control, &iterations);
+    result = dem2di_bezier_fit(env, &outline, arcs, DEM2DI_FIT_RHO_MAX * outline.radius, NULL,
+                               control, &iterations);
     for (int i = 0; i < 3 * arcs && result == DEM2D_OK; i++)
         control[i] = dem2di_add(control[i], outline.centre);
     dem2di_outline_release(env, &outline);
@@ -7574,8 +7573,8 @@ typedef struct dem2di_fit {
     const dem2d_vec *points; /* as given */
     int point_count;
     dem2di_outline outline;
-    dem2d_mass mass; /* of the outline, about outline.centre */
-    const dem2d_fit_desc *desc;
+    dem2d_mass mass;             /* of the outline, about outline.centre */
+    dem2d_fit_desc desc;         /* with defaults filled in */
     int count;                   /* of this attempt */
     dem2d_vec *buffer;           /* candidate outline: DEM2DI_FIT_POINTS */
     dem2d_result compare_result; /* of a comparison */
@@ -7587,10 +7586,10 @@ typedef struct dem2di_fit {
 #define DEM2DI_FIT_POINTS 1440
 
 static void dem2di_fit_resize(const dem2di_fit *fit, double *a, double *b, int order) {
-    double target = fit->desc->scale == DEM2D_SCALE_GRAIN
+    double target = fit->desc.scale == DEM2D_SCALE_GRAIN
                         ? fit->mass.area
                         : dem2di_twice_area(fit->outline.hull, fit->outline.hull_count) / 2;
-    if (fit->desc->scale == DEM2D_SCALE_NONE) return;
+    if (fit->desc.scale == DEM2D_SCALE_NONE) return;
     double area = a[0] * a[0] / 4;
     for (int n = 2; n <= order; n++) area += (1 - (double)n * n) * (a[n] * a[n] + b[n] * b[n]) / 2;
     if (!(area > 0)) return; /* creation will refuse it */
@@ -7604,7 +7603,7 @@ static void dem2di_fit_resize(const dem2di_fit *fit, double *a, double *b, int o
 
 static dem2d_result dem2di_fit_fourier(dem2di_fit *fit) {
     int order = fit->count;
-    const dem2d_fit_desc *desc = fit->desc;
+    const dem2d_fit_desc *desc = &fit->desc;
     size_t terms = (size_t)order + 1;
     double *a = (double *)dem2di_allocate(fit->env, terms, 2 * sizeof *a);
     if (a == NULL) return dem2di_fail_memory(fit->env, order, "terms");
@@ -7620,13 +7619,12 @@ static dem2d_result dem2di_fit_fourier(dem2di_fit *fit) {
         if (result == DEM2D_OK) result = dem2d_fourier_reduce(a, b, order, &reduction, &steps);
     } else {
         dem2di_hull_series(&fit->outline, order, a, b);
-        double margin = desc->corners ? 0 : desc->min_radius == 0 ? 0.1 : desc->min_radius;
         for (int n = 2; n <= order && desc->method == DEM2D_FIT_FEJER; n++) {
             a[n] *= 1 - n / (order + 1.0);
             b[n] *= 1 - n / (order + 1.0);
         }
         if (desc->method != DEM2D_FIT_FEJER && order >= 2)
-            result = dem2di_constrain_series(fit->env, a, b, order, margin, &steps);
+            result = dem2di_constrain_series(fit->env, a, b, order, desc->min_radius, &steps);
         if (result == DEM2D_OK) dem2di_fit_resize(fit, a, b, order);
     }
     fit->report.iterations += steps;
@@ -7639,17 +7637,11 @@ static dem2d_result dem2di_fit_bezier(dem2di_fit *fit) {
     size_t count = 3 * (size_t)fit->count;
     dem2d_vec *control = (dem2d_vec *)dem2di_allocate(fit->env, count, sizeof *control);
     if (control == NULL) return dem2di_fail_memory(fit->env, fit->count, "arcs");
-    const dem2d_fit_desc *desc = fit->desc;
-    dem2di_swarm swarm;
-    swarm.birds = desc->birds > 0 ? desc->birds : 30;
-    swarm.moves = desc->moves > 0 ? desc->moves : 60;
-    swarm.pixels = desc->pixels > 0 ? desc->pixels : 256;
-    swarm.seed = desc->seed;
-    double rho_max = desc->max_radius == 0 ? DEM2DI_FIT_RHO_MAX : desc->max_radius;
-    rho_max = desc->unbounded ? HUGE_VAL : rho_max * fit->outline.radius;
+    const dem2d_fit_desc *desc = &fit->desc;
+    double rho_max = desc->unbounded ? HUGE_VAL : desc->max_radius * fit->outline.radius;
     dem2d_result result = dem2di_bezier_fit(fit->env, &fit->outline, fit->count, rho_max,
-                                            desc->method == DEM2D_FIT_SWARM ? &swarm : NULL,
-                                            control, &fit->report.iterations);
+                                            desc->method == DEM2D_FIT_SWARM ? desc : NULL, control,
+                                            &fit->report.iterations);
     if (result == DEM2D_OK)
         result = dem2d_shape_create_bezier(fit->env, control, fit->count, &fit->shape);
     dem2di_release(fit->env, control, count, sizeof *control);
@@ -7719,7 +7711,7 @@ static bool dem2di_is_convex(const dem2d_vec *points, int count) {
 
 static double dem2di_polygon_objective(void *data, const double *x) {
     dem2di_fit *fit = (dem2di_fit *)data;
-    for (int i = 0; i < fit->count; i++) fit->buffer[i] = dem2di_vec(x[2 * i], x[2 * i + 1]);
+    memcpy(fit->buffer, x, (size_t)fit->count * sizeof *fit->buffer);
     if (!dem2di_is_convex(fit->buffer, fit->count)) return HUGE_VAL;
     return dem2di_fit_difference(fit, fit->buffer, fit->count);
 }
@@ -7727,39 +7719,31 @@ static double dem2di_polygon_objective(void *data, const double *x) {
 /* Corners of the hull are dropped one by one, each time the one with the smallest triangle with its
    neighbours; compass search then moves the remaining corners to the least difference. */
 static dem2d_result dem2di_fit_polygon(dem2di_fit *fit) {
-    int n = fit->outline.hull_count, m = fit->count;
-    size_t room = 2 * (size_t)(n > m ? n : m);
-    double *x = (double *)dem2di_allocate(fit->env, room, 2 * sizeof *x);
-    if (x == NULL) return dem2di_fail_memory(fit->env, n, "corners");
-    double *steps = x + room;
-    dem2d_vec *corners = fit->outline.hull;
-    if (n < m) { /* the hull itself has fewer corners */
-        fit->count = m = n;
-    }
-    for (int i = 0; i < n; i++) {
-        x[2 * i] = corners[i].x;
-        x[2 * i + 1] = corners[i].y;
-    }
-    while (n > m) {
+    int n = fit->outline.hull_count;
+    if (n < fit->count) fit->count = n; /* the hull itself has fewer corners */
+    size_t room = (size_t)n;
+    dem2d_vec *corners = (dem2d_vec *)dem2di_allocate(fit->env, 2 * room, sizeof *corners);
+    if (corners == NULL) return dem2di_fail_memory(fit->env, n, "corners");
+    double *x = &corners->x, *steps = &corners[n].x;
+    memcpy(corners, fit->outline.hull, room * sizeof *corners);
+    for (; n > fit->count; n--) {
         int least = 0;
         double area = HUGE_VAL;
         for (int i = 0; i < n; i++) {
-            int j = (i + n - 1) % n, k = (i + 1) % n;
-            double lost = (x[2 * i] - x[2 * j]) * (x[2 * k + 1] - x[2 * j + 1]) -
-                          (x[2 * i + 1] - x[2 * j + 1]) * (x[2 * k] - x[2 * j]);
+            dem2d_vec before = corners[(i + n - 1) % n], after = corners[(i + 1) % n];
+            double lost = dem2di_cross(dem2di_sub(corners[i], before), dem2di_sub(after, before));
             if (lost >= area) continue;
             area = lost;
             least = i;
         }
-        n--;
-        memmove(&x[2 * least], &x[2 * least + 2], 2 * (size_t)(n - least) * sizeof *x);
+        memmove(&corners[least], &corners[least + 1], (size_t)(n - 1 - least) * sizeof *corners);
     }
-    for (int i = 0; i < 2 * m; i++) steps[i] = 0.1 * fit->outline.radius;
-    fit->report.iterations += dem2di_compass(dem2di_polygon_objective, fit, x, steps, 2 * m, 1e-3);
+    for (int i = 0; i < 2 * n; i++) steps[i] = 0.1 * fit->outline.radius;
+    fit->report.iterations += dem2di_compass(dem2di_polygon_objective, fit, x, steps, 2 * n, 1e-3);
     (void)dem2di_polygon_objective(fit, x);
-    dem2di_release(fit->env, x, room, 2 * sizeof *x);
+    dem2di_release(fit->env, corners, 2 * room, sizeof *corners);
     if (fit->compare_result != DEM2D_OK) return fit->compare_result;
-    return dem2d_shape_create_polygon(fit->env, fit->buffer, m, 0, &fit->shape);
+    return dem2d_shape_create_polygon(fit->env, fit->buffer, n, 0, &fit->shape);
 }
 
 /* One template of the model with fit->count, and its report. */
@@ -7767,19 +7751,18 @@ static dem2d_result dem2di_fit_once(dem2di_fit *fit) {
     dem2d_result result = DEM2D_OUT_OF_RANGE;
     fit->shape = NULL;
     fit->report.pose = dem2d_pose_make(fit->mass.centroid.x, fit->mass.centroid.y, 0, 1);
-    if (fit->desc->model == DEM2D_CIRCLE)
+    if (fit->desc.model == DEM2D_CIRCLE)
         result = dem2d_shape_create_circle(fit->env, sqrt(fit->mass.area / DEM2DI_PI), &fit->shape);
-    if (fit->desc->model == DEM2D_ELLIPSE) result = dem2di_fit_ellipse(fit);
-    if (fit->desc->model == DEM2D_POLYGON) result = dem2di_fit_polygon(fit);
-    if (fit->desc->model == DEM2D_BEZIER) result = dem2di_fit_bezier(fit);
-    if (fit->desc->model == DEM2D_FOURIER) result = dem2di_fit_fourier(fit);
+    if (fit->desc.model == DEM2D_ELLIPSE) result = dem2di_fit_ellipse(fit);
+    if (fit->desc.model == DEM2D_POLYGON) result = dem2di_fit_polygon(fit);
+    if (fit->desc.model == DEM2D_BEZIER) result = dem2di_fit_bezier(fit);
+    if (fit->desc.model == DEM2D_FOURIER) result = dem2di_fit_fourier(fit);
     if (result != DEM2D_OK) return result;
     const dem2d_shape *shape = fit->shape;
     bool placed = shape->type == DEM2D_CIRCLE || shape->type == DEM2D_ELLIPSE;
     if (!placed) fit->report.pose.position = shape->offset;
     int points = shape->type == DEM2D_POLYGON ? shape->count : DEM2DI_FIT_POINTS;
-    for (int i = 0; i < points; i++)
-        fit->buffer[i] = dem2di_place(&fit->report.pose, dem2di_outline_point(shape, i, points));
+    (void)dem2d_shape_outline(shape, fit->report.pose, points, fit->buffer);
     dem2d_difference difference;
     result = dem2d_outline_compare(fit->env, fit->outline.points, fit->outline.count, fit->buffer,
                                    points, &difference);
@@ -7831,9 +7814,19 @@ static dem2d_result dem2di_check_fit(const dem2d_env *env, const dem2d_fit_desc 
     return dem2di_check_number(env, "count", desc->count, DEM2DI_WHOLE(least[desc->model], 1024));
 }
 
+static dem2d_fit_desc dem2di_fit_defaults(dem2d_fit_desc desc) {
+    if (desc.min_radius == 0) desc.min_radius = 0.1;
+    if (desc.corners) desc.min_radius = 0;
+    if (desc.max_radius == 0) desc.max_radius = DEM2DI_FIT_RHO_MAX;
+    if (desc.birds == 0) desc.birds = 30;
+    if (desc.moves == 0) desc.moves = 60;
+    if (desc.pixels == 0) desc.pixels = 256;
+    return desc;
+}
+
 /* The fit with the given count, or with the least one that reaches the coverage. */
 static dem2d_result dem2di_fit_counts(dem2di_fit *fit) {
-    const dem2d_fit_desc *desc = fit->desc;
+    const dem2d_fit_desc *desc = &fit->desc;
     bool counted = desc->model != DEM2D_CIRCLE && desc->model != DEM2D_ELLIPSE;
     fit->count = desc->count;
     if (!counted || desc->count > 0) return dem2di_fit_once(fit);
@@ -7857,20 +7850,17 @@ DEM2D_API dem2d_result dem2d_outline_fit(const dem2d_env *env, const dem2d_vec *
     dem2di_fit fit;
     memset(&fit, 0, sizeof fit);
     fit.env = env;
-    fit.desc = desc;
-    result = dem2di_outline_make(env, points, count, &fit.outline);
+    fit.desc = dem2di_fit_defaults(*desc);
+    result = dem2di_outline_make(env, points, count, true, &fit.outline);
     if (result != DEM2D_OK) return result;
-    result = dem2di_check_crossing(env, "points", points, count);
     double turn = dem2di_twice_area(fit.outline.points, count);
-    if (result == DEM2D_OK && !(turn > DEM2DI_ROUNDOFF * fit.outline.radius * fit.outline.radius))
-        result = dem2di_fail(env, DEM2D_ZERO_AREA, -1, "the outline's area is %g", turn / 2);
     size_t room = DEM2DI_FIT_POINTS;
-    if (result == DEM2D_OK) {
-        fit.buffer = (dem2d_vec *)dem2di_allocate(env, room, sizeof *fit.buffer);
-        if (fit.buffer == NULL)
-            result = dem2di_fail_memory(env, DEM2DI_FIT_POINTS, "points of a candidate");
-    }
-    if (result == DEM2D_OK) {
+    fit.buffer = (dem2d_vec *)dem2di_allocate(env, room, sizeof *fit.buffer);
+    if (!(turn > DEM2DI_ROUNDOFF * fit.outline.radius * fit.outline.radius)) {
+        result = dem2di_fail(env, DEM2D_ZERO_AREA, -1, "the outline's area is %g", turn / 2);
+    } else if (fit.buffer == NULL) {
+        result = dem2di_fail_memory(env, DEM2DI_FIT_POINTS, "points of a candidate");
+    } else {
         fit.mass = dem2di_polygon_mass(fit.outline.points, count);
         result = dem2di_fit_counts(&fit);
     }
