@@ -266,6 +266,9 @@ HOW TO
                          step in the first step, after edits that can matter, and in every 160th.
     lose energy          damping_ratio of the materials, from dem2d_damping_ratio(restitution);
                          rolling_friction for grains that should not roll; else friction, damping.
+    push grains          dem2d_world_set_load: a force and a torque until you set others. What
+                         changes from step to step (drag, magnets, motors) is set by
+                         dem2d_world_desc.loads. The work is in the ledger.
     share a scene        Each world holds its own grains, and copies (ghosts) of the others' grains
       out to processes   within reach, with the same names. dem2d_world_desc.gather gives each ghost
                          the force that its owner has found: the worlds then move like one, to the
@@ -1318,6 +1321,17 @@ typedef void dem2d_gather_fn(void *user, dem2d_sums *sums);
 /// not call functions of this world.
 typedef dem2d_result dem2d_commit_fn(void *user, dem2d_result result);
 
+/// Sets external loads: called at the start of each step that is tried, by the thread that called
+/// the step. It may call queries and dem2d_world_set_load of this world: positions are those of the
+/// force pass that follows, velocities those of half a step before. When a step fails, it is called
+/// again in the next try; the loads stay as it has set them.
+///
+/// A load that depends on the velocity is of first order in the time step: F = -c v has the factor
+/// 1 - c dt/m on v in each step, so that c dt/m must be below 1 (from 2 on it is unstable); for a
+/// terminal velocity g m/c take it below 0.01. A load that depends on the position is a spring that
+/// the bounds of the time step do not know: k dt^2/m must be below 4.
+typedef void dem2d_loads_fn(void *user, dem2d_world *world);
+
 /// A world. Only time_step has no default.
 typedef struct dem2d_world_desc {
     double time_step;          ///< s, > 0
@@ -1343,6 +1357,8 @@ typedef struct dem2d_world_desc {
     dem2d_gather_fn *gather;         ///< may change the sums of contact forces; NULL: none
     dem2d_commit_fn *commit;         ///< may refuse a step; NULL: none
     void *exchange_user;             ///< passed to gather and commit
+    dem2d_loads_fn *loads;           ///< sets external loads in each step; NULL: none
+    void *loads_user;                ///< passed to loads
 } dem2d_world_desc;
 
 /// How a particle moves. Two particles that are not free have no contact with each other, nor with
@@ -1381,6 +1397,8 @@ typedef struct dem2d_particle_info {
     double radius;              ///< m, bounding circle
     double equivalent;          ///< m, radius of the circle of equal area
     uint64_t name;              ///< as given
+    dem2d_vec load;             ///< N/m, external, as it is set
+    double load_torque;         ///< N, likewise
 } dem2d_particle_info;
 
 /// How a wall moves.
@@ -1530,6 +1548,12 @@ DEM2D_API dem2d_result dem2d_world_move_particle(dem2d_world *world, dem2d_parti
 DEM2D_API dem2d_result dem2d_world_drive_particle(dem2d_world *world, dem2d_particle_id id,
                                                   dem2d_motion motion, dem2d_vec velocity,
                                                   double angular_velocity);
+/// Set the external load of a particle, from the next step until it is set again: a force (N/m) at
+/// its centroid and a torque (N). It moves free particles only. Its work is an account of the
+/// ledger. Set it in dem2d_world_desc.loads if it changes from step to step. Errors: NOT_FINITE,
+/// OUT_OF_MEMORY.
+DEM2D_API dem2d_result dem2d_world_set_load(dem2d_world *world, dem2d_particle_id id,
+                                            dem2d_vec force, double torque);
 /// Add a wall.
 DEM2D_API dem2d_result dem2d_world_add_wall(dem2d_world *world, const dem2d_wall_desc *desc,
                                             dem2d_wall_id *id);
@@ -1562,8 +1586,8 @@ DEM2D_API dem2d_result dem2d_world_time_step_bounds(const dem2d_world *world, do
                                                     double *limit,
                                                     dem2d_particle_id *limit_particle);
 /// Take count >= 0 steps; done (may be NULL) gets the number taken, also on failure. Errors: STATE,
-/// TIME_STEP, OUT_OF_MEMORY, OUT_OF_RANGE, what dem2d_world_desc.commit returns; the world then is
-/// as it was before the step that failed.
+/// TIME_STEP, OUT_OF_MEMORY, OUT_OF_RANGE, IN_USE (called by a callback of this world), what
+/// dem2d_world_desc.commit returns; the world then is as it was before the step that failed.
 DEM2D_API dem2d_result dem2d_world_step(dem2d_world *world, int count, int *done);
 
 /* ============================================================================================
@@ -1604,6 +1628,7 @@ typedef struct dem2d_ledger {
     /// each step of all accounts except `given`. The first step after a change by the caller adds
     /// nothing.
     double turnover;
+    double loads; ///< work of the external loads on the free particles
 } dem2d_ledger;
 
 /// Stress tensor, compression positive, Pa.
@@ -1677,7 +1702,8 @@ typedef struct dem2d_equilibrium {
     double max_speed;     ///< m/s
     double kinetic_ratio; ///< the papers' relative kinetic energy: kinetic over spring energy; 0 at
                           ///< rest, HUGE_VAL without contacts
-    double unbalanced;    ///< mean |contact forces + weight| of free particles / mean contact force
+    /// mean |contact forces + weight + external load| of free particles / mean contact force
+    double unbalanced;
 } dem2d_equilibrium;
 
 /// Counters of a world. Errors: NULL_ARGUMENT; so for all queries.
@@ -1765,6 +1791,8 @@ typedef struct dem2d_load_desc {
     dem2d_gather_fn *gather;         ///< of the world, as in dem2d_world_desc
     dem2d_commit_fn *commit;         ///< likewise
     void *exchange_user;             ///< passed to gather and commit
+    dem2d_loads_fn *loads;           ///< of the world, as in dem2d_world_desc
+    void *loads_user;                ///< passed to loads
 } dem2d_load_desc;
 
 /// Hash of the state that the next step depends on: settings, steps, time, materials and their
@@ -10948,7 +10976,7 @@ static bool dem2di_state_finite(const dem2di_state *state) {
                 Of each pair first the geometry (collide), then the law; kernels of circles do both.
                 Where segments are joined, it is decided in between which contacts count (resolve)
      gather     loads -> force and torque of each particle, in the order of its partners' ranks:
-               part of integrate, unless the sums are kept because the caller may change them
+               part of integrate, unless a callback may change the sums; external loads are added
      control    forces on servo walls, next states of their particles -> velocities of walls
      check      contacts, loads -> may the step be taken? The last pass that may refuse it
      integrate  states, forces -> next states
@@ -11159,6 +11187,7 @@ static double dem2di_size_of(dem2d_vec v) {
    and half behind. */
 enum {
     DEM2DI_GRAVITY,
+    DEM2DI_BY_LOADS,
     DEM2DI_BY_WALLS,
     DEM2DI_DRIVING,
     DEM2DI_BY_DAMPING,
@@ -11194,9 +11223,10 @@ typedef enum dem2di_group {
     DEM2DI_RANKS, /* of ids, where named */
     DEM2DI_BODIES,
     DEM2DI_NAMES,         /* of bodies, where named */
+    DEM2DI_LOADS,         /* of bodies, where loaded */
     DEM2DI_DISPLACEMENTS, /* of bodies, where plan.turns */
     DEM2DI_MADE,          /* of bodies, where some are redirected */
-    DEM2DI_SUMS,          /* of bodies, where they are kept */
+    DEM2DI_SUMS,          /* of bodies, where the caller may change them */
     DEM2DI_EXCHANGED,     /* of ids, where the caller may change the sums */
     DEM2DI_WALLS_EXCHANGED,
     DEM2DI_STARTS, /* of the contacts of bodies, and the end of the last */
@@ -11231,6 +11261,9 @@ struct dem2d_world {
     dem2d_gather_fn *gather;
     dem2d_commit_fn *commit;
     void *exchange_user; /* of both */
+    dem2d_loads_fn *set_loads;
+    void *loads_user;
+    bool stepping; /* a step is on its way: callbacks can't start another */
     double time_step, local_damping, global_damping, tolerance;
     double made_step; /* time step of the step that was made; before the first as time_step */
     dem2d_vec gravity;
@@ -11239,7 +11272,6 @@ struct dem2d_world {
     dem2d_face_rule faces;
 
     bool keeps_last; /* the force pass keeps the contacts of the last one */
-    bool keeps_sums; /* the gather pass comes before the motion, with its sums in a column */
     bool check_time_step;
     bool check_due;    /* an edit since the last check of the time step and the speeds can matter */
     int plan_due;      /* steps for which the features in use are found anew, see dem2di_prepare */
@@ -11297,7 +11329,9 @@ struct dem2d_world {
     dem2di_list list;
     double *load_x, *load_y; /* force on the B of each contact, on A against it; in scratch, as: */
     double *load_a, *load_b; /* torques on A and on B */
-    dem2di_load *sums;       /* of the forces on each particle, where they are kept */
+    bool loaded, twisted;    /* a particle has had an external load; one that is a torque: */
+    dem2di_load *loads;      /* of all */
+    dem2di_load *sums;       /* of the forces on each particle, where the caller may change them */
     dem2d_sums exchange;     /* the same and those on walls for a caller, by ids */
     dem2di_push *pushes;     /* room for the contacts of a servo wall */
     char *scratch;           /* what only a step or only the building of the list needs */
@@ -11388,6 +11422,7 @@ static const dem2di_field dem2di_progress_fields[] = {
     DEM2DI_SAVED("law_tag", dem2d_world, law_tag, DEM2DI_TAG),
     DEM2DI_SAVED("redirected", dem2d_world, redirected, DEM2DI_SWITCH),
     DEM2DI_SAVED("named", dem2d_world, named, DEM2DI_SWITCH),
+    DEM2DI_SAVED("loaded", dem2d_world, loaded, DEM2DI_SWITCH),
     DEM2DI_SAVED("order_due", dem2d_world, order_due, DEM2DI_SWITCH),
     DEM2DI_SAVED("list_stale", dem2d_world, list_stale, DEM2DI_SWITCH),
     DEM2DI_SAVED("list_used_up", dem2d_world, list_used_up, DEM2DI_SWITCH),
@@ -11446,6 +11481,8 @@ static const dem2di_field dem2di_ledger_fields[] = {
     DEM2DI_SAVED("edited", dem2d_world, ledger.edited, DEM2DI_SWITCH),
     DEM2DI_ACCOUNT("gravity", sum[DEM2DI_GRAVITY]),
     DEM2DI_ACCOUNT("half_gravity", half[DEM2DI_GRAVITY]),
+    DEM2DI_ACCOUNT("loads", sum[DEM2DI_BY_LOADS]),
+    DEM2DI_ACCOUNT("half_loads", half[DEM2DI_BY_LOADS]),
     DEM2DI_ACCOUNT("walls", sum[DEM2DI_BY_WALLS]),
     DEM2DI_ACCOUNT("half_walls", half[DEM2DI_BY_WALLS]),
     DEM2DI_ACCOUNT("driving", sum[DEM2DI_DRIVING]),
@@ -11473,6 +11510,10 @@ static const dem2di_field dem2di_id_fields[] = {
 
 static const dem2di_field dem2di_ranked_fields[] = {
     DEM2DI_SAVED("id", dem2di_ranked, index, DEM2DI_WHOLE(0, 1 << 30))};
+
+static const dem2di_field dem2di_load_fields[] = {
+    DEM2DI_SAVED("force", dem2di_load, force, DEM2DI_VECTOR),
+    DEM2DI_SAVED("torque", dem2di_load, torque, DEM2DI_FINITE)};
 
 static const dem2di_field dem2di_name_field[] = {DEM2DI_PLAIN("value", uint64_t, DEM2DI_WORD)};
 
@@ -11651,6 +11692,7 @@ static const dem2di_column dem2di_columns[] = {
     DEM2DI_UNSAVED(BODIES, inverse, DEM2DI_MOVES),
     DEM2DI_UNSAVED(BODIES, list.own, 0),
     DEM2DI_COLUMN("names", NAMES, names, DEM2DI_FIRST | DEM2DI_MOVES | DEM2DI_HASHED, name_field),
+    DEM2DI_COLUMN("loads", LOADS, loads, DEM2DI_FIRST | DEM2DI_MOVES | DEM2DI_HASHED, load_fields),
     DEM2DI_COLUMN("displacements", DISPLACEMENTS, displacement, DEM2DI_MOVES | DEM2DI_SWAPS,
                   way_field),
     DEM2DI_UNSAVED(DISPLACEMENTS, next_displacement, 0),
@@ -11805,6 +11847,7 @@ static bool dem2di_reserve_bodies(dem2d_world *world, int count) {
            dem2di_group_reserve(world, DEM2DI_IDS, count) &&
            (!world->named || (dem2di_group_reserve(world, DEM2DI_RANKS, count) &&
                               dem2di_group_reserve(world, DEM2DI_NAMES, count))) &&
+           (!world->loaded || dem2di_group_reserve(world, DEM2DI_LOADS, count)) &&
            (!world->plan.turns || dem2di_group_reserve(world, DEM2DI_DISPLACEMENTS, count)) &&
            (!world->redirected || dem2di_group_reserve(world, DEM2DI_MADE, count));
 }
@@ -11915,6 +11958,8 @@ static const dem2di_field dem2di_world_fields[] = {
     DEM2DI_ROW(dem2d_world_desc, gather, DEM2DI_OPTIONAL, "- NULL"),
     DEM2DI_ROW(dem2d_world_desc, commit, DEM2DI_OPTIONAL, "- NULL"),
     DEM2DI_ROW(dem2d_world_desc, exchange_user, DEM2DI_OPTIONAL, "- NULL"),
+    DEM2DI_ROW(dem2d_world_desc, loads, DEM2DI_OPTIONAL, "- NULL"),
+    DEM2DI_ROW(dem2d_world_desc, loads_user, DEM2DI_OPTIONAL, "- NULL"),
 };
 
 DEM2D_API dem2d_result dem2d_world_create(const dem2d_world_desc *desc, dem2d_world **world) {
@@ -11945,7 +11990,8 @@ DEM2D_API dem2d_result dem2d_world_create(const dem2d_world_desc *desc, dem2d_wo
     made->gather = desc->gather;
     made->commit = desc->commit;
     made->exchange_user = desc->exchange_user;
-    made->keeps_sums = desc->gather != NULL;
+    made->set_loads = desc->loads;
+    made->loads_user = desc->loads_user;
     made->skin_fixed = desc->skin > 0;
     made->skin = made->skin_fixed ? desc->skin : DEM2DI_SKIN_FIRST;
     made->interval = DEM2DI_INTERVAL_FIRST;
@@ -12546,6 +12592,12 @@ static dem2di_load dem2di_load_of(const dem2d_world *world, int slot) {
     return sum;
 }
 
+/* The external load of a particle. */
+static inline dem2di_load dem2di_external(const dem2d_world *world, int slot) {
+    const dem2di_load none = {{0, 0}, 0};
+    return world->loaded ? world->loads[slot] : none;
+}
+
 DEM2D_API dem2d_result dem2d_world_get_particle(const dem2d_world *world, dem2d_particle_id id,
                                                 dem2d_particle_info *info) {
     if (world == NULL || info == NULL) return DEM2D_NULL_ARGUMENT;
@@ -12569,6 +12621,9 @@ DEM2D_API dem2d_result dem2d_world_get_particle(const dem2d_world *world, dem2d_
     info->radius = now->radius;
     info->equivalent = dem2di_equivalent(world, slot);
     info->name = world->named ? world->names[slot] : 0;
+    load = dem2di_external(world, slot);
+    info->load = load.force;
+    info->load_torque = load.torque;
     return DEM2D_OK;
 }
 
@@ -12678,6 +12733,39 @@ DEM2D_API dem2d_result dem2d_world_drive_particle(dem2d_world *world, dem2d_part
     if (dem2di_outruns(world, slot)) world->check_due = true;
     if (dem2di_speeds_matter(world, slot)) dem2di_edited(world);
     dem2di_set_motion(world, slot, motion);
+    return DEM2D_OK;
+}
+
+/* Room for external loads, when the first comes. */
+static bool dem2di_loads_begin(dem2d_world *world) {
+    if (world->loaded) return true;
+    if (!dem2di_group_reserve(world, DEM2DI_LOADS, world->body_count)) return false;
+    memset(world->loads, 0, (size_t)world->body_count * sizeof *world->loads);
+    return world->loaded = true;
+}
+
+/* External loads up to this may be set without a look at the bounds of the motion: N/m and N. */
+#define DEM2DI_LOAD_SURE 1e20
+
+static double dem2di_load_size(const dem2di_load *load) {
+    return dem2di_size_of(load->force) + fabs(load->torque);
+}
+
+DEM2D_API dem2d_result dem2d_world_set_load(dem2d_world *world, dem2d_particle_id id,
+                                            dem2d_vec force, double torque) {
+    if (world == NULL) return DEM2D_NULL_ARGUMENT;
+    int slot = dem2di_slot(world, id);
+    if (slot < 0) return dem2di_stale(world, "particle", id.index);
+    dem2d_result result = dem2di_check_vec(&world->env, "force", force);
+    if (result == DEM2D_OK)
+        result = dem2di_check_number(&world->env, "torque", torque, DEM2DI_FINITE);
+    if (result != DEM2D_OK) return result;
+    if (!dem2di_loads_begin(world)) return dem2di_out_of_memory(world, "external loads");
+    world->loads[slot].force = force;
+    world->loads[slot].torque = torque;
+    bool turns = torque != 0 && !world->twisted;
+    world->twisted = world->twisted || turns;
+    if (turns || dem2di_load_size(&world->loads[slot]) > DEM2DI_LOAD_SURE) dem2di_edited(world);
     return DEM2D_OK;
 }
 
@@ -13491,7 +13579,7 @@ static dem2di_plan dem2di_plan_make(const dem2d_world *world) {
     plan.faces = plan.faces && world->law == NULL;
     plan.turns = plan.turns || !dem2di_has_disc_kernel(world, &plan);
     plan.turns = plan.turns || (world->plan.turns && bodies > 0);
-    plan.spin = plan.spin || plan.turns || plan.friction || world->keeps_sums;
+    plan.spin = plan.spin || plan.turns || plan.friction || world->gather != NULL || world->twisted;
     return plan;
 }
 
@@ -13757,9 +13845,11 @@ static void dem2di_displacement_task(void *context, int begin, int end) {
 static bool dem2di_bounded(const dem2d_world *world, const dem2di_plan *plan, int contacts) {
     double far = 0, size = 0, heavy = 0, light = 0, slender = 0, stiff = 0, ratio = 0, rolling = 0;
     double speed = DEM2DI_SPEED_SURE, spin = DEM2DI_TURN_SURE / world->time_step;
+    double load = world->loaded ? DEM2DI_LOAD_SURE : 0;
     bool circles = true;
     for (int i = 0; i < world->body_count; i++) {
         const dem2di_state *now = &world->now[i];
+        if (world->loaded) load = dem2di_max(load, dem2di_load_size(&world->loads[i]));
         far = dem2di_max(far, dem2di_size_of(now->x));
         speed = dem2di_max(speed, dem2di_size_of(now->v));
         spin = dem2di_max(spin, fabs(now->w));
@@ -13787,8 +13877,9 @@ static bool dem2di_bounded(const dem2d_world *world, const dem2di_plan *plan, in
            dashpot = 2 * ratio * sqrt(heavy * stiff);
     double force = (contacts + 1.0) * (stiff * depth + dashpot * closing); /* damping doubles */
     speed +=
-        2 * time * (dem2di_max(DEM2DI_SPEED_SURE, dem2di_size_of(world->gravity)) + force * light);
-    spin += 2 * time * (force * 2 * size * (1 + rolling) * slender);
+        2 * time *
+        (dem2di_max(DEM2DI_SPEED_SURE, dem2di_size_of(world->gravity)) + (force + load) * light);
+    spin += 2 * time * ((force * 2 * size * (1 + rolling) + load) * slender);
     bool known = plan->terms == 0 || (circles && world->law == NULL);
     return far + time * speed < 1e300 && force * heavy < 1e300 &&
            spin * world->time_step < 1e50 && /* its cube is finite */
@@ -14193,14 +14284,18 @@ static void dem2di_observe_particle(const dem2d_world *world, int slot, dem2di_l
     bool is_free = body->motion == DEM2D_FREE;
     dem2d_vec weight = dem2di_scale(world->gravity, mass);
     dem2d_vec drag = dem2di_scale(dem2di_sub(made->v, old->v), mass / world->time_step);
-    drag = dem2di_sub(dem2di_sub(drag, load.force), weight);
-    double brake = (made->w - old->w) * (inertia / world->time_step) - load.torque;
+    const dem2di_load external = dem2di_external(world, slot);
+    drag = dem2di_sub(dem2di_sub(drag, dem2di_add(load.force, external.force)), weight);
+    double brake = (made->w - old->w) * (inertia / world->time_step);
+    brake -= load.torque + external.torque;
     for (int k = 0; k < 2; k++) {
         dem2di_velocities half =
             k == 0 ? dem2di_velocities_made(world, slot) : dem2di_velocities_of(made);
         double pushed = dem2di_dot(load.force, half.v) + load.torque * half.w;
         if (is_free) {
             power[k][DEM2DI_GRAVITY] += dem2di_dot(weight, half.v);
+            power[k][DEM2DI_BY_LOADS] +=
+                dem2di_dot(external.force, half.v) + external.torque * half.w;
             power[k][DEM2DI_BY_DAMPING] -= dem2di_dot(drag, half.v) + brake * half.w;
         } else {
             power[k][DEM2DI_DRIVING] -= pushed;
@@ -14216,7 +14311,8 @@ static double dem2di_ledger_error(const dem2di_ledger *ledger) {
     const dem2di_stored *stored = &ledger->stored;
     return ledger->kinetic + stored->normal + stored->tangential + stored->rolling +
            sum[DEM2DI_BY_FRICTION] + sum[DEM2DI_BY_DASHPOTS] + sum[DEM2DI_BY_DAMPING] -
-           sum[DEM2DI_GRAVITY] - sum[DEM2DI_BY_WALLS] - sum[DEM2DI_DRIVING] - ledger->given;
+           sum[DEM2DI_GRAVITY] - sum[DEM2DI_BY_LOADS] - sum[DEM2DI_BY_WALLS] - sum[DEM2DI_DRIVING] -
+           ledger->given;
 }
 
 /* What has gone from account to account since `last`. */
@@ -15153,12 +15249,11 @@ static DEM2DI_INLINE dem2di_load dem2di_gather(const dem2d_world *world, int slo
     return sum;
 }
 
-/* Room for the sums, where these are kept. */
+/* Room for the sums that the caller may change. */
 static bool dem2di_sums_reserve(dem2d_world *world) {
-    if (!world->keeps_sums) return true;
-    if (!dem2di_group_reserve(world, DEM2DI_SUMS, world->body_count)) return false;
     return world->gather == NULL ||
-           (dem2di_group_reserve(world, DEM2DI_EXCHANGED, world->id_count) &&
+           (dem2di_group_reserve(world, DEM2DI_SUMS, world->body_count) &&
+            dem2di_group_reserve(world, DEM2DI_EXCHANGED, world->id_count) &&
             dem2di_group_reserve(world, DEM2DI_WALLS_EXCHANGED, world->wall_count));
 }
 
@@ -15195,28 +15290,34 @@ static void dem2di_exchange(dem2d_world *world) {
     }
 }
 
-/* The gather pass, where the sums are kept. */
+/* The gather pass, where the caller may change the sums. */
 static void dem2di_gather_pass(dem2d_world *world) {
-    if (!world->keeps_sums) return;
+    if (world->gather == NULL) return;
     dem2di_run(world, DEM2D_PHASE_MOTION, dem2di_blocks(world->body_count, DEM2DI_BLOCK),
                dem2di_gather_task, world);
-    if (world->gather != NULL) dem2di_exchange(world);
+    dem2di_exchange(world);
 }
 
-/* The sum that moves a particle. */
-static dem2di_load dem2di_sum_of(const dem2d_world *world, int slot) {
-    return world->keeps_sums ? world->sums[slot] : dem2di_gather(world, slot, world->plan.spin);
+/* The sum of the contact forces on a particle, as the caller has left it. */
+static DEM2DI_INLINE dem2di_load dem2di_sum_of(const dem2d_world *world, int slot, bool spin) {
+    return world->gather != NULL ? world->sums[slot] : dem2di_gather(world, slot, spin);
 }
 
-/* A particle a step later: by its sum, if the sums are kept, or it is found here. */
+/* A particle a step later. Pushed: there are external loads, or sums that the caller has left. */
 static DEM2DI_INLINE dem2di_state dem2di_integrate(const dem2d_world *world, int slot,
                                                    const dem2di_damping *damping, bool heavy,
-                                                   bool damped, bool spin, bool turns, bool kept) {
+                                                   bool damped, bool spin, bool turns,
+                                                   bool pushed) {
     const double time_step = world->time_step;
     const dem2di_inverse *inverse = &world->inverse[slot];
     dem2di_state next = world->now[slot];
     if (inverse->mass > 0) {
-        dem2di_load load = kept ? world->sums[slot] : dem2di_gather(world, slot, spin);
+        dem2di_load load =
+            pushed ? dem2di_sum_of(world, slot, spin) : dem2di_gather(world, slot, spin);
+        if (pushed && world->loaded) {
+            load.force = dem2di_add(load.force, world->loads[slot].force);
+            load.torque += world->loads[slot].torque;
+        }
         dem2d_vec a = dem2di_scale(load.force, inverse->mass);
         double turn = load.torque * inverse->inertia;
         if (heavy) a = dem2di_add(world->gravity, a);
@@ -15239,9 +15340,7 @@ static DEM2DI_INLINE dem2di_state dem2di_integrate(const dem2d_world *world, int
 static dem2di_state dem2di_foresee(const dem2d_world *world, int slot) {
     dem2di_damping damping =
         dem2di_damping_make(world->local_damping, world->global_damping, world->time_step);
-    if (world->keeps_sums)
-        return dem2di_integrate(world, slot, &damping, true, true, true, world->plan.turns, true);
-    return dem2di_integrate(world, slot, &damping, true, true, true, world->plan.turns, false);
+    return dem2di_integrate(world, slot, &damping, true, true, true, world->plan.turns, true);
 }
 
 /* --- servo walls --------------------------------------------------------------------------------
@@ -15461,12 +15560,13 @@ static bool dem2di_control_pass(dem2d_world *world) {
    force pass. Returns the greatest square of speed over skin. */
 static DEM2DI_INLINE double dem2di_integrate_range(dem2d_world *world, int begin, int end,
                                                    bool heavy, bool damped, bool spin, bool turns,
-                                                   bool kept) {
+                                                   bool pushed) {
     dem2di_damping damping =
         dem2di_damping_make(world->local_damping, world->global_damping, world->time_step);
     double most = 0;
     for (int i = begin; i < end; i++) {
-        dem2di_state next = dem2di_integrate(world, i, &damping, heavy, damped, spin, turns, kept);
+        dem2di_state next =
+            dem2di_integrate(world, i, &damping, heavy, damped, spin, turns, pushed);
         if (turns)
             world->next_displacement[i] = dem2di_displaced(
                 &next, world->lever[i], world->time_step, world->displacement[i] + world->rounding);
@@ -15484,13 +15584,18 @@ static double dem2di_integrate_block(dem2d_world *w, int b, int e) {
                              : dem2di_integrate_range(w, b, e, true, false, spin, turns, false) \
         : p->damped ? dem2di_integrate_range(w, b, e, false, true, spin, turns, false)          \
                  : dem2di_integrate_range(w, b, e, false, false, spin, turns, false))
-    if (w->keeps_sums) /* one loop for all: what is 0 changes no bit */
-        return p->turns ? dem2di_integrate_range(w, b, e, true, true, true, true, true)
-                        : dem2di_integrate_range(w, b, e, true, true, true, false, true);
+#define DEM2DI_INTEGRATE_PUSHED(spin, turns)                                    \
+    (p->damped ? dem2di_integrate_range(w, b, e, true, true, spin, turns, true) \
+               : dem2di_integrate_range(w, b, e, true, false, spin, turns, true))
+    if (w->loaded || w->gather != NULL)
+        return p->turns  ? DEM2DI_INTEGRATE_PUSHED(true, true)
+               : p->spin ? DEM2DI_INTEGRATE_PUSHED(true, false)
+                         : DEM2DI_INTEGRATE_PUSHED(false, false);
     if (p->turns) return DEM2DI_INTEGRATE(true, true);
     if (p->spin) return DEM2DI_INTEGRATE(true, false);
     return DEM2DI_INTEGRATE(false, false);
 #undef DEM2DI_INTEGRATE
+#undef DEM2DI_INTEGRATE_PUSHED
 }
 
 static void dem2di_integrate_task(void *context, int begin, int end) {
@@ -15522,7 +15627,7 @@ static void dem2di_observe_motion(dem2d_world *world, const dem2di_ledger *last)
     for (int place = 0; place < world->id_count; place++) {
         int slot = dem2di_slot_at(world, place);
         if (slot < 0) continue;
-        dem2di_load load = dem2di_sum_of(world, slot);
+        dem2di_load load = dem2di_sum_of(world, slot, world->plan.spin);
         dem2di_observe_particle(world, slot, load, power, &ledger->kinetic);
     }
     for (int place = 0; place < world->wall_count; place++) {
@@ -15548,12 +15653,14 @@ static void dem2di_observe_motion(dem2d_world *world, const dem2di_ledger *last)
 
 /* Is the next state of each particle finite if no load exceeds the greatest of this pass? */
 static bool dem2di_surely_finite(const dem2d_world *world, const dem2di_count *count) {
-    const double dt = world->time_step, load = count->load * (world->list.count + 1.0);
+    const double dt = world->time_step, pushed = count->load * (world->list.count + 1.0);
     double far = 0, speed = 0, spin = 0;
     if (count->unsound > world->count.unsound) return false;
     for (int i = 0; i < world->body_count; i++) {
         const dem2di_state *now = &world->now[i];
         const dem2di_inverse *inverse = &world->inverse[i];
+        const dem2di_load external = dem2di_external(world, i);
+        const double load = pushed + dem2di_load_size(&external);
         far = dem2di_max(far, fabs(now->x.x) + fabs(now->x.y));
         speed = dem2di_max(speed, fabs(now->v.x) + fabs(now->v.y) + dt * (load * inverse->mass));
         spin = dem2di_max(spin, fabs(now->w) + dt * (load * inverse->inertia));
@@ -15871,6 +15978,7 @@ typedef struct dem2di_trial {
 
 /* The passes that may be refused, up to the last check. */
 static dem2d_result dem2di_step_try(dem2d_world *world, dem2di_trial *trial) {
+    if (world->set_loads != NULL) world->set_loads(world->loads_user, world);
     dem2d_result result = dem2di_prepare(world, &trial->listed);
     if (result != DEM2D_OK) return result;
     world->list_stale = trial->listed; /* if the step fails, the next try builds a list as well */
@@ -15924,10 +16032,15 @@ DEM2D_API dem2d_result dem2d_world_step(dem2d_world *world, int count, int *done
     if (done != NULL) *done = 0;
     if (world == NULL) return DEM2D_NULL_ARGUMENT;
     dem2d_result result = dem2di_check_number(&world->env, "count", count, DEM2DI_COUNT);
+    if (world->stepping)
+        result = dem2di_fail(&world->env, DEM2D_IN_USE, -1, "step called by a callback of a step");
+    if (result != DEM2D_OK) return result;
+    world->stepping = true;
     for (int i = 0; i < count && result == DEM2D_OK; i++) {
         result = dem2di_step(world);
         if (done != NULL && result == DEM2D_OK) *done = i + 1;
     }
+    world->stepping = false;
     return result;
 }
 
@@ -16115,6 +16228,7 @@ DEM2D_API dem2d_result dem2d_world_ledger(const dem2d_world *world, dem2d_ledger
     ledger->given = own->given;
     ledger->closure = own->closure;
     ledger->turnover = own->turnover;
+    ledger->loads = own->sum[DEM2DI_BY_LOADS];
     return DEM2D_OK;
 }
 
@@ -16561,6 +16675,7 @@ DEM2D_API dem2d_result dem2d_world_equilibrium(const dem2d_world *world,
         if (world->bodies[slot].motion != DEM2D_FREE) continue;
         double mass = dem2di_body_mass(world, &world->bodies[slot]);
         dem2d_vec contacts = dem2di_load_of(world, slot).force;
+        contacts = dem2di_add(contacts, dem2di_external(world, slot).force);
         resultants += dem2di_length(dem2di_along(contacts, mass, world->gravity));
         unbound++;
     }
@@ -16778,6 +16893,7 @@ static int dem2di_rows(const void *object, const dem2di_column *column) {
     rows[DEM2DI_RANKS] = w->named ? w->id_count : 0;
     rows[DEM2DI_BODIES] = w->body_count;
     rows[DEM2DI_NAMES] = w->named ? w->body_count : 0;
+    rows[DEM2DI_LOADS] = w->loaded ? w->body_count : 0;
     rows[DEM2DI_DISPLACEMENTS] = w->plan.turns ? w->body_count : 0;
     rows[DEM2DI_MADE] = w->redirected ? w->body_count : 0;
     rows[DEM2DI_WALLS] = w->wall_count;
@@ -17535,6 +17651,9 @@ static void dem2di_finish_world(dem2di_loader *loader) {
     for (int a = 0; a < w->material_count; a++)
         for (int b = 0; b < a; b++) *dem2di_law(w, b, a) = *dem2di_law(w, a, b);
     dem2di_load_room(loader, dem2di_reserve_bodies(w, w->body_count));
+    for (int i = 0; i < w->body_count && w->loaded; i++)
+        w->twisted = w->twisted || w->loads[i].torque != 0;
+    if ((w->twisted || w->gather != NULL) && !w->plan.spin) w->plan_due = 2;
     dem2di_finish_shapes(loader);
     for (int i = 0; i < w->body_count && dem2di_load_good(loader); i++)
         dem2di_finish_body(loader, i);
@@ -17633,6 +17752,8 @@ static dem2d_result dem2di_source_load(const dem2di_source *source, dem2d_world 
     empty.gather = desc->gather;
     empty.commit = desc->commit;
     empty.exchange_user = desc->exchange_user;
+    empty.loads = desc->loads;
+    empty.loads_user = desc->loads_user;
     memset(&loader, 0, sizeof loader);
     dem2d_result result = dem2d_world_create(&empty, &loader.world);
     if (result != DEM2D_OK) return result;
@@ -18376,7 +18497,7 @@ typedef struct dem2di_csv_column {
 } dem2di_csv_column;
 
 /* Room for the columns of a world: 18, and 11 of its ledger. */
-#define DEM2DI_CSV_COLUMNS 29
+#define DEM2DI_CSV_COLUMNS 30
 
 /* The columns of a world, with those of its ledger if it keeps one. Returns their number. */
 static int dem2di_csv_columns(const dem2d_world *world,
@@ -18417,6 +18538,7 @@ static int dem2di_csv_columns(const dem2d_world *world,
         {"ledger_gravity", l.gravity},
         {"ledger_walls", l.walls},
         {"ledger_driven", l.driven},
+        {"ledger_loads", l.loads},
         {"ledger_friction", l.friction},
         {"ledger_dashpot", l.dashpot},
         {"ledger_damping", l.damping},
@@ -18494,6 +18616,8 @@ DEM2D_API dem2d_result dem2d_world_write_csv(const dem2d_world *world, const dem
             friction or a law: these are refused by the names of their arrays.
             A tangential spring of one contact point is shared out to two by the forces of their
             normal springs, without dashpots.
+            External loads: dem2d_world_set_load, or dem2d_world_desc.loads once a step; their work
+            is dem2d_ledger.loads and a column of histories.
             Several processes: dem2d_world_desc.gather may change the sums of the contact forces in
             each step, commit may refuse a step.
             Particles and walls may have a name of 64 bits, which orders pairs and sums in place of

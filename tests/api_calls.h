@@ -761,6 +761,9 @@ typedef struct function {
       PLAIN, ARG(x, "restitution", PORTION), OUT)                                                 \
     F(world_add_segment, dem2d_world_add_wall(v->world, v->desc, v->out),                         \
       DESCRIBED(SEGMENT, with_segment), IN_WORLD, THE_DESC, OUT)                                  \
+    F(world_set_load, dem2d_world_set_load(v->world, v->particle, v->vector, v->x),               \
+      LOGS, IN_WORLD, ARG(particle, "particle", PARTICLE_ID), ARG(vector, "force", VECTOR),       \
+      ARG(x, "torque", FINITE))                                                                   \
     F(world_set_segment, dem2d_world_set_wall(v->world, v->wall, v->desc),                        \
       DESCRIBED(SEGMENT, with_segment), IN_WORLD, ARG(wall, "wall", WALL_ID), THE_DESC)
 /* clang-format on */

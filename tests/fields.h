@@ -56,6 +56,8 @@ static const dem2di_field load_fields[] = {
     DEM2DI_ROW(dem2d_load_desc, gather, DEM2DI_OPTIONAL, "- NULL"),
     DEM2DI_ROW(dem2d_load_desc, commit, DEM2DI_OPTIONAL, "- NULL"),
     DEM2DI_ROW(dem2d_load_desc, exchange_user, DEM2DI_OPTIONAL, "- NULL"),
+    DEM2DI_ROW(dem2d_load_desc, loads, DEM2DI_OPTIONAL, "- NULL"),
+    DEM2DI_ROW(dem2d_load_desc, loads_user, DEM2DI_OPTIONAL, "- NULL"),
 };
 
 bool fields_get(int number, field_row *row) {
