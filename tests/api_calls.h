@@ -72,6 +72,7 @@ enum {
     PVD,
     CSV,
     SEGMENT, /* dem2d_wall_desc once more */
+    QUERY,
     DESCS
 };
 
@@ -331,6 +332,7 @@ typedef struct args {
         dem2d_pvd_desc pvd;
         dem2d_csv_desc csv;
         dem2d_stress stress;
+        dem2d_query_desc query;
     } d;
     dem2d_box box;
     const char *names[NAMED];
@@ -558,6 +560,12 @@ static void free_world(args *v) {
     ARG(shape, "a", POINTER), ARG(other, "b", POINTER), ARG(pose, "pose", POSE), \
         ARG(pose_b, "pose", POSE), ARG(desc, "desc", OPTIONAL), OUT
 
+#define CAPACITY ARG_INT(count, "capacity", 0, INT_MAX, OUT_OF_RANGE)
+#define FOUND ARG(desc, "desc", OPTIONAL), OUT, CAPACITY, SECOND
+#define RAY                                                                \
+    ARG(vector, "origin", VECTOR), ARG(direction, "direction", DIRECTION), \
+        ARG(x, "length", NOT_NEGATIVE)
+
 #define NAMES(kind, text, numbers)                                                                 \
     ARG(names[0], text, kind), ARG(names[NAMED - 1], text, kind), ARG(values[0], numbers, FINITE), \
         ARG(values[NAMED - 1], numbers, FINITE)
@@ -718,9 +726,9 @@ typedef struct function {
       ARG(third, "done", OPTIONAL))                                                               \
     F(world_stats, dem2d_world_stats(v->world, v->out), LOGS, IN_WORLD, OUT)                      \
     F(world_particles, dem2d_world_particles(v->world, v->out, v->count, v->second),              \
-      LOGS, IN_WORLD, OUT, ARG_INT(count, "capacity", 0, INT_MAX, OUT_OF_RANGE), SECOND)          \
+      LOGS, IN_WORLD, OUT, CAPACITY, SECOND)          \
     F(world_contacts, dem2d_world_contacts(v->world, v->out, v->count, v->second),                \
-      LOGS, IN_WORLD, OUT, ARG_INT(count, "capacity", 0, INT_MAX, OUT_OF_RANGE), SECOND)          \
+      LOGS, IN_WORLD, OUT, CAPACITY, SECOND)          \
     F(world_energy, dem2d_world_energy(v->world, v->out), LOGS, IN_WORLD, OUT)                    \
     F(world_stress, dem2d_world_stress(v->world, v->x, v->out),                                   \
       LOGS, IN_WORLD, ARG(x, "area", POSITIVE), OUT)                                              \
@@ -765,7 +773,31 @@ typedef struct function {
       LOGS, IN_WORLD, ARG(particle, "particle", PARTICLE_ID), ARG(vector, "force", VECTOR),       \
       ARG(x, "torque", FINITE))                                                                   \
     F(world_set_segment, dem2d_world_set_wall(v->world, v->wall, v->desc),                        \
-      DESCRIBED(SEGMENT, with_segment), IN_WORLD, ARG(wall, "wall", WALL_ID), THE_DESC)
+      DESCRIBED(SEGMENT, with_segment), IN_WORLD, ARG(wall, "wall", WALL_ID), THE_DESC)           \
+    F(world_query_box,                                                                            \
+      dem2d_world_query_box(v->world, v->region, v->desc, v->out, v->count, v->second),           \
+      DESCRIBED(QUERY, with_nothing), IN_WORLD, ARG(region, "box", POINTER),                      \
+      ARG(box.lower, "box", VECTOR), ARG(box.upper, "box", VECTOR), FOUND)                        \
+    F(world_query_point,                                                                          \
+      dem2d_world_query_point(v->world, v->vector, v->desc, v->out, v->count, v->second),         \
+      DESCRIBED(QUERY, with_nothing), IN_WORLD, ARG(vector, "point", VECTOR), FOUND)              \
+    F(world_query_shape,                                                                          \
+      dem2d_world_query_shape(v->world, v->shape, v->pose, v->desc, v->out, v->count, v->second), \
+      DESCRIBED(QUERY, with_nothing), IN_WORLD, ARG(shape, "shape", POINTER),                     \
+      ARG(pose, "pose", POSE), FOUND)                                                             \
+    F(world_cast_ray,                                                                             \
+      dem2d_world_cast_ray(v->world, v->vector, v->direction, v->x, v->desc, v->out),             \
+      DESCRIBED(QUERY, with_nothing), IN_WORLD, RAY, ARG(desc, "desc", OPTIONAL), OUT)            \
+    F(world_cast_ray_all,                                                                         \
+      dem2d_world_cast_ray_all(v->world, v->vector, v->direction, v->x, v->desc, v->out, v->count,\
+                               v->second),                                                        \
+      DESCRIBED(QUERY, with_nothing), IN_WORLD, RAY, FOUND)                                       \
+    F(world_nearest, dem2d_world_nearest(v->world, v->vector, v->x, v->desc, v->out),             \
+      DESCRIBED(QUERY, with_nothing), IN_WORLD, ARG(vector, "point", VECTOR),                     \
+      ARG(x, "range", NOT_NEGATIVE), ARG(desc, "desc", OPTIONAL), OUT)                            \
+    F(world_particle_contacts,                                                                    \
+      dem2d_world_particle_contacts(v->world, v->particle, v->out, v->count, v->second),          \
+      LOGS, IN_WORLD, ARG(particle, "particle", PARTICLE_ID), OUT, CAPACITY, SECOND)
 /* clang-format on */
 
 #define FUNCTION_CALL(name, expression, ...)   \

@@ -42,6 +42,10 @@ static const dem2di_field save_fields[] = {
     DEM2DI_ROW(dem2d_save_desc, write, DEM2DI_OPTIONAL, "- none; or a path, not both"),
     DEM2DI_ROW(dem2d_save_desc, user, DEM2DI_OPTIONAL, "- NULL"),
 };
+static const dem2di_field query_fields[] = {
+    DEM2DI_ROW(dem2d_query_desc, skip_particles, DEM2DI_SWITCH, "- false"),
+    DEM2DI_ROW(dem2d_query_desc, skip_walls, DEM2DI_SWITCH, "- false"),
+};
 static const dem2di_field load_fields[] = {
     DEM2DI_ROW(dem2d_load_desc, read, DEM2DI_OPTIONAL, "- none; or a path, not both"),
     DEM2DI_ROW(dem2d_load_desc, user, DEM2DI_OPTIONAL, "- NULL"),
@@ -79,6 +83,7 @@ bool fields_get(int number, field_row *row) {
         {"dem2d_pair_desc", DEM2DI_ALL(dem2di_pair_fields)},
         {"dem2d_particle_desc", DEM2DI_ALL(dem2di_particle_fields)},
         {"dem2d_wall_desc", DEM2DI_ALL(dem2di_wall_fields)},
+        {"dem2d_query_desc", DEM2DI_ALL(query_fields)},
         {"dem2d_save_desc", DEM2DI_ALL(save_fields)},
         {"dem2d_load_desc", DEM2DI_ALL(load_fields)},
         {"dem2d_svg_desc", DEM2DI_ALL(dem2di_svg_fields)},
