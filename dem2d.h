@@ -12506,8 +12506,10 @@ static dem2d_pose dem2di_pose_of(const dem2d_world *world, const dem2di_state *s
     return pose;
 }
 
+/* Radius of the circle of equal area. */
 static double dem2di_equivalent(const dem2d_world *world, int slot) {
     const dem2di_body *body = &world->bodies[slot];
+    if (dem2di_shape_of(world, body)->type == DEM2D_CIRCLE) return world->now[slot].radius;
     return body->scale * sqrt(dem2di_shape_of(world, body)->mass.area / DEM2DI_PI);
 }
 
@@ -13635,7 +13637,7 @@ typedef struct dem2di_build {
 
 /* Do two circles take the kernel of circles? It knows friction and the closed form, and no more. */
 static bool dem2di_has_disc_kernel(const dem2d_world *world, const dem2di_plan *plan) {
-    return world->solver == DEM2D_CERTIFIED && plan->terms == 0;
+    return world->solver == DEM2D_CERTIFIED && !(plan->terms & DEM2DI_CALLERS_LAW);
 }
 
 /* Terms of the law for two materials, beside springs and friction. */
@@ -13684,6 +13686,7 @@ static dem2di_plan dem2di_plan_make(const dem2d_world *world) {
     plan.turns = plan.turns || !dem2di_has_disc_kernel(world, &plan);
     plan.turns = plan.turns || (world->plan.turns && bodies > 0);
     plan.spin = plan.spin || plan.turns || plan.friction || world->gather != NULL || world->twisted;
+    plan.spin = plan.spin || (plan.terms & DEM2DI_ROLLING);
     return plan;
 }
 
@@ -13860,8 +13863,7 @@ static void dem2di_carry_over(const dem2di_build *build, int discs, int count) {
     }
 }
 
-/* What else changes for contacts that are not of two circles: separation bounds count from here,
-   and those that were of circles get their arms. */
+/* Separation bounds of pairs count from here. */
 static void dem2di_carry_others(const dem2di_build *build, int discs, int pairs) {
     dem2d_world *world = build->world;
     const dem2di_contacts *contacts = &world->list.contacts;
@@ -13870,10 +13872,6 @@ static void dem2di_carry_others(const dem2di_build *build, int discs, int pairs)
         if (world->plan.turns)
             contacts->history[i - discs].bound -=
                 world->displacement[key->a] + world->displacement[key->b];
-        if (build->old[i] < 0 || build->old[i] >= world->list.discs) continue;
-        dem2di_arms *arms = &contacts->arms[i - discs];
-        arms->a_n = world->now[key->a].radius - contacts->depth[i] / 2;
-        arms->b_n = -(world->now[key->b].radius - contacts->depth[i] / 2);
     }
 }
 
@@ -14444,13 +14442,16 @@ typedef struct dem2di_batch {
     double vx[DEM2DI_BATCH], vy[DEM2DI_BATCH]; /* of B against A */
     double wa[DEM2DI_BATCH], wb[DEM2DI_BATCH];
     double kn[DEM2DI_BATCH], kt[DEM2DI_BATCH], mu[DEM2DI_BATCH];
+    double inverse[DEM2DI_BATCH]; /* 1/m, reduced */
+    double zeta[DEM2DI_BATCH], mu_r[DEM2DI_BATCH];
     double normal_x[DEM2DI_BATCH], normal_y[DEM2DI_BATCH]; /* the last contact, then the next */
-    double depth[DEM2DI_BATCH], force[DEM2DI_BATCH], shear[DEM2DI_BATCH];
+    double depth[DEM2DI_BATCH], force[DEM2DI_BATCH], shear[DEM2DI_BATCH], moment[DEM2DI_BATCH];
     double load_x[DEM2DI_BATCH], load_y[DEM2DI_BATCH], load_a[DEM2DI_BATCH], load_b[DEM2DI_BATCH];
 } dem2di_batch;
 
 static DEM2DI_INLINE void dem2di_batch_fetch(const dem2d_world *world, int first, int count,
-                                             bool friction, bool laws, dem2di_batch *batch) {
+                                             bool friction, int terms, bool one_law,
+                                             dem2di_batch *batch) {
     const dem2di_key *keys = world->list.keys + first;
     for (int k = 0; k < count; k++) {
         const dem2di_state *a = &world->now[keys[k].a], *b = &world->now[keys[k].b];
@@ -14461,11 +14462,15 @@ static DEM2DI_INLINE void dem2di_batch_fetch(const dem2d_world *world, int first
         batch->dy[k] = d.y;
         batch->radius_a[k] = a->radius;
         batch->radius_b[k] = b->radius;
-        if (laws) {
+        if (terms)
+            batch->inverse[k] = world->inverse[keys[k].a].mass + world->inverse[keys[k].b].mass;
+        if (!one_law) {
             const dem2d_pair_desc *law = dem2di_law_of(world, first + k);
             batch->kn[k] = law->normal_stiffness;
             batch->kt[k] = law->tangential_stiffness;
             batch->mu[k] = law->friction;
+            batch->zeta[k] = law->damping_ratio;
+            batch->mu_r[k] = law->rolling_friction;
         }
         if (!friction) continue;
         batch->vx[k] = b->v.x - a->v.x;
@@ -14504,29 +14509,47 @@ static DEM2DI_INLINE double dem2di_batch_slip(const dem2di_batch *batch, int k,
     return slip + (before - slip) * (closed / 2);
 }
 
-/* [F] eq. 8-10 for all of a batch, the next contacts over the last. */
+/* The law of two circles, as dem2di_law_points and dem2di_law_rolling, for all of a batch: the next
+   contacts over the last. Where two are apart the force is 0, and with it all that it limits. */
 static DEM2DI_INLINE void dem2di_batch_loop(dem2di_batch *batch, int count, double time_step,
-                                            const dem2d_pair_desc *law, bool friction,
+                                            const dem2d_pair_desc *law, bool friction, int terms,
                                             bool one_law) {
     for (int k = 0; k < count; k++) {
-        double kn = one_law ? law->normal_stiffness : batch->kn[k];
-        double kt = one_law ? law->tangential_stiffness : batch->kt[k];
-        double mu = one_law ? law->friction : batch->mu[k];
+        const double kn = one_law ? law->normal_stiffness : batch->kn[k];
+        const double kt = one_law ? law->tangential_stiffness : batch->kt[k];
+        const double mu = one_law ? law->friction : batch->mu[k];
         dem2d_vec d;
         d.x = batch->dx[k];
         d.y = batch->dy[k];
         dem2di_round r = dem2di_round_make(d, batch->radius_a[k], batch->radius_b[k], kn);
+        if (terms & DEM2DI_DASHPOT) {
+            double zeta = one_law ? law->damping_ratio : batch->zeta[k];
+            double approach = -(r.normal.x * batch->vx[k] + r.normal.y * batch->vy[k]);
+            double dashpot = 2 * zeta * sqrt(1 / batch->inverse[k] * kn);
+            double damped = dem2di_damped(r.force, dashpot, approach);
+            r.force = r.depth > 0 ? damped : 0;
+        }
         double x = r.normal.x * r.force, y = r.normal.y * r.force;
         if (friction) {
             double slip = dem2di_batch_slip(batch, k, &r);
-            double limit = mu * r.force, spring = batch->shear[k] - kt * slip * time_step;
-            spring = limit < spring ? limit : spring;
-            spring = -limit > spring ? -limit : spring;
+            double spring = batch->shear[k] - kt * slip * time_step;
+            spring = dem2di_held(mu * r.force, spring);
             x -= r.normal.y * spring;
             y += r.normal.x * spring;
             batch->shear[k] = spring;
             batch->load_a[k] = -(r.arm_a * spring);
             batch->load_b[k] = -(r.arm_b * spring);
+        }
+        if (terms & DEM2DI_ROLLING) {
+            double radius_a = batch->radius_a[k], radius_b = batch->radius_b[k];
+            double radius = radius_a * (radius_b / (radius_a + radius_b));
+            double limit = (one_law ? law->rolling_friction : batch->mu_r[k]) * radius * r.force;
+            double spin = batch->wb[k] - batch->wa[k];
+            double moment = batch->moment[k] - kt * radius * radius * spin * time_step;
+            moment = r.depth > 0 ? dem2di_held(limit, moment) : 0;
+            batch->moment[k] = moment;
+            batch->load_a[k] -= moment;
+            batch->load_b[k] += moment;
         }
         batch->normal_x[k] = r.normal.x;
         batch->normal_y[k] = r.normal.y;
@@ -14537,34 +14560,39 @@ static DEM2DI_INLINE void dem2di_batch_loop(dem2di_batch *batch, int count, doub
     }
 }
 
+/* What the scene has, as constants: to(friction, terms) for pairs of circles. Terms are taken with
+   friction, and rolling with dashpots, which may be 0. */
+#define DEM2DI_BATCH_CASES(plan, to)                                                   \
+    ((plan)->terms == 0                ? (plan)->friction ? to(true, 0) : to(false, 0) \
+                    : (plan)->terms == DEM2DI_DASHPOT ? to(true, DEM2DI_DASHPOT)       \
+                                       : to(true, DEM2DI_DASHPOT | DEM2DI_ROLLING))
+
 /* The loop for what the scene has. */
 static void dem2di_batch_solve(dem2di_batch *batch, int count, double time_step,
                                const dem2d_pair_desc *law, const dem2di_plan *plan) {
-    if (plan->friction && plan->one_law)
-        dem2di_batch_loop(batch, count, time_step, law, true, true);
-    else if (plan->friction)
-        dem2di_batch_loop(batch, count, time_step, law, true, false);
-    else if (plan->one_law)
-        dem2di_batch_loop(batch, count, time_step, law, false, true);
-    else
-        dem2di_batch_loop(batch, count, time_step, law, false, false);
+#define DEM2DI_SOLVE(friction, terms)                                                       \
+    (plan->one_law ? dem2di_batch_loop(batch, count, time_step, law, friction, terms, true) \
+                   : dem2di_batch_loop(batch, count, time_step, law, friction, terms, false))
+    DEM2DI_BATCH_CASES(plan, DEM2DI_SOLVE);
+#undef DEM2DI_SOLVE
 }
 DEM2DI_VECTORS_END
 
 /* The last contacts of a batch from the columns. */
 static DEM2DI_INLINE void dem2di_batch_get(const dem2d_world *world, int first, int count,
-                                           dem2di_batch *batch) {
+                                           int terms, dem2di_batch *batch) {
     const dem2di_contacts *from = &world->list.contacts;
     const size_t bytes = (size_t)count * sizeof(double);
     memcpy(batch->normal_x, from->normal_x + first, bytes);
     memcpy(batch->normal_y, from->normal_y + first, bytes);
     memcpy(batch->depth, from->depth + first, bytes);
     memcpy(batch->shear, from->shear + first, bytes);
+    if (terms & DEM2DI_ROLLING) memcpy(batch->moment, from->moment + first, bytes);
 }
 
 /* The next contacts and their loads into the columns. */
 static DEM2DI_INLINE void dem2di_batch_put(dem2d_world *world, int first, int count, bool friction,
-                                           const dem2di_batch *batch) {
+                                           int terms, const dem2di_batch *batch) {
     const dem2di_contacts *to = &world->list.contacts;
     const size_t bytes = (size_t)count * sizeof(double);
     memcpy(to->normal_x + first, batch->normal_x, bytes);
@@ -14580,40 +14608,48 @@ static DEM2DI_INLINE void dem2di_batch_put(dem2d_world *world, int first, int co
     memcpy(to->shear + first, batch->shear, bytes);
     memcpy(world->load_a + first, batch->load_a, bytes);
     memcpy(world->load_b + first, batch->load_b, bytes);
+    if (terms & DEM2DI_ROLLING) memcpy(to->moment + first, batch->moment, bytes);
 }
 
-/* Returns how many are closed. */
-static DEM2DI_INLINE int dem2di_disc_batch(dem2d_world *world, int first, int count, bool friction,
-                                           bool one_law) {
+/* Loads that are not finite, and the greatest. */
+static void dem2di_batch_check(const dem2di_batch *batch, int n, bool friction,
+                               dem2di_count *count) {
+    for (int k = 0; k < n; k++) {
+        double sum = fabs(batch->load_x[k]) + fabs(batch->load_y[k]);
+        if (friction) sum += fabs(batch->load_a[k]) + fabs(batch->load_b[k]);
+        count->unsound += !dem2di_finite(sum);
+        count->load = dem2di_max(count->load, sum);
+    }
+}
+
+static DEM2DI_INLINE void dem2di_disc_batch(dem2d_world *world, int first, int n, bool friction,
+                                            int terms, bool one_law, dem2di_count *count) {
+    const dem2di_plan *plan = &world->plan;
     dem2di_batch batch;
     int closed = 0;
-    if (friction) dem2di_batch_get(world, first, count, &batch);
-    dem2di_batch_fetch(world, first, count, friction, !one_law, &batch);
-    if (friction && world->redirected) dem2di_batch_made(world, first, count, &batch);
-    if (world->immovable) dem2di_batch_hold(world, first, count, &batch);
-    dem2di_batch_solve(&batch, count, world->made_step,
-                       dem2di_law(world, world->plan.material, world->plan.material), &world->plan);
-    dem2di_batch_put(world, first, count, friction, &batch);
-    for (int k = 0; k < count; k++) closed += batch.depth[k] > 0;
-    return closed;
+    if (friction) dem2di_batch_get(world, first, n, terms & plan->terms, &batch);
+    dem2di_batch_fetch(world, first, n, friction, terms, one_law, &batch);
+    if (friction && world->redirected) dem2di_batch_made(world, first, n, &batch);
+    if (world->immovable) dem2di_batch_hold(world, first, n, &batch);
+    dem2di_batch_solve(&batch, n, world->made_step,
+                       dem2di_law(world, plan->material, plan->material), plan);
+    dem2di_batch_put(world, first, n, friction, terms & plan->terms, &batch);
+    if (!world->bounded) dem2di_batch_check(&batch, n, friction, count);
+    for (int k = 0; k < n; k++) closed += batch.depth[k] > 0;
+    count->collisions += closed;
+    count->proofs[DEM2D_BY_FORM] += closed;
 }
 
 static void dem2di_disc_range(dem2d_world *world, int begin, int end, dem2di_count *count) {
     const dem2di_plan *plan = &world->plan;
-    int closed = 0;
     for (int first = begin; first < end; first += DEM2DI_BATCH) {
         int n = dem2di_block_end(first, DEM2DI_BATCH, end) - first;
-        if (plan->friction && plan->one_law)
-            closed += dem2di_disc_batch(world, first, n, true, true);
-        else if (plan->friction)
-            closed += dem2di_disc_batch(world, first, n, true, false);
-        else if (plan->one_law)
-            closed += dem2di_disc_batch(world, first, n, false, true);
-        else
-            closed += dem2di_disc_batch(world, first, n, false, false);
+#define DEM2DI_DISCS_OF(friction, terms)                                              \
+    (plan->one_law ? dem2di_disc_batch(world, first, n, friction, terms, true, count) \
+                   : dem2di_disc_batch(world, first, n, friction, terms, false, count))
+        DEM2DI_BATCH_CASES(plan, DEM2DI_DISCS_OF);
+#undef DEM2DI_DISCS_OF
     }
-    count->collisions += closed;
-    count->proofs[DEM2D_BY_FORM] += closed;
 }
 
 /* Part of a gap that proves nothing: nearer to each other than this (m), two shapes may be found in
@@ -19558,6 +19594,8 @@ DEM2D_API dem2d_result dem2d_world_write_csv(const dem2d_world *world, const dem
    CHANGES
      0.7.0  Snapshots stay of version 4: those of 0.6.0 are read, unless they have dashpots, rolling
             friction or a law: these are refused by the names of their arrays.
+            Circles with dashpots and rolling friction are nearly as fast as those without. A step
+            that would give circles a state that is not finite is refused.
             A tangential spring of one contact point is shared out to two by the forces of their
             normal springs, without dashpots.
             External loads: dem2d_world_set_load, or dem2d_world_desc.loads once a step; their work

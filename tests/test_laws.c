@@ -502,6 +502,23 @@ static void test_circles_two_ways(void **state) {
     for (int k = 0; k < 2; k++) dem2d_world_destroy(s[k].world);
 }
 
+/* Two circles with a spring so stiff that the step would throw them to infinity: it is refused. */
+static void test_infinite_circles(void **state) {
+    (void)state;
+    for (int i = 0; i < 2; i++) {
+        dem2d_world_desc desc = {0};
+        dem2d_material_desc material = stone_desc(0, 0);
+        material.normal_stiffness = 1e304, material.density = 1e-5, material.damping_ratio = i;
+        desc.time_step = 1, desc.skip_time_step_check = true;
+        scene s = make_scene(desc, material);
+        add_free(&s, make_disc(1), vec(0, 0), 0, vec(0, 0), 0);
+        const dem2d_particle_id id = add_free(&s, make_disc(1), vec(1, 0), 0, vec(0, 0), 0);
+        assert_result(dem2d_world_step(s.world, 1, NULL), DEM2D_STATE);
+        assert_true(grain_of(&s, id).pose.position.x == 1 && grain_of(&s, id).velocity.x == 0);
+        dem2d_world_destroy(s.world);
+    }
+}
+
 int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(test_damping_ratio),    cmocka_unit_test(test_restitution),
@@ -509,7 +526,7 @@ int main(void) {
         cmocka_unit_test(test_tension),          cmocka_unit_test(test_ledger_order),
         cmocka_unit_test(test_ledger_closes),    cmocka_unit_test(test_ledger_edits),
         cmocka_unit_test(test_law_changes),      cmocka_unit_test(test_damped_time_step),
-        cmocka_unit_test(test_circles_two_ways),
+        cmocka_unit_test(test_circles_two_ways), cmocka_unit_test(test_infinite_circles),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }
