@@ -388,124 +388,11 @@ leaves it open)
         corrected: eq. 9 caps one sign; here -mu F_n <= F_t <= mu F_n. Chosen: the step's sliding
         velocity, see Sliding. Beyond: dashpots, rolling friction (eq. 10: none), your own law.
 
-OPTIONS (zero means: physical zero for physical fields; "library default" where one is given; fields
-that are not listed are 0, false or NULL by default and may have any value)
-    struct                  field                 unit   default    range
-    dem2d_env               user                  -      NULL       handed to the callbacks
-    dem2d_env               allocate              -      malloc     with release, else not used
-    dem2d_env               release               -      free       with allocate, else not used
-    dem2d_env               log                   -      silent
-    dem2d_custom_desc       support               -      none       required
-    dem2d_custom_desc       rho_min               m      0          >= 0
-    dem2d_custom_desc       inscribed             m      0          >= 0
-    dem2d_custom_desc       mass.area             m2     computed   >= 0, 0: from outline_points
-    dem2d_custom_desc       mass.centroid         m      computed   finite
-    dem2d_custom_desc       mass.polar_moment     m4     computed   >= 0, > 0 with an area
-    dem2d_custom_desc       outline_points        -      1000       0 or >= 3
-    dem2d_reduction_desc    test                  -      SUFFICIENT
-    dem2d_reduction_desc    factor                -      0.9        0 or in (0, 1)
-    dem2d_reduction_desc    tolerance             -      1e-6       >= 0, relative to a0
-    dem2d_image_desc        pixels                -      none       required, or pixels16
-    dem2d_image_desc        pixels16              -      none       not with pixels
-    dem2d_image_desc        width                 px     none       1 to 32768
-    dem2d_image_desc        height                px     none       1 to 32768
-    dem2d_image_desc        stride                -      width      >= 0, not below the width
-    dem2d_image_desc        crop_left             px     0          >= 0, below the width
-    dem2d_image_desc        crop_top              px     0          >= 0, below the height
-    dem2d_image_desc        crop_width            px     the rest   >= 0, within the width
-    dem2d_image_desc        crop_height           px     the rest   >= 0, within the height
-    dem2d_image_desc        labels                -      false      without the next three
-    dem2d_image_desc        threshold             -      Otsu       0 to 65535, to 255 for pixels
-    dem2d_image_desc        ignore_frame          -      false      without a threshold
-    dem2d_image_desc        min_pixels            -      16         >= 0
-    dem2d_image_desc        max_pixels            -      no limit   >= 0
-    dem2d_image_desc        scale                 m/px   none       > 0
-    dem2d_fit_desc          count                 -      coverage   0 to 1024, 3 for polygon, bezier
-    dem2d_fit_desc          coverage              -      none       >= 0, in (0, 1) if count is 0
-    dem2d_fit_desc          model                 -      CIRCLE     not CUSTOM
-    dem2d_fit_desc          method                -      DEFAULT    of the model
-    dem2d_fit_desc          scale                 -      HULL
-    dem2d_fit_desc          min_radius            -      0.1        in [0, 1), of a0/2
-    dem2d_fit_desc          max_radius            -      20         0 or >= 1, of the size
-    dem2d_fit_desc          birds                 -      30         0 or 2 to 256
-    dem2d_fit_desc          moves                 -      60         0 to 100000
-    dem2d_fit_desc          pixels                px     256        0 or 8 to 4096
-    dem2d_virtual_desc      radius                m      none       > 0
-    dem2d_virtual_desc      elongation            -      0          >= 0
-    dem2d_virtual_desc      roundness             -      0          >= 0
-    dem2d_virtual_desc      roughness             -      0          >= 0
-    dem2d_virtual_desc      spectrum              -      NULL       order + 1 values >= 0
-    dem2d_virtual_desc      min_radius            -      0.1        in [0, 1), of a0/2
-    dem2d_contact_desc      tolerance             -      1e-10      >= 0, of R_A + R_B + |d|
-    dem2d_contact_desc      max_iterations        -      128        >= 0
-    dem2d_contact_desc      start                 -      centres    finite, any direction
-    dem2d_contact_desc      solver                -      CERTIFIED
-    dem2d_world_desc        time_step             s      none       > 0
-    dem2d_world_desc        gravity               m/s2   0          finite
-    dem2d_world_desc        local_damping         -      0          in [0, 1)
-    dem2d_world_desc        global_damping        1/s    0          >= 0
-    dem2d_world_desc        skin                  -      by itself  >= 0, of the particle radius
-    dem2d_world_desc        contact_tolerance     -      1e-8       >= 0, of R_A + R_B + |d|
-    dem2d_world_desc        max_iterations        -      128        0 to 1073741824
-    dem2d_world_desc        solver                -      CERTIFIED
-    dem2d_world_desc        faces                 -      TWO_POINTS
-    dem2d_world_desc        particle_capacity     -      grows      0 to 1073741824
-    dem2d_world_desc        pair_capacity         -      grows      0 to 1073741824
-    dem2d_world_desc        law                   -      NULL       springs and friction
-    dem2d_world_desc        parallel_for          -      NULL       one thread does all
-    dem2d_world_desc        env                   -      NULL       copied
-    dem2d_material_desc     density               kg/m2  none       > 0, walls ignore it
-    dem2d_material_desc     normal_stiffness      N/m    none       > 0
-    dem2d_material_desc     tangential_stiffness  N/m    0          >= 0
-    dem2d_material_desc     friction              -      0          >= 0
-    dem2d_material_desc     damping_ratio         -      0          >= 0
-    dem2d_material_desc     rolling_friction      -      0          >= 0
-    dem2d_pair_desc         normal_stiffness      N/m    none       > 0
-    dem2d_pair_desc         tangential_stiffness  N/m    0          >= 0
-    dem2d_pair_desc         friction              -      0          >= 0
-    dem2d_pair_desc         damping_ratio         -      0          >= 0
-    dem2d_pair_desc         rolling_friction      -      0          >= 0
-    dem2d_particle_desc     scale                 -      none       > 0
-    dem2d_particle_desc     shape                 -      none       a shape of this world
-    dem2d_particle_desc     material              -      none       a material of this world
-    dem2d_particle_desc     motion                -      FREE
-    dem2d_particle_desc     position              m      0          finite
-    dem2d_particle_desc     angle                 rad    0          -1073741824 to 1073741824
-    dem2d_particle_desc     velocity              m/s    0          finite, 0 when FIXED
-    dem2d_particle_desc     angular_velocity      rad/s  0          finite, 0 when FIXED
-    dem2d_wall_desc         length                m      none       >= 0, of a servo > 0 or spans
-    dem2d_wall_desc         mode                  -      STILL
-    dem2d_wall_desc         material              -      none       a material of this world
-    dem2d_wall_desc         point                 m      0          finite
-    dem2d_wall_desc         normal                -      none       finite, not zero; normalised
-    dem2d_wall_desc         end                   m      0          finite, of segments not point
-    dem2d_wall_desc         velocity              m/s    0          finite, MOVING only
-    dem2d_wall_desc         stress                Pa     0          finite, SERVO only
-    dem2d_wall_desc         max_speed             m/s    none       >= 0, > 0 for SERVO
-    dem2d_wall_desc         spans                 -      none       two walls, or both zero
-    dem2d_save_desc         write                 -      none       or a path, not both
-    dem2d_load_desc         read                  -      none       or a path, not both
-    dem2d_load_desc         parallel_for          -      NULL       one thread does all
-    dem2d_load_desc         custom                -      NULL       required for custom shapes
-    dem2d_load_desc         law                   -      NULL       required for its worlds
-    dem2d_load_desc         law_tag               -      0          as it was saved
-    dem2d_load_desc         env                   -      NULL       copied
-    dem2d_svg_desc          width                 px     800        >= 0
-    dem2d_svg_desc          outline_points        -      64         0 or >= 3
-    dem2d_svg_desc          view.lower            m      all        finite
-    dem2d_svg_desc          view.upper            m      all        finite, above lower, or all zero
-    dem2d_svg_desc          write                 -      none       or a path, not both
-    dem2d_vtp_desc          outline_points        -      64         0 or >= 3
-    dem2d_vtp_desc          part                  -      PARTICLES
-    dem2d_vtp_desc          write                 -      none       or a path, not both
-    dem2d_pvd_desc          count                 -      0          0 to 1073741824
-    dem2d_pvd_desc          times                 s      none       count values, finite
-    dem2d_pvd_desc          files                 -      none       count names, no control bytes
-    dem2d_pvd_desc          write                 -      none       or a path, not both
-    dem2d_csv_desc          count                 -      0          0 to 1073741824
-    dem2d_csv_desc          names                 -      none       count; no comma, quote, line end
-    dem2d_csv_desc          values                -      none       count values, finite
-    dem2d_csv_desc          write                 -      none       or a path, not both
+OPTIONS
+    The comments in the desc structs give the unit, the range and the meaning of 0 for each field:
+    0 is a physical 0, the first value of an enum, or stands for what the comment names ("0 for
+    128"). A field whose range leaves out 0 is required. Numbers and vectors have to be finite.
+    Where a desc may be NULL, NULL means that all its fields are 0.
 
 ERRORS
     Functions that can fail return a dem2d_result; dem2d_result_text gives its text. Outputs are
@@ -720,11 +607,11 @@ typedef dem2d_vec dem2d_support_fn(void *user, dem2d_vec direction, double *rho)
 typedef struct dem2d_custom_desc {
     dem2d_support_fn *support; ///< convex support function; required
     void *user;                ///< passed to support
-    double rho_min;            ///< m, a lower bound of the radius of curvature; 0 if unknown
-    double inscribed;          ///< m, radius of a circle about the centroid inside; 0 if unknown
-    dem2d_mass mass;           ///< taken as given if area > 0; else from points of the outline
-    int outline_points;        ///< number of these points; 0 for 1000
-    int tag;                   ///< identifies support in snapshots: see dem2d_load_desc
+    double rho_min;            ///< m, >= 0, lower bound of the radius of curvature; 0 if unknown
+    double inscribed;   ///< m, >= 0, radius of a circle about the centroid inside; 0 if unknown
+    dem2d_mass mass;    ///< m2, m, m4, >= 0; from points of the outline if area is 0
+    int outline_points; ///< number of these points, >= 3; 0 for 1000
+    int tag;            ///< identifies support in snapshots: see dem2d_load_desc
 } dem2d_custom_desc;
 
 /// What a shape is, as a template (scale 1, about its centroid).
@@ -844,22 +731,24 @@ DEM2D_API dem2d_result dem2d_shape_mass_interpolated(const dem2d_shape *shape, i
 /// brighter) than a threshold, or have a label.
 typedef struct dem2d_image_desc {
     const uint8_t *pixels;    ///< height rows of width values; either this
-    const uint16_t *pixels16; ///< or this, with two bytes each, is required
+    const uint16_t *pixels16; ///< or this, with two bytes each, is required, not both
     int width;                ///< px, 1 to 2^15
     int height;               ///< px, 1 to 2^15
-    int stride;               ///< px from row to row; 0 for width
-    int crop_left;            ///< px, columns left of the region of interest
-    int crop_top;             ///< px, rows above it
-    int crop_width;           ///< px, width of the region; 0 for all right of crop_left
-    int crop_height;          ///< px, height of the region; 0 for all below crop_top
-    bool labels;              ///< values are grain numbers, 0 is background (a label mask)
-    int threshold;            ///< grains are darker than this, from 1; 0 finds it (Otsu)
+    int stride;               ///< px from row to row, >= 0, not below width; 0 for width
+    int crop_left;            ///< px, >= 0, columns left of the region of interest
+    int crop_top;             ///< px, >= 0, rows above it
+    int crop_width;           ///< px, >= 0, width of the region; 0 for all right of crop_left
+    int crop_height;          ///< px, >= 0, height of the region; 0 for all below crop_top
+    bool labels;              ///< values are grain numbers, 0 is background (a label mask); the
+                              ///< next three are then 0
+    int threshold;            ///< grains are darker than this, 0 to 65535 (pixels: to 255); 0
+                              ///< finds it (Otsu)
     bool ignore_frame;        ///< find the threshold without a frame along the region's border
     bool bright;              ///< grains have values from the threshold on instead
-    int min_pixels;           ///< smaller grains are dropped; 0 for 16
-    int max_pixels;           ///< larger grains are dropped; 0 for no limit
+    int min_pixels;           ///< >= 0, smaller grains are dropped; 0 for 16
+    int max_pixels;           ///< >= 0, larger grains are dropped; 0 for no limit
     bool keep_border;         ///< keep grains that touch the region's border
-    double scale;             ///< m per pixel, > 0
+    double scale;             ///< m/px, > 0
 } dem2d_image_desc;
 
 /// One outline of a set; valid until the set is destroyed.
@@ -959,7 +848,7 @@ typedef enum dem2d_convexity_test {
 typedef struct dem2d_reduction_desc {
     dem2d_convexity_test test; ///< stop when this test holds
     double factor;             ///< multiplies the highest pair (a_n, b_n), in (0, 1); 0 for 0.9
-    double tolerance;          ///< of a0: smaller pairs become 0; 0 for 1e-6
+    double tolerance;          ///< >= 0, of a0: smaller pairs become 0; 0 for 1e-6
 } dem2d_reduction_desc;
 
 /// Convexity of a Fourier series of a support function.
@@ -1026,20 +915,21 @@ typedef enum dem2d_fit_scale {
 
 /// A fit of a template to an outline.
 typedef struct dem2d_fit_desc {
-    int count;               ///< order, arcs or vertices; 0: the least that reaches the coverage
-    double coverage;         ///< wanted coverage, inside (0, 1), if count is 0
+    int count;               ///< order, arcs (3 or more) or vertices (3 or more), 0 to 1024; 0: the
+                             ///< least that reaches the coverage
+    double coverage;         ///< >= 0; wanted coverage, inside (0, 1), if count is 0
     dem2d_shape_type model;  ///< circle, ellipse, polygon, bezier or fourier
     dem2d_fit_method method; ///< DEFAULT or one of the model's
     dem2d_fit_scale scale;   ///< FOURIER
-    double min_radius;       ///< CONSTRAINED: least radius of curvature, of a0/2; 0 for 0.1
+    double min_radius;       ///< CONSTRAINED: least radius of curvature, of a0/2, [0, 1); 0 for 0.1
     bool corners;            ///< CONSTRAINED: min_radius is 0, not its default
-    double max_radius;       ///< BEZIER: greatest radius of curvature, of the radius of the circle
-                             ///< with the hull's area; 0 for 20
+    double max_radius;       ///< BEZIER: greatest radius of curvature, >= 1, of the radius of the
+                             ///< circle with the hull's area; 0 for 20
     bool unbounded;          ///< BEZIER: any radius of curvature, and joints as in [P]
     uint64_t seed;           ///< SWARM: seed of its random numbers
-    int birds;               ///< SWARM: number of birds that search for each arc; 0 for 30
-    int moves;               ///< SWARM: moves of each bird; 0 for 60
-    int pixels;              ///< SWARM: across the circle with the hull's area; 0 for 256
+    int birds;               ///< SWARM: birds that search for each arc, 2 to 256; 0 for 30
+    int moves;               ///< SWARM: moves of each bird, 0 to 100000; 0 for 60
+    int pixels;              ///< SWARM: px across the hull's circle, 8 to 4096; 0 for 256
 } dem2d_fit_desc;
 
 /// Result of a fit.
@@ -1074,8 +964,8 @@ typedef struct dem2d_virtual_desc {
     double elongation;      ///< amplitude of n = 2, >= 0
     double roundness;       ///< amplitude of n = 3, falling as 1/n^2 to n = 7, >= 0
     double roughness;       ///< amplitude of n = 8, falling as 1/n^2 beyond, >= 0
-    const double *spectrum; ///< order + 1 amplitudes that replace the three above, or NULL
-    double min_radius;      ///< least radius of curvature, of a0/2; 0 for 0.1
+    const double *spectrum; ///< order + 1 amplitudes >= 0 that replace the three above, or NULL
+    double min_radius;      ///< least radius of curvature, of a0/2, [0, 1); 0 for 0.1
     uint64_t seed;          ///< same seed, same grain
 } dem2d_virtual_desc;
 
@@ -1118,8 +1008,8 @@ typedef enum dem2d_proof {
 
 /// Options of a contact query; all zero for the defaults.
 typedef struct dem2d_contact_desc {
-    double tolerance;    ///< of R_A + R_B + |d|: wanted error; 0 for 1e-10
-    int max_iterations;  ///< of each search; 0 for 128; a polytope takes 250 at most
+    double tolerance;    ///< wanted error, >= 0, of R_A + R_B + |d|; 0 for 1e-10
+    int max_iterations;  ///< of each search, >= 0; 0 for 128; a polytope takes 250 at most
     dem2d_vec start;     ///< first direction, e.g. the last normal; 0 for the line of centres
     dem2d_solver solver; ///< certified, or GJK and EPA
     bool skip_points;    ///< compute no contact points: count is 0, faster
@@ -1244,7 +1134,7 @@ typedef void dem2d_parallel_fn(void *user, dem2d_phase phase, int count, dem2d_t
 /// series, doubled), the smaller friction coefficients and the greater damping ratio, unless
 /// dem2d_world_set_pair sets others.
 typedef struct dem2d_material_desc {
-    double density;              ///< kg/m2 (kg/m3 per metre of thickness), > 0
+    double density;              ///< kg/m2 (kg/m3 per metre of thickness), > 0; walls ignore it
     double normal_stiffness;     ///< N/m, > 0
     double tangential_stiffness; ///< N/m, >= 0; 0: neither friction nor rolling friction
     double friction;             ///< coefficient, >= 0
@@ -1344,13 +1234,13 @@ typedef struct dem2d_world_desc {
     dem2d_vec gravity;         ///< m/s2
     double local_damping;      ///< Cundall's factor, [0, 1)
     double global_damping;     ///< 1/s, viscous, >= 0
-    double skin;               ///< of the neighbour list, of the particle radius; 0: tuned
-    double contact_tolerance;  ///< of R_A + R_B + |d|; 0 for 1e-8
-    int max_iterations;        ///< of each search; 0 for 128
+    double skin;               ///< of the neighbour list, >= 0, of the particle radius; 0: tuned
+    double contact_tolerance;  ///< >= 0, of R_A + R_B + |d|; 0 for 1e-8
+    int max_iterations;        ///< of each search, 0 to 2^30; 0 for 128
     dem2d_solver solver;       ///< of contacts: certified, or GJK and EPA
     dem2d_face_rule faces;     ///< where forces act
-    int particle_capacity;     ///< reserved at creation; 0 grows
-    int pair_capacity;         ///< reserved at creation; 0 grows
+    int particle_capacity;     ///< reserved at creation, 0 to 2^30; 0 grows
+    int pair_capacity;         ///< reserved at creation, 0 to 2^30; 0 grows
     bool skip_time_step_check; ///< no stability check
     bool ledger;               ///< keep the ledger of energies, see dem2d_world_ledger
     /// Replaces springs, dashpot and friction, and contacts have one point. NULL for the built-in.
@@ -1378,13 +1268,13 @@ typedef enum dem2d_motion {
 /// A particle. Errors name the field.
 typedef struct dem2d_particle_desc {
     double scale;               ///< size factor on the template, > 0
-    dem2d_shape_id shape;       ///< template
-    dem2d_material_id material; ///< material
+    dem2d_shape_id shape;       ///< template, of this world
+    dem2d_material_id material; ///< material, of this world
     dem2d_motion motion;        ///< free, fixed or driven
     dem2d_vec position;         ///< m, of the centroid
-    double angle;               ///< rad
-    dem2d_vec velocity;         ///< m/s, half a step before the position
-    double angular_velocity;    ///< rad/s
+    double angle;               ///< rad, -2^30 to 2^30
+    dem2d_vec velocity;         ///< m/s, half a step before the position; 0 when FIXED
+    double angular_velocity;    ///< rad/s, likewise
     uint64_t name;              ///< orders pairs and sums: see Name in the manual; 0: none
 } dem2d_particle_desc;
 
@@ -1435,18 +1325,18 @@ typedef enum dem2d_wall_mode {
 /// with stress 0 yields to particles that press on it, and stands still without any; below 0 it
 /// moves away, unless a law of yours pulls.
 typedef struct dem2d_wall_desc {
-    double length;              ///< m, for stress; ignored if spans are given, and for segments
-    dem2d_wall_mode mode;       ///< still, moving, servo
+    double length;        ///< m, >= 0, for the stress of a servo half-plane without spans: then > 0
+    dem2d_wall_mode mode; ///< still, moving, servo
     dem2d_material_id material; ///< friction and stiffness (its density is not used)
     dem2d_vec point;            ///< m, on the surface; of a segment the start
     dem2d_vec normal;           ///< out of the wall, towards the grains; any length but 0
     bool segment;               ///< from point to end; its normal is to the left, `normal` ignored
-    dem2d_vec end;              ///< m, of a segment
-    dem2d_vec velocity;         ///< m/s, for MOVING
-    double stress;              ///< Pa, for SERVO, compression positive
-    double max_speed;           ///< m/s, for SERVO, > 0: greatest speed, taken before first contact
-    dem2d_wall_id spans[2];     ///< the length is the distance between these walls; or both zero
-    uint64_t name;              ///< orders contacts and sums: see Name in the manual; 0: none
+    dem2d_vec end;              ///< m, of a segment, not its point
+    dem2d_vec velocity;         ///< m/s, for MOVING, else 0
+    double stress;              ///< Pa, for SERVO, else 0; compression positive
+    double max_speed; ///< m/s, >= 0, for SERVO > 0: greatest speed, taken before first contact
+    dem2d_wall_id spans[2]; ///< the length is the distance between these walls; or both zero
+    uint64_t name;          ///< orders contacts and sums: see Name in the manual; 0: none
 } dem2d_wall_desc;
 
 /// State of a wall.
@@ -1906,10 +1796,11 @@ DEM2D_API dem2d_result dem2d_world_load(const dem2d_load_desc *desc, const char 
 
 /// An SVG picture of a world.
 typedef struct dem2d_svg_desc {
-    double width;          ///< px, 0 for 800; the height follows from the scene
-    int outline_points;    ///< per curved particle, 0 for 64
+    double width;          ///< px, >= 0; 0 for 800; the height follows from the scene
+    int outline_points;    ///< per curved particle, >= 3; 0 for 64
     bool force_chains;     ///< lines along branches, width by normal force
-    dem2d_box view;        ///< m, the part that is drawn; all zero for the whole scene
+    dem2d_box view;        ///< m, the part that is drawn, upper above lower; all zero for the whole
+                           ///< scene
     dem2d_write_fn *write; ///< where the bytes go, or NULL when a path is given
     void *user;            ///< passed to write
 } dem2d_svg_desc;
@@ -1924,7 +1815,7 @@ typedef enum dem2d_vtp_part {
 
 /// A file of VTK's XML PolyData.
 typedef struct dem2d_vtp_desc {
-    int outline_points;    ///< per curved particle, 0 for 64
+    int outline_points;    ///< per curved particle, >= 3; 0 for 64
     dem2d_vtp_part part;   ///< what is written
     dem2d_write_fn *write; ///< where the bytes go, or NULL when a path is given
     void *user;            ///< passed to write
@@ -1932,8 +1823,8 @@ typedef struct dem2d_vtp_desc {
 
 /// A ParaView collection: files by time.
 typedef struct dem2d_pvd_desc {
-    int count;                ///< of files, >= 0
-    const double *times;      ///< s, one for each
+    int count;                ///< of files, 0 to 2^30
+    const double *times;      ///< s, finite, one for each
     const char *const *files; ///< names as seen from the .pvd, in UTF-8, without control characters
     dem2d_write_fn *write;    ///< where the bytes go, or NULL when a path is given
     void *user;               ///< passed to write
@@ -1941,7 +1832,7 @@ typedef struct dem2d_pvd_desc {
 
 /// A row of a history, as comma-separated values; with the columns of the ledger if there is one.
 typedef struct dem2d_csv_desc {
-    int count;                ///< of the caller's columns, >= 0
+    int count;                ///< of the caller's columns, 0 to 2^30
     const char *const *names; ///< of them, without commas, quotes and line ends
     const double *values;     ///< of them, finite
     bool append;              ///< one more row; else a header line and the first row, a new file
@@ -2403,8 +2294,8 @@ static void *dem2di_next_array(char **next, size_t count, size_t size) {
 
    Each desc has a table with a row for each field, in their order. One function checks a desc by
    its table; rules between fields are code beside the table. To add a field, declare it in the
-   struct with its comment and give it a row: tests/test_header.c then says which line the manual's
-   OPTIONS needs, and tests/test_misuse.c tries what is out of its range.
+   struct with its comment and give it a row: tests/test_header.c then compares the unit, default
+   and range of both, and tests/test_misuse.c tries what is out of the range.
    ============================================================================================ */
 
 /* Both components of a vector are in the range. Any value is right for the last three. */
@@ -2429,7 +2320,7 @@ typedef struct dem2di_field {
     uint8_t flags, type, size;
     uint16_t offset;
 #ifdef DEM2DI_FIELD_TEXTS
-    const char *text; /* for OPTIONS: "unit default; note" */
+    const char *text; /* "unit default; note", for the test of the struct's comments */
 #endif
 } dem2di_field;
 
@@ -19602,6 +19493,7 @@ DEM2D_API dem2d_result dem2d_world_write_csv(const dem2d_world *world, const dem
             is dem2d_ledger.loads and a column of histories.
             Several processes: dem2d_world_desc.gather may change the sums of the contact forces in
             each step, commit may refuse a step.
+            Units, ranges and defaults of options are said once, in the comments of the descs.
             Particles and walls may have a name of 64 bits, which orders pairs and sums in place of
             the id (name in their descs and infos).
             Polygons in contact at one point take a third less time, smooth grains a tenth.

@@ -22,7 +22,7 @@
 #define HELLO_PATH "../examples/hello.c" // likewise DEM2D_HELLO
 #endif
 
-enum { MAX_COLUMNS = 100, MAX_LINES = 60, MAX_NAMES = 256, NAME = 96 };
+enum { MAX_COLUMNS = 100, MAX_LINES = 60, MAX_NAMES = 256, NAME = 96, COMMENT = 1024 };
 
 static const char lower[] = "abcdefghijklmnopqrstuvwxyz";
 static const char word_characters[] = "abcdefghijklmnopqrstuvwxyz0123456789_"
@@ -291,30 +291,59 @@ static void part_of(const char **text, const char *separator, char part[NAME]) {
     *text = end ? end + strlen(separator) : "";
 }
 
-// The line of a field in the manual's OPTIONS; false where there is nothing to say: any value is
-// right, and none is 0.
-static bool option_line(const field_row *row, char line[256]) {
-    char unit[NAME], value[NAME];
-    const char *note = row->text;
-    part_of(&note, " ", unit);
-    part_of(&note, "; ", value);
-    bool plain =
-        strcmp(value, "0") == 0 || strcmp(value, "false") == 0 || strcmp(value, "NULL") == 0;
-    if (plain && strcmp(unit, "-") == 0 && !row->range[0] && !*note) return false;
-    snprintf(line, 256, "    %-23s %-21s %-6s %-10s %s%s%s", row->of, row->name, unit, value,
-             row->range, row->range[0] && *note ? ", " : "", note);
-    for (size_t length = strlen(line); line[length - 1] == ' ';) line[--length] = '\0';
-    return true;
+// The comment of the field that a line declares: `///` above, `///<` behind and below.
+static void field_comment(const doc *d, int line, char text[COMMENT]) {
+    int first = line, last = line + 1;
+    while (first > 0 && strstr(d->line[first - 1], "    /// ") == d->line[first - 1]) first--;
+    while (last < d->count && starts(d->line[last] + strspn(d->line[last], " "), "///<")) last++;
+    size_t used = 0;
+    text[0] = '\0';
+    for (int i = first; i < last; i++) {
+        const char *slashes = strstr(d->line[i], "///");
+        if (!slashes) continue;
+        slashes += slashes[3] == '<' ? 4 : 3;
+        used += (size_t)snprintf(text + used, COMMENT - used, "%s", slashes);
+        if (used >= COMMENT) return;
+    }
 }
 
-// "struct field" of each row of the tables: "dem2d_svg_desc view" for its parts.
+// Does a text have a part, with a blank before it and none of these characters behind?
+static bool has_part(const char *text, const char *part, const char *not_behind) {
+    for (const char *at = text; (at = strstr(at, part)) != NULL; at++) {
+        const char behind = at[strlen(part)];
+        if (at > text && at[-1] == ' ' && !(behind && strchr(not_behind, behind))) return true;
+    }
+    return false;
+}
+
+// A range as a comment has it: "2 to 256" of "0 or 2 to 256", 2^30 of 1073741824.
+static void range_in_words(const field_row *row, char range[NAME]) {
+    const char *text = row->range;
+    if (starts(text, "0 or ")) text += 5;
+    if (starts(text, "in ")) text += 3;
+    snprintf(range, NAME, "%s", text);
+    for (int power = 15; power < 31; power += 15) {
+        char digits[16];
+        snprintf(digits, sizeof digits, "%d", 1 << power);
+        for (char *at; (at = strstr(range, digits)) != NULL;) {
+            memmove(at + 4, at + strlen(digits), strlen(at + strlen(digits)) + 1);
+            memcpy(at, power == 15 ? "2^15" : "2^30", 4);
+        }
+    }
+}
+
+// "struct " and the field of a row: "dem2d_svg_desc " and "view" for its parts.
+static void row_field(const field_row *row, char type[NAME], char field[NAME]) {
+    const char *rest = row->name;
+    part_of(&rest, ".", field);
+    snprintf(type, NAME, "%s ", row->of);
+}
+
 static void rows_read(list *rows) {
     rows->count = 0;
     for (int i = 0; i < known->count; i++) {
         char type[NAME], field[NAME];
-        const char *rest = known->row[i].name;
-        part_of(&rest, ".", field);
-        snprintf(type, sizeof type, "%s ", known->row[i].of);
+        row_field(&known->row[i], type, field);
         list_add(rows, type, field, i);
         int last = rows->count - 1; // the parts of a field follow each other
         if (last > 0 && strcmp(rows->name[last], rows->name[last - 1]) == 0) rows->count--;
@@ -338,29 +367,39 @@ static int check_fields(const doc *d, const doc *hello) {
     return errors;
 }
 
-// The manual's OPTIONS are the lines that follow from the tables, in the order of the tables.
+// The comment of a field says the unit, the default and the range that its row has.
+static int option_faults(const doc *d, const field_row *row, int line) {
+    char unit[NAME], value[NAME], range[NAME], wanted[NAME + 8], text[COMMENT];
+    const char *rest = row->text;
+    part_of(&rest, " ", unit);
+    part_of(&rest, "; ", value);
+    field_comment(d, line, text);
+    range_in_words(row, range);
+    int errors = 0;
+    if (strcmp(unit, "-") != 0 && !has_part(text, unit, word_characters))
+        errors += fault(d, line, "its comment needs the unit ", unit);
+    snprintf(wanted, sizeof wanted, "0 for %s", value);
+    if (strtod(value, NULL) > 0 && !has_part(text, wanted, word_characters))
+        errors += fault(d, line, "its comment needs ", wanted);
+    if (range[0] && strcmp(range, "finite") != 0 && !has_part(text, range, "0123456789^."))
+        errors += fault(d, line, "its comment needs the range ", range);
+    return errors;
+}
+
 static int check_options(const doc *d, const doc *hello) {
     (void)hello;
-    static char lines[MAX_NAMES][256];
-    int count = 0, errors = 0, first = line_starting(d, 0, "OPTIONS");
-    for (int i = 0; i < known->count; i++) count += option_line(&known->row[i], lines[count]);
-    if (first < 0 || count == 0) return fault(d, -1, "no OPTIONS or no table", "");
-    while (first < d->count && !starts(d->line[first], "    dem2d_")) first++;
-    int latest = first - 1, last = first;
-    while (last < d->count && starts(d->line[last], "    dem2d_")) last++;
-    for (int i = 0; i < count; i++) {
-        int at = first;
-        while (at < last && strcmp(d->line[at], lines[i]) != 0) at++;
-        if (at == last) errors += fault(d, -1, "OPTIONS needs the line:\n", lines[i]);
-        if (at < last && at < latest) errors += fault(d, at, "out of order", "");
-        if (at < last) latest = at;
+    list fields;
+    fields_read(d, &fields);
+    int errors = 0;
+    if (known->count == 0) return fault(d, -1, "no table", "");
+    for (int i = 0; i < known->count; i++) {
+        char type[NAME], field[NAME], name[2 * NAME];
+        row_field(&known->row[i], type, field);
+        snprintf(name, sizeof name, "%s%s", type, field);
+        int at = list_find(&fields, 0, name);
+        if (at >= 0) errors += option_faults(d, &known->row[i], fields.line[at]);
     }
-    for (int at = first; at < last; at++) {
-        int i = 0;
-        while (i < count && strcmp(d->line[at], lines[i]) != 0) i++;
-        if (i == count) errors += fault(d, at, "not what the tables of fields say", "");
-    }
-    return last - first == count ? errors : errors + fault(d, first, "too many or too few", "");
+    return errors;
 }
 
 // The manual's quick start, less its indent of four, is hello.c.
@@ -735,12 +774,13 @@ static int check_named(const doc *d, const doc *hello) {
 
 static const char sample_hello[] = "int main(void) {\n\n    return 0;\n}\n";
 
-#define SAMPLE_LOG "    dem2d_env               log                   -      silent\n"
-
 static table sample_fields = {
     {{.of = "dem2d_env", .name = "user", .text = "- NULL"},
      {.of = "dem2d_env", .name = "log", .text = "- silent"},
-     {.of = "dem2d_some_desc", .name = "width", .text = "m none; of the grain", .range = "> 0"},
+     {.of = "dem2d_some_desc",
+      .name = "width",
+      .text = "m 800; of the grain",
+      .range = "0 or >= 3"},
      {.of = "dem2d_some_desc", .name = "spans.lower", .text = "- all", .range = "finite"},
      {.of = "dem2d_some_desc", .name = "spans.upper", .text = "- false"}},
     5};
@@ -767,9 +807,7 @@ static const char sample[] =
     "    }\n"
     "\n"
     "OPTIONS\n"
-    "    struct                  field                 unit   default    range\n" SAMPLE_LOG
-    "    dem2d_some_desc         width                 m      none       > 0, of the grain\n"
-    "    dem2d_some_desc         spans.lower           -      all        finite\n"
+    "    In the comments.\n"
     "\n"
     "ERRORS\n"
     "=============\n"
@@ -793,7 +831,8 @@ static const char sample[] =
     "} dem2d_env;\n"
     "/// Some.\n"
     "typedef struct dem2d_some_desc {\n"
-    "    double width;    ///< m\n"
+    "    double width;    ///< m, of the grain, >= 3;\n"
+    "                     ///< 0 for 800\n"
     "    double spans[2]; ///< m\n"
     "} dem2d_some_desc;\n"
     "/// An enum.\n"
@@ -883,20 +922,16 @@ static mutation mutations[] = {
     {"rejects: callback without row", check_fields, "(*log)", "(*message)"},
     {"rejects: array without row", check_fields, "spans[2];", "lengths[2];"},
     {"rejects: two fields in a line", check_fields, "double spans[2]", "double width, spans[2]"},
-    {"rejects: row without field", check_fields, "    double width;    ///< m\n", ""},
-    {"rejects: no option", check_options, SAMPLE_LOG, ""},
-    {"rejects: option without row", check_options, SAMPLE_LOG,
-     SAMPLE_LOG "    dem2d_env               free                  -      free\n"},
-    {"rejects: option of another struct", check_options, "dem2d_some_desc         width",
-     "dem2d_env               width"},
-    {"rejects: option twice", check_options, SAMPLE_LOG, SAMPLE_LOG SAMPLE_LOG},
-    {"rejects: options out of order", check_options, "    dem2d_some_desc         spans.lower",
-     SAMPLE_LOG "    dem2d_some_desc         spans.lower"},
-    {"rejects: unit", check_options, "m      none", "px     none"},
-    {"rejects: default", check_options, "silent", "print"},
-    {"rejects: range", check_options, "> 0", ">= 0"},
-    {"rejects: note", check_options, "of the grain", "of the sample"},
-    {"rejects: no table of options", check_options, "OPTIONS", "CHOICES"},
+    {"rejects: row without field", check_fields,
+     "    double width;    ///< m, of the grain, >= 3;\n", ""},
+    {"rejects: unit", check_options, "< m, of", "< px, of"},
+    {"rejects: power of a unit", check_options, "< m, of", "< m2, of"},
+    {"rejects: no unit", check_options, "< m, of", "< of"},
+    {"rejects: default", check_options, "0 for 800", "0 for 80"},
+    {"rejects: default with more digits", check_options, "0 for 800", "0 for 8000"},
+    {"rejects: range", check_options, ">= 3", "> 3"},
+    {"rejects: range with more digits", check_options, ">= 3", ">= 30"},
+    {"rejects: no comment", check_options, "///< m, of the grain, >= 3;", ""},
     {"rejects: quick start differs", check_quick_start, "        return 0;", "        return 1;"},
     {"rejects: quick start is longer", check_quick_start, "    }\n\nOPT", "    }\n    ;\n\nOPT"},
     {"rejects: quick start is shorter", check_quick_start, "    }\n\nOPT", "\nOPT"},
