@@ -350,7 +350,7 @@ leaves it open)
         with the last bit of the angle and does not conserve energy. At a wall DEM2D_TWO_POINTS
         takes the foot point: the wall is rigid, so that the grain has all of the deformation.
     [P] sec. 4 steps 1-5: templates by particle swarm      DEM2D_FIT_SWARM
-        same steps, when unbounded. Chosen: birds, moves, constriction, pixels; joints that share
+        same steps, when unbounded. Chosen: birds, moves, constriction, pixels; knots that share
         a corner of the hull are moved away from it. Improved: a bound of the radius of curvature,
         with straight arcs; dem2d_bezier_fit and DEM2D_FIT_AREA minimise the exact area of the
         symmetric difference.
@@ -608,10 +608,10 @@ typedef struct dem2d_custom_desc {
     dem2d_support_fn *support; ///< convex support function; required
     void *user;                ///< passed to support
     double rho_min;            ///< m, >= 0, lower bound of the radius of curvature; 0 if unknown
-    double inscribed;   ///< m, >= 0, radius of a circle about the centroid inside; 0 if unknown
-    dem2d_mass mass;    ///< m2, m, m4, >= 0; from points of the outline if area is 0
-    int outline_points; ///< number of these points, >= 3; 0 for 1000
-    int tag;            ///< identifies support in snapshots: see dem2d_load_desc
+    double inscribed;          ///< m, >= 0, radius of a circle inside about the centroid; or 0
+    dem2d_mass mass;           ///< m2, m, m4, >= 0; from points of the outline if area is 0
+    int outline_points;        ///< number of these points, >= 3; 0 for 1000
+    int tag;                   ///< identifies support in snapshots: see dem2d_load_desc
 } dem2d_custom_desc;
 
 /// What a shape is, as a template (scale 1, about its centroid).
@@ -659,10 +659,11 @@ DEM2D_API dem2d_result dem2d_shape_create_ellipse(const dem2d_env *env, double a
 DEM2D_API dem2d_result dem2d_shape_create_polygon(const dem2d_env *env, const dem2d_vec *points,
                                                   int count, double rounding, dem2d_shape **shape);
 /// Closed chain of cubic Bezier arcs ([P] sec. 2): control[3 * arcs] (m), arc i uses the points
-/// 3i .. 3i + 3 (cyclic); 2 <= arcs <= INT_MAX / 12. Each arc has to be convex and to turn by at
-/// most pi, neighbours share a tangent (G1), and all arcs together make one turn; a sine of 1e-6 is
-/// allowed, the precision of coordinates with seven digits. M3 = M4 = 0 is allowed. Arcs shorter
-/// than 6e-14 of the size count as corners and may turn in any way. Clockwise input is reversed.
+/// 3i .. 3i + 3 (cyclic), of which the first and the last are knots, where two arcs meet;
+/// 2 <= arcs <= INT_MAX / 12. Each arc has to be convex and to turn by at most pi, neighbours share
+/// a tangent (G1), and all arcs together make one turn; a sine of 1e-6 is allowed, the precision of
+/// coordinates with seven digits. M3 = M4 = 0 is allowed. Arcs shorter than 6e-14 of the size count
+/// as corners and may turn in any way. Clockwise input is reversed.
 ///
 /// Contacts use repaired arcs: exactly convex and smooth, and straight where the given arc is
 /// straight within the rounding of its coordinates. Their distance from the given arcs is the
@@ -880,12 +881,12 @@ DEM2D_API dem2d_result dem2d_fourier_convexity(const double *a, const double *b,
 /// of multiplications. Errors: NULL_ARGUMENT, NOT_FINITE, OUT_OF_RANGE, ZERO_AREA (a0 not above 0).
 DEM2D_API dem2d_result dem2d_fourier_reduce(double *a, double *b, int order,
                                             const dem2d_reduction_desc *desc, int *reductions);
-/// Polybezier of an outline ([P] sec. 4): the joints are support points of the hull in `arcs`
+/// Polybezier of an outline ([P] sec. 4): the knots are support points of the hull in `arcs`
 /// uniform directions (3 to 2^20), the tangents are perpendicular to these, and the two tangent
 /// lengths of each arc minimise the exact area between arc and outline ([P]'s step 4 uses a swarm:
 /// DEM2D_FIT_SWARM). Where possible no arc has a radius of curvature above 20 times the radius of
 /// the circle with the hull's area, because nearly flat arcs shorten the stable time step. Long
-/// edges of the hull become straight arcs where that is better; the joints between these lie in
+/// edges of the hull become straight arcs where that is better; the knots between these lie in
 /// uniform directions. dem2d_outline_fit can change or drop the bound. control gets 3 * arcs points
 /// (m). Errors: NULL_ARGUMENT, TOO_FEW_POINTS, NOT_FINITE, OUT_OF_RANGE, CROSSING, ZERO_AREA,
 /// OUT_OF_MEMORY.
@@ -902,7 +903,7 @@ typedef enum dem2d_fit_method {
     DEM2D_FIT_AREA,            ///< BEZIER: least exact area to the outline
     /// BEZIER: [P] sec. 4, particle swarm with pixel overlap. [P] leaves its settings open: here
     /// inertia .7298 and attraction 1.4962 (Clerc and Kennedy's constriction); birds, moves and
-    /// pixels as in the desc. Joints that share a corner of the hull are moved along both edges.
+    /// pixels as in the desc. Knots that share a corner of the hull are moved along both edges.
     DEM2D_FIT_SWARM
 } dem2d_fit_method;
 
@@ -925,7 +926,7 @@ typedef struct dem2d_fit_desc {
     bool corners;            ///< CONSTRAINED: min_radius is 0, not its default
     double max_radius;       ///< BEZIER: greatest radius of curvature, >= 1, of the radius of the
                              ///< circle with the hull's area; 0 for 20
-    bool unbounded;          ///< BEZIER: any radius of curvature, and joints as in [P]
+    bool unbounded;          ///< BEZIER: any radius of curvature, and knots as in [P]
     uint64_t seed;           ///< SWARM: seed of its random numbers
     int birds;               ///< SWARM: birds that search for each arc, 2 to 256; 0 for 30
     int moves;               ///< SWARM: moves of each bird, 0 to 100000; 0 for 60
@@ -3213,7 +3214,7 @@ static dem2d_vec dem2di_rounded_point(const dem2d_shape *shape, int k, int j, in
 }
 
 /* Point i of count on the boundary of a template. Each edge (or arc) has about as many points, so
-   that every corner (or joint) is one of them if there are enough. */
+   that every corner (or knot) is one of them if there are enough. */
 static dem2d_vec dem2di_outline_point(const dem2d_shape *shape, int i, int count) {
     int n = shape->count;
     if (shape->type == DEM2D_POLYGON || shape->type == DEM2D_BEZIER) {
@@ -3624,7 +3625,7 @@ static void dem2di_arc_least_rho(dem2d_shape *shape, const dem2di_arc *arc, int 
     dem2di_least_rho_lower(shape, from, to, rho);
 }
 
-/* A joint with this sine between its tangents is smooth, and an arc that turns by it is straight:
+/* A knot with this sine between its tangents is smooth, and an arc that turns by it is straight:
    the precision of coordinates with seven digits. */
 #define DEM2DI_SMOOTH 1e-6
 
@@ -3672,9 +3673,9 @@ static bool dem2di_arc_convex(const dem2di_arc *arc, double roundoff) {
            dem2di_cross(*start, *end) >= -2 * slack; /* slack of two turns */
 }
 
-/* Is the joint of two arcs smooth? kink gets the sine between the tangents. */
-static bool dem2di_joint_smooth(const dem2di_arc *before, const dem2di_arc *after, double roundoff,
-                                double *kink) {
+/* Is the knot between two arcs smooth? kink gets the sine between the tangents. */
+static bool dem2di_knot_smooth(const dem2di_arc *before, const dem2di_arc *after, double roundoff,
+                               double *kink) {
     dem2d_vec a = *dem2di_arc_side(before, roundoff, true);
     dem2d_vec b = *dem2di_arc_side(after, roundoff, false);
     double la = dem2di_length(a), lb = dem2di_length(b), turn = dem2di_cross(a, b);
@@ -3682,8 +3683,8 @@ static bool dem2di_joint_smooth(const dem2di_arc *before, const dem2di_arc *afte
     return fabs(turn) <= dem2di_turn_slack(la, lb, roundoff) && dem2di_dot(a, b) > 0;
 }
 
-/* Check the caller's arcs: no arc is a point, each is tiny or convex, and joints of two arcs that
-   are not tiny are smooth. */
+/* Check the caller's arcs: no arc is a point, each is tiny or convex, and knots between two arcs
+   that are not tiny are smooth. */
 static dem2d_result dem2di_check_arcs(const dem2d_env *env, const dem2di_arc *arcs, int count,
                                       bool reversed, dem2di_limits limits) {
     const dem2di_arc *before = &arcs[count - 1];
@@ -3699,7 +3700,7 @@ static dem2d_result dem2di_check_arcs(const dem2d_env *env, const dem2di_arc *ar
             return dem2di_fail(env, DEM2D_NOT_CONVEX, place, "arc %d is not convex", place);
         if (reversed) place = (count - k) % count;
         if (!tiny && dem2di_arc_length(before) > limits.tiny &&
-            !dem2di_joint_smooth(before, arc, limits.roundoff, &kink))
+            !dem2di_knot_smooth(before, arc, limits.roundoff, &kink))
             return dem2di_fail(env, DEM2D_NOT_SMOOTH, place,
                                "the tangents at the start of arc %d differ by a sine of %g", place,
                                kink);
@@ -3725,7 +3726,7 @@ static void dem2di_arcs_from_control(const dem2d_vec *control, int count, bool r
 }
 
 /* --- repair of the caller's arcs, for contacts ---
-   Contact detection needs joints with one tangent, straight arcs that are straight to the bit, arcs
+   Contact detection needs knots with one tangent, straight arcs that are straight to the bit, arcs
    that turn by at most a right angle, and no arc too short to have a direction. The caller's arcs
    fulfil this only within the smoothness, because coordinates are rounded. The control polygon is
    repaired: differences that should have one direction, and those that turn to the right, are tied
@@ -3796,15 +3797,15 @@ static bool dem2di_chain_set(dem2di_chain *chain, const dem2di_arc *arcs, int co
     return true;
 }
 
-/* Estimate the rounding errors of the coordinates from kinks of joints and from turns to the right:
+/* Estimate the rounding errors of the coordinates from kinks of knots and from turns to the right:
    distance of the point between two differences from their chord. */
 static void dem2di_chain_noise(dem2di_chain *chain) {
     chain->noise = chain->limits.roundoff / 8; /* of one coordinate */
     for (int k = 0; k < chain->count; k++) {
         dem2d_vec a = chain->d[k], b = chain->d[(k + 1) % chain->count];
         double turn = dem2di_cross(a, b), lengths = dem2di_length(a) + dem2di_length(b);
-        bool joint = k % 3 == 2 && chain->tied[k];
-        if (joint || turn < 0) chain->noise = dem2di_max(chain->noise, fabs(turn) / lengths);
+        bool knot = k % 3 == 2 && chain->tied[k];
+        if (knot || turn < 0) chain->noise = dem2di_max(chain->noise, fabs(turn) / lengths);
     }
 }
 
@@ -3886,7 +3887,7 @@ static bool dem2di_chain_pool(dem2di_chain *chain, int first) {
 }
 
 /* Move the points of a group onto its chord. False if a difference is off by more than smooth
-   joints and arcs allow at both ends together. */
+   knots and arcs allow at both ends together. */
 static bool dem2di_chain_align(dem2di_chain *chain, int from, int *end) {
     int n = chain->count;
     dem2d_vec along, shift = dem2di_vec(0, 0), sum = dem2di_chain_sum(chain, from, end);
@@ -6455,14 +6456,14 @@ DEM2D_API dem2d_result dem2d_fourier_reduce(double *a, double *b, int order,
     return DEM2D_OK;
 }
 
-/* A joint of the polybezier: point, tangent, and its place in the outline. */
-typedef struct dem2di_joint {
+/* A knot of the polybezier: point, tangent, and its place in the outline. */
+typedef struct dem2di_knot {
     dem2d_vec point, normal, tangent;
     int corner;    /* of the hull: the support corner, or the first corner of an edge */
-    bool edge;     /* the joint is on the hull's edge from corner to the next, with its normal */
+    bool edge;     /* the knot is on the hull's edge from corner to the next, with its normal */
     bool straight; /* an end of a straight arc along that edge */
     int place;     /* index in the outline */
-} dem2di_joint;
+} dem2di_knot;
 
 /* With an angle below this a direction counts as an edge's normal: tangent lines would meet the
    edge within 1e-6 of its length, and control points could not be distinguished. */
@@ -6478,39 +6479,39 @@ static dem2d_vec dem2di_hull_edge(const dem2di_outline *outline, int from) {
     return dem2di_sub(outline->hull[(from + 1) % outline->hull_count], outline->hull[from]);
 }
 
-/* A joint at a fraction of a hull's edge. It divides the outline below the edge between the arcs on
+/* A knot at a fraction of a hull's edge. It divides the outline below the edge between the arcs on
    both sides. */
-static void dem2di_joint_on_edge(const dem2di_outline *outline, int from, double fraction,
-                                 dem2di_joint *joint) {
+static void dem2di_knot_on_edge(const dem2di_outline *outline, int from, double fraction,
+                                dem2di_knot *knot) {
     dem2d_vec start = outline->hull[from], edge = dem2di_hull_edge(outline, from);
     int place = dem2di_place_of(outline, start);
-    joint->edge = true;
-    joint->corner = from;
-    joint->point = dem2di_along(start, fraction, edge);
+    knot->edge = true;
+    knot->corner = from;
+    knot->point = dem2di_along(start, fraction, edge);
     for (int j = 0; j < outline->count; j++) {
         dem2d_vec q = outline->points[place];
-        if (dem2di_dot(dem2di_sub(q, joint->point), edge) >= 0) break;
+        if (dem2di_dot(dem2di_sub(q, knot->point), edge) >= 0) break;
         place = (place + 1) % outline->count;
     }
-    joint->place = place;
+    knot->place = place;
 }
 
-/* The joint at the support point in a direction, searched from a hull's corner at or before it; at
+/* The knot at the support point in a direction, searched from a hull's corner at or before it; at
    an edge's middle if the direction is the edge's normal. Returns the support corner. */
-static int dem2di_joint_make(const dem2di_outline *outline, int k, dem2d_vec normal,
-                             dem2di_joint *joint) {
+static int dem2di_knot_make(const dem2di_outline *outline, int k, dem2d_vec normal,
+                            dem2di_knot *knot) {
     int n = outline->hull_count;
-    joint->normal = normal;
-    joint->tangent = dem2di_perp(normal);
-    joint->corner = k = dem2di_hull_climb(outline, k, normal);
-    joint->edge = joint->straight = false;
-    joint->point = outline->hull[k];
-    joint->place = dem2di_place_of(outline, joint->point);
-    for (int side = 0; side < 2 && !joint->edge; side++) {
+    knot->normal = normal;
+    knot->tangent = dem2di_perp(normal);
+    knot->corner = k = dem2di_hull_climb(outline, k, normal);
+    knot->edge = knot->straight = false;
+    knot->point = outline->hull[k];
+    knot->place = dem2di_place_of(outline, knot->point);
+    for (int side = 0; side < 2 && !knot->edge; side++) {
         int from = side == 0 ? k : (k + n - 1) % n;
         dem2d_vec edge = dem2di_hull_edge(outline, from);
-        if (fabs(dem2di_dot(edge, joint->normal)) <= DEM2DI_EDGE_ANGLE * dem2di_length(edge))
-            dem2di_joint_on_edge(outline, from, 0.5, joint);
+        if (fabs(dem2di_dot(edge, knot->normal)) <= DEM2DI_EDGE_ANGLE * dem2di_length(edge))
+            dem2di_knot_on_edge(outline, from, 0.5, knot);
     }
     return k;
 }
@@ -6556,33 +6557,33 @@ static double dem2di_corner_reach(const dem2di_outline *outline) {
     return 0.05 * outline->radius;
 }
 
-/* Joints in uniform directions; with straight edges, at both ends of each edge, and in uniform
+/* Knots in uniform directions; with straight edges, at both ends of each edge, and in uniform
    directions between them. */
-static void dem2di_joints_make(const dem2di_outline *outline, int arcs,
-                               const dem2di_straight *sides, int count, dem2di_joint *joints) {
+static void dem2di_knots_make(const dem2di_outline *outline, int arcs, const dem2di_straight *sides,
+                              int count, dem2di_knot *knots) {
     int k = dem2di_hull_start(outline);
     for (int i = 0; i < arcs && count == 0; i++)
-        k = dem2di_joint_make(outline, k, dem2di_direction(i, arcs), &joints[i]);
+        k = dem2di_knot_make(outline, k, dem2di_direction(i, arcs), &knots[i]);
     for (int j = 0; j < count; j++) {
         const dem2di_straight *side = &sides[j];
         dem2d_vec normal = dem2di_edge_normal(outline, side->edge);
         double cut = dem2di_min(0.25, dem2di_corner_reach(outline) / side->length);
-        for (int end = 0; end < 2; end++, joints++) {
-            joints->normal = normal;
-            joints->tangent = dem2di_perp(normal);
-            joints->straight = true;
-            dem2di_joint_on_edge(outline, side->edge, end == 0 ? cut : 1 - cut, joints);
+        for (int end = 0; end < 2; end++, knots++) {
+            knots->normal = normal;
+            knots->tangent = dem2di_perp(normal);
+            knots->straight = true;
+            dem2di_knot_on_edge(outline, side->edge, end == 0 ? cut : 1 - cut, knots);
         }
         k = (side->edge + 1) % outline->hull_count;
-        for (int i = 1; i < side->arcs; i++, joints++) {
+        for (int i = 1; i < side->arcs; i++, knots++) {
             dem2d_rot turn = dem2d_rot_make(side->turn * i / side->arcs);
-            k = dem2di_joint_make(outline, k, dem2di_turn(turn, normal), joints);
+            k = dem2di_knot_make(outline, k, dem2di_turn(turn, normal), knots);
         }
     }
 }
 
 /* Distances from both ends of an arc to the point where its tangent lines meet. */
-static void dem2di_tangent_lengths(const dem2di_joint *from, const dem2di_joint *to, double *l1,
+static void dem2di_tangent_lengths(const dem2di_knot *from, const dem2di_knot *to, double *l1,
                                    double *l2) {
     dem2d_vec chord = dem2di_sub(to->point, from->point);
     double sine = dem2di_cross(from->tangent, to->tangent);
@@ -6591,21 +6592,21 @@ static void dem2di_tangent_lengths(const dem2di_joint *from, const dem2di_joint 
 }
 
 /* If several directions had the same corner as support point, arcs would have no length. Their
-   joints are moved onto a circle that touches the tangent lines of the first and the last direction
-   at a distance `reach` from the corner. A joint in the middle of an edge stays there. */
-static void dem2di_round_corner(const dem2di_outline *outline, dem2di_joint *joints, int arcs,
+   knots are moved onto a circle that touches the tangent lines of the first and the last direction
+   at a distance `reach` from the corner. A knot in the middle of an edge stays there. */
+static void dem2di_round_corner(const dem2di_outline *outline, dem2di_knot *knots, int arcs,
                                 int first, int last, int low, int high) {
-    dem2di_joint *start = &joints[low % arcs], *end = &joints[high % arcs];
-    dem2d_vec corner = joints[first % arcs].point, bisector;
+    dem2di_knot *start = &knots[low % arcs], *end = &knots[high % arcs];
+    dem2d_vec corner = knots[first % arcs].point, bisector;
     double before, after, unused, reach = dem2di_corner_reach(outline);
     if (start->edge)
         before = dem2di_length(dem2di_sub(corner, start->point));
     else
-        dem2di_tangent_lengths(&joints[(low + arcs - 1) % arcs], start, &unused, &before);
+        dem2di_tangent_lengths(&knots[(low + arcs - 1) % arcs], start, &unused, &before);
     if (end->edge)
         after = dem2di_length(dem2di_sub(corner, end->point));
     else
-        dem2di_tangent_lengths(end, &joints[(high + 1) % arcs], &after, &unused);
+        dem2di_tangent_lengths(end, &knots[(high + 1) % arcs], &after, &unused);
     if (start->straight) before *= 2; /* a straight arc may end where the circle begins */
     if (end->straight) after *= 2;
     reach = dem2di_min(reach, dem2di_min(before, after) / 2);
@@ -6615,40 +6616,40 @@ static void dem2di_round_corner(const dem2di_outline *outline, dem2di_joint *joi
     double radius = reach * cosine / sine;
     dem2d_vec centre = dem2di_along(corner, -radius / cosine, bisector);
     for (int i = first; i <= last; i++)
-        joints[i % arcs].point = dem2di_along(centre, radius, joints[i % arcs].normal);
+        knots[i % arcs].point = dem2di_along(centre, radius, knots[i % arcs].normal);
     if (start->straight) start->point = dem2di_along(corner, -reach, start->tangent);
     if (end->straight) end->point = dem2di_along(corner, reach, end->tangent);
 }
 
-static void dem2di_round_corners(const dem2di_outline *outline, dem2di_joint *joints, int arcs) {
+static void dem2di_round_corners(const dem2di_outline *outline, dem2di_knot *knots, int arcs) {
     int n = outline->hull_count, begin = 0;
     /* begin after a change of corner, so that no run continues past the end of the array */
     for (int i = 0; i < arcs; i++) {
-        dem2di_joint *last = &joints[(i + arcs - 1) % arcs];
-        if (joints[i].edge || last->edge || last->corner != joints[i].corner) begin = i;
+        dem2di_knot *last = &knots[(i + arcs - 1) % arcs];
+        if (knots[i].edge || last->edge || last->corner != knots[i].corner) begin = i;
     }
     for (int i = begin; i < begin + arcs;) {
-        dem2di_joint *joint = &joints[i % arcs];
-        int last = i, corner = joint->corner;
-        if (joint->edge) {
+        dem2di_knot *knot = &knots[i % arcs];
+        int last = i, corner = knot->corner;
+        if (knot->edge) {
             i++;
             continue;
         }
-        while (last + 1 < begin + arcs && !joints[(last + 1) % arcs].edge &&
-               joints[(last + 1) % arcs].corner == corner)
+        while (last + 1 < begin + arcs && !knots[(last + 1) % arcs].edge &&
+               knots[(last + 1) % arcs].corner == corner)
             last++;
-        dem2di_joint *before = &joints[(i + arcs - 1) % arcs], *after = &joints[(last + 1) % arcs];
+        dem2di_knot *before = &knots[(i + arcs - 1) % arcs], *after = &knots[(last + 1) % arcs];
         int low = before->edge && (before->corner + 1) % n == corner ? i - 1 + arcs : i;
         int high = after->edge && after->corner == corner ? last + 1 : last;
-        if (high > i || low != i) dem2di_round_corner(outline, joints, arcs, i, last, low, high);
+        if (high > i || low != i) dem2di_round_corner(outline, knots, arcs, i, last, low, high);
         i = last + 1;
     }
 }
 
-/* One arc and the part of the outline between its joints, both relative to its first joint. */
+/* One arc and the part of the outline between its knots, both relative to its first knot. */
 typedef struct dem2di_section {
     const dem2di_outline *outline;
-    const dem2di_joint *from, *to;
+    const dem2di_knot *from, *to;
     double l1, l2;  /* tangent lengths */
     double rho_max; /* bound of the radius of curvature, m; HUGE_VAL: none */
     double bend;    /* bound of the curvature in the penalty, 1/m */
@@ -6842,13 +6843,13 @@ static double dem2di_section_penalty(const dem2di_section *section, const dem2di
     return weight * sum;
 }
 
-/* Number of points of a section: those of the outline between its joints, then the second joint. */
+/* Number of points of a section: those of the outline between its knots, then the second knot. */
 static int dem2di_section_count(const dem2di_section *section) {
     int count = section->outline->count;
     return (section->to->place - section->from->place + count) % count + 2;
 }
 
-/* Point i of count, relative to the first joint. */
+/* Point i of count, relative to the first knot. */
 static dem2d_vec dem2di_section_point(const dem2di_section *section, int i, int count) {
     const dem2di_outline *outline = section->outline;
     int place = (section->from->place + i) % outline->count;
@@ -6893,7 +6894,7 @@ static double dem2di_section_area(const dem2di_section *section, const double f[
     return area + dem2di_section_penalty(section, &arc, slope);
 }
 
-/* Fractions stay in [1e-4, 1]: 1e-4 keeps the tangents at the joints, 1 the control polygon
+/* Fractions stay in [1e-4, 1]: 1e-4 keeps the tangents at the knots, 1 the control polygon
    convex. */
 static double dem2di_fraction(double f) {
     return dem2di_max(1e-4, dem2di_min(1, f));
@@ -7111,20 +7112,20 @@ static dem2d_result dem2di_swarm_section(const dem2d_env *env, const dem2di_sect
     return DEM2D_OK;
 }
 
-/* A candidate polybezier: joints, and the fractions of each arc. */
+/* A candidate polybezier: knots, and the fractions of each arc. */
 typedef struct dem2di_bezier_plan {
     const dem2di_outline *outline;
     int arcs, iterations;
-    double rho_max;       /* bound of the radius of curvature, m; HUGE_VAL: none */
-    dem2di_joint *joints; /* arcs */
-    double *fractions;    /* 2 arcs */
-    double area, rho;     /* result: area between arcs and outline, greatest radius */
+    double rho_max;     /* bound of the radius of curvature, m; HUGE_VAL: none */
+    dem2di_knot *knots; /* arcs */
+    double *fractions;  /* 2 arcs */
+    double area, rho;   /* result: area between arcs and outline, greatest radius */
 } dem2di_bezier_plan;
 
 static bool dem2di_plan_section(const dem2di_bezier_plan *plan, int i, dem2di_section *section) {
     section->outline = plan->outline;
-    section->from = &plan->joints[i];
-    section->to = &plan->joints[(i + 1) % plan->arcs];
+    section->from = &plan->knots[i];
+    section->to = &plan->knots[(i + 1) % plan->arcs];
     section->rho_max = plan->rho_max;
     section->bend = 1 / plan->rho_max;
     bool straight = section->from->straight && section->to->straight &&
@@ -7137,7 +7138,7 @@ static bool dem2di_plan_section(const dem2di_bezier_plan *plan, int i, dem2di_se
     return !straight;
 }
 
-/* Least area for the plan's joints. The search starts from the arcs of a circle, which have x/l =
+/* Least area for the plan's knots. The search starts from the arcs of a circle, which have x/l =
    (4/3) tan(phi/4) / tan(phi/2) = (4/3) cos(phi/2) / (1 + cos(phi/2)). */
 static void dem2di_plan_fit(dem2di_bezier_plan *plan) {
     double unused[2];
@@ -7206,8 +7207,8 @@ static void dem2di_plan_search(dem2di_bezier_plan *plan, dem2di_bezier_plan *spa
         if (straight > 0 &&
             !dem2di_distribute_arcs(plan->outline, sides, straight, plan->arcs - straight))
             continue;
-        dem2di_joints_make(plan->outline, plan->arcs, sides, straight, spare->joints);
-        dem2di_round_corners(plan->outline, spare->joints, plan->arcs);
+        dem2di_knots_make(plan->outline, plan->arcs, sides, straight, spare->knots);
+        dem2di_round_corners(plan->outline, spare->knots, plan->arcs);
         dem2di_plan_fit(spare);
         if (straight > 0 && !dem2di_plan_better(spare, plan)) continue;
         dem2di_bezier_plan swap = *plan;
@@ -7222,18 +7223,18 @@ static dem2d_result dem2di_bezier_fit(const dem2d_env *env, const dem2di_outline
                                       double rho_max, const dem2d_fit_desc *swarm,
                                       dem2d_vec *control, int *iterations) {
     size_t count = (size_t)arcs;
-    size_t size = sizeof(dem2di_joint) + sizeof(dem2di_straight) + 2 * sizeof(double);
-    dem2di_joint *memory = (dem2di_joint *)dem2di_allocate(env, 2 * count, size);
-    if (memory == NULL) return dem2di_fail_memory(env, arcs, "joints");
+    size_t size = sizeof(dem2di_knot) + sizeof(dem2di_straight) + 2 * sizeof(double);
+    dem2di_knot *memory = (dem2di_knot *)dem2di_allocate(env, 2 * count, size);
+    if (memory == NULL) return dem2di_fail_memory(env, arcs, "knots");
     dem2di_bezier_plan plan, spare;
     memset(&plan, 0, sizeof plan);
     plan.outline = outline;
     plan.arcs = arcs;
     plan.rho_max = rho_max;
     spare = plan;
-    plan.joints = memory;
-    spare.joints = memory + count;
-    dem2di_straight *sides = (dem2di_straight *)(void *)(spare.joints + count);
+    plan.knots = memory;
+    spare.knots = memory + count;
+    dem2di_straight *sides = (dem2di_straight *)(void *)(spare.knots + count);
     plan.fractions = (double *)(void *)(sides + 2 * count);
     spare.fractions = plan.fractions + 2 * count;
     dem2di_plan_search(&plan, &spare, sides, sides + count);
@@ -7247,10 +7248,10 @@ static dem2d_result dem2di_bezier_fit(const dem2d_env *env, const dem2di_outline
         dem2di_arc arc = dem2di_section_arc(&section, f[0], f[1]);
         if (swarm != NULL && curved)
             result = dem2di_swarm_section(env, &section, swarm, &random, &arc, iterations);
-        dem2d_vec joint = section.from->point;
-        control[3 * i] = joint;
-        control[3 * i + 1] = dem2di_add(joint, arc.d0);
-        control[3 * i + 2] = dem2di_add(joint, dem2di_add(arc.d0, arc.d1));
+        dem2d_vec knot = section.from->point;
+        control[3 * i] = knot;
+        control[3 * i + 1] = dem2di_add(knot, arc.d0);
+        control[3 * i + 2] = dem2di_add(knot, dem2di_add(arc.d0, arc.d1));
     }
     dem2di_release(env, memory, 2 * count, size);
     return result;

@@ -200,30 +200,30 @@ static void draw_tiny(curve *c, uint64_t *d) {
     curve_cut(c, &p, d);
 }
 
-/* Joints on an ellipse-like chain with tangents between those of the chords. */
+/* Knots on an ellipse-like chain with tangents between those of the chords. */
 static void draw_smooth(curve *c, uint64_t *d) {
     const int n = 3 + random_below(d, 8);
-    spot joint[12], tangent[12];
+    spot knot[12], tangent[12];
     const real thin = random_between(d, 0.3, 1);
     for (int i = 0; i < n; i++) {
         const spot u =
             spot_turned(spot_make(1, 0), 2 * CASE_PI * (i + random_between(d, 0, 0.7)) / n);
-        joint[i] = spot_make(u.x, thin * u.y);
+        knot[i] = spot_make(u.x, thin * u.y);
     }
     for (int i = 0; i < n; i++) {
-        const spot in = spot_unit(spot_less(joint[i], joint[(i + n - 1) % n]));
-        const spot out = spot_unit(spot_less(joint[(i + 1) % n], joint[i]));
+        const spot in = spot_unit(spot_less(knot[i], knot[(i + n - 1) % n]));
+        const spot out = spot_unit(spot_less(knot[(i + 1) % n], knot[i]));
         const real w = random_between(d, 0.1, 0.9);
         tangent[i] = spot_unit(spot_make((1 - w) * in.x + w * out.x, (1 - w) * in.y + w * out.y));
     }
     for (int i = 0; i < n; i++) {
         const int k = (i + 1) % n;
-        const spot way = spot_less(joint[k], joint[i]), s = tangent[i], t = tangent[k];
+        const spot way = spot_less(knot[k], knot[i]), s = tangent[i], t = tangent[k];
         const real sine = spot_cross(s, t); /* arcs that turn by more than pi/2 may lack one */
         real a = hypotl(way.x, way.y), b = a;
         if (sine > 0.01L) a = spot_cross(way, t) / sine, b = spot_cross(s, way) / sine;
         a *= random_between(d, 0.2, 0.95), b *= random_between(d, 0.2, 0.95);
-        curve_arc(c, joint[i], spot_sum(joint[i], a, s), spot_sum(joint[k], -b, t));
+        curve_arc(c, knot[i], spot_sum(knot[i], a, s), spot_sum(knot[k], -b, t));
     }
 }
 
@@ -392,7 +392,7 @@ typedef struct grain {
     int curve, written;
     dem2d_result result;
     bool allowed; /* by what dem2d_shape_create_bezier says it takes */
-    real kink;    /* rad, most that neighbouring legs turn at a joint, or to the right */
+    real kink;    /* rad, most that neighbouring legs turn at a knot, or to the right */
     double size;  /* of the template; poses are scaled by 1 / size */
     uint64_t seed;
 } grain;
@@ -510,10 +510,10 @@ static bool grain_allowed(const model *m, real *kink) {
         const real sine = sign * spot_cross(legs[last], legs[i]) / (lengths[last] * lengths[i]);
         const real angle = atan2l(sine * lengths[last] * lengths[i], spot_dot(legs[last], legs[i]));
         const real slack = 0.9e-6L + rounding * coordinates * (1 / lengths[last] + 1 / lengths[i]);
-        const bool joint = last / 3 != i / 3 || last >= i;
-        *kink = fmaxl(*kink, joint ? fabsl(angle) : -angle);
-        if (angle < -slack || (joint && angle > slack)) return false;
-        if (!joint) arc += angle;
+        const bool knot = last / 3 != i / 3 || last >= i;
+        *kink = fmaxl(*kink, knot ? fabsl(angle) : -angle);
+        if (angle < -slack || (knot && angle > slack)) return false;
+        if (!knot) arc += angle;
         if (arc > CASE_PI + slack) return false;
         turned += angle, last = i;
     }

@@ -24,7 +24,7 @@ static pair bare_pair(const model *a, const model *b, double x, double y) {
     return p;
 }
 
-/* Four arcs of a circle: on it at joints and in the middle of arcs, outside by 2.725e-4 at most;
+/* Four arcs of a circle: on it at knots and in the middle of arcs, outside by 2.725e-4 at most;
    areas differ by 2.800e-4 with the handles 0.5522847498. */
 static void test_oracle_circle(void **state) {
     (void)state;

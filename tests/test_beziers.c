@@ -1,4 +1,4 @@
-/* Polybeziers whose arcs turn by pi, are straight or nearly so, have joints that are smooth only to
+/* Polybeziers whose arcs turn by pi, are straight or nearly so, have knots that are smooth only to
    the digits of a file, or are tiny: support, boxes, walls, contacts, faces. The truth is a scan of
    the given arcs in long double. */
 #include "dem2d.h"
@@ -254,7 +254,7 @@ static void nearly_straight_arcs(void **state) {
         dem2d_vec control[3 * ARCS];
         const double bend = pow(10, -i);
         (void)make_control(&chains[2], 0, 0, control);
-        control[1].y = control[2].y = -0.5 - bend; /* and joints that stay smooth */
+        control[1].y = control[2].y = -0.5 - bend; /* and knots that stay smooth */
         control[11].y = -0.5 + 0.6 / 0.7 * bend, control[4].y = -0.5 + 0.6 / 0.7 * bend;
         dem2d_shape *shape, *circle;
         dem2d_shape_info info;

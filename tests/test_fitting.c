@@ -360,7 +360,7 @@ static void bezier_fit_of_round_outlines(void **state) {
     }
 }
 
-/* Angular outlines whose joints share corners or lie along edges: always a shape. How much it
+/* Angular outlines whose knots share corners or lie along edges: always a shape. How much it
    covers is bounded only by common sense. */
 static void bezier_fit_of_polygons(void **state) {
     (void)state;
