@@ -303,6 +303,10 @@ typedef struct args {
     store *snapshot; /* that is read */
     double *a, *b;   /* of a series; fourier_reduce writes them */
     void *out, *second, *third;
+    const dem2d_body *bodies;
+    const dem2d_body_pair *pairs;
+    dem2d_body two[2];
+    dem2d_body_pair one;
     dem2d_pose pose, pose_b;
     dem2d_vec vector, direction;
     double x, y;
@@ -416,6 +420,13 @@ static void with_virtual(args *a, fixture *f) {
 static void with_nothing(args *a, fixture *f) { /* contact, reduction: all 0 */
     (void)a;
     (void)f;
+}
+static void with_bodies(args *a, fixture *f) {
+    (void)f;
+    a->bodies = a->two, a->pairs = &a->one, a->count = 2, a->number = 1;
+    a->two[0].shape = a->shape, a->two[0].pose = a->pose;
+    a->two[1].shape = a->other, a->two[1].pose = a->pose_b;
+    a->one.b = 1;
 }
 static void with_world(args *a, fixture *f) {
     a->d.world = good_world(&f->env.env);
@@ -676,6 +687,15 @@ typedef struct function {
       SILENT(CONTACT, with_nothing), PAIR_ARGS)                                                   \
     F(pair_contact, dem2d_pair_contact(v->shape, v->pose, v->other, v->pose_b, v->desc, v->out),  \
       SILENT(CONTACT, with_nothing), PAIR_ARGS)                                                   \
+    F(pairs_contact,                                                                              \
+      dem2d_pairs_contact(v->env, v->bodies, v->count, v->pairs, v->number, v->desc, NULL,        \
+                          v->out, NULL),                                                          \
+      DESCRIBED(CONTACT, with_bodies), ENV, ARG(bodies, "bodies", POINTER),                       \
+      ARG_INT(count, "bodies", 2, INT_MAX, OUT_OF_RANGE), ARG(pairs, "pairs", POINTER),       \
+      ARG_INT(number, "pairs", 0, INT_MAX, OUT_OF_RANGE),                                    \
+      ARG(two[1].shape, "bodies[1].shape", POINTER), ARG(two[1].pose, "bodies[1].pose", POSE),    \
+      ARG_INT(one.a, "pairs[0]", 0, 0, OUT_OF_RANGE),                                             \
+      ARG_INT(one.b, "pairs[0]", 1, 1, OUT_OF_RANGE), ARG(desc, "desc", OPTIONAL), OUT)           \
     F(wall_contact, dem2d_wall_contact(v->shape, v->pose, v->vector, v->direction, v->out),       \
       PLAIN, ARG(shape, "shape", POINTER), ARG(pose, "pose", POSE), ARG(vector, "point", VECTOR), \
       ARG(direction, "wall_normal", DIRECTION), OUT)                                              \
