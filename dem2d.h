@@ -22,6 +22,7 @@ CONTENTS (search for the anchor, ">>" and the word)
                     world                                                   >>api-world
                     measures                                                >>api-measures
                     queries of space                                        >>api-queries
+                    particles and contacts in bulk                          >>api-bulk
                     state hash, snapshots                                   >>api-snapshot
                     writers                                                 >>api-writers
     Implementation  compiler, constants, floating point                     >>config
@@ -52,6 +53,7 @@ CONTENTS (search for the anchor, ">>" and the word)
                     contacts, sums, motion; the stable time step            >>step
                     energy, stress, fabric, packing, distance from rest     >>measures
                     overlaps, rays, the nearest                             >>queries
+                    particles and contacts from and into arrays             >>bulk
                     bytes to a callback or a file                           >>output
                     state hash, snapshots                                   >>snapshot
                     pictures, files for ParaView, histories                 >>writers
@@ -270,6 +272,9 @@ HOW TO
                          step in the first step, after edits that can matter, and in every 160th.
     lose energy          damping_ratio of the materials, from dem2d_damping_ratio(restitution);
                          rolling_friction for grains that should not roll; else friction, damping.
+    read many at once    dem2d_world_read_particles, dem2d_world_read_contacts: into arrays of
+                         yours, as many as you name; with a stride into a struct of yours.
+                         dem2d_world_write_particles sets positions, velocities and loads from them.
     push grains          dem2d_world_set_load: a force and a torque until you set others. What
                          changes from step to step (drag, magnets, motors) is set by
                          dem2d_world_desc.loads. The work is in the ledger.
@@ -1774,6 +1779,70 @@ DEM2D_API dem2d_result dem2d_world_nearest(dem2d_world *world, dem2d_vec point, 
 DEM2D_API dem2d_result dem2d_world_particle_contacts(const dem2d_world *world, dem2d_particle_id id,
                                                      dem2d_contact_info *contacts, int capacity,
                                                      int *count);
+
+/* ============================================================================================
+   >>api-bulk  Particles and contacts in bulk
+   ============================================================================================ */
+
+/// Arrays of a caller for numbers of particles, one row each; NULL: not wanted. Row i is that of
+/// the i-th id of dem2d_world_particles. With a stride of 0 each array is dense. Else row i is
+/// stride * i bytes behind the first in every array: arrays of a struct of yours.
+typedef struct dem2d_particle_arrays {
+    int stride;                 ///< bytes from a row to the next, 0 or at least 16
+    bool at_forces;             ///< read: poses and mean velocities of the last force pass
+    dem2d_particle_id *ids;     ///< write: of the rows, in any order; NULL: as they are read
+    dem2d_vec *positions;       ///< m
+    double *angles;             ///< rad; read in [-pi, pi]
+    dem2d_rot *rotations;       ///< read only: the same without a sine, an arctangent
+    dem2d_vec *velocities;      ///< m/s, half a step before the positions
+    double *angular_velocities; ///< rad/s, likewise
+    dem2d_vec *forces;          ///< N/m, read only: sum over contacts of the last force pass
+    double *torques;            ///< N, likewise
+    dem2d_vec *loads;           ///< N/m, external
+    double *load_torques;       ///< N, external
+    double *masses;             ///< kg/m, read only
+    double *inertias;           ///< kg m, read only
+    double *radii;              ///< m, read only: bounding circles
+    double *equivalents;        ///< m, read only: radii of the circles of equal area
+    uint64_t *names;            ///< read only
+} dem2d_particle_arrays;
+
+/// Arrays of a caller for numbers of contacts, as those of particles: row i is the i-th contact of
+/// dem2d_world_contacts, with the numbers of dem2d_contact_info.
+typedef struct dem2d_contact_arrays {
+    int stride;                ///< bytes from a row to the next, 0 or at least 16
+    dem2d_particle_id *a;      ///< particle A
+    dem2d_particle_id *b;      ///< particle B; generation 0 when B is a wall
+    dem2d_wall_id *walls;      ///< wall B; generation 0 when B is a particle
+    dem2d_vec *points;         ///< m
+    dem2d_vec *normals;        ///< unit, from A to B
+    dem2d_vec *branches;       ///< m
+    double *depths;            ///< m, overlap
+    double *normal_forces;     ///< N/m, on B along the normal
+    double *tangential_forces; ///< N/m, on B along the normal turned by +90 degrees
+    double *moments;           ///< N, on B
+} dem2d_contact_arrays;
+
+/// Read numbers of all particles: the first `capacity` rows go into the arrays, count gets the
+/// number of particles. Forces have the bits of dem2d_world_get_particle; after their first reading
+/// steps store them (24 bytes and some 5 % of a step). Allocates nothing while the number of
+/// contacts does not grow. Errors: OUT_OF_RANGE (capacity, stride), OUT_OF_MEMORY.
+DEM2D_API dem2d_result dem2d_world_read_particles(dem2d_world *world,
+                                                  const dem2d_particle_arrays *arrays, int capacity,
+                                                  int *count);
+/// Set positions, angles, velocities, angular velocities and external loads of `count` particles:
+/// those of the ids, or the first of dem2d_world_particles. Arrays that are NULL change nothing.
+/// The rules are those of dem2d_world_move_particle (for rows with another pose than the particle
+/// has), dem2d_world_drive_particle and dem2d_world_set_load; the kind of motion stays. All rows
+/// are checked before the first is set. Errors: OUT_OF_RANGE (count, stride; an array that is read
+/// only; a velocity of a fixed particle that is not 0), STALE_ID, NOT_FINITE, OUT_OF_MEMORY.
+DEM2D_API dem2d_result dem2d_world_write_particles(dem2d_world *world,
+                                                   const dem2d_particle_arrays *arrays, int count);
+/// Read numbers of the contacts of the last force pass: the first `capacity` rows go into the
+/// arrays, count gets the number of contacts. Errors: OUT_OF_RANGE (capacity, stride).
+DEM2D_API dem2d_result dem2d_world_read_contacts(const dem2d_world *world,
+                                                 const dem2d_contact_arrays *arrays, int capacity,
+                                                 int *count);
 
 /* ============================================================================================
    >>api-snapshot  State hash, snapshots
@@ -11224,7 +11293,7 @@ static bool dem2di_state_finite(const dem2di_state *state) {
                 Of each pair first the geometry (collide), then the law; kernels of circles do both.
                 Where segments are joined, it is decided in between which contacts count (resolve)
      gather     loads -> force and torque of each particle, in the order of its partners' ranks:
-               part of integrate, unless a callback may change the sums; external loads are added
+               part of integrate, unless the sums are kept; external loads are added
      control    forces on servo walls, next states of their particles -> velocities of walls
      check      contacts, loads -> may the step be taken? The last pass that may refuse it
      integrate  states, forces -> next states
@@ -11481,9 +11550,9 @@ typedef enum dem2di_group {
     DEM2DI_BODIES,
     DEM2DI_NAMES,         /* of bodies, where named */
     DEM2DI_LOADS,         /* of bodies, where loaded */
+    DEM2DI_SUMS,          /* of bodies, where they are kept */
     DEM2DI_DISPLACEMENTS, /* of bodies, where plan.turns */
     DEM2DI_MADE,          /* of bodies, where some are redirected */
-    DEM2DI_SUMS,          /* of bodies, where the caller may change them */
     DEM2DI_EXCHANGED,     /* of ids, where the caller may change the sums */
     DEM2DI_WALLS_EXCHANGED,
     DEM2DI_STARTS, /* of the contacts of bodies, and the end of the last */
@@ -11530,6 +11599,8 @@ struct dem2d_world {
     dem2d_face_rule faces;
 
     bool keeps_last; /* the force pass keeps the contacts of the last one */
+    bool keeps_sums; /* steps keep the sums of forces: a caller changes them, or reads them */
+    bool sums_fresh; /* what is kept are the sums of the contacts as they are now */
     bool check_time_step;
     bool check_due;    /* an edit since the last check of the time step and the speeds can matter */
     int plan_due;      /* steps for which the features in use are found anew, see dem2di_prepare */
@@ -11589,7 +11660,7 @@ struct dem2d_world {
     double *load_a, *load_b; /* torques on A and on B */
     bool loaded, twisted;    /* a particle has had an external load; one that is a torque: */
     dem2di_load *loads;      /* of all */
-    dem2di_load *sums;       /* of the forces on each particle, where the caller may change them */
+    dem2di_load *sums;       /* of the contact forces on each particle, where they are kept */
     dem2d_sums exchange;     /* the same and those on walls for a caller, by ids */
     dem2di_push *pushes;     /* room for the contacts of a servo wall */
     char *scratch;           /* what only a step or only the building of the list needs */
@@ -11957,7 +12028,7 @@ static const dem2di_column dem2di_columns[] = {
     DEM2DI_UNSAVED(DISPLACEMENTS, next_displacement, 0),
     DEM2DI_UNSAVED(DISPLACEMENTS, lever, DEM2DI_MOVES),
     DEM2DI_COLUMN("last_velocities", MADE, made, DEM2DI_MOVES | DEM2DI_HASHED, velocity_fields),
-    DEM2DI_UNSAVED(SUMS, sums, 0),
+    DEM2DI_UNSAVED(SUMS, sums, DEM2DI_MOVES),
     DEM2DI_UNSAVED(EXCHANGED, exchange.force, 0),
     DEM2DI_UNSAVED(EXCHANGED, exchange.torque, 0),
     DEM2DI_UNSAVED(WALLS_EXCHANGED, exchange.wall_force, 0),
@@ -12111,6 +12182,7 @@ static bool dem2di_reserve_bodies(dem2d_world *world, int count) {
            (!world->named || (dem2di_group_reserve(world, DEM2DI_RANKS, count) &&
                               dem2di_group_reserve(world, DEM2DI_NAMES, count))) &&
            (!world->loaded || dem2di_group_reserve(world, DEM2DI_LOADS, count)) &&
+           (!world->keeps_sums || dem2di_group_reserve(world, DEM2DI_SUMS, count)) &&
            (!world->plan.turns || dem2di_group_reserve(world, DEM2DI_DISPLACEMENTS, count)) &&
            (!world->redirected || dem2di_group_reserve(world, DEM2DI_MADE, count));
 }
@@ -12253,6 +12325,7 @@ DEM2D_API dem2d_result dem2d_world_create(const dem2d_world_desc *desc, dem2d_wo
     made->gather = desc->gather;
     made->commit = desc->commit;
     made->exchange_user = desc->exchange_user;
+    made->keeps_sums = desc->gather != NULL;
     made->set_loads = desc->loads;
     made->loads_user = desc->loads_user;
     made->skin_fixed = desc->skin > 0;
@@ -12634,6 +12707,7 @@ static inline void dem2di_contact_clear(dem2d_world *world, int i) {
 /* A contact ends: its pair is apart, and leaves with the next list. */
 static void dem2di_contact_forget(dem2d_world *world, int i) {
     dem2di_list *list = &world->list;
+    world->sums_fresh = false;
     list->keys[i].a = -1;
     list->contacts.depth[i] = 0;
     dem2di_contact_clear(world, i);
@@ -12909,6 +12983,7 @@ static void dem2di_contact_end(dem2d_world *world, int i) {
 /* A particle has been put elsewhere: all its contacts end, and as much of its skin is used up. */
 static void dem2di_moved(dem2d_world *world, int slot, dem2d_vec way) {
     const dem2di_list *list = &world->list;
+    world->sums_fresh = false;
     world->check_due = world->ledger.edited = true;
     world->tree.made = false;
     if (world->list_stale) {
@@ -12921,6 +12996,15 @@ static void dem2di_moved(dem2d_world *world, int slot, dem2d_vec way) {
     world->list_stale = !(world->list_displacement <= 1 - DEM2DI_LIST_STEPS * DBL_EPSILON);
 }
 
+/* To a position and an orientation, as states hold it. */
+static void dem2di_put_at(dem2d_world *world, int slot, dem2d_vec position, dem2d_rot q) {
+    dem2d_vec way = dem2di_sub(position, world->now[slot].x);
+    world->now[slot].x = position;
+    world->now[slot].q = q;
+    world->before[slot] = world->now[slot];
+    dem2di_moved(world, slot, way);
+}
+
 DEM2D_API dem2d_result dem2d_world_move_particle(dem2d_world *world, dem2d_particle_id id,
                                                  dem2d_vec position, double angle) {
     if (world == NULL) return DEM2D_NULL_ARGUMENT;
@@ -12931,11 +13015,7 @@ DEM2D_API dem2d_result dem2d_world_move_particle(dem2d_world *world, dem2d_parti
     moved.angle = angle;
     dem2d_result result = dem2di_check_motion(&world->env, &moved);
     if (result != DEM2D_OK) return result;
-    dem2d_vec way = dem2di_sub(position, world->now[slot].x);
-    world->now[slot].x = position;
-    world->now[slot].q = dem2di_orientation(world, angle);
-    world->before[slot] = world->now[slot];
-    dem2di_moved(world, slot, way);
+    dem2di_put_at(world, slot, position, dem2di_orientation(world, angle));
     return DEM2D_OK;
 }
 
@@ -12981,6 +13061,17 @@ static void dem2di_set_motion(dem2d_world *world, int slot, dem2d_motion motion)
     dem2di_edited(world);
 }
 
+/* Other velocities from the next move on; false when there is no memory. */
+static bool dem2di_drive(dem2d_world *world, int slot, dem2d_vec velocity, double spin) {
+    if (!dem2di_redirect(world, slot, velocity, spin)) return false;
+    world->now[slot].v = velocity;
+    world->now[slot].w = spin;
+    if (world->bodies[slot].redirected) world->ledger.edited = true;
+    if (dem2di_outruns(world, slot)) world->check_due = true;
+    if (dem2di_speeds_matter(world, slot)) dem2di_edited(world);
+    return true;
+}
+
 DEM2D_API dem2d_result dem2d_world_drive_particle(dem2d_world *world, dem2d_particle_id id,
                                                   dem2d_motion motion, dem2d_vec velocity,
                                                   double angular_velocity) {
@@ -12993,13 +13084,8 @@ DEM2D_API dem2d_result dem2d_world_drive_particle(dem2d_world *world, dem2d_part
     driven.angular_velocity = angular_velocity;
     dem2d_result result = dem2di_check_motion(&world->env, &driven);
     if (result != DEM2D_OK) return result;
-    if (!dem2di_redirect(world, slot, velocity, angular_velocity))
+    if (!dem2di_drive(world, slot, velocity, angular_velocity))
         return dem2di_out_of_memory(world, "velocities");
-    world->now[slot].v = velocity;
-    world->now[slot].w = angular_velocity;
-    if (world->bodies[slot].redirected) world->ledger.edited = true;
-    if (dem2di_outruns(world, slot)) world->check_due = true;
-    if (dem2di_speeds_matter(world, slot)) dem2di_edited(world);
     dem2di_set_motion(world, slot, motion);
     return DEM2D_OK;
 }
@@ -13019,6 +13105,14 @@ static double dem2di_load_size(const dem2di_load *load) {
     return dem2di_size_of(load->force) + fabs(load->torque);
 }
 
+static void dem2di_load_put(dem2d_world *world, int slot, dem2d_vec force, double torque) {
+    world->loads[slot].force = force;
+    world->loads[slot].torque = torque;
+    bool turns = torque != 0 && !world->twisted;
+    world->twisted = world->twisted || turns;
+    if (turns || dem2di_load_size(&world->loads[slot]) > DEM2DI_LOAD_SURE) dem2di_edited(world);
+}
+
 DEM2D_API dem2d_result dem2d_world_set_load(dem2d_world *world, dem2d_particle_id id,
                                             dem2d_vec force, double torque) {
     if (world == NULL) return DEM2D_NULL_ARGUMENT;
@@ -13029,11 +13123,7 @@ DEM2D_API dem2d_result dem2d_world_set_load(dem2d_world *world, dem2d_particle_i
         result = dem2di_check_number(&world->env, "torque", torque, DEM2DI_FINITE);
     if (result != DEM2D_OK) return result;
     if (!dem2di_loads_begin(world)) return dem2di_out_of_memory(world, "external loads");
-    world->loads[slot].force = force;
-    world->loads[slot].torque = torque;
-    bool turns = torque != 0 && !world->twisted;
-    world->twisted = world->twisted || turns;
-    if (turns || dem2di_load_size(&world->loads[slot]) > DEM2DI_LOAD_SURE) dem2di_edited(world);
+    dem2di_load_put(world, slot, force, torque);
     return DEM2D_OK;
 }
 
@@ -15554,11 +15644,12 @@ static DEM2DI_INLINE dem2di_load dem2di_gather(const dem2d_world *world, int slo
     return sum;
 }
 
-/* Room for the sums that the caller may change. */
+/* Room for the sums, where these are kept. */
 static bool dem2di_sums_reserve(dem2d_world *world) {
+    if (!world->keeps_sums) return true;
+    if (!dem2di_group_reserve(world, DEM2DI_SUMS, world->body_count)) return false;
     return world->gather == NULL ||
-           (dem2di_group_reserve(world, DEM2DI_SUMS, world->body_count) &&
-            dem2di_group_reserve(world, DEM2DI_EXCHANGED, world->id_count) &&
+           (dem2di_group_reserve(world, DEM2DI_EXCHANGED, world->id_count) &&
             dem2di_group_reserve(world, DEM2DI_WALLS_EXCHANGED, world->wall_count));
 }
 
@@ -15595,20 +15686,21 @@ static void dem2di_exchange(dem2d_world *world) {
     }
 }
 
-/* The gather pass, where the caller may change the sums. */
+/* The gather pass, where the sums are kept. */
 static void dem2di_gather_pass(dem2d_world *world) {
-    if (world->gather == NULL) return;
+    world->sums_fresh = false;
+    if (!world->keeps_sums) return;
     dem2di_run(world, DEM2D_PHASE_MOTION, dem2di_blocks(world->body_count, DEM2DI_BLOCK),
                dem2di_gather_task, world);
-    dem2di_exchange(world);
+    if (world->gather != NULL) dem2di_exchange(world);
 }
 
 /* The sum of the contact forces on a particle, as the caller has left it. */
 static DEM2DI_INLINE dem2di_load dem2di_sum_of(const dem2d_world *world, int slot, bool spin) {
-    return world->gather != NULL ? world->sums[slot] : dem2di_gather(world, slot, spin);
+    return world->keeps_sums ? world->sums[slot] : dem2di_gather(world, slot, spin);
 }
 
-/* A particle a step later. Pushed: there are external loads, or sums that the caller has left. */
+/* A particle a step later. Pushed: there are external loads, or sums that are kept. */
 static DEM2DI_INLINE dem2di_state dem2di_integrate(const dem2d_world *world, int slot,
                                                    const dem2di_damping *damping, bool heavy,
                                                    bool damped, bool spin, bool turns,
@@ -15892,7 +15984,7 @@ static double dem2di_integrate_block(dem2d_world *w, int b, int e) {
 #define DEM2DI_INTEGRATE_PUSHED(spin, turns)                                    \
     (p->damped ? dem2di_integrate_range(w, b, e, true, true, spin, turns, true) \
                : dem2di_integrate_range(w, b, e, true, false, spin, turns, true))
-    if (w->loaded || w->gather != NULL)
+    if (w->loaded || w->keeps_sums)
         return p->turns  ? DEM2DI_INTEGRATE_PUSHED(true, true)
                : p->spin ? DEM2DI_INTEGRATE_PUSHED(true, false)
                          : DEM2DI_INTEGRATE_PUSHED(false, false);
@@ -16253,6 +16345,7 @@ static void dem2di_commit(dem2d_world *world) {
         if (world->walls[j].desc.mode != DEM2D_WALL_STILL) dem2di_surfaces_set(world, j);
     dem2di_made(world);
     world->steps++;
+    world->sums_fresh = world->keeps_sums && world->gather == NULL;
     world->tree.made = false;
 }
 
@@ -17846,6 +17939,319 @@ DEM2D_API dem2d_result dem2d_world_particle_contacts(const dem2d_world *world, d
         at.branch = dem2di_branch_of(&at.contact, at.walls);
         if (open < capacity) contacts[open] = dem2di_contact_of(world, &at);
         open++;
+    }
+    *count = open;
+    return DEM2D_OK;
+}
+
+/* ============================================================================================
+   >>bulk  Particles and contacts from and into arrays of a caller
+   uses: config, math, memory, fields, law, motion, world, objects, list, step, measures
+   ============================================================================================ */
+
+/* Particles are read array by array, each in the order of the slots, in which the columns are read
+   one line after the other; rows are where the ids put them. Sums of contact forces take two
+   passes: the force of each contact into the arrays of loads, which are scratch between two steps,
+   then those of each particle, in the order of the step. What is 0 there stays 0. */
+
+#define DEM2DI_STRIDE DEM2DI_WHOLE_OR_0(16, 1 << 20) /* bytes; an id, a vector fit in */
+
+/* Where particles go: of each slot the row, or -1. */
+typedef struct dem2di_rows_of {
+    dem2d_world *world;
+    const dem2d_particle_arrays *arrays;
+    int *rows;
+    int begin, end; /* slots of the present block, whose lines stay in the cache */
+} dem2di_rows_of;
+
+/* Row i of a caller's array. */
+static inline void *dem2di_row_at(void *array, int row, int stride, size_t size) {
+    return (char *)array + (size_t)row * (stride > 0 ? (size_t)stride : size);
+}
+
+/* Scratch for the loads of a step and for the rows behind them. The loads stay where they are. */
+static bool dem2di_rows_make(dem2di_rows_of *to, int capacity) {
+    dem2d_world *world = to->world;
+    const dem2di_list *list = &world->list;
+    size_t slots = (size_t)world->body_count;
+    size_t loads =
+        dem2di_step_cut(world, NULL, list->discs, list->pairs, list->count, &world->plan, false);
+    bool room = dem2di_scratch_reserve(world, loads + slots * sizeof(int));
+    (void)dem2di_step_cut(world, world->scratch, list->discs, list->pairs, list->count,
+                          &world->plan, false);
+    if (!room) return false;
+    to->rows = slots > 0 ? (int *)(void *)(world->scratch + loads) : NULL;
+    for (size_t i = 0; i < slots; i++) to->rows[i] = -1;
+    for (int index = 0, row = 0; index < world->id_count && row < capacity; index++)
+        if (world->ids[index].slot >= 0) to->rows[world->ids[index].slot] = row++;
+    return true;
+}
+
+/* One array: `value` of each slot i. */
+#define DEM2DI_READ(to, type, array, value)                                                 \
+    for (int i = (to)->begin; i < (to)->end && (to)->arrays->array != NULL; i++) {          \
+        int row = (to)->rows[i];                                                            \
+        if (row < 0) continue;                                                              \
+        const type number = value;                                                          \
+        memcpy(dem2di_row_at((to)->arrays->array, row, (to)->arrays->stride, sizeof(type)), \
+               &number, sizeof number);                                                     \
+    }
+
+/* The angle of a state, in [-pi, pi]. */
+static double dem2di_angle_of(const dem2d_world *world, const dem2di_state *state) {
+    double angle = state->q.c;
+    if (world->plan.turns) return dem2d_rot_angle(state->q);
+    return fabs(angle) <= DEM2DI_PI ? angle : dem2d_rot_angle(dem2d_rot_make(angle));
+}
+
+static void dem2di_read_states(const dem2di_rows_of *to) {
+    const dem2d_world *world = to->world;
+    const bool mean = to->arrays->at_forces;
+    const dem2di_state *states = mean ? world->before : world->now;
+    DEM2DI_READ(to, dem2d_vec, positions, states[i].x)
+    DEM2DI_READ(to, double, angles, dem2di_angle_of(world, &states[i]))
+    DEM2DI_READ(to, dem2d_rot, rotations, dem2di_pose_of(world, states, i).rotation)
+    if (!mean) {
+        DEM2DI_READ(to, dem2d_vec, velocities, states[i].v)
+        DEM2DI_READ(to, double, angular_velocities, states[i].w)
+        return;
+    }
+    DEM2DI_READ(to, dem2d_vec, velocities, dem2di_velocities_mean(world, i).v)
+    DEM2DI_READ(to, double, angular_velocities, dem2di_velocities_mean(world, i).w)
+}
+
+/* The force of each contact, where the sums have to be taken anew. */
+static void dem2di_read_contact_forces(const dem2di_rows_of *to) {
+    dem2d_world *world = to->world;
+    const dem2di_list *list = &world->list;
+    const dem2di_contacts *from = &list->contacts;
+    if (to->arrays->forces == NULL || world->sums_fresh) return;
+    for (int i = 0; i < list->count; i++) {
+        double force = from->force[i], shear = from->shear[i];
+        world->load_x[i] = from->normal_x[i] * force - from->normal_y[i] * shear;
+        world->load_y[i] = from->normal_y[i] * force + from->normal_x[i] * shear;
+    }
+}
+
+static void dem2di_read_forces(const dem2di_rows_of *to) {
+    const dem2d_world *world = to->world;
+    if (world->sums_fresh) {
+        DEM2DI_READ(to, dem2d_vec, forces, world->sums[i].force)
+        DEM2DI_READ(to, double, torques, world->sums[i].torque)
+        return;
+    }
+    DEM2DI_READ(to, dem2d_vec, forces, dem2di_gather(world, i, false).force)
+    DEM2DI_READ(to, double, torques, dem2di_load_of(world, i).torque)
+}
+
+static void dem2di_read_bodies(const dem2di_rows_of *to) {
+    const dem2d_world *world = to->world;
+    DEM2DI_READ(to, dem2d_particle_id, ids, dem2di_particle_id(world, i))
+    DEM2DI_READ(to, dem2d_vec, loads, dem2di_external(world, i).force)
+    DEM2DI_READ(to, double, load_torques, dem2di_external(world, i).torque)
+    DEM2DI_READ(to, double, masses, dem2di_body_mass(world, &world->bodies[i]))
+    DEM2DI_READ(to, double, inertias, dem2di_body_inertia(world, &world->bodies[i]))
+    DEM2DI_READ(to, double, radii, world->now[i].radius)
+    DEM2DI_READ(to, double, equivalents, dem2di_equivalent(world, i))
+    DEM2DI_READ(to, uint64_t, names, world->named ? world->names[i] : 0)
+}
+
+DEM2D_API dem2d_result dem2d_world_read_particles(dem2d_world *world,
+                                                  const dem2d_particle_arrays *arrays, int capacity,
+                                                  int *count) {
+    if (world == NULL || arrays == NULL || count == NULL) return DEM2D_NULL_ARGUMENT;
+    dem2d_result result = dem2di_check_number(&world->env, "stride", arrays->stride, DEM2DI_STRIDE);
+    if (result == DEM2D_OK)
+        result = dem2di_check_number(&world->env, "capacity", capacity, DEM2DI_COUNT);
+    if (result != DEM2D_OK) return result;
+    dem2di_rows_of to = {world, arrays, NULL, 0, 0};
+    if (!dem2di_rows_make(&to, capacity)) return dem2di_out_of_memory(world, "rows of particles");
+    dem2di_read_contact_forces(&to);
+    for (; to.begin < world->body_count; to.begin = to.end) {
+        to.end = dem2di_block_end(to.begin, DEM2DI_BLOCK, world->body_count);
+        dem2di_read_states(&to);
+        dem2di_read_forces(&to);
+        dem2di_read_bodies(&to);
+    }
+    if (arrays->forces != NULL || arrays->torques != NULL) world->keeps_sums = true;
+    *count = world->body_count - world->holes;
+    return DEM2D_OK;
+}
+
+/* --- writing ------------------------------------------------------------------------------------
+ */
+
+/* What a row says of its particle; what it does not say is as it is. */
+typedef struct dem2di_new_state {
+    int slot;
+    dem2d_vec position, velocity;
+    dem2d_rot q;
+    double angle, angular_velocity;
+    dem2di_load load;
+} dem2di_new_state;
+
+#define DEM2DI_TAKE(arrays, row, array, to)                                                  \
+    do {                                                                                     \
+        if ((arrays)->array != NULL)                                                         \
+            memcpy(&(to), dem2di_row_at((arrays)->array, row, (arrays)->stride, sizeof(to)), \
+                   sizeof(to));                                                              \
+    } while (false)
+
+/* The particle of a row: of its id, or the next in the order of ids, from `index` on; -1: stale. */
+static int dem2di_row_slot(const dem2d_world *world, const dem2d_particle_arrays *arrays, int row,
+                           int *index) {
+    dem2d_particle_id id = {0, 0};
+    if (arrays->ids == NULL) {
+        while (world->ids[*index].slot < 0) (*index)++;
+        return world->ids[(*index)++].slot;
+    }
+    DEM2DI_TAKE(arrays, row, ids, id);
+    *index = (int)(id.index & INT_MAX);
+    return dem2di_slot(world, id);
+}
+
+static dem2di_new_state dem2di_row_take(const dem2d_world *world,
+                                        const dem2d_particle_arrays *arrays, int row, int slot) {
+    const dem2di_state *now = &world->now[slot];
+    dem2di_new_state made;
+    made.slot = slot;
+    made.position = now->x;
+    made.velocity = now->v;
+    made.angle = dem2di_angle_of(world, now);
+    made.angular_velocity = now->w;
+    made.load = dem2di_external(world, slot);
+    const double angle = made.angle;
+    DEM2DI_TAKE(arrays, row, positions, made.position);
+    DEM2DI_TAKE(arrays, row, angles, made.angle);
+    DEM2DI_TAKE(arrays, row, velocities, made.velocity);
+    DEM2DI_TAKE(arrays, row, angular_velocities, made.angular_velocity);
+    DEM2DI_TAKE(arrays, row, loads, made.load.force);
+    DEM2DI_TAKE(arrays, row, load_torques, made.load.torque);
+    made.q = now->q;
+    if (made.angle != angle) made.q = dem2di_orientation(world, made.angle);
+    return made;
+}
+
+static dem2d_result dem2di_check_row(const dem2d_world *world, int row,
+                                     const dem2di_new_state *made) {
+    static const char *const names[9] = {"positions",  "positions",  "angles",
+                                         "velocities", "velocities", "angular_velocities",
+                                         "loads",      "loads",      "load_torques"};
+    const double values[9] = {made->position.x,   made->position.y,   made->angle,
+                              made->velocity.x,   made->velocity.y,   made->angular_velocity,
+                              made->load.force.x, made->load.force.y, made->load.torque};
+    const dem2d_env *env = &world->env;
+    bool holds = world->bodies[made->slot].motion == DEM2D_FIXED;
+    for (int k = 0; k < 9; k++) {
+        if (!dem2di_finite(values[k]))
+            return dem2di_fail(env, DEM2D_NOT_FINITE, row, "%s[%d] = %g is not finite", names[k],
+                               row, values[k]);
+        if (holds && values[k] != 0 && k >= 3 && k < 6)
+            return dem2di_fail(env, DEM2D_OUT_OF_RANGE, row,
+                               "%s[%d] = %g of a fixed particle is not 0", names[k], row,
+                               values[k]);
+    }
+    return dem2di_check_number(env, "angles", made->angle, DEM2DI_ANGLE);
+}
+
+static dem2d_result dem2di_check_writable(const dem2d_world *world,
+                                          const dem2d_particle_arrays *arrays, int count) {
+    const char *what = arrays->rotations != NULL     ? "rotations"
+                       : arrays->forces != NULL      ? "forces"
+                       : arrays->torques != NULL     ? "torques"
+                       : arrays->masses != NULL      ? "masses"
+                       : arrays->inertias != NULL    ? "inertias"
+                       : arrays->radii != NULL       ? "radii"
+                       : arrays->equivalents != NULL ? "equivalents"
+                       : arrays->names != NULL       ? "names"
+                                                     : NULL;
+    dem2d_result result = dem2di_check_number(&world->env, "stride", arrays->stride, DEM2DI_STRIDE);
+    if (result == DEM2D_OK && what != NULL)
+        result = dem2di_fail(&world->env, DEM2D_OUT_OF_RANGE, -1, "%s can't be written", what);
+    if (result == DEM2D_OK && arrays->at_forces)
+        result = dem2di_fail(&world->env, DEM2D_OUT_OF_RANGE, -1,
+                             "at_forces: what was at the last force pass can't be written");
+    if (result == DEM2D_OK) result = dem2di_check_number(&world->env, "count", count, DEM2DI_COUNT);
+    if (result == DEM2D_OK && arrays->ids == NULL && count > world->body_count - world->holes)
+        result = dem2di_fail(&world->env, DEM2D_OUT_OF_RANGE, -1, "count = %d, of %d particles",
+                             count, world->body_count - world->holes);
+    return result;
+}
+
+static dem2d_result dem2di_check_rows(const dem2d_world *world, const dem2d_particle_arrays *arrays,
+                                      int count) {
+    dem2d_result result = dem2di_check_writable(world, arrays, count);
+    for (int row = 0, index = 0; row < count && result == DEM2D_OK; row++) {
+        int slot = dem2di_row_slot(world, arrays, row, &index);
+        if (slot < 0) return dem2di_stale(world, "particle", (uint32_t)index);
+        const dem2di_new_state made = dem2di_row_take(world, arrays, row, slot);
+        result = dem2di_check_row(world, row, &made);
+    }
+    return result;
+}
+
+DEM2D_API dem2d_result dem2d_world_write_particles(dem2d_world *world,
+                                                   const dem2d_particle_arrays *arrays, int count) {
+    if (world == NULL || arrays == NULL) return DEM2D_NULL_ARGUMENT;
+    dem2d_result result = dem2di_check_rows(world, arrays, count);
+    if (result != DEM2D_OK) return result;
+    bool moves = arrays->positions != NULL || arrays->angles != NULL;
+    bool drives = arrays->velocities != NULL || arrays->angular_velocities != NULL;
+    bool loads = arrays->loads != NULL || arrays->load_torques != NULL;
+    if ((drives && !dem2di_group_reserve(world, DEM2DI_MADE, world->body_count)) ||
+        (loads && !dem2di_loads_begin(world)))
+        return dem2di_out_of_memory(world, "velocities and loads");
+    for (int row = 0, index = 0; row < count; row++) {
+        int slot = dem2di_row_slot(world, arrays, row, &index);
+        const dem2di_new_state made = dem2di_row_take(world, arrays, row, slot);
+        const dem2di_state *now = &world->now[slot];
+        bool there = made.position.x == now->x.x && made.position.y == now->x.y &&
+                     made.q.c == now->q.c && made.q.s == now->q.s;
+        if (moves && !there) dem2di_put_at(world, slot, made.position, made.q);
+        if (drives) (void)dem2di_drive(world, slot, made.velocity, made.angular_velocity);
+        if (loads) dem2di_load_put(world, slot, made.load.force, made.load.torque);
+    }
+    return DEM2D_OK;
+}
+
+/* --- contacts -----------------------------------------------------------------------------------
+ */
+
+#define DEM2DI_PUT(arrays, row, array, value)                                                      \
+    do {                                                                                           \
+        if ((arrays)->array != NULL)                                                               \
+            memcpy(dem2di_row_at((arrays)->array, row, (arrays)->stride, sizeof(value)), &(value), \
+                   sizeof(value));                                                                 \
+    } while (false)
+
+static void dem2di_put_contact(const dem2d_contact_arrays *arrays, int row,
+                               const dem2d_contact_info *info) {
+    DEM2DI_PUT(arrays, row, a, info->a);
+    DEM2DI_PUT(arrays, row, b, info->b);
+    DEM2DI_PUT(arrays, row, walls, info->wall);
+    DEM2DI_PUT(arrays, row, points, info->point);
+    DEM2DI_PUT(arrays, row, normals, info->normal);
+    DEM2DI_PUT(arrays, row, branches, info->branch);
+    DEM2DI_PUT(arrays, row, depths, info->depth);
+    DEM2DI_PUT(arrays, row, normal_forces, info->normal_force);
+    DEM2DI_PUT(arrays, row, tangential_forces, info->tangential_force);
+    DEM2DI_PUT(arrays, row, moments, info->moment);
+}
+
+DEM2D_API dem2d_result dem2d_world_read_contacts(const dem2d_world *world,
+                                                 const dem2d_contact_arrays *arrays, int capacity,
+                                                 int *count) {
+    if (world == NULL || arrays == NULL || count == NULL) return DEM2D_NULL_ARGUMENT;
+    dem2d_result result = dem2di_check_number(&world->env, "stride", arrays->stride, DEM2DI_STRIDE);
+    if (result == DEM2D_OK)
+        result = dem2di_check_number(&world->env, "capacity", capacity, DEM2DI_COUNT);
+    if (result != DEM2D_OK) return result;
+    int open = 0;
+    dem2di_contact_iterator iterator = dem2di_contacts_start(false);
+    for (; dem2di_next_contact(world, &iterator); open++) {
+        if (open >= capacity) continue;
+        const dem2d_contact_info info = dem2di_contact_of(world, &iterator);
+        dem2di_put_contact(arrays, open, &info);
     }
     *count = open;
     return DEM2D_OK;
@@ -19763,6 +20169,8 @@ DEM2D_API dem2d_result dem2d_world_write_csv(const dem2d_world *world, const dem
             that would give circles a state that is not finite is refused.
             A tangential spring of one contact point is shared out to two by the forces of their
             normal springs, without dashpots.
+            Arrays: dem2d_world_read_particles, dem2d_world_write_particles,
+            dem2d_world_read_contacts.
             External loads: dem2d_world_set_load, or dem2d_world_desc.loads once a step; their work
             is dem2d_ledger.loads and a column of histories.
             Several processes: dem2d_world_desc.gather may change the sums of the contact forces in

@@ -337,6 +337,8 @@ typedef struct args {
         dem2d_csv_desc csv;
         dem2d_stress stress;
         dem2d_query_desc query;
+        dem2d_particle_arrays particles;
+        dem2d_contact_arrays contacts;
     } d;
     dem2d_box box;
     const char *names[NAMED];
@@ -470,6 +472,21 @@ static void with_stress(args *a, fixture *f) {
     const dem2d_stress stress = {3, 1, 2, -1};
     (void)f;
     a->d.stress = stress;
+}
+static void with_particles(args *a, fixture *f) { /* read */
+    (void)f;
+    a->d.particles.positions = (dem2d_vec *)a->out;
+    a->d.particles.forces = (dem2d_vec *)a->second;
+}
+static void with_rows(args *a, fixture *f) { /* written */
+    (void)f;
+    a->d.particles.ids = &a->particle, a->count = 1;
+    a->d.particles.positions = a->p, a->d.particles.loads = a->q;
+}
+static void with_contacts(args *a, fixture *f) {
+    (void)f;
+    a->d.contacts.points = (dem2d_vec *)a->out;
+    a->d.contacts.depths = (double *)a->second;
 }
 static void with_save(args *a, fixture *f) {
     (void)f;
@@ -792,6 +809,22 @@ typedef struct function {
     F(world_set_load, dem2d_world_set_load(v->world, v->particle, v->vector, v->x),               \
       LOGS, IN_WORLD, ARG(particle, "particle", PARTICLE_ID), ARG(vector, "force", VECTOR),       \
       ARG(x, "torque", FINITE))                                                                   \
+    F(world_read_particles,                                                                       \
+      dem2d_world_read_particles(v->world, v->desc, v->count, v->third),                          \
+      DESCRIBED(NO_DESC, with_particles), IN_WORLD, THE_DESC,                                     \
+      ARG_INT(count, "capacity", 0, INT_MAX, OUT_OF_RANGE), ARG(third, "count", POINTER),         \
+      ARG_INT(d.particles.stride, "stride", 16, 1 << 20, OUT_OF_RANGE, .or_0 = true))             \
+    F(world_write_particles, dem2d_world_write_particles(v->world, v->desc, v->count),            \
+      DESCRIBED(NO_DESC, with_rows), IN_WORLD, THE_DESC,                                          \
+      ARG_INT(count, "count", 0, INT_MAX, OUT_OF_RANGE),                                          \
+      ARG_INT(d.particles.stride, "stride", 16, 1 << 20, OUT_OF_RANGE, .or_0 = true),             \
+      ARG(particle, "particle", PARTICLE_ID), ARG(p[0], "positions[", VECTOR),                    \
+      ARG(q[0], "loads[", VECTOR))                                                                \
+    F(world_read_contacts,                                                                        \
+      dem2d_world_read_contacts(v->world, v->desc, v->count, v->third),                           \
+      DESCRIBED(NO_DESC, with_contacts), IN_WORLD, THE_DESC,                                      \
+      ARG_INT(count, "capacity", 0, INT_MAX, OUT_OF_RANGE), ARG(third, "count", POINTER),         \
+      ARG_INT(d.contacts.stride, "stride", 16, 1 << 20, OUT_OF_RANGE, .or_0 = true))              \
     F(world_set_segment, dem2d_world_set_wall(v->world, v->wall, v->desc),                        \
       DESCRIBED(SEGMENT, with_segment), IN_WORLD, ARG(wall, "wall", WALL_ID), THE_DESC)           \
     F(world_query_box,                                                                            \
