@@ -207,20 +207,18 @@ CONCEPTS
     Force       On B, along the normal at each contact point: kn times depth, and a dashpot if the
                 materials have one; never attractive. Along the tangent an incremental spring kt,
                 limited to friction times the normal force ([F] eq. 8-10). A rolling spring resists
-                relative rotation if the materials have rolling friction. A law of your own can
-                replace all of these.
-    Sliding     For all pairs, the tangential spring stretches by the sliding velocity of the last
-                step times the time step. The sliding velocity is the mean of its values with the
-                normal and arms at the beginning and at the end of the step, both with the
-                velocities of that step. In the first step of a contact only the end is used. A time
-                step or velocity that you change during a contact takes effect with the next move.
-    Skipping    A pair with a known gap is not collided again until its particles have moved and
-                turned by that gap together. Circle pairs skip this test: it costs more than the
-                contact itself.
-    List        The neighbour list (Verlet list) holds the pairs that are nearer than the sum of
-                their skins. It is rebuilt when a particle has moved as far as its skin. Skins are
-                tuned to the motion: thick skins list more pairs that are apart, thin ones cause
-                more rebuilds. A fast particle gets a thicker skin. Edits keep the list, except: a
+                relative rotation if the materials have rolling friction. Beside both springs there
+                may be dashpots; the limit is that of spring and dashpot together. A law of your own
+can replace all of these. Sliding     For all pairs, the tangential spring stretches by the sliding
+velocity of the last step times the time step. The sliding velocity is the mean of its values with
+the normal and arms at the beginning and at the end of the step, both with the velocities of that
+step. In the first step of a contact only the end is used. A time step or velocity that you change
+during a contact takes effect with the next move. Skipping    A pair with a known gap is not
+collided again until its particles have moved and turned by that gap together. Circle pairs skip
+this test: it costs more than the contact itself. List        The neighbour list (Verlet list) holds
+the pairs that are nearer than the sum of their skins. It is rebuilt when a particle has moved as
+far as its skin. Skins are tuned to the motion: thick skins list more pairs that are apart, thin
+ones cause more rebuilds. A fast particle gets a thicker skin. Edits keep the list, except: a
                 particle or a wall is added, removed or moved out of its skin; a particle becomes
                 fixed or free; friction, a dashpot or rolling friction is set where no materials had
                 it, or removed from the last ones.
@@ -271,6 +269,7 @@ HOW TO
     choose a time step   dem2d_world_time_step_bounds on a settled scene. The world checks its time
                          step in the first step, after edits that can matter, and in every 160th.
     lose energy          damping_ratio of the materials, from dem2d_damping_ratio(restitution);
+                         tangential_damping_ratio against swinging tangential springs;
                          rolling_friction for grains that should not roll; else friction, damping.
     read many at once    dem2d_world_read_particles, dem2d_world_read_contacts: into arrays of
                          yours, as many as you name; with a stride into a struct of yours.
@@ -1179,15 +1178,17 @@ typedef void dem2d_parallel_fn(void *user, dem2d_phase phase, int count, dem2d_t
                                void *context);
 
 /// A material. A contact of two materials has the harmonic mean of their stiffnesses (springs in
-/// series, doubled), the smaller friction coefficients and the greater damping ratio, unless
+/// series, doubled), the smaller friction coefficients and the greater damping ratios, unless
 /// dem2d_world_set_pair sets others.
 typedef struct dem2d_material_desc {
-    double density;              ///< kg/m2 (kg/m3 per metre of thickness), > 0; walls ignore it
-    double normal_stiffness;     ///< N/m, > 0
-    double tangential_stiffness; ///< N/m, >= 0; 0: neither friction nor rolling friction
-    double friction;             ///< coefficient, >= 0
-    double damping_ratio;        ///< of the normal dashpot, >= 0: see dem2d_damping_ratio
-    double rolling_friction;     ///< coefficient, >= 0
+    double density;                  ///< kg/m2 (kg/m3 per metre of thickness), > 0; walls ignore it
+    double normal_stiffness;         ///< N/m, > 0
+    double tangential_stiffness;     ///< N/m, >= 0; 0: neither friction nor rolling friction
+    double friction;                 ///< coefficient, >= 0
+    double damping_ratio;            ///< of the normal dashpot, >= 0: see dem2d_damping_ratio
+    double rolling_friction;         ///< coefficient, >= 0
+    double tangential_damping_ratio; ///< of the dashpot beside the tangential spring, >= 0
+    double rolling_damping_ratio;    ///< of the dashpot beside the rolling spring, >= 0
 } dem2d_material_desc;
 
 /// Properties of the contacts of two materials.
@@ -1201,6 +1202,14 @@ typedef struct dem2d_pair_desc {
     /// Coefficient mu_r, >= 0: a rolling spring kt R^2 whose moment is at most mu_r R times the
     /// normal force, with 1/R = 1/R_A + 1/R_B of the equivalent radii (infinite for a wall).
     double rolling_friction;
+    /// Damping ratio, >= 0, of a dashpot beside the tangential spring: its force is 2 zeta sqrt(m
+    /// kt) times the sliding velocity, 1/m = 1/m_A + 1/m_B + a^2/I_A + b^2/I_B with the heights a
+    /// and b of the centres above the contact point. Friction limits the sum of spring and dashpot.
+    /// While the contact slides, both yield at the rate at which their sum stays at the limit.
+    double tangential_damping_ratio;
+    /// The same for rolling, >= 0: 2 zeta sqrt(I kt R^2) times the relative spin, with 1/I = 1/I_A
+    /// + 1/I_B; the limit is that of rolling friction.
+    double rolling_damping_ratio;
 } dem2d_pair_desc;
 
 /// A contact as a caller's law gets it. Velocities are those of the last step, half a step before
@@ -10901,7 +10910,14 @@ typedef struct dem2di_two {
 
 /* Terms of the law beside springs and friction, which some pair of materials in use has. With a
    caller's law all of them are in use. */
-enum { DEM2DI_DASHPOT = 1, DEM2DI_ROLLING = 2, DEM2DI_CALLERS_LAW = 4, DEM2DI_TERMS = 8 };
+enum {
+    DEM2DI_DASHPOT = 1,
+    DEM2DI_ROLLING = 2,
+    DEM2DI_TANGENTIAL_DASHPOT = 4,
+    DEM2DI_ROLLING_DASHPOT = 8,
+    DEM2DI_CALLERS_LAW = 16,
+    DEM2DI_TERMS = 32
+};
 
 /* How the two of a contact moved against each other in the step that was made, half a step before
    its force. */
@@ -11021,9 +11037,10 @@ static inline void dem2di_arms_shift(dem2di_arms *arms, double by) {
 /* --- dashpot, rolling --------------------------------------------------------------------------
  */
 
-/* Coefficient of the dashpot, N s/m. */
-static double dem2di_dashpot(const dem2d_pair_desc *law, double mass) {
-    return 2 * law->damping_ratio * sqrt(mass * law->normal_stiffness);
+/* Coefficient of a dashpot beside a spring, N s/m (N m s for rolling), between two with the sum of
+   inverse masses (inertias); 0 where neither can be moved. */
+static DEM2DI_INLINE double dem2di_dashpot(double ratio, double stiffness, double inverse) {
+    return inverse > 0 ? 2 * ratio * sqrt(1 / inverse * stiffness) : 0;
 }
 
 /* Stiffness of the spring against rolling. */
@@ -11071,12 +11088,14 @@ typedef struct dem2di_law_rows {
     double depth[DEM2DI_BATCH], approach[DEM2DI_BATCH], sliding[DEM2DI_BATCH], spin[DEM2DI_BATCH];
     /* of the pair of materials, here: the part of the point, the reduced mass and radius are in */
     double stiffness[DEM2DI_BATCH], dashpot[DEM2DI_BATCH], friction[DEM2DI_BATCH];
-    double tangential_stiffness[DEM2DI_BATCH], rolling_stiffness[DEM2DI_BATCH];
+    double tangential_stiffness[DEM2DI_BATCH], tangential_dashpot[DEM2DI_BATCH];
+    double rolling_stiffness[DEM2DI_BATCH], rolling_dashpot[DEM2DI_BATCH];
     double rolling_friction[DEM2DI_BATCH]; /* m: the limit of the moment over the normal force */
     /* forces on B: of the springs in the step before, then those of this step. The moment of two
        points is that of the first row */
     double last_shear[DEM2DI_BATCH], last_moment[DEM2DI_BATCH];
     double force[DEM2DI_BATCH], shear[DEM2DI_BATCH], moment[DEM2DI_BATCH];
+    double viscous_shear[DEM2DI_BATCH], viscous_moment[DEM2DI_BATCH]; /* parts of the dashpots */
     dem2di_two state[DEM2DI_BATCH]; /* what the caller's law keeps */
 } dem2di_law_rows;
 
@@ -11092,49 +11111,77 @@ static DEM2DI_INLINE double dem2di_damped(double spring, double dashpot, double 
     return 0 > force ? 0 : force;
 }
 
+/* Spring and dashpot side by side, and in series with both a slider that yields at the limit of
+   their sum: the whole slides at a rate, spring and dashpot at that of which the slider has no
+   part. So what the dashpot and the slider take is never below 0. Of sum and dashpot the forces. */
+static DEM2DI_INLINE double dem2di_slider(double stiffness, double dashpot, double rate,
+                                          double time_step, double limit, double last,
+                                          double *viscous) {
+    double force = last - stiffness * rate * time_step - dashpot * rate;
+    double held = dem2di_held(limit, force);
+    double own = (last - held) / (stiffness * time_step + dashpot);
+    *viscous = -(dashpot * (held == force ? rate : own));
+    return held;
+}
+
 /* Normal force and friction of one point, [F] eq. 8-10. The tangential spring is a scalar along
    perp(normal), so that it turns with the contact. */
-static DEM2DI_INLINE void dem2di_law_points(dem2di_law_rows *rows, double time_step, bool damped) {
+static DEM2DI_INLINE void dem2di_law_points(dem2di_law_rows *rows, double time_step, bool normal,
+                                            bool tangential) {
     for (int k = 0; k < rows->count; k++) {
-        double force = rows->stiffness[k] * rows->depth[k];
-        if (damped) force = dem2di_damped(force, rows->dashpot[k], rows->approach[k]);
-        double shear =
-            rows->last_shear[k] - rows->tangential_stiffness[k] * rows->sliding[k] * time_step;
+        double force = rows->stiffness[k] * rows->depth[k], rate = rows->sliding[k];
+        double kt = rows->tangential_stiffness[k], last = rows->last_shear[k];
+        if (normal) force = dem2di_damped(force, rows->dashpot[k], rows->approach[k]);
+        double limit = rows->friction[k] * force;
         rows->force[k] = force;
-        rows->shear[k] = dem2di_held(rows->friction[k] * force, shear);
+        if (tangential)
+            rows->shear[k] = dem2di_slider(kt, rows->tangential_dashpot[k], rate, time_step, limit,
+                                           last, &rows->viscous_shear[k]);
+        else
+            rows->shear[k] = dem2di_held(limit, last - kt * rate * time_step);
     }
 }
 
-/* Moments of the springs against rolling, held within their limits (Ai et al. 2011, model C without
-   the dashpot). The limit of two points is that of both normal forces. */
-static void dem2di_law_rolling(dem2di_law_rows *rows, double time_step) {
+/* Moments against rolling, held within their limits (Ai et al. 2011, model C, but for the dashpot,
+   which yields with the spring). The limit of two points is that of both normal forces. */
+static void dem2di_law_rolling(dem2di_law_rows *rows, double time_step, bool dashpots) {
     for (int k = 0; k < rows->count; k++) {
         bool two = k + 1 < rows->count && rows->contact[k + 1] == rows->contact[k];
         double force = two ? rows->force[k] + rows->force[k + 1] : rows->force[k];
-        double moment =
-            rows->last_moment[k] - rows->rolling_stiffness[k] * rows->spin[k] * time_step;
-        rows->moment[k] = dem2di_held(rows->rolling_friction[k] * force, moment);
-        if (two) rows->moment[++k] = 0;
+        double limit = rows->rolling_friction[k] * force, dashpot = 0, viscous = 0;
+        if (dashpots) dashpot = rows->rolling_dashpot[k];
+        rows->moment[k] = dem2di_slider(rows->rolling_stiffness[k], dashpot, rows->spin[k],
+                                        time_step, limit, rows->last_moment[k], &viscous);
+        rows->viscous_moment[k] = viscous;
+        if (two) rows->moment[k + 1] = rows->viscous_moment[k + 1] = 0;
+        k += two;
     }
 }
 
 DEM2DI_VECTORS_BEGIN
 static void dem2di_law_springs(dem2di_law_rows *rows, double time_step) {
-    dem2di_law_points(rows, time_step, false);
+    dem2di_law_points(rows, time_step, false, false);
 }
 
 static void dem2di_law_dashpots(dem2di_law_rows *rows, double time_step) {
-    dem2di_law_points(rows, time_step, true);
+    dem2di_law_points(rows, time_step, true, false);
+}
+
+static void dem2di_law_all_dashpots(dem2di_law_rows *rows, double time_step) {
+    dem2di_law_points(rows, time_step, true, true);
 }
 DEM2DI_VECTORS_END
 
 /* The law for all rows, with the terms that are in use. */
 static void dem2di_law_solve(dem2di_law_rows *rows, double time_step, int terms) {
-    if (terms & DEM2DI_DASHPOT)
+    if (terms & DEM2DI_TANGENTIAL_DASHPOT)
+        dem2di_law_all_dashpots(rows, time_step);
+    else if (terms & DEM2DI_DASHPOT)
         dem2di_law_dashpots(rows, time_step);
     else
         dem2di_law_springs(rows, time_step);
-    if (terms & DEM2DI_ROLLING) dem2di_law_rolling(rows, time_step);
+    if (terms & DEM2DI_ROLLING)
+        dem2di_law_rolling(rows, time_step, (terms & DEM2DI_ROLLING_DASHPOT) != 0);
 }
 
 /* --- forces on the two -------------------------------------------------------------------------
@@ -11420,10 +11467,13 @@ typedef struct dem2di_contacts {
     dem2di_history *history;        /* likewise */
     dem2di_point_pair *point_pairs; /* likewise, where contacts may have two points */
     /* of all contacts, where their terms of the law are in use: */
-    double *moment;            /* on B, N */
-    double *energy;            /* J/m, of the caller's law, */
-    dem2di_two *state;         /* and what it keeps */
-    dem2di_two *point_viscous; /* as point_pairs: parts of normal forces that dashpots have */
+    double *moment;        /* on B, N */
+    double *viscous_shear; /* parts of shear and moment that dashpots have */
+    double *viscous_moment;
+    double *energy;    /* J/m, of the caller's law, */
+    dem2di_two *state; /* and what it keeps */
+    /* as point_pairs: parts of the points' normal and tangential forces that dashpots have */
+    dem2di_two *point_viscous, *point_viscous_shear;
 } dem2di_contacts;
 
 /* The listed pairs: of two circles, of two other particles, of particles and parts of walls (in the
@@ -11559,11 +11609,14 @@ typedef enum dem2di_group {
     DEM2DI_WALLS,
     DEM2DI_PARTS,
     DEM2DI_KEYS,
-    DEM2DI_MOMENTS,       /* of all contacts, where plan.terms has DEM2DI_ROLLING, */
-    DEM2DI_CALLERS,       /* or DEM2DI_CALLERS_LAW */
-    DEM2DI_GENERAL,       /* of all but circles */
-    DEM2DI_POINT_PAIRS,   /* of these, where plan.faces, */
-    DEM2DI_POINT_VISCOUS, /* and plan.terms has DEM2DI_DASHPOT */
+    DEM2DI_MOMENTS,              /* of all contacts, where plan.terms has DEM2DI_ROLLING, */
+    DEM2DI_VISCOUS_SHEARS,       /* DEM2DI_TANGENTIAL_DASHPOT, */
+    DEM2DI_VISCOUS_MOMENTS,      /* DEM2DI_ROLLING_DASHPOT, */
+    DEM2DI_CALLERS,              /* DEM2DI_CALLERS_LAW */
+    DEM2DI_GENERAL,              /* of all but circles */
+    DEM2DI_POINT_PAIRS,          /* of these, where plan.faces, */
+    DEM2DI_POINT_VISCOUS,        /* and plan.terms has DEM2DI_DASHPOT, */
+    DEM2DI_POINT_VISCOUS_SHEARS, /* or DEM2DI_TANGENTIAL_DASHPOT */
     DEM2DI_ADJACENCY,
     DEM2DI_BLOCK_RESULTS,
     DEM2DI_TREE,    /* particles and walls, where queries are asked; as many nodes are enough */
@@ -11696,6 +11749,8 @@ static const dem2di_field dem2di_material_fields[] = {
     DEM2DI_ROW(dem2d_material_desc, friction, DEM2DI_FROM_0, "- 0"),
     DEM2DI_ROW(dem2d_material_desc, damping_ratio, DEM2DI_FROM_0, "- 0"),
     DEM2DI_ROW(dem2d_material_desc, rolling_friction, DEM2DI_FROM_0, "- 0"),
+    DEM2DI_ROW(dem2d_material_desc, tangential_damping_ratio, DEM2DI_FROM_0, "- 0"),
+    DEM2DI_ROW(dem2d_material_desc, rolling_damping_ratio, DEM2DI_FROM_0, "- 0"),
 };
 
 static const dem2di_field dem2di_pair_fields[] = {
@@ -11704,6 +11759,8 @@ static const dem2di_field dem2di_pair_fields[] = {
     DEM2DI_ROW(dem2d_pair_desc, friction, DEM2DI_FROM_0, "- 0"),
     DEM2DI_ROW(dem2d_pair_desc, damping_ratio, DEM2DI_FROM_0, "- 0"),
     DEM2DI_ROW(dem2d_pair_desc, rolling_friction, DEM2DI_FROM_0, "- 0"),
+    DEM2DI_ROW(dem2d_pair_desc, tangential_damping_ratio, DEM2DI_FROM_0, "- 0"),
+    DEM2DI_ROW(dem2d_pair_desc, rolling_damping_ratio, DEM2DI_FROM_0, "- 0"),
 };
 
 static const dem2di_field dem2di_wall_fields[] = {
@@ -12049,12 +12106,16 @@ static const dem2di_column dem2di_columns[] = {
     DEM2DI_CONTACT_COLUMN("normal_force", KEYS, force, finite_field),
     DEM2DI_CONTACT_COLUMN("shear_force", KEYS, shear, finite_field),
     DEM2DI_CONTACT_COLUMN("moment", MOMENTS, moment, finite_field),
+    DEM2DI_CONTACT_COLUMN("viscous_shear", VISCOUS_SHEARS, viscous_shear, finite_field),
+    DEM2DI_CONTACT_COLUMN("viscous_moment", VISCOUS_MOMENTS, viscous_moment, finite_field),
     DEM2DI_CONTACT_COLUMN("law_energy", CALLERS, energy, any_field), /* the caller's: anything */
     DEM2DI_CONTACT_COLUMN("law_state", CALLERS, state, any_two),
     DEM2DI_CONTACT_COLUMN("arms", GENERAL, arms, arms_fields),
     DEM2DI_COLUMN("histories", GENERAL, list.contacts.history, DEM2DI_STORED, history_fields),
     DEM2DI_CONTACT_COLUMN("two_points", POINT_PAIRS, point_pairs, point_pair_fields),
     DEM2DI_CONTACT_COLUMN("point_viscous_forces", POINT_VISCOUS, point_viscous, finite_two),
+    DEM2DI_CONTACT_COLUMN("point_viscous_shears", POINT_VISCOUS_SHEARS, point_viscous_shear,
+                          finite_two),
     DEM2DI_UNSAVED(ADJACENCY, list.adjacent, 0),
     DEM2DI_UNSAVED(BLOCK_RESULTS, block_results, 0),
     DEM2DI_UNSAVED(TREE, tree.boxes, 0),
@@ -12191,9 +12252,13 @@ static bool dem2di_reserve_bodies(dem2d_world *world, int count) {
 static bool dem2di_plan_needs(const dem2di_plan *plan, dem2di_group group) {
     const int terms = plan->terms;
     if (group == DEM2DI_MOMENTS) return (terms & DEM2DI_ROLLING) != 0;
+    if (group == DEM2DI_VISCOUS_SHEARS) return (terms & DEM2DI_TANGENTIAL_DASHPOT) != 0;
+    if (group == DEM2DI_VISCOUS_MOMENTS) return (terms & DEM2DI_ROLLING_DASHPOT) != 0;
     if (group == DEM2DI_CALLERS) return (terms & DEM2DI_CALLERS_LAW) != 0;
     if (group == DEM2DI_POINT_PAIRS) return plan->faces;
     if (group == DEM2DI_POINT_VISCOUS) return plan->faces && (terms & DEM2DI_DASHPOT);
+    if (group == DEM2DI_POINT_VISCOUS_SHEARS)
+        return plan->faces && (terms & DEM2DI_TANGENTIAL_DASHPOT);
     return true;
 }
 
@@ -12449,6 +12514,9 @@ static dem2d_pair_desc dem2di_mix(const dem2d_material_desc *a, const dem2d_mate
     law.friction = dem2di_min(a->friction, b->friction);
     law.damping_ratio = dem2di_max(a->damping_ratio, b->damping_ratio);
     law.rolling_friction = dem2di_min(a->rolling_friction, b->rolling_friction);
+    law.tangential_damping_ratio =
+        dem2di_max(a->tangential_damping_ratio, b->tangential_damping_ratio);
+    law.rolling_damping_ratio = dem2di_max(a->rolling_damping_ratio, b->rolling_damping_ratio);
     return law;
 }
 
@@ -12688,6 +12756,8 @@ static void dem2di_terms_clear(dem2d_world *world, int i) {
     const dem2di_contacts *contacts = &world->list.contacts;
     const int terms = world->plan.terms, at = i - world->list.discs;
     if (terms & DEM2DI_ROLLING) contacts->moment[i] = 0;
+    if (terms & DEM2DI_TANGENTIAL_DASHPOT) contacts->viscous_shear[i] = 0;
+    if (terms & DEM2DI_ROLLING_DASHPOT) contacts->viscous_moment[i] = 0;
     if (terms & DEM2DI_CALLERS_LAW) {
         contacts->energy[i] = 0;
         memset(&contacts->state[i], 0, sizeof *contacts->state);
@@ -12696,6 +12766,8 @@ static void dem2di_terms_clear(dem2d_world *world, int i) {
     memset(&contacts->point_pairs[at], 0, sizeof *contacts->point_pairs);
     if (terms & DEM2DI_DASHPOT)
         memset(&contacts->point_viscous[at], 0, sizeof *contacts->point_viscous);
+    if (terms & DEM2DI_TANGENTIAL_DASHPOT)
+        memset(&contacts->point_viscous_shear[at], 0, sizeof *contacts->point_viscous_shear);
 }
 
 /* Contact i has no force and no history: the two are apart. */
@@ -12798,6 +12870,42 @@ static double dem2di_reduced_inverse(const dem2d_world *world, int contact) {
     return contact >= world->list.pairs ? inverse : inverse + world->inverse[key->b].mass;
 }
 
+/* The same where they slide at the contact point, and where they roll: 1/I. */
+static double dem2di_sliding_inverse(const dem2d_world *world, int i, const dem2di_arms *arms) {
+    const dem2di_key *key = &world->list.keys[i];
+    double a = world->inverse[key->a].inertia;
+    double b = i >= world->list.pairs ? 0 : world->inverse[key->b].inertia;
+    return dem2di_reduced_inverse(world, i) + arms->a_n * arms->a_n * a + arms->b_n * arms->b_n * b;
+}
+
+static double dem2di_rolling_inverse(const dem2d_world *world, int i) {
+    const dem2di_key *key = &world->list.keys[i];
+    double a = world->inverse[key->a].inertia;
+    return i >= world->list.pairs ? a : a + world->inverse[key->b].inertia;
+}
+
+/* The dashpots of a contact: normal, tangential, and against rolling. */
+static double dem2di_normal_dashpot(const dem2d_world *world, int i) {
+    const dem2d_pair_desc *law = dem2di_law_of(world, i);
+    return dem2di_dashpot(law->damping_ratio, law->normal_stiffness,
+                          dem2di_reduced_inverse(world, i));
+}
+
+static double dem2di_tangential_dashpot(const dem2d_world *world, int i, const dem2di_arms *arms) {
+    const dem2d_pair_desc *law = dem2di_law_of(world, i);
+    if (!(law->tangential_damping_ratio > 0)) return 0;
+    return dem2di_dashpot(law->tangential_damping_ratio, law->tangential_stiffness,
+                          dem2di_sliding_inverse(world, i, arms));
+}
+
+static double dem2di_rolling_dashpot(const dem2d_world *world, int i) {
+    const dem2d_pair_desc *law = dem2di_law_of(world, i);
+    if (!(law->rolling_damping_ratio > 0)) return 0;
+    return dem2di_dashpot(law->rolling_damping_ratio,
+                          dem2di_rolling_stiffness(law, dem2di_reduced_radius(world, i)),
+                          dem2di_rolling_inverse(world, i));
+}
+
 /* Can no force move the two of a listed pair against each other? Neither particle is free, and the
    wall is no servo wall. Such a pair is no contact. */
 static inline bool dem2di_immovable(const dem2d_world *world, int i) {
@@ -12870,6 +12978,17 @@ static inline double dem2di_moment_of(const dem2d_world *world, const dem2di_con
     return world->plan.terms & DEM2DI_ROLLING ? from->moment[i] : 0;
 }
 
+/* What dashpots have of the shear force and of the moment of a contact. */
+static inline double dem2di_viscous_shear_of(const dem2d_world *world, const dem2di_contacts *from,
+                                             int i) {
+    return world->plan.terms & DEM2DI_TANGENTIAL_DASHPOT ? from->viscous_shear[i] : 0;
+}
+
+static inline double dem2di_viscous_moment_of(const dem2d_world *world, const dem2di_contacts *from,
+                                              int i) {
+    return world->plan.terms & DEM2DI_ROLLING_DASHPOT ? from->viscous_moment[i] : 0;
+}
+
 /* What the dashpot has of the normal force of a closed contact, or of its point k. With one point
    this is what the spring has not. */
 static double dem2di_viscous_of(const dem2d_world *world, const dem2di_contacts *from, int i,
@@ -12887,7 +13006,8 @@ static dem2di_stored dem2di_stored_in(const dem2d_world *world, const dem2di_con
     const dem2d_pair_desc *law = dem2di_law_of(world, i);
     const dem2di_point_pair *pair = dem2di_point_pair_of(world, from, i);
     double kn = law->normal_stiffness, kt = law->tangential_stiffness;
-    double moment = dem2di_moment_of(world, from, i);
+    double shear = contact->shear - dem2di_viscous_shear_of(world, from, i);
+    double moment = dem2di_moment_of(world, from, i) - dem2di_viscous_moment_of(world, from, i);
     dem2di_stored stored = {0, 0, 0};
     if (world->law != NULL) {
         stored.normal = from->energy[i];
@@ -12899,12 +13019,15 @@ static dem2di_stored dem2di_stored_in(const dem2d_world *world, const dem2di_con
     }
     if (pair == NULL) {
         stored.normal = kn * contact->depth * contact->depth / 2;
-        if (kt > 0) stored.tangential = contact->shear * (contact->shear / kt) / 2;
+        if (kt > 0) stored.tangential = shear * (shear / kt) / 2;
         return stored;
     }
     stored.normal = kn * pair->energy;
     for (int k = 0; k < 2 && kt > 0; k++) {
-        double weight = pair->weight[k], shear = pair->shear[k];
+        double weight = pair->weight[k];
+        shear = pair->shear[k];
+        if (world->plan.terms & DEM2DI_TANGENTIAL_DASHPOT)
+            shear -= from->point_viscous_shear[i - world->list.discs].at[k];
         if (weight > 0) stored.tangential += shear * (shear / (weight * kt)) / 2;
     }
     return stored;
@@ -13898,7 +14021,11 @@ static bool dem2di_has_disc_kernel(const dem2d_world *world, const dem2di_plan *
 /* Terms of the law for two materials, beside springs and friction. */
 static int dem2di_terms_of(const dem2d_pair_desc *law) {
     return (law->damping_ratio > 0 ? DEM2DI_DASHPOT : 0) |
-           (law->rolling_friction > 0 ? DEM2DI_ROLLING : 0);
+           (law->rolling_friction > 0 ? DEM2DI_ROLLING : 0) |
+           (law->tangential_damping_ratio > 0 && law->friction > 0 ? DEM2DI_TANGENTIAL_DASHPOT
+                                                                   : 0) |
+           (law->rolling_damping_ratio > 0 && law->rolling_friction > 0 ? DEM2DI_ROLLING_DASHPOT
+                                                                        : 0);
 }
 
 /* The features in use. A term of the law that is no longer needed is still there in the first step
@@ -14584,6 +14711,28 @@ static double dem2di_dashpot_work(const dem2d_world *world, const dem2di_contact
     return work;
 }
 
+/* What the tangential dashpot and that against rolling take in the same time: the mean of their
+   forces at both passes times their own rate in the step, which is the force at this pass over the
+   coefficient. Of this the rest of what sliding takes is friction's. */
+static double dem2di_sliding_dashpots_work(const dem2d_world *world, int i) {
+    const dem2di_contacts *last = &world->list.last, *next = &world->list.contacts;
+    const dem2di_point_pair *pair = dem2di_point_pair_of(world, next, i);
+    double work = 0;
+    dem2di_contact contact;
+    if (!(world->plan.terms & (DEM2DI_TANGENTIAL_DASHPOT | DEM2DI_ROLLING_DASHPOT))) return 0;
+    (void)dem2di_contact_get(world, next, i, &contact);
+    double dashpot = dem2di_tangential_dashpot(world, i, &contact.arms);
+    double force = dem2di_viscous_shear_of(world, next, i);
+    if (pair != NULL) dashpot *= pair->weight[0] + pair->weight[1];
+    if (dashpot > 0)
+        work += (dem2di_viscous_shear_of(world, last, i) + force) / 2 * (force / dashpot);
+    dashpot = dem2di_rolling_dashpot(world, i);
+    force = dem2di_viscous_moment_of(world, next, i);
+    if (dashpot > 0)
+        work += (dem2di_viscous_moment_of(world, last, i) + force) / 2 * (force / dashpot);
+    return work * world->made_step;
+}
+
 /* One contact between the last force pass and this: forces act half at each, so that the energy
    they take is their mean times the way; where it opens or closes in between, the force of the one
    pass times the way by the contact's own geometry there. What sliding and rolling take is that
@@ -14614,9 +14763,11 @@ static void dem2di_observe_contact(const dem2d_world *world, int i, dem2di_ledge
             dem2di_dashpot_work(world, pass[k], i, contact.depth, closing, turning);
     }
     if (closed[0] && closed[1]) slide /= 2;
+    const double damped = closed[1] ? dem2di_sliding_dashpots_work(world, i) : 0;
+    ledger->sum[DEM2DI_BY_DASHPOTS] += damped;
     double taken = -(shear * slide + moment * turning * world->made_step);
     if (world->law != NULL) taken += force * deeper - gained.normal;
-    ledger->sum[DEM2DI_BY_FRICTION] += taken - gained.tangential - gained.rolling;
+    ledger->sum[DEM2DI_BY_FRICTION] += taken - gained.tangential - gained.rolling - damped;
 }
 
 /* All contacts in the order of ranks, before the motion. */
@@ -14697,10 +14848,12 @@ typedef struct dem2di_batch {
     double vx[DEM2DI_BATCH], vy[DEM2DI_BATCH]; /* of B against A */
     double wa[DEM2DI_BATCH], wb[DEM2DI_BATCH];
     double kn[DEM2DI_BATCH], kt[DEM2DI_BATCH], mu[DEM2DI_BATCH];
-    double inverse[DEM2DI_BATCH]; /* 1/m, reduced */
-    double zeta[DEM2DI_BATCH], mu_r[DEM2DI_BATCH];
+    double inverse[DEM2DI_BATCH];                            /* 1/m, reduced */
+    double inverse_a[DEM2DI_BATCH], inverse_b[DEM2DI_BATCH]; /* 1/I */
+    double zeta[DEM2DI_BATCH], mu_r[DEM2DI_BATCH], zeta_t[DEM2DI_BATCH], zeta_r[DEM2DI_BATCH];
     double normal_x[DEM2DI_BATCH], normal_y[DEM2DI_BATCH]; /* the last contact, then the next */
     double depth[DEM2DI_BATCH], force[DEM2DI_BATCH], shear[DEM2DI_BATCH], moment[DEM2DI_BATCH];
+    double viscous_shear[DEM2DI_BATCH], viscous_moment[DEM2DI_BATCH];
     double load_x[DEM2DI_BATCH], load_y[DEM2DI_BATCH], load_a[DEM2DI_BATCH], load_b[DEM2DI_BATCH];
 } dem2di_batch;
 
@@ -14719,6 +14872,10 @@ static DEM2DI_INLINE void dem2di_batch_fetch(const dem2d_world *world, int first
         batch->radius_b[k] = b->radius;
         if (terms)
             batch->inverse[k] = world->inverse[keys[k].a].mass + world->inverse[keys[k].b].mass;
+        if (terms & DEM2DI_TANGENTIAL_DASHPOT) {
+            batch->inverse_a[k] = world->inverse[keys[k].a].inertia;
+            batch->inverse_b[k] = world->inverse[keys[k].b].inertia;
+        }
         if (!one_law) {
             const dem2d_pair_desc *law = dem2di_law_of(world, first + k);
             batch->kn[k] = law->normal_stiffness;
@@ -14726,6 +14883,8 @@ static DEM2DI_INLINE void dem2di_batch_fetch(const dem2d_world *world, int first
             batch->mu[k] = law->friction;
             batch->zeta[k] = law->damping_ratio;
             batch->mu_r[k] = law->rolling_friction;
+            batch->zeta_t[k] = law->tangential_damping_ratio;
+            batch->zeta_r[k] = law->rolling_damping_ratio;
         }
         if (!friction) continue;
         batch->vx[k] = b->v.x - a->v.x;
@@ -14764,6 +14923,45 @@ static DEM2DI_INLINE double dem2di_batch_slip(const dem2di_batch *batch, int k,
     return slip + (before - slip) * (closed / 2);
 }
 
+/* Tangential force of two circles at a normal force. */
+static DEM2DI_INLINE double dem2di_batch_shear(dem2di_batch *batch, int k, double time_step,
+                                               const dem2d_pair_desc *law, bool one_law, int terms,
+                                               const dem2di_round *r) {
+    const double kt = one_law ? law->tangential_stiffness : batch->kt[k];
+    const double limit = (one_law ? law->friction : batch->mu[k]) * r->force;
+    const double slip = dem2di_batch_slip(batch, k, r);
+    if (!(terms & DEM2DI_TANGENTIAL_DASHPOT))
+        return dem2di_held(limit, batch->shear[k] - kt * slip * time_step);
+    double ratio = one_law ? law->tangential_damping_ratio : batch->zeta_t[k];
+    double inverse = batch->inverse[k] + r->arm_a * r->arm_a * batch->inverse_a[k] +
+                     r->arm_b * r->arm_b * batch->inverse_b[k];
+    double viscous, dashpot = 2 * ratio * sqrt(1 / inverse * kt);
+    double shear = dem2di_slider(kt, dashpot, slip, time_step, limit, batch->shear[k], &viscous);
+    batch->viscous_shear[k] = r->depth > 0 ? viscous : 0;
+    return r->depth > 0 ? shear : 0;
+}
+
+/* Moment of two circles against rolling. */
+static DEM2DI_INLINE double dem2di_batch_moment(dem2di_batch *batch, int k, double time_step,
+                                                const dem2d_pair_desc *law, bool one_law, int terms,
+                                                const dem2di_round *r) {
+    const double kt = one_law ? law->tangential_stiffness : batch->kt[k];
+    const double radius_a = batch->radius_a[k], radius_b = batch->radius_b[k];
+    const double radius = radius_a * (radius_b / (radius_a + radius_b));
+    const double limit = (one_law ? law->rolling_friction : batch->mu_r[k]) * radius * r->force;
+    const double spin = batch->wb[k] - batch->wa[k], stiffness = kt * radius * radius;
+    double moment, viscous, dashpot = 0;
+    if (!(terms & DEM2DI_ROLLING_DASHPOT)) {
+        moment = dem2di_held(limit, batch->moment[k] - stiffness * spin * time_step);
+        return r->depth > 0 ? moment : 0;
+    }
+    double ratio = one_law ? law->rolling_damping_ratio : batch->zeta_r[k];
+    dashpot = 2 * ratio * sqrt(1 / (batch->inverse_a[k] + batch->inverse_b[k]) * stiffness);
+    moment = dem2di_slider(stiffness, dashpot, spin, time_step, limit, batch->moment[k], &viscous);
+    batch->viscous_moment[k] = r->depth > 0 ? viscous : 0;
+    return r->depth > 0 ? moment : 0;
+}
+
 /* The law of two circles, as dem2di_law_points and dem2di_law_rolling, for all of a batch: the next
    contacts over the last. Where two are apart the force is 0, and with it all that it limits. */
 static DEM2DI_INLINE void dem2di_batch_loop(dem2di_batch *batch, int count, double time_step,
@@ -14771,8 +14969,6 @@ static DEM2DI_INLINE void dem2di_batch_loop(dem2di_batch *batch, int count, doub
                                             bool one_law) {
     for (int k = 0; k < count; k++) {
         const double kn = one_law ? law->normal_stiffness : batch->kn[k];
-        const double kt = one_law ? law->tangential_stiffness : batch->kt[k];
-        const double mu = one_law ? law->friction : batch->mu[k];
         dem2d_vec d;
         d.x = batch->dx[k];
         d.y = batch->dy[k];
@@ -14786,22 +14982,15 @@ static DEM2DI_INLINE void dem2di_batch_loop(dem2di_batch *batch, int count, doub
         }
         double x = r.normal.x * r.force, y = r.normal.y * r.force;
         if (friction) {
-            double slip = dem2di_batch_slip(batch, k, &r);
-            double spring = batch->shear[k] - kt * slip * time_step;
-            spring = dem2di_held(mu * r.force, spring);
-            x -= r.normal.y * spring;
-            y += r.normal.x * spring;
-            batch->shear[k] = spring;
-            batch->load_a[k] = -(r.arm_a * spring);
-            batch->load_b[k] = -(r.arm_b * spring);
+            double shear = dem2di_batch_shear(batch, k, time_step, law, one_law, terms, &r);
+            x -= r.normal.y * shear;
+            y += r.normal.x * shear;
+            batch->shear[k] = shear;
+            batch->load_a[k] = -(r.arm_a * shear);
+            batch->load_b[k] = -(r.arm_b * shear);
         }
         if (terms & DEM2DI_ROLLING) {
-            double radius_a = batch->radius_a[k], radius_b = batch->radius_b[k];
-            double radius = radius_a * (radius_b / (radius_a + radius_b));
-            double limit = (one_law ? law->rolling_friction : batch->mu_r[k]) * radius * r.force;
-            double spin = batch->wb[k] - batch->wa[k];
-            double moment = batch->moment[k] - kt * radius * radius * spin * time_step;
-            moment = r.depth > 0 ? dem2di_held(limit, moment) : 0;
+            double moment = dem2di_batch_moment(batch, k, time_step, law, one_law, terms, &r);
             batch->moment[k] = moment;
             batch->load_a[k] -= moment;
             batch->load_b[k] += moment;
@@ -14816,11 +15005,13 @@ static DEM2DI_INLINE void dem2di_batch_loop(dem2di_batch *batch, int count, doub
 }
 
 /* What the scene has, as constants: to(friction, terms) for pairs of circles. Terms are taken with
-   friction, and rolling with dashpots, which may be 0. */
-#define DEM2DI_BATCH_CASES(plan, to)                                                   \
-    ((plan)->terms == 0                ? (plan)->friction ? to(true, 0) : to(false, 0) \
-                    : (plan)->terms == DEM2DI_DASHPOT ? to(true, DEM2DI_DASHPOT)       \
-                                       : to(true, DEM2DI_DASHPOT | DEM2DI_ROLLING))
+   friction, and with those before them, which may be 0. */
+#define DEM2DI_DASHPOT_ROLLING (DEM2DI_DASHPOT | DEM2DI_ROLLING)
+#define DEM2DI_BATCH_CASES(plan, to)                                                     \
+    ((plan)->terms == 0                ? (plan)->friction ? to(true, 0) : to(false, 0)   \
+                    : (plan)->terms == DEM2DI_DASHPOT ? to(true, DEM2DI_DASHPOT)         \
+     : ((plan)->terms & ~DEM2DI_DASHPOT_ROLLING) == 0 ? to(true, DEM2DI_DASHPOT_ROLLING) \
+                                                      : to(true, DEM2DI_CALLERS_LAW - 1))
 
 /* The loop for what the scene has. */
 static void dem2di_batch_solve(dem2di_batch *batch, int count, double time_step,
@@ -14833,7 +15024,7 @@ static void dem2di_batch_solve(dem2di_batch *batch, int count, double time_step,
 }
 DEM2DI_VECTORS_END
 
-/* The last contacts of a batch from the columns. */
+/* The last contacts of a batch from the columns, their forces without dashpots. */
 static DEM2DI_INLINE void dem2di_batch_get(const dem2d_world *world, int first, int count,
                                            int terms, dem2di_batch *batch) {
     const dem2di_contacts *from = &world->list.contacts;
@@ -14843,6 +15034,10 @@ static DEM2DI_INLINE void dem2di_batch_get(const dem2d_world *world, int first, 
     memcpy(batch->depth, from->depth + first, bytes);
     memcpy(batch->shear, from->shear + first, bytes);
     if (terms & DEM2DI_ROLLING) memcpy(batch->moment, from->moment + first, bytes);
+    if (terms & DEM2DI_TANGENTIAL_DASHPOT)
+        for (int k = 0; k < count; k++) batch->shear[k] -= from->viscous_shear[first + k];
+    if (terms & DEM2DI_ROLLING_DASHPOT)
+        for (int k = 0; k < count; k++) batch->moment[k] -= from->viscous_moment[first + k];
 }
 
 /* The next contacts and their loads into the columns. */
@@ -14864,6 +15059,10 @@ static DEM2DI_INLINE void dem2di_batch_put(dem2d_world *world, int first, int co
     memcpy(world->load_a + first, batch->load_a, bytes);
     memcpy(world->load_b + first, batch->load_b, bytes);
     if (terms & DEM2DI_ROLLING) memcpy(to->moment + first, batch->moment, bytes);
+    if (terms & DEM2DI_TANGENTIAL_DASHPOT)
+        memcpy(to->viscous_shear + first, batch->viscous_shear, bytes);
+    if (terms & DEM2DI_ROLLING_DASHPOT)
+        memcpy(to->viscous_moment + first, batch->viscous_moment, bytes);
 }
 
 /* Loads that are not finite, and the greatest. */
@@ -14882,6 +15081,7 @@ static DEM2DI_INLINE void dem2di_disc_batch(dem2d_world *world, int first, int n
     const dem2di_plan *plan = &world->plan;
     dem2di_batch batch;
     int closed = 0;
+    if ((terms & ~plan->terms) & DEM2DI_ROLLING) memset(batch.moment, 0, sizeof batch.moment);
     if (friction) dem2di_batch_get(world, first, n, terms & plan->terms, &batch);
     dem2di_batch_fetch(world, first, n, friction, terms, one_law, &batch);
     if (friction && world->redirected) dem2di_batch_made(world, first, n, &batch);
@@ -15019,7 +15219,8 @@ static int dem2di_collide_pair(const dem2d_world *world, int a, int b, const dem
 }
 
 /* What contact i was in the last force pass, before its geometry is written over. Its springs may
-   be those of another contact that it took over from, across a joint of segments. */
+   be those of another contact that it took over from, across a joint of segments. Shear forces are
+   those of the springs. */
 typedef struct dem2di_last {
     const dem2di_contacts *from; /* columns with the forces of the last force pass, */
     int at;                      /* and the contact there */
@@ -15038,31 +15239,41 @@ static inline void dem2di_last_get(const dem2d_world *world, const dem2di_contac
     last->contact.shear = from->shear[i];
     last->contact.arms = from->arms[at];
     if (world->plan.faces) last->pair = from->point_pairs[at];
+    if (!(world->plan.terms & DEM2DI_TANGENTIAL_DASHPOT)) return;
+    last->contact.shear -= from->viscous_shear[i];
+    for (int k = 0; k < 2 && world->plan.faces; k++)
+        last->pair.shear[k] -= from->point_viscous_shear[at].at[k];
 }
 
-/* Terms of the law beside springs and friction, of the rows from first to before the end. */
+/* Terms of the law beside springs and friction, of the rows from `first` on. */
 static void dem2di_law_add_terms(const dem2d_world *world, int i, const dem2di_last *last,
                                  const dem2di_contact *contact,
                                  const dem2di_relative_motion *motion, int first,
                                  dem2di_law_rows *rows) {
     const dem2d_pair_desc *law = dem2di_law_of(world, i);
-    const double inverse = dem2di_reduced_inverse(world, i), spin = motion->wb - motion->wa;
-    const double approach = -dem2di_velocity_n(contact, motion);
-    const double dashpot = dem2di_dashpot(law, inverse > 0 ? 1 / inverse : 0);
+    const double spin = motion->wb - motion->wa, approach = -dem2di_velocity_n(contact, motion);
+    const double dashpot = dem2di_normal_dashpot(world, i);
     rows->approach[first] = approach;
     rows->dashpot[first] = dashpot;
-    for (int k = first; k < rows->count && rows->count - first == 2; k++) {
+    rows->tangential_dashpot[first] = dem2di_tangential_dashpot(world, i, &contact->arms);
+    if (rows->count - first == 2) {
         const dem2di_point_pair *pair = &world->list.contacts.point_pairs[i - world->list.discs];
-        rows->approach[k] = approach + spin * pair->offset[k - first];
-        rows->dashpot[k] = pair->weight[k - first] * dashpot;
+        double sliding = rows->tangential_dashpot[first];
+        for (int k = 0; k < 2; k++) {
+            rows->approach[first + k] = approach + spin * pair->offset[k];
+            rows->dashpot[first + k] = pair->weight[k] * dashpot;
+            rows->tangential_dashpot[first + k] = pair->weight[k] * sliding;
+        }
     }
     if (!(world->plan.terms & DEM2DI_ROLLING)) return;
-    bool rolls = law->rolling_friction > 0;
-    double radius = rolls ? dem2di_reduced_radius(world, i) : 0;
+    double radius = law->rolling_friction > 0 ? dem2di_reduced_radius(world, i) : 0;
     rows->spin[first] = spin;
     rows->rolling_stiffness[first] = dem2di_rolling_stiffness(law, radius);
     rows->rolling_friction[first] = law->rolling_friction * radius;
-    rows->last_moment[first] = last->from->moment[last->at];
+    rows->last_moment[first] =
+        last->from->moment[last->at] - dem2di_viscous_moment_of(world, last->from, last->at);
+    if (world->plan.terms & DEM2DI_ROLLING_DASHPOT)
+        rows->rolling_dashpot[first] = radius > 0 ? dem2di_rolling_dashpot(world, i) : 0;
     if (world->law != NULL) rows->state[first] = last->from->state[last->at];
 }
 
@@ -15121,6 +15332,9 @@ static void dem2di_law_put_two(dem2d_world *world, int i, const dem2di_law_rows 
     contact->force = force[0] + force[1];
     contact->shear = rows->shear[k] + rows->shear[k + 1];
     for (int p = 0; p < 2; p++) pair->shear[p] = rows->shear[k + p];
+    if (world->plan.terms & DEM2DI_TANGENTIAL_DASHPOT)
+        for (int p = 0; p < 2; p++)
+            world->list.contacts.point_viscous_shear[at].at[p] = rows->viscous_shear[k + p];
     if (!(world->plan.terms & DEM2DI_DASHPOT)) return;
     for (int p = 0; p < 2; p++)
         world->list.contacts.point_viscous[at].at[p] =
@@ -15147,6 +15361,11 @@ static DEM2DI_INLINE int dem2di_law_put(dem2d_world *world, const dem2di_law_row
     contact.shear = rows->shear[k];
     if (two) dem2di_law_put_two(world, i, rows, k, &contact);
     if (world->plan.terms & DEM2DI_ROLLING) contacts->moment[i] = moment = rows->moment[k];
+    if (world->plan.terms & DEM2DI_TANGENTIAL_DASHPOT)
+        contacts->viscous_shear[i] =
+            rows->viscous_shear[k] + (two ? rows->viscous_shear[k + 1] : 0);
+    if (world->plan.terms & DEM2DI_ROLLING_DASHPOT)
+        contacts->viscous_moment[i] = rows->viscous_moment[k];
     contacts->force[i] = contact.force;
     contacts->shear[i] = contact.shear;
     dem2d_vec force = dem2di_contact_force(&contact);
@@ -15200,6 +15419,7 @@ static void dem2di_law_ask(dem2d_world *world, dem2di_law_rows *rows) {
         rows->force[k] = output.normal_force;
         rows->shear[k] = output.tangential_force;
         rows->moment[k] = output.moment;
+        rows->viscous_shear[k] = rows->viscous_moment[k] = 0;
         contacts->energy[rows->contact[k]] = output.energy;
         memcpy(&contacts->state[rows->contact[k]], output.state, sizeof output.state);
     }
@@ -15801,7 +16021,7 @@ static dem2di_push dem2di_push_make(const dem2d_world *world, int i, const dem2d
     const dem2d_pair_desc *law = dem2di_law_of(world, i);
     const dem2di_point_pair *pair = dem2di_point_pair_of(world, &list->contacts, i);
     int a = list->keys[i].a;
-    double inverse = world->inverse[a].mass, mass = inverse > 0 ? 1 / inverse : 0;
+    double inverse = world->inverse[a].mass;
     double weight = 1, spring = contact->force;
     dem2di_arms arms = contact->arms;
     if (pair != NULL) { /* their springs act at the centre of the weights */
@@ -15811,7 +16031,7 @@ static dem2di_push dem2di_push_make(const dem2d_world *world, int i, const dem2d
     }
     double stiffness = weight * law->normal_stiffness;
     double elastic = stiffness * world->time_step;
-    double impedance = elastic + weight * dem2di_dashpot(law, mass);
+    double impedance = elastic + weight * dem2di_normal_dashpot(world, i);
     if (world->plan.terms & DEM2DI_DASHPOT)
         spring -= dem2di_viscous_of(world, &list->contacts, i, 0) +
                   dem2di_viscous_of(world, &list->contacts, i, 1);
@@ -15824,7 +16044,7 @@ static dem2di_push dem2di_push_make(const dem2d_world *world, int i, const dem2d
     push.rise = impedance * push.along;
     backing->stiffness += stiffness;
     backing->impedance += impedance;
-    backing->mass += mass;
+    backing->mass += inverse > 0 ? 1 / inverse : 0;
     return push;
 }
 
@@ -16086,28 +16306,41 @@ static void dem2di_stiffness_point(double kn, double kt, dem2d_vec normal, doubl
     dem2di_stiffness_add(sum, kt, dem2di_perp(normal), arm_n);
 }
 
-/* The greatest c/kn of the dashpots on a particle, s. */
-static double dem2di_dashpot_lag(const dem2d_world *world, int slot) {
-    const dem2di_list *list = &world->list;
-    double lag = 0;
-    if (!(world->plan.terms & DEM2DI_DASHPOT) || world->law != NULL) return 0;
-    for (int k = list->first[slot]; k < list->first[slot + 1]; k++) {
-        int i = list->adjacent[k];
-        if (!(list->contacts.depth[i] > 0)) continue;
-        const dem2d_pair_desc *law = dem2di_law_of(world, i);
-        double inverse = dem2di_reduced_inverse(world, i);
-        if (!(inverse > 0)) continue;
-        lag = dem2di_max(lag, dem2di_dashpot(law, 1 / inverse) / law->normal_stiffness);
-    }
-    return lag;
+/* Two terms of stiffness and damping coefficients: K + f D. */
+static dem2di_stiffness dem2di_stiffness_with(const dem2di_stiffness *k, const dem2di_stiffness *d,
+                                              double f) {
+    dem2di_stiffness sum;
+    sum.xx = k->xx + f * d->xx;
+    sum.xy = k->xy + f * d->xy;
+    sum.yy = k->yy + f * d->yy;
+    sum.xr = k->xr + f * d->xr;
+    sum.yr = k->yr + f * d->yr;
+    sum.rr = k->rr + f * d->rr;
+    return sum;
 }
 
-/* The eigenvalue without dashpots that bounds the time step as one with them does: velocities lag
-   by half a step, so that x'' = -l (x + lag x') is stable while l dt (dt + 2 lag) <= 4. */
-static double dem2di_lagging(double value, double lag) {
-    if (!(lag > 0 && value > 0)) return value;
-    double time_step = 4 / value / (lag + sqrt(lag * lag + 4 / value));
-    return 4 / (time_step * time_step);
+/* The eigenvalue without dashpots that bounds the time step as one with them does. Velocities lag
+   by half a step, so that M x'' = -K x - D x' is stable while dt^2 K + 2 dt D is at most 4 M: each
+   dashpot adds the lag 2 c/k to its own spring. The greatest such step from below: dt -> 2/sqrt of
+   the greatest eigenvalue of K + 2/dt D grows to it from any smaller step. */
+static double dem2di_lagging(const dem2di_stiffness *k, const dem2di_stiffness *d, double mass,
+                             double inertia, double enough) {
+    const double at_once = sqrt(enough); /* 2/dt of the step that is asked about */
+    dem2di_stiffness sum = dem2di_stiffness_with(k, d, at_once);
+    double value = (sum.xx + sum.yy) / mass + sum.rr / inertia, least;
+    if (!(value > 0) || value <= enough) return value;
+    value = dem2di_largest_eigenvalue(&sum, mass, inertia);
+    if (value <= enough || !(d->xx + d->yy + d->rr > 0)) return value;
+    double stiff = dem2di_largest_eigenvalue(k, mass, inertia);
+    double damped = dem2di_largest_eigenvalue(d, mass, inertia);
+    double dt = 4 / (damped + sqrt(damped * damped + 4 * stiff)); /* dt^2 K + 2 dt D = 4 for both */
+    for (int i = 0; i < 60; i++) {                                /* halves the error at least */
+        sum = dem2di_stiffness_with(k, d, 2 / dt);
+        least = dt;
+        dt = 2 / sqrt(dem2di_largest_eigenvalue(&sum, mass, inertia));
+        if (!(dt > least * (1 + 4 * DBL_EPSILON))) break;
+    }
+    return 4 / (dt * dt);
 }
 
 /* Flatter than this many circumscribed radii counts as that: it turns by 1e-5 over the size, and
@@ -16160,13 +16393,33 @@ static double dem2di_rocking(const dem2d_world *world, const dem2di_state *state
     return e > 0 ? contact->force * (p * (e / (p + e))) : 0;
 }
 
+/* The dashpots of one contact, which count f times, on one of its particles. */
+static void dem2di_damping_add(const dem2d_world *world, int i, const dem2di_contact *contact,
+                               bool side, double f, dem2di_stiffness *damping) {
+    const dem2di_point_pair *pair = dem2di_point_pair_of(world, &world->list.contacts, i);
+    const dem2di_arms *arms = &contact->arms;
+    const double normal = dem2di_normal_dashpot(world, i);
+    const bool rubs = (world->plan.terms & DEM2DI_TANGENTIAL_DASHPOT) != 0;
+    const double sliding = rubs ? dem2di_tangential_dashpot(world, i, arms) : 0;
+    double arm_n = side ? arms->b_n : arms->a_n, arm_t = side ? arms->b_t : arms->a_t;
+    if (world->plan.terms & DEM2DI_ROLLING_DASHPOT)
+        damping->rr += f * dem2di_rolling_dashpot(world, i);
+    for (int p = 0; p < (pair != NULL ? 2 : 1); p++) {
+        double w = pair != NULL ? f * pair->weight[p] : f, at = pair != NULL ? pair->offset[p] : 0;
+        dem2di_stiffness_point(w * normal, w * sliding, contact->normal, arm_n, arm_t + at,
+                               damping);
+    }
+}
+
 /* Stiffness of the contacts of a particle for the limit (bound 0) or for the safe bound (1), which
    counts those between two free particles twice. A contact that slides does not resist, and may not
-   when it rolls, or by the caller's law: it counts for the safe bound only. */
+   when it rolls, or by the caller's law: it counts for the safe bound only, as dashpots do. */
 static dem2di_stiffness dem2di_stiffness_sum(const dem2d_world *world, const dem2di_state *states,
-                                             int slot, int bound) {
+                                             int slot, int bound, dem2di_stiffness *damping) {
     const dem2di_list *list = &world->list;
     dem2di_stiffness sum = {0, 0, 0, 0, 0, 0};
+    const int damped = world->law == NULL ? world->plan.terms & ~DEM2DI_ROLLING : 0;
+    memset(damping, 0, sizeof *damping);
     for (int k = list->first[slot]; k < list->first[slot + 1]; k++) {
         int i = list->adjacent[k], side = k < list->own[slot];
         dem2di_contact contact;
@@ -16182,6 +16435,7 @@ static dem2di_stiffness dem2di_stiffness_sum(const dem2d_world *world, const dem
         double slide = sticks || (bound == 1 && rubs) ? f * law->tangential_stiffness : 0;
         double arm_n = side ? contact.arms.b_n : contact.arms.a_n;
         double arm_t = side ? contact.arms.b_t : contact.arms.a_t;
+        if (bound == 1 && damped) dem2di_damping_add(world, i, &contact, side, f, damping);
         if (bound == 1 && law->rolling_friction > 0)
             sum.rr += f * dem2di_rolling_stiffness(law, dem2di_reduced_radius(world, i));
         if (pair == NULL || bound == 1)
@@ -16220,15 +16474,12 @@ static void dem2di_stiffest_range(const dem2d_world *world, const dem2di_state *
         const dem2di_body *body = &world->bodies[i];
         if (body->shape_index < 0 || body->motion != DEM2D_FREE) continue;
         double mass = dem2di_body_mass(world, body), inertia = dem2di_body_inertia(world, body);
-        double lag = dem2di_dashpot_lag(world, i);
         bool touched = false;
         for (int bound = 1; bound >= 0; bound--) {
-            const dem2di_stiffness k = dem2di_stiffness_sum(world, states, i, bound);
-            double value = (k.xx + k.yy) / mass + k.rr / inertia;
+            dem2di_stiffness damping;
+            const dem2di_stiffness k = dem2di_stiffness_sum(world, states, i, bound, &damping);
             touched = touched || k.xx + k.yy > 0;
-            if (touched && (value > enough || lag > 0))
-                value = dem2di_largest_eigenvalue(&k, mass, inertia);
-            if (bound == 1) value = dem2di_lagging(value, lag);
+            double value = dem2di_lagging(&k, &damping, mass, inertia, enough);
             dem2di_stiffest_meet(world, stiffest, bound, value, i);
             if (value <= enough) break;
         }
@@ -18758,7 +19009,7 @@ typedef struct dem2di_loader {
     const dem2d_env *env;
     dem2d_result result;             /* the first failure */
     const unsigned char *next, *end; /* what is left */
-    uint64_t seen;                   /* columns: bits; of shapes those of the last one */
+    bool seen[DEM2DI_COLUMNS];       /* columns; of shapes those of the last one */
     dem2di_slot_shape shape;         /* the last one */
 } dem2di_loader;
 
@@ -18876,7 +19127,7 @@ static void dem2di_take_rows(dem2di_loader *loader, const dem2di_record *record)
 static void dem2di_load_missing(dem2di_loader *loader, const void *object, bool shape) {
     for (int k = 0; k < DEM2DI_COLUMNS && dem2di_load_good(loader); k++) {
         const dem2di_column *column = &dem2di_columns[k];
-        if ((column->group >= DEM2DI_SHAPE) != shape || (loader->seen >> k & 1)) continue;
+        if ((column->group >= DEM2DI_SHAPE) != shape || loader->seen[k]) continue;
         int rows = dem2di_rows(object, column);
         if (rows == 0) continue;
         if (column->treatment & DEM2DI_FIRST)
@@ -18891,7 +19142,7 @@ static void dem2di_load_shape_end(dem2di_loader *loader) {
     if (loader->shape.shape.circumscribed > 0) dem2di_load_missing(loader, &loader->shape, true);
     memset(&loader->shape, 0, sizeof loader->shape);
     for (int k = 0; k < DEM2DI_COLUMNS; k++)
-        if (dem2di_columns[k].group >= DEM2DI_SHAPE) loader->seen &= ~((uint64_t)1 << k);
+        if (dem2di_columns[k].group >= DEM2DI_SHAPE) loader->seen[k] = false;
 }
 
 /* The column of the next record: of the world, or of its last shape. */
@@ -18911,8 +19162,8 @@ static void dem2di_take_column(dem2di_loader *loader, dem2di_record *record) {
     record->object = loader->world;
     if (record->column->group == DEM2DI_SHAPE) dem2di_load_shape_end(loader);
     if (record->column->group >= DEM2DI_SHAPE) record->object = &loader->shape;
-    if (loader->seen >> k & 1) dem2di_load_refuse(loader, DEM2D_FORMAT, "there twice", name, NULL);
-    loader->seen |= (uint64_t)1 << k;
+    if (loader->seen[k]) dem2di_load_refuse(loader, DEM2D_FORMAT, "there twice", name, NULL);
+    loader->seen[k] = true;
 }
 
 /* A custom shape's function is the caller's. */
@@ -20165,6 +20416,9 @@ DEM2D_API dem2d_result dem2d_world_write_csv(const dem2d_world *world, const dem
    CHANGES
      0.7.0  Snapshots stay of version 4: those of 0.6.0 are read, unless they have dashpots, rolling
             friction or a law: these are refused by the names of their arrays.
+            Dashpots beside the tangential spring and that against rolling:
+            tangential_damping_ratio and rolling_damping_ratio of materials and pairs. In the safe
+            time step each dashpot adds its lag to its own spring only.
             Circles with dashpots and rolling friction are nearly as fast as those without. A step
             that would give circles a state that is not finite is refused.
             A tangential spring of one contact point is shared out to two by the forces of their

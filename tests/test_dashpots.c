@@ -1,0 +1,278 @@
+/* Dashpots beside the tangential and the rolling spring: impacts against an independent integration
+   of spring, dashpot and slider, energies, the ledger, the bounds of the time step, extreme ratios.
+ */
+#include "dem2d.h"
+#include "testing.h"
+#include "world_scene.h"
+
+#define KN 1e7
+#define RADIUS 0.05
+
+typedef struct impact {
+    const char *name;
+    double zeta, zeta_t, zeta_r, friction, rolling; /* kt is 0.8 kn */
+    double vx, spin;                                /* at 1 m/s downwards */
+} impact;
+
+static const double mass = 2700 * (double)TEST_PI * RADIUS * RADIUS;
+
+static dem2d_material_desc material_of(const impact *c) {
+    dem2d_material_desc material = stone_desc(0.8 * KN, c->friction);
+    material.rolling_friction = c->rolling, material.damping_ratio = c->zeta;
+    material.tangential_damping_ratio = c->zeta_t, material.rolling_damping_ratio = c->zeta_r;
+    return material;
+}
+
+static double contact_time(void) {
+    return (double)TEST_PI * sqrt(mass / KN);
+}
+
+static scene impact_scene(const impact *c, double time_step, double spare, dem2d_particle_id *id) {
+    dem2d_world_desc desc = {0};
+    const dem2d_material_desc material = material_of(c);
+    desc.time_step = time_step, desc.ledger = true, desc.skip_time_step_check = true;
+    scene s = open_scene(&desc, &material);
+    add_plane(&s, 0, 0, 0, 1);
+    *id = add_shape(&s, make_disc(RADIUS), DEM2D_FREE, vec(0, RADIUS + spare), 0, vec(c->vx, -1),
+                    c->spin);
+    return s;
+}
+
+/* --- the integration: the disc alone, in steps that are short against the world's ------------- */
+
+typedef struct motion {
+    double y, vx, vy, w;
+    double q, theta; /* stretch of the tangential spring and of that against rolling */
+} motion;
+
+/* Rate of a spring with a dashpot in series with a slider, which moves at `rate` as a whole, and
+   their force. Without a dashpot the spring yields at once. */
+static double yield(double k, double c, double rate, double limit, double *stretch, double *force) {
+    *force = -(k * *stretch + c * rate);
+    if (fabs(*force) <= limit) return rate;
+    *force = *force > 0 ? limit : -limit;
+    if (c > 0) return -(*force + k * *stretch) / c;
+    *stretch = -*force / k;
+    return 0;
+}
+
+static motion rates(const impact *c, motion *m) {
+    const double kt = 0.8 * KN, inertia = mass * RADIUS * RADIUS / 2;
+    const double arm = m->y; /* of the foot point: the radius less the depth */
+    const double kr = kt * RADIUS * RADIUS, mt = 1 / (1 / mass + arm * arm / inertia);
+    const double spring = KN * (RADIUS - m->y) - 2 * c->zeta * sqrt(mass * KN) * m->vy;
+    const double normal = m->y < RADIUS ? fmax(0, spring) : 0;
+    double force, moment;
+    motion rate = {m->vy, 0, normal / mass, 0, 0, 0};
+    rate.q = yield(kt, 2 * c->zeta_t * sqrt(mt * kt), m->vx + m->w * arm, c->friction * normal,
+                   &m->q, &force);
+    rate.theta = yield(kr, 2 * c->zeta_r * sqrt(inertia * kr), m->w, c->rolling * RADIUS * normal,
+                       &m->theta, &moment);
+    rate.vx = force / mass, rate.w = (force * arm + moment) / inertia;
+    return rate;
+}
+
+static motion along(const motion *m, const motion *rate, double h) {
+    const motion next = {m->y + h * rate->y, m->vx + h * rate->vx, m->vy + h * rate->vy,
+                         m->w + h * rate->w, m->q + h * rate->q,   m->theta + h * rate->theta};
+    return next;
+}
+
+/* The midpoint rule, from touch to parting. */
+static motion integrate(const impact *c) {
+    motion m = {RADIUS, c->vx, -1, c->spin, 0, 0};
+    const double h = contact_time() / 200000;
+    for (int i = 0; m.y <= RADIUS && i < 1000000; i++) {
+        const motion rate = rates(c, &m);
+        motion middle = along(&m, &rate, h / 2);
+        const motion there = rates(c, &middle);
+        m = along(&m, &there, h);
+    }
+    return m;
+}
+
+/* Greatest error of the velocities after an impact, m/s, with so many steps in a contact time. The
+   moment at which the two touch is anywhere in a step. */
+static double impact_error(const impact *c, const motion *m, int steps) {
+    double error = 0;
+    for (int k = 0; k < 5; k++) {
+        const double step = contact_time() / steps;
+        dem2d_particle_id id;
+        scene s = impact_scene(c, step, (3 + k / 5.0) * step, &id);
+        assert_ok(dem2d_world_step(s.world, 3 * steps, NULL));
+        const dem2d_particle_info p = grain_of(&s, id);
+        const double one = fmax(fabs(p.velocity.y - m->vy), fabs(p.velocity.x - m->vx));
+        error = fmax(error, fmax(one, fabs(p.angular_velocity - m->w) * RADIUS));
+        close_scene(&s);
+    }
+    return error;
+}
+
+/* Oblique impacts of a disc on a plane. The first step of a contact counts as a whole, and dashpots
+   lag by half a step: errors of first order. */
+static void test_impacts(void **state) {
+    (void)state;
+    static const impact cases[] = {
+        {"springs", 0, 0, 0, 0.5, 0, 0.5, 0},
+        {"normal", 0.1, 0, 0, 0.5, 0, 0.5, 0},
+        {"sticks", 0, 0.1, 0, 5, 0, 0.3, 4},
+        {"critical", 0, 1, 0, 5, 0, 0.3, 4},
+        {"slides", 0, 0.1, 0, 0.1, 0, 3, 0},
+        {"slides, sticks", 0, 0.1, 0, 0.3, 0, 0.8, -3},
+        {"strong, slides", 0, 2, 0, 0.3, 0, 0.8, 0},
+        {"rolls", 0, 0, 0.1, 0.5, 2, 0.5, 10},
+        {"rolls, slides", 0, 0.05, 0.05, 0.5, 0.1, 0.5, 30},
+        {"all", 0.1, 0.1, 0.1, 0.4, 0.3, 0.7, 10},
+    };
+    for (int i = 0; i < COUNT_OF(cases); i++) {
+        const impact *c = &cases[i];
+        const motion m = integrate(c);
+        const double error = impact_error(c, &m, 500), fine = impact_error(c, &m, 5000);
+        print_message("%-15s t_c/500: %.2g, t_c/5000: %.2g\n", c->name, error, fine);
+        assert_true(error < 2e-3);
+        assert_true(fine < error / 7 || fine < 1e-6);
+    }
+}
+
+/* --- energies ----------------------------------------------------------------------------------
+ */
+
+static double stored_energy(const dem2d_ledger *l) {
+    return l->kinetic + l->normal + l->tangential;
+}
+
+/* A disc, or a box that comes down on a corner and then on its face, hits a plane obliquely:
+   greatest error of the ledger, of its energy at first. What is stored never grows, and what is
+   dissipated never shrinks, but for the error of the step. */
+static double closure(const impact *c, bool box, int steps) {
+    dem2d_particle_id id;
+    scene s = impact_scene(c, contact_time() / steps, 1e-4, &id);
+    if (box)
+        add_shape(&s, make_box(0.1, 0.06), DEM2D_FREE, vec(1, 0.07), 0.3, vec(c->vx, -1), c->spin);
+    double worst = 0, first = 0;
+    dem2d_ledger last = {0};
+    for (int i = 0; i < 8 * steps; i++) {
+        assert_ok(dem2d_world_step(s.world, 1, NULL));
+        const dem2d_ledger l = ledger_of(&s);
+        if (i == 0) first = l.kinetic;
+        worst = fmax(worst, fabs(l.closure) / first);
+        const double spare = 20 * first / steps / steps;
+        if (i > 0) assert_true(stored_energy(&l) < stored_energy(&last) + spare);
+        if (i > 0) assert_true(l.friction + l.dashpot > last.friction + last.dashpot - spare);
+        if (i > 0) assert_true(l.dashpot > last.dashpot - spare);
+        last = l;
+    }
+    assert_true((last.dashpot > 1e-4 * first) == (c->zeta > 0 || c->zeta_t > 0 || c->zeta_r > 0));
+    close_scene(&s);
+    return worst;
+}
+
+static void test_energies(void **state) {
+    (void)state;
+    static const impact cases[] = {
+        {"none", 0, 0, 0, 0.5, 0.1, 0.5, 10},       {"normal", 0.3, 0, 0, 0.5, 0.1, 0.5, 10},
+        {"tangential", 0, 0.3, 0, 0.5, 0, 0.5, 10}, {"rolling", 0, 0, 0.3, 0.5, 0.3, 0.5, 20},
+        {"all", 0.2, 0.3, 0.4, 0.5, 0.3, 0.7, 20},
+    };
+    for (int i = 0; i < COUNT_OF(cases); i++)
+        for (int box = 0; box < 2; box++) {
+            const double coarse = closure(&cases[i], box, 100), fine = closure(&cases[i], box, 800);
+            print_message("%-10s %d: t_c/100 %.2g, t_c/800 %.2g\n", cases[i].name, box, coarse,
+                          fine);
+            assert_true(fine < 1e-3 && fine < coarse / 16);
+        }
+}
+
+/* --- the stable time step -----------------------------------------------------------------------
+ */
+
+/* A disc on a plane: l dt (dt + 2 lag) = 4 for l = kt/m_t, or kn/m, and the lag of that dashpot. */
+static void test_bounds(void **state) {
+    (void)state;
+    const double kt = 0.8 * KN, inertia = mass * RADIUS * RADIUS / 2;
+    static const double ratios[] = {0, 0.1, 1, 10, 1000};
+    for (int i = 0; i < COUNT_OF(ratios); i++)
+        for (int k = 0; k < 3; k++) {
+            const double z = ratios[i], depth = 1e-5, arm = RADIUS - depth;
+            const impact c = {"", k == 0 ? z : 0, k == 1 ? z : 0, k == 2 ? z : 0, 1e3, 1e3, 0, 0};
+            dem2d_particle_id id;
+            scene s = impact_scene(&c, 1e-9, -depth, &id);
+            assert_ok(dem2d_world_drive_particle(s.world, id, DEM2D_FREE, vec(0, 0), 0));
+            assert_ok(dem2d_world_step(s.world, 1, NULL));
+            double safe, limit, expected = HUGE_VAL;
+            assert_ok(dem2d_world_time_step_bounds(s.world, &safe, &limit, NULL));
+            /* normal; sliding and rolling, which are coupled: only bounded by their sum */
+            const double mt = 1 / (1 / mass + arm * arm / inertia), kr = kt * RADIUS * RADIUS;
+            const double stiff[3] = {KN / mass, kt / mt, kr / inertia};
+            for (int j = 0; j < 3; j++) {
+                const double lag = j == k ? 2 * z / sqrt(stiff[j]) : 0;
+                expected = fmin(expected, 4 / stiff[j] / (lag + sqrt(lag * lag + 4 / stiff[j])));
+            }
+            if (k == 0 && z >= 1)
+                assert_near(safe, expected, 1e-9); /* normal, alone */
+            else
+                assert_true(safe <= expected * (1 + 1e-9) && safe > expected / 2);
+            close_scene(&s);
+        }
+}
+
+/* A strong dashpot at the safe step: the vibration dies down. */
+static void test_safe_step(void **state) {
+    (void)state;
+    static const double ratios[] = {0.1, 2, 1000};
+    for (int i = 0; i < COUNT_OF(ratios); i++)
+        for (int k = 0; k < 3; k++) {
+            const double z = ratios[i];
+            const impact c = {
+                "", k == 0 ? z : 0.1, k == 1 ? z : 0.1, k == 2 ? z : 0.1, 0.5, 0.2, 0.01, 1};
+            dem2d_particle_id id;
+            scene s = impact_scene(&c, 1e-9, -1e-5, &id);
+            double safe, limit;
+            assert_ok(dem2d_world_step(s.world, 1, NULL));
+            assert_ok(dem2d_world_time_step_bounds(s.world, &safe, &limit, NULL));
+            assert_ok(dem2d_world_set_time_step(s.world, 0.9 * safe));
+            assert_ok(dem2d_world_set_gravity(s.world, vec(0, -9.81)));
+            assert_ok(dem2d_world_drive_particle(s.world, id, DEM2D_FREE, vec(0.01, 0), 1));
+            double energy = 0;
+            for (int n = 0; n < 40; n++) {
+                dem2d_energy e;
+                assert_ok(dem2d_world_step(s.world, 500, NULL));
+                assert_ok(dem2d_world_energy(s.world, &e));
+                const double now = e.translational + e.rotational;
+                if (n == 0) energy = now;
+                assert_true(now <= energy * 1.5 + 1e-9);
+            }
+            close_scene(&s);
+        }
+}
+
+/* Without a tangential spring, or without friction, there is nothing for the dashpots to damp. */
+static void test_nothing_to_damp(void **state) {
+    (void)state;
+    for (int i = 0; i < 2; i++) {
+        dem2d_vec at[2];
+        for (int k = 0; k < 2; k++) {
+            dem2d_world_desc desc = {0};
+            dem2d_material_desc material = stone_desc(i == 0 ? 0 : KN, i == 0 ? 0.5 : 0);
+            if (k == 1) material.tangential_damping_ratio = material.rolling_damping_ratio = 3;
+            desc.time_step = 1e-5;
+            scene s = open_scene(&desc, &material);
+            add_plane(&s, 0, 0, 0, 1);
+            const dem2d_particle_id id =
+                add_shape(&s, make_disc(RADIUS), DEM2D_FREE, vec(0, RADIUS), 0, vec(0.3, -1), 20);
+            assert_ok(dem2d_world_step(s.world, 1000, NULL));
+            at[k] = grain_of(&s, id).pose.position;
+            close_scene(&s);
+        }
+        assert_true(at[0].x == at[1].x && at[0].y == at[1].y);
+    }
+}
+
+int main(void) {
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(test_impacts),         cmocka_unit_test(test_energies),
+        cmocka_unit_test(test_bounds),          cmocka_unit_test(test_safe_step),
+        cmocka_unit_test(test_nothing_to_damp),
+    };
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}
