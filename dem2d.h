@@ -298,6 +298,10 @@ HOW TO
                          what overlaps; dem2d_world_cast_ray for the first hit of a ray,
                          dem2d_world_cast_ray_all for all; dem2d_world_nearest. Also before the
                          first step. dem2d_world_particle_contacts: contacts of one particle.
+    choose who meets     groups of particles and walls: category and mask. dem2d_world_set_groups,
+      whom               dem2d_world_set_wall. dem2d_world_set_user_data keeps a number of yours.
+    detect without       groups.sensor of a particle or wall, then dem2d_world_particle_overlaps or
+      pushing            dem2d_world_wall_overlaps as often as you want to know.
     build a hopper       walls with segment: where two meet, a particle has one contact.
     follow the energy    dem2d_world_energy for what is stored. dem2d_world_desc.ledger, then
                          dem2d_world_ledger: what gravity, walls and you put in, where it went, and
@@ -1322,6 +1326,16 @@ typedef enum dem2d_motion {
     DEM2D_DRIVEN ///< at given velocities, whatever the forces
 } dem2d_motion;
 
+/// Whom a particle or a wall meets. Two meet if each is in a group that the other's mask names.
+/// Those that do not meet have no contact: they may overlap, and nothing acts between them. A
+/// sensor has no contacts at all, and measures of a packing do not count it; what overlaps it is
+/// found by dem2d_world_particle_overlaps and dem2d_world_wall_overlaps.
+typedef struct dem2d_groups {
+    uint32_t category; ///< groups it is in, a bit for each; 0: all
+    uint32_t mask;     ///< groups it meets, a bit for each; 0: all
+    bool sensor;       ///< detects, and does not push
+} dem2d_groups;
+
 /// A particle. Errors name the field.
 typedef struct dem2d_particle_desc {
     double scale;               ///< size factor on the template, > 0
@@ -1333,6 +1347,8 @@ typedef struct dem2d_particle_desc {
     dem2d_vec velocity;         ///< m/s, half a step before the position; 0 when FIXED
     double angular_velocity;    ///< rad/s, likewise
     uint64_t name;              ///< orders pairs and sums: see Name in the manual; 0: none
+    dem2d_groups groups;        ///< whom it meets; all zero: everyone
+    uint64_t user_data;         ///< the caller's: kept and saved
 } dem2d_particle_desc;
 
 /// State of a particle.
@@ -1352,6 +1368,8 @@ typedef struct dem2d_particle_info {
     uint64_t name;              ///< as given
     dem2d_vec load;             ///< N/m, external, as it is set
     double load_torque;         ///< N, likewise
+    dem2d_groups groups;        ///< as given
+    uint64_t user_data;         ///< as given
 } dem2d_particle_info;
 
 /// How a wall moves.
@@ -1394,6 +1412,8 @@ typedef struct dem2d_wall_desc {
     double max_speed; ///< m/s, >= 0, for SERVO > 0: greatest speed, taken before first contact
     dem2d_wall_id spans[2]; ///< the length is the distance between these walls; or both zero
     uint64_t name;          ///< orders contacts and sums: see Name in the manual; 0: none
+    dem2d_groups groups;    ///< whom it meets; all zero: everyone
+    uint64_t user_data;     ///< the caller's: kept and saved
 } dem2d_wall_desc;
 
 /// State of a wall.
@@ -1410,6 +1430,8 @@ typedef struct dem2d_wall_info {
     double stress;              ///< Pa, -force . normal / length; 0 when there is no length
     double target;              ///< Pa, for SERVO
     uint64_t name;              ///< as given
+    dem2d_groups groups;        ///< as given
+    uint64_t user_data;         ///< as given
 } dem2d_wall_info;
 
 /// One contact of the last force pass.
@@ -1507,6 +1529,13 @@ DEM2D_API dem2d_result dem2d_world_drive_particle(dem2d_world *world, dem2d_part
 /// OUT_OF_MEMORY.
 DEM2D_API dem2d_result dem2d_world_set_load(dem2d_world *world, dem2d_particle_id id,
                                             dem2d_vec force, double torque);
+/// Set whom a particle meets. Contacts with those that it no longer meets end; the list is rebuilt
+/// only if it meets others than before. Of a wall: dem2d_world_set_wall.
+DEM2D_API dem2d_result dem2d_world_set_groups(dem2d_world *world, dem2d_particle_id id,
+                                              dem2d_groups groups);
+/// Set the caller's number of a particle.
+DEM2D_API dem2d_result dem2d_world_set_user_data(dem2d_world *world, dem2d_particle_id id,
+                                                 uint64_t user_data);
 /// Add a wall.
 DEM2D_API dem2d_result dem2d_world_add_wall(dem2d_world *world, const dem2d_wall_desc *desc,
                                             dem2d_wall_id *id);
@@ -1720,6 +1749,8 @@ DEM2D_API dem2d_result dem2d_world_inertial_number(const dem2d_world *world, dou
 typedef struct dem2d_query_desc {
     bool skip_particles; ///< look for walls only
     bool skip_walls;     ///< look for particles only
+    bool skip_sensors;   ///< look for no sensors
+    uint32_t mask;       ///< groups it looks for, a bit for each; 0: all
 } dem2d_query_desc;
 
 /// A particle or a wall that a query found.
@@ -1762,6 +1793,16 @@ DEM2D_API dem2d_result dem2d_world_query_point(dem2d_world *world, dem2d_vec poi
 DEM2D_API dem2d_result dem2d_world_query_shape(dem2d_world *world, const dem2d_shape *shape,
                                                dem2d_pose pose, const dem2d_query_desc *desc,
                                                dem2d_found *found, int capacity, int *count);
+/// What overlaps a particle, of those whom it meets by its groups (sensors meet, too): the same.
+/// Errors: also STALE_ID.
+DEM2D_API dem2d_result dem2d_world_particle_overlaps(dem2d_world *world, dem2d_particle_id id,
+                                                     const dem2d_query_desc *desc,
+                                                     dem2d_found *found, int capacity, int *count);
+/// Particles that overlap a wall, of those whom it meets by its groups (sensors meet, too): the
+/// same. Errors: also STALE_ID.
+DEM2D_API dem2d_result dem2d_world_wall_overlaps(dem2d_world *world, dem2d_wall_id id,
+                                                 const dem2d_query_desc *desc, dem2d_found *found,
+                                                 int capacity, int *count);
 /// What a ray hits first, from an origin (m) along a direction (any length but 0) up to a length
 /// (m, >= 0; 0: without end). Of several at the same distance the first in the order of
 /// dem2d_world_query_box. A ray that begins in a shape hits it at distance 0. Circles, ellipses and
@@ -10761,11 +10802,29 @@ static void dem2di_grid_sort(dem2di_grid *grid) {
     grid->heads[grid->table] = grid->count;
 }
 
+/* Who is in which groups and meets which: 0 stands for all. */
+typedef struct dem2di_groups {
+    uint32_t category, mask;
+    bool sensor;
+    uint64_t user_data;
+} dem2di_groups;
+
+static inline bool dem2di_in_groups(uint32_t mask, uint32_t category) {
+    return mask == 0 || category == 0 || (mask & category) != 0;
+}
+
+/* May the two have a contact? */
+static inline bool dem2di_meet(const dem2di_groups *a, const dem2di_groups *b) {
+    return !a->sensor && !b->sensor && dem2di_in_groups(a->mask, b->category) &&
+           dem2di_in_groups(b->mask, a->category);
+}
+
 /* The partners of a disc that were found: counted by kind, and written as (own, other) if there is
    an array. */
 typedef struct dem2di_finds {
     int own, count[2];
-    dem2di_key *to[2]; /* or NULL */
+    dem2di_key *to[2];           /* or NULL */
+    const dem2di_groups *groups; /* of the discs; NULL: all meet */
 } dem2di_finds;
 
 /* One more partner; circles or not. */
@@ -10789,6 +10848,8 @@ static inline void dem2di_grid_range(const dem2di_grid *grid, int begin, int end
         double both = own->reach + other->reach;
         if (!(dem2di_dot(d, d) < both * both) || other->level != level) continue;
         if (own->fixed && other->fixed) continue;
+        if (finds->groups != NULL && !dem2di_meet(&finds->groups[finds->own], &finds->groups[j]))
+            continue;
         dem2di_find_pair(finds, j, own->circle && other->circle);
     }
 }
@@ -11601,6 +11662,7 @@ typedef enum dem2di_group {
     DEM2DI_NAMES,         /* of bodies, where named */
     DEM2DI_LOADS,         /* of bodies, where loaded */
     DEM2DI_SUMS,          /* of bodies, where they are kept */
+    DEM2DI_GROUPED,       /* of bodies, where grouped */
     DEM2DI_DISPLACEMENTS, /* of bodies, where plan.turns */
     DEM2DI_MADE,          /* of bodies, where some are redirected */
     DEM2DI_EXCHANGED,     /* of ids, where the caller may change the sums */
@@ -11717,6 +11779,8 @@ struct dem2d_world {
     dem2d_sums exchange;     /* the same and those on walls for a caller, by ids */
     dem2di_push *pushes;     /* room for the contacts of a servo wall */
     char *scratch;           /* what only a step or only the building of the list needs */
+    bool grouped;            /* a particle has had groups or user data: */
+    dem2di_groups *groups;
     dem2di_tree tree;
     dem2di_block_result *block_results;
 
@@ -11776,6 +11840,10 @@ static const dem2di_field dem2di_wall_fields[] = {
     DEM2DI_ROW(dem2d_wall_desc, max_speed, DEM2DI_FROM_0, "m/s none; > 0 for SERVO"),
     DEM2DI_ROW(dem2d_wall_desc, spans, DEM2DI_HANDLE, "- none; two walls, or both zero"),
     DEM2DI_ROW(dem2d_wall_desc, name, DEM2DI_WORD, "- 0"),
+    DEM2DI_ROW(dem2d_wall_desc, groups.category, DEM2DI_TAG, "- 0"),
+    DEM2DI_ROW(dem2d_wall_desc, groups.mask, DEM2DI_TAG, "- 0"),
+    DEM2DI_ROW(dem2d_wall_desc, groups.sensor, DEM2DI_SWITCH, "- false"),
+    DEM2DI_ROW(dem2d_wall_desc, user_data, DEM2DI_WORD, "- 0"),
 };
 
 /* --- columns ------------------------------------------------------------------------------------
@@ -11810,6 +11878,7 @@ static const dem2di_field dem2di_progress_fields[] = {
     DEM2DI_SAVED("redirected", dem2d_world, redirected, DEM2DI_SWITCH),
     DEM2DI_SAVED("named", dem2d_world, named, DEM2DI_SWITCH),
     DEM2DI_SAVED("loaded", dem2d_world, loaded, DEM2DI_SWITCH),
+    DEM2DI_SAVED("grouped", dem2d_world, grouped, DEM2DI_SWITCH),
     DEM2DI_SAVED("order_due", dem2d_world, order_due, DEM2DI_SWITCH),
     DEM2DI_SAVED("list_stale", dem2d_world, list_stale, DEM2DI_SWITCH),
     DEM2DI_SAVED("list_used_up", dem2d_world, list_used_up, DEM2DI_SWITCH),
@@ -11897,6 +11966,12 @@ static const dem2di_field dem2di_id_fields[] = {
 
 static const dem2di_field dem2di_ranked_fields[] = {
     DEM2DI_SAVED("id", dem2di_ranked, index, DEM2DI_WHOLE(0, 1 << 30))};
+
+static const dem2di_field dem2di_groups_fields[] = {
+    DEM2DI_SAVED("category", dem2di_groups, category, DEM2DI_TAG),
+    DEM2DI_SAVED("mask", dem2di_groups, mask, DEM2DI_TAG),
+    DEM2DI_SAVED("sensor", dem2di_groups, sensor, DEM2DI_SWITCH),
+    DEM2DI_SAVED("user_data", dem2di_groups, user_data, DEM2DI_WORD)};
 
 static const dem2di_field dem2di_load_fields[] = {
     DEM2DI_SAVED("force", dem2di_load, force, DEM2DI_VECTOR),
@@ -12080,6 +12155,8 @@ static const dem2di_column dem2di_columns[] = {
     DEM2DI_UNSAVED(BODIES, list.own, 0),
     DEM2DI_COLUMN("names", NAMES, names, DEM2DI_FIRST | DEM2DI_MOVES | DEM2DI_HASHED, name_field),
     DEM2DI_COLUMN("loads", LOADS, loads, DEM2DI_FIRST | DEM2DI_MOVES | DEM2DI_HASHED, load_fields),
+    DEM2DI_COLUMN("groups", GROUPED, groups, DEM2DI_FIRST | DEM2DI_MOVES | DEM2DI_HASHED,
+                  groups_fields),
     DEM2DI_COLUMN("displacements", DISPLACEMENTS, displacement, DEM2DI_MOVES | DEM2DI_SWAPS,
                   way_field),
     DEM2DI_UNSAVED(DISPLACEMENTS, next_displacement, 0),
@@ -12244,6 +12321,7 @@ static bool dem2di_reserve_bodies(dem2d_world *world, int count) {
                               dem2di_group_reserve(world, DEM2DI_NAMES, count))) &&
            (!world->loaded || dem2di_group_reserve(world, DEM2DI_LOADS, count)) &&
            (!world->keeps_sums || dem2di_group_reserve(world, DEM2DI_SUMS, count)) &&
+           (!world->grouped || dem2di_group_reserve(world, DEM2DI_GROUPED, count)) &&
            (!world->plan.turns || dem2di_group_reserve(world, DEM2DI_DISPLACEMENTS, count)) &&
            (!world->redirected || dem2di_group_reserve(world, DEM2DI_MADE, count));
 }
@@ -12609,6 +12687,10 @@ static const dem2di_field dem2di_particle_fields[] = {
     DEM2DI_ROW(dem2d_particle_desc, velocity, DEM2DI_VECTOR, "m/s 0; 0 when FIXED"),
     DEM2DI_ROW(dem2d_particle_desc, angular_velocity, DEM2DI_FINITE, "rad/s 0; 0 when FIXED"),
     DEM2DI_ROW(dem2d_particle_desc, name, DEM2DI_WORD, "- 0"),
+    DEM2DI_ROW(dem2d_particle_desc, groups.category, DEM2DI_TAG, "- 0"),
+    DEM2DI_ROW(dem2d_particle_desc, groups.mask, DEM2DI_TAG, "- 0"),
+    DEM2DI_ROW(dem2d_particle_desc, groups.sensor, DEM2DI_SWITCH, "- false"),
+    DEM2DI_ROW(dem2d_particle_desc, user_data, DEM2DI_WORD, "- 0"),
 };
 
 /* A particle as it is described, but for its ids. */
@@ -12703,6 +12785,48 @@ static bool dem2di_names_begin(dem2d_world *world) {
     return world->named = true;
 }
 
+/* Groups of the slots, where some have any. */
+static const dem2di_groups *dem2di_groups_used(const dem2d_world *world) {
+    return world->grouped ? world->groups : NULL;
+}
+
+static dem2di_groups dem2di_groups_of(const dem2d_groups *given, uint64_t user_data) {
+    dem2di_groups groups;
+    memset(&groups, 0, sizeof groups);
+    groups.category = given->category;
+    groups.mask = given->mask;
+    groups.sensor = given->sensor;
+    groups.user_data = user_data;
+    return groups;
+}
+
+static dem2di_groups dem2di_groups_at(const dem2d_world *world, int slot) {
+    dem2di_groups none;
+    memset(&none, 0, sizeof none);
+    return world->grouped ? world->groups[slot] : none;
+}
+
+static dem2di_groups dem2di_wall_groups(const dem2di_wall *wall) {
+    return dem2di_groups_of(&wall->desc.groups, wall->desc.user_data);
+}
+
+static dem2d_groups dem2di_groups_given(const dem2di_groups *groups) {
+    dem2d_groups given;
+    given.category = groups->category;
+    given.mask = groups->mask;
+    given.sensor = groups->sensor;
+    return given;
+}
+
+/* The column of groups, if these are the first that are not all zero. */
+static bool dem2di_groups_begin(dem2d_world *world, const dem2di_groups *groups) {
+    bool any = groups->category != 0 || groups->mask != 0 || groups->sensor || groups->user_data;
+    if (world->grouped || !any) return true;
+    if (!dem2di_group_reserve(world, DEM2DI_GROUPED, world->capacity[DEM2DI_BODIES])) return false;
+    memset(world->groups, 0, (size_t)world->body_count * sizeof *world->groups);
+    return world->grouped = true;
+}
+
 DEM2D_API dem2d_result dem2d_world_add_particle(dem2d_world *world, const dem2d_particle_desc *desc,
                                                 dem2d_particle_id *id) {
     if (world == NULL || desc == NULL || id == NULL) return DEM2D_NULL_ARGUMENT;
@@ -12721,12 +12845,15 @@ DEM2D_API dem2d_result dem2d_world_add_particle(dem2d_world *world, const dem2d_
     int slot = world->body_count;
     if (slot == 1 << 30)
         return dem2di_fail(&world->env, DEM2D_OUT_OF_RANGE, -1, "more than %d particles", slot);
-    if (!dem2di_reserve_bodies(world, slot + 1) || (desc->name != 0 && !dem2di_names_begin(world)))
+    const dem2di_groups groups = dem2di_groups_of(&desc->groups, desc->user_data);
+    if (!dem2di_reserve_bodies(world, slot + 1) ||
+        (desc->name != 0 && !dem2di_names_begin(world)) || !dem2di_groups_begin(world, &groups))
         return dem2di_out_of_memory(world, "a particle");
     dem2di_row_clear(world, DEM2DI_BODIES, DEM2DI_MADE, slot);
     body.index = dem2di_id_take(world);
     body.rank = world->named ? world->order[body.index].rank : body.index;
     if (world->named) world->names[slot] = desc->name;
+    if (world->grouped) world->groups[slot] = groups;
     world->order_due = world->named;
     world->ids[body.index].slot = slot;
     world->bodies[slot] = body;
@@ -13085,6 +13212,9 @@ DEM2D_API dem2d_result dem2d_world_get_particle(const dem2d_world *world, dem2d_
     info->radius = now->radius;
     info->equivalent = dem2di_equivalent(world, slot);
     info->name = world->named ? world->names[slot] : 0;
+    const dem2di_groups groups = dem2di_groups_at(world, slot);
+    info->groups = dem2di_groups_given(&groups);
+    info->user_data = groups.user_data;
     load = dem2di_external(world, slot);
     info->load = load.force;
     info->load_torque = load.torque;
@@ -13139,6 +13269,64 @@ DEM2D_API dem2d_result dem2d_world_move_particle(dem2d_world *world, dem2d_parti
     dem2d_result result = dem2di_check_motion(&world->env, &moved);
     if (result != DEM2D_OK) return result;
     dem2di_put_at(world, slot, position, dem2di_orientation(world, angle));
+    return DEM2D_OK;
+}
+
+/* Somebody's groups change: does that change with whom it may have contacts? */
+static bool dem2di_meets_others(const dem2d_world *world, const dem2di_groups *old,
+                                const dem2di_groups *now, bool wall) {
+    for (int i = 0; i < world->body_count; i++) {
+        const dem2di_groups other = dem2di_groups_at(world, i);
+        if (world->bodies[i].shape_index >= 0 &&
+            dem2di_meet(old, &other) != dem2di_meet(now, &other))
+            return true;
+    }
+    for (int j = 0; j < world->wall_count && !wall; j++) {
+        const dem2di_groups other = dem2di_wall_groups(&world->walls[j]);
+        if (world->walls[j].alive && dem2di_meet(old, &other) != dem2di_meet(now, &other))
+            return true;
+    }
+    return false;
+}
+
+/* Groups that have been set decide about contact i: it is forgotten if the two no longer meet. */
+static void dem2di_contact_regroup(dem2d_world *world, int i) {
+    const dem2di_key *key = &world->list.keys[i];
+    if (key->a < 0) return;
+    const dem2di_groups a = dem2di_groups_at(world, key->a);
+    const dem2di_groups b = i >= world->list.pairs
+                                ? dem2di_wall_groups(&world->walls[dem2di_wall_of(world, i)])
+                                : dem2di_groups_at(world, key->b);
+    if (!dem2di_meet(&a, &b)) dem2di_contact_forget(world, i);
+}
+
+DEM2D_API dem2d_result dem2d_world_set_groups(dem2d_world *world, dem2d_particle_id id,
+                                              dem2d_groups groups) {
+    if (world == NULL) return DEM2D_NULL_ARGUMENT;
+    int slot = dem2di_slot(world, id);
+    if (slot < 0) return dem2di_stale(world, "particle", id.index);
+    const dem2di_list *list = &world->list;
+    const dem2di_groups old = dem2di_groups_at(world, slot);
+    const dem2di_groups now = dem2di_groups_of(&groups, old.user_data);
+    if (!dem2di_groups_begin(world, &now)) return dem2di_out_of_memory(world, "groups");
+    if (!world->grouped) return DEM2D_OK;
+    world->groups[slot] = now;
+    if (!dem2di_meets_others(world, &old, &now, false)) return DEM2D_OK;
+    for (int k = list->first[slot]; k < list->first[slot + 1]; k++)
+        dem2di_contact_regroup(world, list->adjacent[k]);
+    world->list_stale = world->check_due = world->ledger.edited = true;
+    return DEM2D_OK;
+}
+
+DEM2D_API dem2d_result dem2d_world_set_user_data(dem2d_world *world, dem2d_particle_id id,
+                                                 uint64_t user_data) {
+    if (world == NULL) return DEM2D_NULL_ARGUMENT;
+    int slot = dem2di_slot(world, id);
+    if (slot < 0) return dem2di_stale(world, "particle", id.index);
+    dem2di_groups now = dem2di_groups_at(world, slot);
+    now.user_data = user_data;
+    if (!dem2di_groups_begin(world, &now)) return dem2di_out_of_memory(world, "user data");
+    if (world->grouped) world->groups[slot] = now;
     return DEM2D_OK;
 }
 
@@ -13296,7 +13484,7 @@ DEM2D_API dem2d_result dem2d_world_set_time_step(dem2d_world *world, double time
 
 /* ============================================================================================
    >>walls  Walls: their descs, parts and places
-   uses: config, math, memory, fields, shapes, world, objects
+   uses: config, math, memory, fields, shapes, broad, world, objects
    ============================================================================================ */
 
 static dem2d_result dem2di_check_spans(const dem2d_world *world, const dem2d_wall_desc *desc) {
@@ -13654,6 +13842,7 @@ DEM2D_API dem2d_result dem2d_world_set_wall(dem2d_world *world, dem2d_wall_id id
     const dem2di_wall old = *wall;
     double extent = world->parts[wall->first].extent;
     if (old.desc.name != desc->name) world->list_stale = true; /* contacts go by the wall's rank */
+    const dem2di_groups met = dem2di_wall_groups(&old);
     dem2di_wall_unspan(world, wall);
     dem2di_wall_place(world, (int)id.index, desc);
     dem2d_vec normal = wall->desc.normal;
@@ -13664,6 +13853,12 @@ DEM2D_API dem2d_result dem2d_world_set_wall(dem2d_world *world, dem2d_wall_id id
         dem2di_forget_wall(world, (int)id.index);
     if (!(dem2di_wall_change(world, world->wall_now, (int)id.index) <= wall->skin))
         world->list_stale = true;
+    const dem2di_groups meets = dem2di_wall_groups(wall);
+    if (dem2di_meets_others(world, &met, &meets, true)) {
+        for (int i = world->list.pairs; i < world->list.count; i++)
+            dem2di_contact_regroup(world, i);
+        world->list_stale = world->check_due = true;
+    }
     if (other_kind || old.desc.material.index != desc->material.index) {
         world->check_due = true;
         dem2di_edited(world);
@@ -13708,6 +13903,8 @@ DEM2D_API dem2d_result dem2d_world_get_wall(const dem2d_world *world, dem2d_wall
     const dem2di_wall *wall = &world->walls[id.index];
     const dem2di_wall_state *now = &world->wall_now[id.index];
     info->name = wall->desc.name;
+    info->groups = wall->desc.groups;
+    info->user_data = wall->desc.user_data;
     info->mode = wall->desc.mode;
     info->material = wall->desc.material;
     info->point = now->point;
@@ -14136,6 +14333,13 @@ static void dem2di_find_add(const dem2d_world *world, int slot, int part, dem2di
     (*count)++;
 }
 
+/* May a particle have a contact with a part? */
+static bool dem2di_meets_part(const dem2d_world *world, int slot, int part) {
+    const dem2di_groups groups = dem2di_groups_at(world, slot);
+    const dem2di_groups wall = dem2di_wall_groups(&world->walls[world->parts[part].wall]);
+    return dem2di_meet(&groups, &wall);
+}
+
 /* The parts of walls near a particle, and those that it had a contact with in the last force pass,
    wherever they are now: these stay listed for the queries. Counted, and written where there is
    room. */
@@ -14144,7 +14348,8 @@ static int dem2di_find_walls(const dem2d_world *world, const dem2di_disc *disc, 
     const dem2di_list *list = &world->list;
     int count = 0;
     for (int j = 0; j < world->part_count; j++)
-        if (dem2di_part_is_near(world, disc, j)) dem2di_find_add(world, slot, j, to, &count);
+        if (dem2di_part_is_near(world, disc, j) && dem2di_meets_part(world, slot, j))
+            dem2di_find_add(world, slot, j, to, &count);
     for (int k = list->first[slot]; k < list->first[slot + 1]; k++) {
         int contact = list->adjacent[k];
         if (contact < list->pairs || !(list->contacts.depth[contact] > 0)) continue;
@@ -14175,7 +14380,7 @@ static void dem2di_count_task(void *context, int begin, int end) {
     const dem2di_build *build = (const dem2di_build *)context;
     int last = dem2di_block_end((end - 1) * DEM2DI_BLOCK, DEM2DI_BLOCK, build->grid.count);
     for (int i = begin * DEM2DI_BLOCK; i < last; i++) {
-        dem2di_finds finds = {i, {0, 0}, {NULL, NULL}};
+        dem2di_finds finds = {i, {0, 0}, {NULL, NULL}, dem2di_groups_used(build->world)};
         dem2di_find_partners(build, &finds);
         build->count[DEM2DI_DISCS][i] = finds.count[0];
         build->count[DEM2DI_OTHERS][i] = finds.count[1];
@@ -14267,6 +14472,7 @@ static void dem2di_fill_task(void *context, int begin, int end) {
         for (int i = first; i < dem2di_block_end(first, DEM2DI_BLOCK, build->grid.count); i++) {
             dem2di_finds finds;
             finds.own = i;
+            finds.groups = dem2di_groups_used(world);
             finds.to[0] = build->keys + build->count[DEM2DI_DISCS][i];
             finds.to[1] = build->keys + build->total[DEM2DI_DISCS] + build->count[DEM2DI_OTHERS][i];
             dem2di_find_partners(build, &finds);
@@ -16708,6 +16914,14 @@ static int dem2di_next_particle(const dem2d_world *world, int *place) {
     return -1;
 }
 
+/* The same without sensors. */
+static int dem2di_next_grain(const dem2d_world *world, int *place) {
+    int slot = dem2di_next_particle(world, place);
+    while (slot >= 0 && dem2di_groups_at(world, slot).sensor)
+        slot = dem2di_next_particle(world, place);
+    return slot;
+}
+
 /* An iterator over the contacts of the last force pass in the order of ranks: those of particles,
    then, unless they are left out, those with walls. */
 typedef struct dem2di_contact_iterator {
@@ -16983,7 +17197,7 @@ DEM2D_API dem2d_result dem2d_world_packing(const dem2d_world *world, dem2d_packi
     if (world == NULL || packing == NULL) return DEM2D_NULL_ARGUMENT;
     double ends = 0, loaded_ends = 0, overlap = 0, greatest = 0, area = 0;
     int alive = 0, loaded = 0, open = 0;
-    for (int place = 0, slot; (slot = dem2di_next_particle(world, &place)) >= 0; alive++) {
+    for (int place = 0, slot; (slot = dem2di_next_grain(world, &place)) >= 0; alive++) {
         int contacts = dem2di_contacts_of(world, slot);
         ends += contacts;
         loaded += contacts >= 2;
@@ -17084,7 +17298,7 @@ DEM2D_API dem2d_result dem2d_world_porosity(const dem2d_world *world, const dem2
     dem2d_result result = dem2di_check_region(&world->env, region);
     if (result != DEM2D_OK) return result;
     double solid = 0;
-    for (int place = 0, slot; (slot = dem2di_next_particle(world, &place)) >= 0;)
+    for (int place = 0, slot; (slot = dem2di_next_grain(world, &place)) >= 0;)
         solid += dem2di_area_inside(world, slot, region);
     double width = region->upper.x - region->lower.x, height = region->upper.y - region->lower.y;
     *porosity = 1 - solid / (width * height);
@@ -17200,7 +17414,7 @@ static int dem2di_bin(dem2d_vec direction, double turn, int bins) {
 }
 
 static void dem2di_bin_coordination(const dem2d_world *world, int bins, int *counts) {
-    for (int place = 0, slot; (slot = dem2di_next_particle(world, &place)) >= 0;) {
+    for (int place = 0, slot; (slot = dem2di_next_grain(world, &place)) >= 0;) {
         int contacts = dem2di_contacts_of(world, slot);
         counts[contacts < bins ? contacts : bins - 1]++;
     }
@@ -17216,7 +17430,7 @@ static void dem2di_bin_orientation(const dem2d_world *world, int bins, dem2d_rot
         axes[t] = dem2d_rot_make(angle);
         if (ratio == 1) axes[t].c = axes[t].s = 0;
     }
-    for (int place = 0, slot; (slot = dem2di_next_particle(world, &place)) >= 0;) {
+    for (int place = 0, slot; (slot = dem2di_next_grain(world, &place)) >= 0;) {
         dem2d_rot axis = axes[world->bodies[slot].shape_index];
         dem2d_pose pose = dem2di_pose_of(world, world->before, slot);
         if (axis.c == 0 && axis.s == 0) continue;
@@ -17316,7 +17530,7 @@ DEM2D_API dem2d_result dem2d_world_equilibrium(const dem2d_world *world,
     if (world == NULL || equilibrium == NULL) return DEM2D_NULL_ARGUMENT;
     double speeds = 0, most = 0, resultants = 0, force = dem2di_mean_contact_force(world);
     int moving = 0, unbound = 0;
-    for (int place = 0, slot; (slot = dem2di_next_particle(world, &place)) >= 0;) {
+    for (int place = 0, slot; (slot = dem2di_next_grain(world, &place)) >= 0;) {
         if (world->bodies[slot].motion == DEM2D_FIXED) continue;
         double speed = dem2di_length(dem2di_velocities_mean(world, slot).v);
         speeds += speed;
@@ -17346,7 +17560,7 @@ DEM2D_API dem2d_result dem2d_world_inertial_number(const dem2d_world *world, dou
     if (result != DEM2D_OK) return result;
     double diameters = 0, mass = 0, area = 0;
     int count = 0;
-    for (int place = 0, slot; (slot = dem2di_next_particle(world, &place)) >= 0; count++) {
+    for (int place = 0, slot; (slot = dem2di_next_grain(world, &place)) >= 0; count++) {
         diameters += 2 * dem2di_equivalent(world, slot);
         mass += dem2di_body_mass(world, &world->bodies[slot]);
         area += dem2di_body_area(world, &world->bodies[slot]);
@@ -17382,12 +17596,20 @@ DEM2D_API dem2d_result dem2d_world_inertial_number(const dem2d_world *world, dou
 /* Lists of up to this many are sorted by insertion: a radix sort counts 256 digits for a byte. */
 #define DEM2DI_FEW_FOUND 32
 
-typedef enum dem2di_ask { DEM2DI_ASK_REGION, DEM2DI_ASK_RAY, DEM2DI_ASK_NEAREST } dem2di_ask;
+typedef enum dem2di_ask {
+    DEM2DI_ASK_REGION,
+    DEM2DI_ASK_WALL,
+    DEM2DI_ASK_RAY,
+    DEM2DI_ASK_NEAREST
+} dem2di_ask;
 
 typedef struct dem2di_question {
     dem2d_world *world;
     dem2di_ask ask;
     dem2d_query_desc desc;
+    dem2di_groups groups;     /* whom it meets */
+    int self;                 /* slot of the particle that asks, or -1 */
+    int wall;                 /* the wall that is the region */
     dem2d_box box;            /* of the region */
     const dem2d_shape *shape; /* the region; NULL when it is the box */
     dem2d_pose pose;          /* of the shape */
@@ -17532,6 +17754,7 @@ static double dem2di_reach(const dem2di_question *question, const dem2d_box *box
     case DEM2DI_ASK_NEAREST:
         return dem2di_length(dem2di_to_box(question->origin, box));
     case DEM2DI_ASK_REGION:
+    case DEM2DI_ASK_WALL:
         break;
     }
     return own->lower.x <= box->upper.x && own->upper.x >= box->lower.x &&
@@ -17897,11 +18120,48 @@ static bool dem2di_nearest_part(const dem2di_question *question, int part, dem2d
 /* --- asking ------------------------------------------------------------------------------------
  */
 
+/* A particle as the region of a question. */
+static void dem2di_region_set(dem2di_question *question, int slot) {
+    const dem2d_world *world = question->world;
+    question->shape = dem2di_shape_of(world, &world->bodies[slot]);
+    question->pose = dem2di_pose_of(world, world->now, slot);
+    question->box = dem2di_bounding_box(&world->now[slot]);
+}
+
+/* Does a particle overlap the wall that asks? */
+static bool dem2di_wall_has(const dem2di_question *question, int slot) {
+    const dem2d_world *world = question->world;
+    const dem2di_wall *wall = &world->walls[question->wall];
+    dem2di_question particle = *question;
+    dem2di_region_set(&particle, slot);
+    for (int k = wall->first; k < wall->first + wall->count; k++)
+        if (dem2di_part_distance(world, k, world->now[slot].x) <= world->now[slot].radius &&
+            dem2di_region_has_part(&particle, k))
+            return true;
+    return false;
+}
+
+/* Is an item among what is looked for? */
+static bool dem2di_item_wanted(const dem2di_question *question, int item) {
+    const dem2d_world *world = question->world;
+    const dem2d_query_desc *desc = &question->desc;
+    if (item >= 0 ? desc->skip_particles || item == question->self : desc->skip_walls) return false;
+    const dem2di_groups groups =
+        item >= 0 ? dem2di_groups_at(world, item)
+                  : dem2di_wall_groups(&world->walls[world->parts[-1 - item].wall]);
+    return !(desc->skip_sensors && groups.sensor) &&
+           dem2di_in_groups(desc->mask, groups.category) &&
+           dem2di_in_groups(question->groups.mask, groups.category) &&
+           dem2di_in_groups(groups.mask, question->groups.category);
+}
+
 /* Does a question find an item? Of rays and the nearest, where. */
 static bool dem2di_item_find(const dem2di_question *question, int item, dem2d_hit *hit) {
     int part = -1 - item;
-    if (item >= 0 ? question->desc.skip_particles : question->desc.skip_walls) return false;
+    if (!dem2di_item_wanted(question, item)) return false;
     switch (question->ask) {
+    case DEM2DI_ASK_WALL:
+        return item >= 0 && dem2di_wall_has(question, item);
     case DEM2DI_ASK_RAY:
         return item >= 0 ? dem2di_ray_particle(question, item, hit)
                          : dem2di_ray_part(question, part, hit);
@@ -17992,6 +18252,7 @@ static dem2di_question dem2di_question_make(dem2d_world *world, dem2di_ask ask,
     question.world = world;
     question.ask = ask;
     if (desc != NULL) question.desc = *desc;
+    question.self = -1;
     question.limit = DBL_MAX; /* below HUGE_VAL, which is out of reach */
     return question;
 }
@@ -18086,6 +18347,35 @@ DEM2D_API dem2d_result dem2d_world_query_shape(dem2d_world *world, const dem2d_s
     question.pose = pose;
     question.box.lower = dem2di_sub(pose.position, dem2di_vec(radius, radius));
     question.box.upper = dem2di_add(pose.position, dem2di_vec(radius, radius));
+    return dem2di_region_ask(&question, found, capacity, count);
+}
+
+DEM2D_API dem2d_result dem2d_world_particle_overlaps(dem2d_world *world, dem2d_particle_id id,
+                                                     const dem2d_query_desc *desc,
+                                                     dem2d_found *found, int capacity, int *count) {
+    if (world == NULL || count == NULL) return DEM2D_NULL_ARGUMENT;
+    dem2di_question question = dem2di_question_make(world, DEM2DI_ASK_REGION, desc);
+    question.self = dem2di_slot(world, id);
+    if (question.self < 0) return dem2di_stale(world, "particle", id.index);
+    question.groups = dem2di_groups_at(world, question.self);
+    dem2di_region_set(&question, question.self);
+    return dem2di_region_ask(&question, found, capacity, count);
+}
+
+DEM2D_API dem2d_result dem2d_world_wall_overlaps(dem2d_world *world, dem2d_wall_id id,
+                                                 const dem2d_query_desc *desc, dem2d_found *found,
+                                                 int capacity, int *count) {
+    const dem2d_box plane = {{-DBL_MAX, -DBL_MAX}, {DBL_MAX, DBL_MAX}};
+    if (world == NULL || count == NULL) return DEM2D_NULL_ARGUMENT;
+    if (!dem2di_wall_lives(world, id)) return dem2di_stale(world, "wall", id.index);
+    const dem2di_wall *wall = &world->walls[id.index];
+    dem2di_question question = dem2di_question_make(world, DEM2DI_ASK_WALL, desc);
+    question.wall = (int)id.index;
+    question.groups = dem2di_wall_groups(wall);
+    for (int k = wall->first; k < wall->first + wall->count; k++) {
+        dem2d_box box = world->parts[k].extent > 0 ? dem2di_item_box(world, -1 - k) : plane;
+        question.box = k == wall->first ? box : dem2di_box_join(&question.box, &box);
+    }
     return dem2di_region_ask(&question, found, capacity, count);
 }
 
@@ -18696,6 +18986,7 @@ static int dem2di_rows(const void *object, const dem2di_column *column) {
     rows[DEM2DI_BODIES] = w->body_count;
     rows[DEM2DI_NAMES] = w->named ? w->body_count : 0;
     rows[DEM2DI_LOADS] = w->loaded ? w->body_count : 0;
+    rows[DEM2DI_GROUPED] = w->grouped ? w->body_count : 0;
     rows[DEM2DI_DISPLACEMENTS] = w->plan.turns ? w->body_count : 0;
     rows[DEM2DI_MADE] = w->redirected ? w->body_count : 0;
     rows[DEM2DI_WALLS] = w->wall_count;
@@ -20437,6 +20728,9 @@ DEM2D_API dem2d_result dem2d_world_write_csv(const dem2d_world *world, const dem
             _cast_ray_all, _nearest), and dem2d_world_particle_contacts.
             New: dem2d_pairs_contact, many contact queries at once, with a memory that the caller
             keeps.
+            Particles and walls may have groups that decide who meets whom, may be sensors, and
+            have user_data (groups and user_data in their descs and infos, dem2d_world_set_groups,
+            dem2d_world_set_user_data, dem2d_world_particle_overlaps, dem2d_world_wall_overlaps).
      0.6.0  Runs differ from those of 0.5.0 with friction between circles, dashpots, polybeziers,
             two contact points with friction, and servo walls. Snapshots (version 4) name their
             arrays and fields, so that later headers read them; earlier snapshots are refused. The

@@ -316,6 +316,7 @@ typedef struct args {
     dem2d_material_id material, material_b;
     dem2d_particle_id particle;
     dem2d_wall_id wall;
+    dem2d_groups groups;
     /* what some of the pointers point to */
     union {
         dem2d_custom_desc custom;
@@ -368,6 +369,7 @@ static void args_make(args *a, fixture *f) {
     a->count = 5, a->number = 5;
     a->shape_id = f->spare_shape, a->particle = f->particle, a->wall = f->free_wall;
     a->material = f->materials[0], a->material_b = f->materials[1];
+    a->groups.category = 2, a->hash = 7;
     memcpy(a->p, five_corners, sizeof five_corners);
     for (int i = 0; i < 5; i++) a->q[i] = vec(1.1 * a->p[i].x + 0.1, 0.9 * a->p[i].y);
     a->series_a[0] = 2, a->series_a[2] = 0.1, a->series_b[3] = 0.05; /* order 3 or more */
@@ -848,6 +850,16 @@ typedef struct function {
     F(world_nearest, dem2d_world_nearest(v->world, v->vector, v->x, v->desc, v->out),             \
       DESCRIBED(QUERY, with_nothing), IN_WORLD, ARG(vector, "point", VECTOR),                     \
       ARG(x, "range", NOT_NEGATIVE), ARG(desc, "desc", OPTIONAL), OUT)                            \
+    F(world_particle_overlaps,                                                                    \
+      dem2d_world_particle_overlaps(v->world, v->particle, v->desc, v->out, v->count, v->second), \
+      DESCRIBED(QUERY, with_nothing), IN_WORLD, ARG(particle, "particle", PARTICLE_ID), FOUND)    \
+    F(world_wall_overlaps,                                                                        \
+      dem2d_world_wall_overlaps(v->world, v->wall, v->desc, v->out, v->count, v->second),         \
+      DESCRIBED(QUERY, with_nothing), IN_WORLD, ARG(wall, "wall", WALL_ID), FOUND)                \
+    F(world_set_groups, dem2d_world_set_groups(v->world, v->particle, v->groups),                 \
+      LOGS, IN_WORLD, ARG(particle, "particle", PARTICLE_ID))                                     \
+    F(world_set_user_data, dem2d_world_set_user_data(v->world, v->particle, v->hash),             \
+      LOGS, IN_WORLD, ARG(particle, "particle", PARTICLE_ID))                                     \
     F(world_particle_contacts,                                                                    \
       dem2d_world_particle_contacts(v->world, v->particle, v->out, v->count, v->second),          \
       LOGS, IN_WORLD, ARG(particle, "particle", PARTICLE_ID), OUT, CAPACITY, SECOND)

@@ -45,6 +45,8 @@ static const dem2di_field save_fields[] = {
 static const dem2di_field query_fields[] = {
     DEM2DI_ROW(dem2d_query_desc, skip_particles, DEM2DI_SWITCH, "- false"),
     DEM2DI_ROW(dem2d_query_desc, skip_walls, DEM2DI_SWITCH, "- false"),
+    DEM2DI_ROW(dem2d_query_desc, skip_sensors, DEM2DI_SWITCH, "- false"),
+    DEM2DI_ROW(dem2d_query_desc, mask, DEM2DI_TAG, "- 0"),
 };
 static const dem2di_field load_fields[] = {
     DEM2DI_ROW(dem2d_load_desc, read, DEM2DI_OPTIONAL, "- none; or a path, not both"),

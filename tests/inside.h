@@ -85,6 +85,11 @@ static bool inside_contact_holds(const dem2d_world *w, int i) {
         !(inside_lives(w, key->b) && w->bodies[key->a].rank < w->bodies[key->b].rank))
         return inside_fail("B of a contact is gone, or has the lower rank", i);
     (void)dem2di_contact_get(w, &list->contacts, i, &contact);
+    const dem2di_groups of_a = dem2di_groups_at(w, key->a);
+    const dem2di_groups of_b = i >= list->pairs
+                                   ? dem2di_wall_groups(&w->walls[dem2di_wall_of(w, i)])
+                                   : dem2di_groups_at(w, key->b);
+    if (!dem2di_meet(&of_a, &of_b)) return inside_fail("two are listed that do not meet", i);
     if (!closed && (contact.force != 0 || contact.shear != 0))
         return inside_fail("two that are apart have a force", i);
     if (closed && fabs(dem2di_length(contact.normal) - 1) > 1e-12)
