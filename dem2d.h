@@ -5722,26 +5722,18 @@ static dem2d_result dem2di_check_crossing(const dem2d_env *env, const char *name
     return result;
 }
 
-/* Points of a caller that enclose an area. */
+/* Points of a caller that enclose an area. With `simple` the outline has to be valid: a figure of
+   eight may have no area, so a crossing is reported first. */
 static dem2d_result dem2di_check_outline(const dem2d_env *env, const char *name,
-                                         const dem2d_vec *points, int count, dem2d_mass *mass) {
+                                         const dem2d_vec *points, int count, bool simple,
+                                         dem2d_mass *mass) {
     dem2d_result result = dem2di_check_points(env, name, points, count, 3);
+    if (result == DEM2D_OK && simple) result = dem2di_check_crossing(env, name, points, count);
     if (result != DEM2D_OK) return result;
     result = dem2d_polygon_mass(points, count, mass);
     if (result != DEM2D_OK)
         return dem2di_fail(env, result, -1, "%s: the outline has no area", name);
     return DEM2D_OK;
-}
-
-/* The same for a valid outline: a figure of eight may have no area, so a crossing is reported
-   first. */
-static dem2d_result dem2di_check_good_outline(const dem2d_env *env, const char *name,
-                                              const dem2d_vec *points, int count,
-                                              dem2d_mass *mass) {
-    dem2d_result result = dem2di_check_points(env, name, points, count, 3);
-    if (result == DEM2D_OK) result = dem2di_check_crossing(env, name, points, count);
-    if (result != DEM2D_OK) return result;
-    return dem2di_check_outline(env, name, points, count, mass);
 }
 
 /* The sides of nonzero length, counter-clockwise, relative to an origin. Returns their number. */
@@ -6131,7 +6123,7 @@ DEM2D_API dem2d_result dem2d_outline_measure(const dem2d_env *env, const dem2d_v
     dem2d_outline_info found;
     memset(&found, 0, sizeof found);
     if (info == NULL) return dem2di_fail_null(env, "info");
-    dem2d_result result = dem2di_check_good_outline(env, "points", points, count, &found.mass);
+    dem2d_result result = dem2di_check_outline(env, "points", points, count, true, &found.mass);
     if (result != DEM2D_OK) return result;
     size_t n = (size_t)count, size = n + 2 * DEM2DI_SAMPLES;
     dem2di_side *sides = (dem2di_side *)dem2di_allocate(env, n, sizeof *sides);
@@ -6359,7 +6351,7 @@ static bool dem2di_difference_area(const dem2d_env *env, const dem2d_vec *a, int
 /* Sides of an outline in groups of neighbours with a bounding box each. */
 typedef struct dem2di_side_groups {
     dem2di_side *sides;
-    dem2d_vec *boxes; /* low and high corner of each group */
+    dem2d_box *boxes; /* of each group */
     int count;
 } dem2di_side_groups;
 
@@ -6370,12 +6362,10 @@ typedef struct dem2di_side_groups {
 static void dem2di_side_groups_boxes(dem2di_side_groups *grouped) {
     for (int i = 0; i < grouped->count; i++) {
         dem2d_vec a = grouped->sides[i].a, b = dem2di_add(a, grouped->sides[i].e);
-        dem2d_vec *box = &grouped->boxes[2 * (i / DEM2DI_GROUP)];
-        if (i % DEM2DI_GROUP == 0) box[0] = box[1] = a;
-        box[0].x = dem2di_min(box[0].x, dem2di_min(a.x, b.x));
-        box[0].y = dem2di_min(box[0].y, dem2di_min(a.y, b.y));
-        box[1].x = dem2di_max(box[1].x, dem2di_max(a.x, b.x));
-        box[1].y = dem2di_max(box[1].y, dem2di_max(a.y, b.y));
+        dem2d_box *box = &grouped->boxes[i / DEM2DI_GROUP];
+        if (i % DEM2DI_GROUP == 0) box->lower = box->upper = a;
+        dem2di_box_add(box, a);
+        dem2di_box_add(box, b);
     }
 }
 
@@ -6384,9 +6374,9 @@ static void dem2di_side_groups_boxes(dem2di_side_groups *grouped) {
 static int dem2di_side_groups_nearest(const dem2di_side_groups *grouped, dem2d_vec p, int k,
                                       double enough, double *square) {
     for (int start = 0; *square > enough && start < grouped->count; start += DEM2DI_GROUP) {
-        const dem2d_vec *box = &grouped->boxes[2 * (start / DEM2DI_GROUP)];
-        double x = dem2di_max(0, dem2di_max(box[0].x - p.x, p.x - box[1].x));
-        double y = dem2di_max(0, dem2di_max(box[0].y - p.y, p.y - box[1].y));
+        const dem2d_box *box = &grouped->boxes[start / DEM2DI_GROUP];
+        double x = dem2di_max(0, dem2di_max(box->lower.x - p.x, p.x - box->upper.x));
+        double y = dem2di_max(0, dem2di_max(box->lower.y - p.y, p.y - box->upper.y));
         if (x * x + y * y >= *square) continue;
         int end = grouped->count - start > DEM2DI_GROUP ? start + DEM2DI_GROUP : grouped->count;
         for (int i = start; i < end; i++) {
@@ -6427,15 +6417,15 @@ static bool dem2di_hausdorff(const dem2d_env *env, const dem2d_vec *a, int a_cou
                              const dem2d_vec *b, int b_count, double *distance) {
     dem2di_side_groups grouped[2];
     size_t room = (size_t)a_count + (size_t)b_count;
-    size_t size = sizeof(dem2di_side) + sizeof(dem2d_vec); /* fewer boxes than sides */
+    size_t size = sizeof(dem2di_side) + sizeof(dem2d_box); /* fewer boxes than sides */
     dem2di_side *sides = (dem2di_side *)dem2di_allocate(env, room, size);
     if (sides == NULL) return false;
-    dem2d_vec *boxes = (dem2d_vec *)(void *)(sides + room);
+    dem2d_box *boxes = (dem2d_box *)(void *)(sides + room);
     grouped[0].sides = sides;
     grouped[0].boxes = boxes;
     grouped[0].count = dem2di_sides_make(a, a_count, a[0], sides);
     grouped[1].sides = sides + a_count;
-    grouped[1].boxes = boxes + 2 * ((a_count - 1) / DEM2DI_GROUP + 1);
+    grouped[1].boxes = boxes + (a_count - 1) / DEM2DI_GROUP + 1;
     grouped[1].count = dem2di_sides_make(b, b_count, a[0], grouped[1].sides);
     for (int i = 0; i < 2; i++) dem2di_side_groups_boxes(&grouped[i]);
     double most = dem2di_side_groups_farthest(&grouped[1], grouped[0].sides, grouped[0].count, 0);
@@ -6451,9 +6441,10 @@ DEM2D_API dem2d_result dem2d_outline_compare(const dem2d_env *env, const dem2d_v
     dem2d_mass mass, unused;
     dem2d_difference found = {0, 0, 0};
     if (difference == NULL) return dem2di_fail_null(env, "difference");
-    dem2d_result result = dem2di_check_outline(env, "reference", reference, reference_count, &mass);
+    dem2d_result result =
+        dem2di_check_outline(env, "reference", reference, reference_count, false, &mass);
     if (result == DEM2D_OK)
-        result = dem2di_check_outline(env, "other", other, other_count, &unused);
+        result = dem2di_check_outline(env, "other", other, other_count, false, &unused);
     if (result != DEM2D_OK) return result;
     bool room =
         other_count < INT_MAX - reference_count &&
@@ -7734,14 +7725,12 @@ static dem2d_result dem2di_constrain_series(const dem2d_env *env, double *a, dou
 /* A fit of one of the models. */
 typedef struct dem2di_fit {
     const dem2d_env *env;
-    const dem2d_vec *points; /* as given */
-    int point_count;
     dem2di_outline outline;
-    dem2d_mass mass;             /* of the outline, about outline.centre */
-    dem2d_fit_desc desc;         /* with defaults filled in */
-    int count;                   /* of this attempt */
-    dem2d_vec *buffer;           /* candidate outline: DEM2DI_FIT_POINTS */
-    dem2d_result compare_result; /* of a comparison */
+    dem2d_mass mass;     /* of the outline, about outline.centre */
+    dem2d_fit_desc desc; /* with defaults filled in */
+    int count;           /* of this attempt */
+    dem2d_vec *buffer;   /* candidate outline: DEM2DI_FIT_POINTS */
+    bool no_memory;      /* for a comparison */
     dem2d_shape *shape;
     dem2d_fit_report report;
 } dem2di_fit;
@@ -7814,12 +7803,11 @@ static dem2d_result dem2di_fit_bezier(dem2di_fit *fit) {
 
 /* Difference of a candidate's outline from the grain's. */
 static double dem2di_fit_difference(dem2di_fit *fit, const dem2d_vec *points, int count) {
-    dem2d_difference difference;
-    dem2d_result result = dem2d_outline_compare(fit->env, fit->outline.points, fit->outline.count,
-                                                points, count, &difference);
-    if (result == DEM2D_OK) return difference.area;
-    fit->compare_result = result;
-    return HUGE_VAL;
+    double area = HUGE_VAL;
+    if (!dem2di_difference_area(fit->env, fit->outline.points, fit->outline.count, points, count,
+                                &area))
+        fit->no_memory = true;
+    return area;
 }
 
 /* x is centre, half axes, angle. The polygon of 120 points would have 5e-4 less area than the
@@ -7856,7 +7844,8 @@ static dem2d_result dem2di_fit_ellipse(dem2di_fit *fit) {
     double x[5] = {0, 0, size * ratio, size / ratio, dem2d_rot_angle(dem2di_rot(twice)) / 2};
     double steps[5] = {0.1 * size, 0.1 * size, 0.1 * size, 0.1 * size, 0.2};
     fit->report.iterations += dem2di_compass(dem2di_ellipse_objective, fit, x, steps, 5, 1e-3);
-    if (fit->compare_result != DEM2D_OK) return fit->compare_result;
+    if (fit->no_memory)
+        return dem2di_fail_memory(fit->env, fit->outline.count, "points to compare");
     fit->report.pose.position = dem2di_vec(x[0], x[1]);
     fit->report.pose.rotation = dem2d_rot_make(x[4]);
     return dem2d_shape_create_ellipse(fit->env, x[2], x[3], &fit->shape);
@@ -7906,7 +7895,8 @@ static dem2d_result dem2di_fit_polygon(dem2di_fit *fit) {
     fit->report.iterations += dem2di_compass(dem2di_polygon_objective, fit, x, steps, 2 * n, 1e-3);
     (void)dem2di_polygon_objective(fit, x);
     dem2di_release(fit->env, corners, 2 * room, sizeof *corners);
-    if (fit->compare_result != DEM2D_OK) return fit->compare_result;
+    if (fit->no_memory)
+        return dem2di_fail_memory(fit->env, fit->outline.count, "points to compare");
     return dem2d_shape_create_polygon(fit->env, fit->buffer, n, 0, &fit->shape);
 }
 
@@ -8060,7 +8050,7 @@ DEM2D_API dem2d_result dem2d_radial_compare(const dem2d_env *env, const dem2d_ve
     const int rays = DEM2DI_FIT_POINTS;
     if (difference == NULL) return dem2di_fail_null(env, "difference");
     dem2d_mass mass;
-    dem2d_result result = dem2di_check_good_outline(env, "points", points, count, &mass);
+    dem2d_result result = dem2di_check_outline(env, "points", points, count, true, &mass);
     if (result != DEM2D_OK) return result;
     result = dem2di_check_number(env, "order", order, DEM2DI_WHOLE(0, (rays - 1) / 2));
     if (result != DEM2D_OK) return result;
