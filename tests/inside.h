@@ -79,7 +79,7 @@ static bool inside_contact_holds(const dem2d_world *w, int i) {
     if (key->a < 0)
         return (w->list_stale && !closed) || inside_fail("a forgotten contact is closed", i);
     if (!inside_lives(w, key->a)) return inside_fail("A of a contact is gone", i);
-    if (i >= list->pairs && !(key->b >= 0 && key->b < w->part_count))
+    if (i >= list->pairs && !(key->b >= 0 && key->b % DEM2DI_VERTEX < w->part_count))
         return inside_fail("a wall of a contact is gone", i);
     if (i < list->pairs &&
         !(inside_lives(w, key->b) && w->bodies[key->a].rank < w->bodies[key->b].rank))
