@@ -272,6 +272,9 @@ HOW TO
     lose energy          damping_ratio of the materials, from dem2d_damping_ratio(restitution);
                          tangential_damping_ratio against swinging tangential springs;
                          rolling_friction for grains that should not roll; else friction, damping.
+    hear contacts        dem2d_world_desc.event_capacity, then dem2d_world_events: which contacts
+                         closed and opened, where, how fast, with which impulse. A short hit
+                         between two calls is told as well.
     read many at once    dem2d_world_read_particles, dem2d_world_read_contacts: into arrays of
                          yours, as many as you name; with a stride into a struct of yours.
                          dem2d_world_write_particles sets positions, velocities and loads from them.
@@ -1317,6 +1320,7 @@ typedef struct dem2d_world_desc {
     void *exchange_user;             ///< passed to gather and commit
     dem2d_loads_fn *loads;           ///< sets external loads in each step; NULL: none
     void *loads_user;                ///< passed to loads
+    int event_capacity;              ///< of events for dem2d_world_events, 0 to 2^30; 0: none
 } dem2d_world_desc;
 
 /// How a particle moves. Two particles that are not free have no contact with each other, nor with
@@ -1483,6 +1487,28 @@ typedef struct dem2d_stats {
     size_t bytes;                      ///< in use, all of the world
 } dem2d_stats;
 
+/// What has happened to a contact.
+typedef enum dem2d_event_kind {
+    DEM2D_CONTACT_CLOSED, ///< the two touch
+    DEM2D_CONTACT_OPENED  ///< they touch no more, or one has been moved or removed
+} dem2d_event_kind;
+
+/// A contact that closed or opened, found in the force pass of a step, or in an edit. Of the two
+/// points of a face the place is the centre of their normal force.
+typedef struct dem2d_contact_event {
+    int64_t step;          ///< dem2d_stats.steps when the step was done
+    int64_t since;         ///< the same of the step in which the contact closed
+    dem2d_event_kind kind; ///< closed or opened
+    dem2d_particle_id a;   ///< particle A
+    dem2d_particle_id b;   ///< particle B; generation 0 when B is a wall
+    dem2d_wall_id wall;    ///< wall B; generation 0 when B is a particle
+    dem2d_vec point;       ///< m, contact point when it closed
+    dem2d_vec normal;      ///< unit, from A to B, when it closed
+    double speed;          ///< m/s, approach speed when it closed, half a step before the force
+    double impulse;        ///< N s/m, of the normal force while it was closed; 0 when it closes
+    double greatest_force; ///< N/m, greatest normal force while it was closed; 0 when it closes
+} dem2d_contact_event;
+
 /// Create a world; *world is the caller's, to be released by dem2d_world_destroy. Errors:
 /// NULL_ARGUMENT, NOT_FINITE, OUT_OF_RANGE, OUT_OF_MEMORY.
 ///
@@ -1579,6 +1605,13 @@ DEM2D_API dem2d_result dem2d_world_time_step_bounds(const dem2d_world *world, do
 /// TIME_STEP, OUT_OF_MEMORY, OUT_OF_RANGE, IN_USE (called by a callback of this world), what
 /// dem2d_world_desc.commit returns; the world then is as it was before the step that failed.
 DEM2D_API dem2d_result dem2d_world_step(dem2d_world *world, int count, int *done);
+/// Take the oldest events out of a world with event_capacity: up to `capacity` of them go into
+/// events (may be NULL if capacity is 0); count gets their number, lost (may be NULL) how many have
+/// found no room since the last call. Events of one step come in the order of dem2d_world_contacts,
+/// and do not depend on threads or the neighbour list. A contact that closes and opens between two
+/// calls gives two events. Errors: OUT_OF_RANGE (capacity below 0; a world without events).
+DEM2D_API dem2d_result dem2d_world_events(dem2d_world *world, dem2d_contact_event *events,
+                                          int capacity, int *count, int64_t *lost);
 
 /* ============================================================================================
    >>api-measures  Queries: lists, energy, stress, fabric, packing, distance from rest
@@ -11554,6 +11587,19 @@ typedef struct dem2di_contacts {
                        contacts of sign -1 take away */
 } dem2di_contacts;
 
+/* What events tell of a contact while it is closed. */
+typedef struct dem2di_touch {
+    int64_t since; /* steps done when it closed; 0: it is apart */
+    dem2d_vec point, normal;
+    double speed, impulse, greatest;
+} dem2di_touch;
+
+/* An event, and its place among those of a step: walls behind, ranks of A and of B. */
+typedef struct dem2di_event {
+    dem2d_contact_event event;
+    int order[3];
+} dem2di_event;
+
 /* The listed pairs: of two circles, of two other particles, of particles and parts of walls (in the
    order of the part, then of the particle's rank), and their contacts as the last force pass left
    them. */
@@ -11598,6 +11644,7 @@ typedef struct dem2di_block_result {
     double most;    /* greatest reach of the discs; greatest square of speed over skin */
     int fast;       /* slot of the one of least rank that may pass through others, or -1 */
     int64_t spread; /* sum of the distances in memory of the partners found */
+    int changes;    /* contacts that close or open */
 } dem2di_block_result;
 
 /* The features in use: decided after an edit, not per contact. See dem2di_prepare. */
@@ -11613,6 +11660,7 @@ typedef struct dem2di_plan {
     int terms;                 /* DEM2DI_DASHPOT ...: of the law, beside springs and friction */
     int terms_now, terms_made; /* those that the laws have now, and had in the last force pass */
     bool faces;         /* contacts may have two points: by the rule, and some particle has faces */
+    bool events;        /* contacts that close and open are told */
     bool heavy, damped; /* gravity, damping: as they are set at the step */
 } dem2di_plan;
 
@@ -11692,6 +11740,7 @@ typedef enum dem2di_group {
     DEM2DI_VISCOUS_SHEARS,       /* DEM2DI_TANGENTIAL_DASHPOT, */
     DEM2DI_VISCOUS_MOMENTS,      /* DEM2DI_ROLLING_DASHPOT, */
     DEM2DI_CALLERS,              /* DEM2DI_CALLERS_LAW */
+    DEM2DI_TOUCHES,              /* of all contacts, where plan.events */
     DEM2DI_GENERAL,              /* of all but circles */
     DEM2DI_POINT_PAIRS,          /* of these, where plan.faces, */
     DEM2DI_POINT_VISCOUS,        /* and plan.terms has DEM2DI_DASHPOT, */
@@ -11699,7 +11748,8 @@ typedef enum dem2di_group {
     DEM2DI_JOINED,               /* where plan.joints */
     DEM2DI_ADJACENCY,
     DEM2DI_BLOCK_RESULTS,
-    DEM2DI_TREE,    /* particles and walls, where queries are asked; as many nodes are enough */
+    DEM2DI_TREE, /* particles and walls, where queries are asked; as many nodes are enough */
+    DEM2DI_EVENTS,
     DEM2DI_SCRATCH, /* lines */
     DEM2DI_SHAPE,   /* one row: a shape itself; its columns by its count, its parts, ... */
     DEM2DI_SHAPE_COUNT,
@@ -11792,6 +11842,10 @@ struct dem2d_world {
     int wall_count, part_count;
 
     dem2di_list list;
+    dem2di_touch *touches; /* of contacts */
+    dem2di_event *events;  /* that nobody has taken yet, the oldest first */
+    int event_count, event_capacity;
+    int64_t events_lost;
     double *load_x, *load_y; /* force on the B of each contact, on A against it; in scratch, as: */
     double *load_a, *load_b; /* torques on A and on B */
     int *pools; /* of contacts with walls: another one, with whose springs these are shared */
@@ -11901,6 +11955,9 @@ static const dem2di_field dem2di_progress_fields[] = {
     DEM2DI_SAVED("named", dem2d_world, named, DEM2DI_SWITCH),
     DEM2DI_SAVED("loaded", dem2d_world, loaded, DEM2DI_SWITCH),
     DEM2DI_SAVED("grouped", dem2d_world, grouped, DEM2DI_SWITCH),
+    DEM2DI_SAVED("event_capacity", dem2d_world, event_capacity, DEM2DI_WHOLE(0, 1 << 30)),
+    DEM2DI_SAVED("events", dem2d_world, event_count, DEM2DI_WHOLE(0, 1 << 30)),
+    DEM2DI_SAVED("events_lost", dem2d_world, events_lost, DEM2DI_COUNTER),
     DEM2DI_SAVED("order_due", dem2d_world, order_due, DEM2DI_SWITCH),
     DEM2DI_SAVED("list_stale", dem2d_world, list_stale, DEM2DI_SWITCH),
     DEM2DI_SAVED("list_used_up", dem2d_world, list_used_up, DEM2DI_SWITCH),
@@ -11952,6 +12009,7 @@ static const dem2di_field dem2di_plan_fields[] = {
     DEM2DI_SAVED("terms", dem2d_world, plan.terms, DEM2DI_WHOLE(0, DEM2DI_TERMS - 1)),
     DEM2DI_SAVED("terms_now", dem2d_world, plan.terms_now, DEM2DI_WHOLE(0, DEM2DI_TERMS - 1)),
     DEM2DI_SAVED("terms_made", dem2d_world, plan.terms_made, DEM2DI_WHOLE(0, DEM2DI_TERMS - 1)),
+    DEM2DI_SAVED("events", dem2d_world, plan.events, DEM2DI_SWITCH),
     DEM2DI_SAVED("faces", dem2d_world, plan.faces, DEM2DI_SWITCH)};
 
 #define DEM2DI_ACCOUNT(name, place) DEM2DI_SAVED(name, dem2d_world, ledger.place, DEM2DI_ANY_NUMBER)
@@ -12080,6 +12138,27 @@ static const dem2di_field dem2di_point_pair_fields[] = {
     DEM2DI_SAVED("energy", dem2di_point_pair, energy, DEM2DI_FINITE),
     DEM2DI_SAVED("corners", dem2di_point_pair, corner, DEM2DI_TAG)};
 
+static const dem2di_field dem2di_touch_fields[] = {
+    DEM2DI_SAVED("since", dem2di_touch, since, DEM2DI_COUNTER),
+    DEM2DI_SAVED("point", dem2di_touch, point, DEM2DI_VECTOR),
+    DEM2DI_SAVED("normal", dem2di_touch, normal, DEM2DI_VECTOR),
+    DEM2DI_SAVED("speed", dem2di_touch, speed, DEM2DI_ANY_NUMBER),
+    DEM2DI_SAVED("impulse", dem2di_touch, impulse, DEM2DI_ANY_NUMBER),
+    DEM2DI_SAVED("greatest", dem2di_touch, greatest, DEM2DI_ANY_NUMBER)};
+
+static const dem2di_field dem2di_event_fields[] = {
+    DEM2DI_SAVED("step", dem2di_event, event.step, DEM2DI_COUNTER),
+    DEM2DI_SAVED("since", dem2di_event, event.since, DEM2DI_COUNTER),
+    DEM2DI_SAVED("kind", dem2di_event, event.kind, DEM2DI_CHOICE(DEM2D_CONTACT_OPENED + 1)),
+    DEM2DI_SAVED("a", dem2di_event, event.a, DEM2DI_HANDLE),
+    DEM2DI_SAVED("b", dem2di_event, event.b, DEM2DI_HANDLE),
+    DEM2DI_SAVED("wall", dem2di_event, event.wall, DEM2DI_HANDLE),
+    DEM2DI_SAVED("point", dem2di_event, event.point, DEM2DI_VECTOR),
+    DEM2DI_SAVED("normal", dem2di_event, event.normal, DEM2DI_VECTOR),
+    DEM2DI_SAVED("speed", dem2di_event, event.speed, DEM2DI_ANY_NUMBER),
+    DEM2DI_SAVED("impulse", dem2di_event, event.impulse, DEM2DI_ANY_NUMBER),
+    DEM2DI_SAVED("greatest_force", dem2di_event, event.greatest_force, DEM2DI_ANY_NUMBER)};
+
 static const dem2di_field dem2di_any_field[] = {DEM2DI_PLAIN("value", double, DEM2DI_ANY_NUMBER)};
 static const dem2di_field dem2di_finite_field[] = {DEM2DI_PLAIN("value", double, DEM2DI_FINITE)};
 static const dem2di_field dem2di_any_two[] = {
@@ -12136,8 +12215,8 @@ enum {
     DEM2DI_FIRST = 8,   /* of its group in a snapshot, even if all is 0: no number of rows takes
                            memory without as many bytes */
     DEM2DI_SHARES = 16, /* its memory is that of another line, or of the world itself */
-    DEM2DI_STORED =
-        32 /* of contacts: carried over from list to list, kept in steps that look back */
+    DEM2DI_STORED = 32, /* of contacts: carried over from list to list, */
+    DEM2DI_KEPT = 64    /* and kept in steps that look back, as force passes write over it */
 };
 
 /* A column in an object: a world, or a shape. */
@@ -12160,8 +12239,9 @@ typedef struct dem2di_column {
         NULL, DEM2DI_##group, offsetof(dem2d_world, pointer),        \
             sizeof(*((dem2d_world *)0)->pointer), treatment, NULL, 0 \
     }
-#define DEM2DI_CONTACT_COLUMN(name, group, pointer, fields) \
-    DEM2DI_COLUMN(name, group, list.contacts.pointer, DEM2DI_STORED | DEM2DI_HASHED, fields)
+#define DEM2DI_CONTACT_COLUMN(name, group, pointer, fields)                                        \
+    DEM2DI_COLUMN(name, group, list.contacts.pointer, DEM2DI_STORED | DEM2DI_KEPT | DEM2DI_HASHED, \
+                  fields)
 #define DEM2DI_SHAPE_COLUMN(name, group, pointer, fields)                             \
     {                                                                                 \
         name, DEM2DI_SHAPE_##group, offsetof(dem2di_slot_shape, shape.pointer),       \
@@ -12224,12 +12304,15 @@ static const dem2di_column dem2di_columns[] = {
     DEM2DI_CONTACT_COLUMN("law_energy", CALLERS, energy, any_field), /* the caller's: anything */
     DEM2DI_CONTACT_COLUMN("law_state", CALLERS, state, any_two),
     DEM2DI_CONTACT_COLUMN("arms", GENERAL, arms, arms_fields),
-    DEM2DI_COLUMN("histories", GENERAL, list.contacts.history, DEM2DI_STORED, history_fields),
+    DEM2DI_COLUMN("histories", GENERAL, list.contacts.history, DEM2DI_STORED | DEM2DI_KEPT,
+                  history_fields),
     DEM2DI_CONTACT_COLUMN("two_points", POINT_PAIRS, point_pairs, point_pair_fields),
     DEM2DI_CONTACT_COLUMN("point_viscous_forces", POINT_VISCOUS, point_viscous, finite_two),
     DEM2DI_CONTACT_COLUMN("point_viscous_shears", POINT_VISCOUS_SHEARS, point_viscous_shear,
                           finite_two),
     DEM2DI_CONTACT_COLUMN("reliefs", JOINED, relief, finite_field),
+    DEM2DI_COLUMN("touches", TOUCHES, touches, DEM2DI_STORED, touch_fields),
+    DEM2DI_COLUMN("events", EVENTS, events, DEM2DI_FIRST, event_fields),
     DEM2DI_UNSAVED(ADJACENCY, list.adjacent, 0),
     DEM2DI_UNSAVED(BLOCK_RESULTS, block_results, 0),
     DEM2DI_UNSAVED(TREE, tree.boxes, 0),
@@ -12370,6 +12453,7 @@ static bool dem2di_plan_needs(const dem2di_plan *plan, dem2di_group group) {
     if (group == DEM2DI_VISCOUS_SHEARS) return (terms & DEM2DI_TANGENTIAL_DASHPOT) != 0;
     if (group == DEM2DI_VISCOUS_MOMENTS) return (terms & DEM2DI_ROLLING_DASHPOT) != 0;
     if (group == DEM2DI_CALLERS) return (terms & DEM2DI_CALLERS_LAW) != 0;
+    if (group == DEM2DI_TOUCHES) return plan->events;
     if (group == DEM2DI_POINT_PAIRS) return plan->faces;
     if (group == DEM2DI_POINT_VISCOUS) return plan->faces && (terms & DEM2DI_DASHPOT);
     if (group == DEM2DI_POINT_VISCOUS_SHEARS)
@@ -12420,7 +12504,7 @@ static void dem2di_contacts_keep(dem2d_world *world, int first, int end, bool ba
     const dem2di_list *list = &world->list;
     for (int k = 0; k < DEM2DI_COLUMNS; k++) {
         const dem2di_column *column = &dem2di_columns[k];
-        if (!(column->treatment & DEM2DI_STORED)) continue;
+        if (!(column->treatment & DEM2DI_KEPT)) continue;
         int begin = dem2di_contacts_begin(&world->plan, list->discs, list->count, column->group);
         int from = first > begin ? first - begin : 0;
         if (end - begin <= from) continue;
@@ -12476,6 +12560,7 @@ static const dem2di_field dem2di_world_fields[] = {
     DEM2DI_ROW(dem2d_world_desc, exchange_user, DEM2DI_OPTIONAL, "- NULL"),
     DEM2DI_ROW(dem2d_world_desc, loads, DEM2DI_OPTIONAL, "- NULL"),
     DEM2DI_ROW(dem2d_world_desc, loads_user, DEM2DI_OPTIONAL, "- NULL"),
+    DEM2DI_ROW(dem2d_world_desc, event_capacity, DEM2DI_WHOLE(0, 1 << 30), "- none"),
 };
 
 DEM2D_API dem2d_result dem2d_world_create(const dem2d_world_desc *desc, dem2d_world **world) {
@@ -12507,6 +12592,7 @@ DEM2D_API dem2d_result dem2d_world_create(const dem2d_world_desc *desc, dem2d_wo
     made->commit = desc->commit;
     made->exchange_user = desc->exchange_user;
     made->keeps_sums = desc->gather != NULL;
+    made->event_capacity = desc->event_capacity;
     made->set_loads = desc->loads;
     made->loads_user = desc->loads_user;
     made->skin_fixed = desc->skin > 0;
@@ -12941,10 +13027,60 @@ static inline void dem2di_contact_clear(dem2d_world *world, int i) {
     if (world->plan.terms != 0 || world->plan.faces) dem2di_terms_clear(world, i);
 }
 
+/* --- events -------------------------------------------------------------------------------------
+   The touch of a contact holds what events tell of it while it is closed. Steps write it once they
+   can't be refused any more; edits that end a contact tell it at once. */
+
+/* One event more. There is room in the array, or it is lost. */
+static void dem2di_event_add(dem2d_world *world, dem2d_event_kind kind, int64_t step, int i) {
+    const dem2di_key *key = &world->list.keys[i];
+    const dem2di_touch *touch = &world->touches[i];
+    const bool wall = i >= world->list.pairs, opened = kind == DEM2D_CONTACT_OPENED;
+    if (!dem2di_group_reserve(world, DEM2DI_EVENTS, world->event_count + 1)) {
+        world->events_lost++;
+        return;
+    }
+    dem2di_event *made = &world->events[world->event_count++];
+    memset((void *)made, 0, sizeof *made);
+    made->event.step = step;
+    made->event.since = touch->since;
+    made->event.kind = kind;
+    made->event.a = dem2di_particle_id(world, key->a);
+    if (wall)
+        made->event.wall = dem2di_wall_id(world, dem2di_wall_of(world, i));
+    else
+        made->event.b = dem2di_particle_id(world, key->b);
+    made->event.point = touch->point;
+    made->event.normal = touch->normal;
+    made->event.speed = touch->speed;
+    made->event.impulse = opened ? touch->impulse : 0;
+    made->event.greatest_force = opened ? touch->greatest : 0;
+    made->order[0] = wall;
+    made->order[1] = world->bodies[key->a].rank;
+    made->order[2] = wall ? key->b : world->bodies[key->b].rank;
+}
+
+/* No more events than the caller wants: the last ones are lost. */
+static void dem2di_events_trim(dem2d_world *world) {
+    int over = world->event_count - world->event_capacity;
+    if (over <= 0) return;
+    world->event_count -= over;
+    world->events_lost += over;
+}
+
+/* An edit ends a contact. */
+static void dem2di_touch_end(dem2d_world *world, int i) {
+    if (!world->plan.events || world->touches[i].since == 0) return;
+    dem2di_event_add(world, DEM2D_CONTACT_OPENED, world->steps, i);
+    dem2di_events_trim(world);
+    memset(&world->touches[i], 0, sizeof *world->touches);
+}
+
 /* A contact ends: its pair is apart, and leaves with the next list. */
 static void dem2di_contact_forget(dem2d_world *world, int i) {
     dem2di_list *list = &world->list;
     world->sums_fresh = false;
+    dem2di_touch_end(world, i);
     list->keys[i].a = -1;
     list->contacts.depth[i] = 0;
     dem2di_contact_clear(world, i);
@@ -13295,8 +13431,10 @@ static void dem2di_moved(dem2d_world *world, int slot, dem2d_vec way) {
         dem2di_forget(world, slot);
         return;
     }
-    for (int k = list->first[slot]; k < list->first[slot + 1]; k++)
+    for (int k = list->first[slot]; k < list->first[slot + 1]; k++) {
+        dem2di_touch_end(world, list->adjacent[k]);
         dem2di_contact_end(world, list->adjacent[k]);
+    }
     world->list_displacement += dem2di_length(way) * sqrt(world->inverse_skin_squared[slot]);
     world->list_stale = !(world->list_displacement <= 1 - DEM2DI_LIST_STEPS * DBL_EPSILON);
 }
@@ -14699,6 +14837,7 @@ static dem2di_plan dem2di_plan_make(const dem2d_world *world) {
     plan.faces = plan.faces && world->law == NULL;
     plan.turns = plan.turns || !dem2di_has_disc_kernel(world, &plan);
     plan.turns = plan.turns || (world->plan.turns && bodies > 0);
+    plan.events = world->event_capacity > 0;
     plan.spin = plan.spin || plan.turns || plan.friction || world->gather != NULL || world->twisted;
     plan.spin = plan.spin || (plan.terms & DEM2DI_ROLLING);
     return plan;
@@ -14708,7 +14847,7 @@ static dem2di_plan dem2di_plan_make(const dem2d_world *world) {
    the same arrays and the same kinds of pairs. */
 static bool dem2di_plan_fits(const dem2di_plan *one, const dem2di_plan *other) {
     return one->terms == other->terms && one->faces == other->faces && one->turns == other->turns &&
-           one->joints == other->joints;
+           one->joints == other->joints && one->events == other->events;
 }
 
 static void dem2di_disc_task(void *context, int begin, int end) {
@@ -15095,7 +15234,7 @@ static size_t dem2di_step_cut(dem2d_world *world, char *memory, int discs, int p
         world->pools = (int *)dem2di_cut(&cutter, (size_t)(count - pairs), sizeof *world->pools);
     for (int k = 0; k < DEM2DI_COLUMNS && back; k++) {
         const dem2di_column *column = &dem2di_columns[k];
-        if (!(column->treatment & DEM2DI_STORED)) continue;
+        if (!(column->treatment & DEM2DI_KEPT)) continue;
         int begin = dem2di_contacts_begin(plan, discs, count, column->group);
         dem2di_column last = dem2di_column_last(column);
         dem2di_column_set(world, &last, dem2di_cut(&cutter, (size_t)(count - begin), column->size));
@@ -17474,6 +17613,79 @@ DEM2D_API dem2d_result dem2d_world_time_step_bounds(const dem2d_world *world, do
     return DEM2D_OK;
 }
 
+/* --- events -------------------------------------------------------------------------------------
+   The observe pass of contacts that close and open, after the checks and before the motion: blocks
+   add up the impulses of those that stay closed and count the others, which are few. These are told
+   one after the other, and sorted, as the list is in no order that a caller may know of. */
+
+/* The step in progress changes contact i: it closes, or it opens. */
+static inline bool dem2di_touch_changes(const dem2d_world *world, int i) {
+    return (world->list.contacts.depth[i] > 0) != (world->touches[i].since != 0);
+}
+
+static inline void dem2di_touch_press(const dem2d_world *world, int i, dem2di_touch *touch) {
+    double force = world->list.contacts.force[i];
+    touch->impulse += force * world->time_step;
+    touch->greatest = dem2di_max(touch->greatest, force);
+}
+
+static void dem2di_touch_task(void *context, int begin, int end) {
+    dem2d_world *world = (dem2d_world *)context;
+    for (int block = begin; block < end; block++) {
+        int first = block * DEM2DI_BLOCK, changes = 0;
+        int last = dem2di_block_end(first, DEM2DI_BLOCK, world->list.count);
+        for (int i = first; i < last; i++) {
+            if (dem2di_touch_changes(world, i))
+                changes++;
+            else if (world->touches[i].since != 0)
+                dem2di_touch_press(world, i, &world->touches[i]);
+        }
+        world->block_results[block].changes = changes;
+    }
+}
+
+/* Contact i closes or opens in the step. */
+static void dem2di_touch_change(dem2d_world *world, int i) {
+    dem2di_touch *touch = &world->touches[i];
+    dem2di_contact contact;
+    if (!dem2di_contact_get(world, &world->list.contacts, i, &contact)) {
+        dem2di_event_add(world, DEM2D_CONTACT_OPENED, world->steps + 1, i);
+        memset(touch, 0, sizeof *touch);
+        return;
+    }
+    const dem2di_relative_motion motion = dem2di_motion_of(world, i);
+    touch->since = world->steps + 1;
+    touch->point = dem2di_add(world->now[world->list.keys[i].a].x, dem2di_arm_a(&contact));
+    touch->normal = contact.normal;
+    touch->speed = -dem2di_velocity_n(&contact, &motion);
+    touch->impulse = touch->greatest = 0;
+    dem2di_event_add(world, DEM2D_CONTACT_CLOSED, touch->since, i);
+    dem2di_touch_press(world, i, touch);
+}
+
+static int dem2di_event_compare(const void *a, const void *b) {
+    const int *one = ((const dem2di_event *)a)->order, *other = ((const dem2di_event *)b)->order;
+    for (int k = 0; k < 3; k++)
+        if (one[k] != other[k]) return one[k] < other[k] ? -1 : 1;
+    return 0;
+}
+
+static void dem2di_observe_touches(dem2d_world *world) {
+    int blocks = dem2di_blocks(world->list.count, DEM2DI_BLOCK), known = world->event_count;
+    if (!world->plan.events) return;
+    dem2di_run(world, DEM2D_PHASE_CONTACTS, blocks, dem2di_touch_task, world);
+    for (int block = 0; block < blocks; block++) {
+        int first = block * DEM2DI_BLOCK;
+        int last = dem2di_block_end(first, DEM2DI_BLOCK, world->list.count);
+        for (int i = first; i < last && world->block_results[block].changes > 0; i++)
+            if (dem2di_touch_changes(world, i)) dem2di_touch_change(world, i);
+    }
+    if (world->event_count - known > 1)
+        qsort(world->events + known, (size_t)(world->event_count - known), sizeof *world->events,
+              dem2di_event_compare);
+    dem2di_events_trim(world);
+}
+
 /* --- the step ------------------------------------------------------------------------------------
  */
 
@@ -17557,6 +17769,7 @@ static dem2d_result dem2di_step(dem2d_world *world) {
     }
     const dem2di_ledger ledger = world->ledger;
     if (ledger.kept) dem2di_observe_contacts(world); /* nothing fails from here on */
+    dem2di_observe_touches(world);
     double path = dem2di_integrate_pass(world);
     if (ledger.kept) dem2di_observe_motion(world, &ledger);
     bool used_up = trial.used_up || path > 1 - DEM2DI_LIST_STEPS * DBL_EPSILON ||
@@ -17588,6 +17801,27 @@ DEM2D_API dem2d_result dem2d_world_step(dem2d_world *world, int count, int *done
     }
     world->stepping = false;
     return result;
+}
+
+DEM2D_API dem2d_result dem2d_world_events(dem2d_world *world, dem2d_contact_event *events,
+                                          int capacity, int *count, int64_t *lost) {
+    if (world == NULL || count == NULL) return DEM2D_NULL_ARGUMENT;
+    if (events == NULL && capacity > 0) return dem2di_fail_null(&world->env, "events");
+    dem2d_result result = dem2di_check_number(&world->env, "capacity", capacity, DEM2DI_COUNT);
+    if (result == DEM2D_OK && world->event_capacity == 0)
+        result = dem2di_fail(&world->env, DEM2D_OUT_OF_RANGE, -1,
+                             "event_capacity = 0: this world keeps no events");
+    if (result != DEM2D_OK) return result;
+    int taken = capacity < world->event_count ? capacity : world->event_count;
+    for (int i = 0; i < taken; i++) events[i] = world->events[i].event;
+    world->event_count -= taken;
+    if (world->event_count > 0)
+        memmove((void *)world->events, (const void *)(world->events + taken),
+                (size_t)world->event_count * sizeof *world->events);
+    *count = taken;
+    if (lost != NULL) *lost = world->events_lost;
+    world->events_lost = 0;
+    return DEM2D_OK;
 }
 
 /* ============================================================================================
@@ -19680,6 +19914,7 @@ static int dem2di_rows(const void *object, const dem2di_column *column) {
     rows[DEM2DI_GROUPED] = w->grouped ? w->body_count : 0;
     rows[DEM2DI_DISPLACEMENTS] = w->plan.turns ? w->body_count : 0;
     rows[DEM2DI_MADE] = w->redirected ? w->body_count : 0;
+    rows[DEM2DI_EVENTS] = w->event_count;
     rows[DEM2DI_WALLS] = w->wall_count;
     rows[DEM2DI_PARTS] = w->part_count;
     for (int k = DEM2DI_KEYS; k < DEM2DI_ADJACENCY; k++)
@@ -20225,6 +20460,7 @@ static void dem2di_check_settings(dem2di_loader *loader) {
     dem2d_world *w = loader->world;
     const dem2d_load_desc *desc = loader->desc;
     dem2di_load_expect(loader, w->timed_at <= w->steps, "timed_at is to come");
+    dem2di_load_expect(loader, w->event_count <= w->event_capacity, "more events than allowed");
     dem2di_load_expect(loader, w->listed_at <= w->steps, "listed_at is to come");
     dem2di_load_expect(loader, w->list.discs <= w->list.pairs && w->list.pairs <= w->list.count,
                        "kinds of contacts");
@@ -21427,6 +21663,8 @@ DEM2D_API dem2d_result dem2d_world_write_csv(const dem2d_world *world, const dem
             that would give circles a state that is not finite is refused.
             A tangential spring of one contact point is shared out to two by the forces of their
             normal springs, without dashpots.
+            Events: contacts that closed and opened, with impulse and greatest force
+            (dem2d_world_desc.event_capacity, dem2d_world_events).
             Arrays: dem2d_world_read_particles, dem2d_world_write_particles,
             dem2d_world_read_contacts.
             External loads: dem2d_world_set_load, or dem2d_world_desc.loads once a step; their work

@@ -124,6 +124,7 @@ static dem2d_image_desc good_image(void) {
 static dem2d_world_desc good_world(const dem2d_env *env) {
     dem2d_world_desc d = {0};
     d.time_step = 1e-4, d.gravity = vec(0, -9.81), d.local_damping = 0.1, d.env = env;
+    d.event_capacity = 50;
     return d;
 }
 
@@ -827,6 +828,9 @@ typedef struct function {
       DESCRIBED(NO_DESC, with_contacts), IN_WORLD, THE_DESC,                                      \
       ARG_INT(count, "capacity", 0, INT_MAX, OUT_OF_RANGE), ARG(third, "count", POINTER),         \
       ARG_INT(d.contacts.stride, "stride", 16, 1 << 20, OUT_OF_RANGE, .or_0 = true))              \
+    F(world_events, dem2d_world_events(v->world, v->out, v->count, v->second, v->third),          \
+      LOGS, IN_WORLD, OUT, ARG_INT(count, "capacity", 0, INT_MAX, OUT_OF_RANGE), SECOND,          \
+      ARG(third, "lost", OPTIONAL))                                                               \
     F(world_set_segment, dem2d_world_set_wall(v->world, v->wall, v->desc),                        \
       DESCRIBED(SEGMENT, with_segment), IN_WORLD, ARG(wall, "wall", WALL_ID), THE_DESC)           \
     F(world_query_box,                                                                            \
