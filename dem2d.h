@@ -3069,6 +3069,15 @@ static inline int dem2di_around(int count, int k, int step) {
     return k + count * ((k < 0) - (k == count));
 }
 
+/* The same for a step that is known: fewer instructions. */
+static inline int dem2di_after(int count, int k) {
+    return k + 1 < count ? k + 1 : 0;
+}
+
+static inline int dem2di_before(int count, int k) {
+    return k > 0 ? k - 1 : count - 1;
+}
+
 /* The corner (polygon) or part (Bezier) that has the support point: advance while the support value
    still grows at its end. */
 static inline int dem2di_sector_find(const dem2d_shape *shape, dem2d_vec u) {
@@ -8868,11 +8877,8 @@ static inline double dem2di_edge_near(const dem2di_core *core, int k, dem2d_vec 
     return dem2di_min(ahead, back);
 }
 
-/* Faces of polygons are edges whose normals are at most about 45 degrees (cosine) off a contact. An
-   edge this near (sine) to a contact counts for both sides of it: the contact is on this edge, up
-   to the tolerance of EPA. */
+/* Faces of polygons are edges whose normals are at most about 45 degrees (cosine) off a contact. */
 #define DEM2DI_FACE_COSINE 0.7071
-#define DEM2DI_ALONG 1e-4
 
 /* A corner of one core at an edge of the other, in coordinates along the edge's normal and tangent.
  */
@@ -8888,15 +8894,19 @@ typedef struct dem2di_corner_at_edge {
    corner; the edge goes on for a length beyond the corner. A second point is where, in this order,
    the far end of either edge is less than the radii away from the line of the other:
    dem2di_second_place takes one of these ends, and finds no point if it is apart. Values within
-   `unsure` of 0 decide nothing, nor does an edge that may count for both sides. No short circuits:
-   branches could not be predicted. */
+   `unsure` of 0 decide nothing. No short circuits: branches could not be predicted.
+
+   An edge within DEM2DI_ALONG of the contact counts for both sides. On the other side it turns the
+   wrong way, and dem2di_second_place finds no point there because the common part, the shorter of
+   the edge and `length`, times the sine is above ROUNDOFF times the size: both are above `unsure`
+   if both ends are apart. */
 static DEM2DI_INLINE bool dem2di_side_apart(const dem2di_corner_at_edge *at, double sine,
                                             double cosine, double rise, double length,
                                             double unsure) {
     bool far_apart = rise - at->h - at->radii > unsure;
     bool end_apart = length * sine - at->h * cosine - at->radii > unsure;
     bool no_face = !(cosine > DEM2DI_FACE_COSINE);
-    return no_face | ((sine > 2 * DEM2DI_ALONG) & far_apart & end_apart);
+    return no_face | (far_apart & end_apart);
 }
 
 /* Is it certain that two overlapping polygons, a corner k of one at an edge of the other, have no
@@ -8910,13 +8920,13 @@ static DEM2DI_INLINE bool dem2di_corner_alone(const dem2di_pair *pair, const dem
                                               int k, const dem2di_corner_at_edge *at) {
     const double unsure = 4 * DEM2DI_ROUNDOFF * pair->size;
     if (other->type != DEM2D_POLYGON) return true; /* a circle */
-    int before = dem2di_around(other->count, k, -1), after = dem2di_around(other->count, k, 1);
+    int before = dem2di_before(other->count, k), after = dem2di_after(other->count, k);
     dem2d_vec here = other->corners[k], v = at->v;
     double rise_after = -dem2di_dot(dem2di_sub(other->corners[after], here), v) * scale;
     double rise_before = -dem2di_dot(dem2di_sub(other->corners[before], here), v) * scale;
     double cosine_after = dem2di_cross(v, other->tangents[k]);
     double cosine_before = dem2di_cross(v, other->tangents[before]);
-    dem2d_vec last = own->tangents[dem2di_around(own->count, edge, -1)];
+    dem2d_vec last = own->tangents[dem2di_before(own->count, edge)];
     bool distinct = fabs(dem2di_cross(last, own->tangents[edge])) > 4 * DEM2DI_ROUNDOFF;
     return distinct &
            dem2di_side_apart(at, at->sine[0], cosine_after, rise_after, -at->low, unsure) &
@@ -8929,9 +8939,8 @@ static DEM2DI_INLINE bool dem2di_corner_alone(const dem2di_pair *pair, const dem
    dem2di_corners_exclude). In coordinates along n and the tangent t only the other core's corner
    has to be rotated. With `check` the corner is checked first, and whether there is no second
    contact point. */
-static DEM2DI_INLINE bool dem2di_feature_holds(const dem2di_pair *pair,
-                                               const dem2di_feature *feature, bool check,
-                                               dem2di_search *search) {
+static bool dem2di_feature_holds(const dem2di_pair *pair, const dem2di_feature *feature, bool check,
+                                 dem2di_search *search) {
     const bool of_a = feature->own == 0; /* B is reflected: its scale counts as negative */
     const dem2d_shape *own = of_a ? pair->a : pair->b, *other = of_a ? pair->b : pair->a;
     const dem2d_rot q = of_a ? pair->ra : pair->rb, turn = of_a ? pair->rb : pair->ra;
@@ -8940,7 +8949,7 @@ static DEM2DI_INLINE bool dem2di_feature_holds(const dem2di_pair *pair,
     const int edge = of_a ? feature->corner[0] : feature->corner[1];
     const int k = of_a ? feature->corner[1] : feature->corner[0];
     const dem2d_vec along = own->tangents[edge], c0 = own->corners[edge];
-    const dem2d_vec c1 = own->corners[dem2di_around(own->count, edge, 1)];
+    const dem2d_vec c1 = own->corners[dem2di_after(own->count, edge)];
     dem2di_corner_at_edge at;
     dem2d_vec t = dem2di_turn(q, along);
     t.x *= sign;
@@ -8950,7 +8959,7 @@ static DEM2DI_INLINE bool dem2di_feature_holds(const dem2di_pair *pair,
     at.v = dem2di_turn_back(turn, dem2di_scale(n, -sign));
     if (check && other->type == DEM2D_POLYGON) {
         at.sine[0] = -dem2di_dot(other->tangents[k], at.v);
-        at.sine[1] = dem2di_dot(other->tangents[dem2di_around(other->count, k, -1)], at.v);
+        at.sine[1] = dem2di_dot(other->tangents[dem2di_before(other->count, k)], at.v);
         if (!((at.sine[0] >= 0) & (at.sine[1] >= 0))) return false;
     }
     dem2d_vec p = dem2di_turn(turn, dem2di_core_corners(other)[k]);
@@ -9885,6 +9894,10 @@ typedef struct dem2di_face {
    of a radian is a tilted face, a third is another contact. */
 #define DEM2DI_FLAT_ANGLE 0.3
 
+/* An edge this near (sine) to a contact counts for both sides of it: the contact is on this edge,
+   up to the tolerance of EPA. */
+#define DEM2DI_ALONG 1e-4
+
 /* The edge beside corner k on a side (1: counter-clockwise), as a face of a contact along v; -1 if
    it is more than 45 degrees off. */
 static inline int dem2di_polygon_face(const dem2d_shape *shape, dem2d_vec v, int k, int side) {
@@ -10426,9 +10439,8 @@ DEM2D_API dem2d_result dem2d_pair_distance(const dem2d_shape *a, dem2d_pose pose
 }
 
 /* The search of a contact query. */
-static DEM2DI_INLINE void dem2di_query_solve(dem2di_pair *pair, const dem2d_contact_desc *used,
-                                             const dem2di_feature *last, dem2d_vec start,
-                                             dem2di_search *search) {
+static void dem2di_query_solve(dem2di_pair *pair, const dem2d_contact_desc *used,
+                               const dem2di_feature *last, dem2d_vec start, dem2di_search *search) {
     search->residual = 0;
     if (pair->a->type != DEM2D_CIRCLE || pair->b->type != DEM2D_CIRCLE ||
         used->solver != DEM2D_CERTIFIED) {
