@@ -525,13 +525,176 @@ static void test_corner(void **state) {
         }
 }
 
+/* --- walls that move, lists, friction -----------------------------------------------------------
+ */
+
+static dem2d_wall_id add_moving(const scene *s, dem2d_vec from, dem2d_vec to, dem2d_vec velocity) {
+    dem2d_wall_desc desc = plane_desc(s, from, vec(0, 0));
+    desc.segment = true, desc.end = to;
+    desc.mode = DEM2D_WALL_MOVING, desc.velocity = velocity;
+    return add_wall(s, &desc);
+}
+
+/* Two segments under a disc that stands still, or follows: at rest relative to each other they are
+   one face; while one of them moves away by itself both push, and where it comes back and stands
+   still they are one face again. */
+static void test_moving(void **state) {
+    dem2d_contact_info list[8];
+    (void)state;
+    for (int together = 0; together < 2; together++) {
+        const dem2d_vec way = vec(1e-3, 0);
+        scene s = led_scene(0, 1e-3);
+        const dem2d_wall_id left = add_moving(&s, vec(-1, 0), vec(0, 0), way);
+        (void)add_moving(&s, vec(0, 0), vec(1, 0), together ? way : vec(2e-3, 0));
+        const dem2d_particle_id id =
+            add_shape(&s, make_disc(0.05), DEM2D_FREE, vec(-0.001, 0.0499), 0, way, 0);
+        for (int i = 0; i < 50; i++) {
+            step(&s, 1);
+            assert_int_equal(contacts_of(&s, list, 8), together ? 1 : 2);
+            if (together) assert_near(grain_of(&s, id).force.y, KN * 1e-4, 1e-9);
+        }
+        assert_int_equal(list[0].wall.index, left.index);
+        close_scene(&s);
+    }
+}
+
+/* A piece of a floor is taken out, moved and put back under a box: joints follow each edit, with
+   the contacts of the box. */
+static void test_edits_of_joints(void **state) {
+    dem2d_contact_info list[16];
+    (void)state;
+    scene s = led_scene(0, 1);
+    dem2d_wall_id ids[5];
+    for (int i = 0; i < 5; i++)
+        ids[i] = add_segment(&s, vec(0.02 * i - 0.05, 0), vec(0.02 * i - 0.03, 0));
+    add_shape(&s, make_box(0.06, 0.04), DEM2D_FREE, vec(0, 0.0199), 0, vec(0, 0), 0);
+    step(&s, 1);
+    const dem2d_energy whole = energy_of(&s);
+    assert_int_equal(contacts_of(&s, list, 16), 1);
+    assert_int_equal(list[0].points, 2);
+    assert_near(whole.normal, 2 * KN * 1e-4 * 1e-4 / 2, 1e-9);
+    /* the middle one is lowered: two faces, each with its own common part */
+    dem2d_wall_desc desc = plane_desc(&s, vec(-0.01, -0.1), vec(0, 0));
+    desc.segment = true, desc.end = vec(0.01, -0.1);
+    assert_ok(dem2d_world_set_wall(s.world, ids[2], &desc));
+    step(&s, 1);
+    assert_int_equal(contacts_of(&s, list, 16), 2);
+    assert_true(list[0].points == 2 && list[1].points == 2);
+    desc.point.y = desc.end.y = 0; /* and is back */
+    assert_ok(dem2d_world_set_wall(s.world, ids[2], &desc));
+    step(&s, 1);
+    assert_int_equal(contacts_of(&s, list, 16), 1);
+    assert_near(energy_of(&s).normal, whole.normal, 1e-12);
+    assert_ok(dem2d_world_remove_wall(s.world, ids[2]));
+    step(&s, 1);
+    assert_int_equal(contacts_of(&s, list, 16), 2);
+    close_scene(&s);
+}
+
+/* Joints are found from either side: segments given twice, of no length in float, in any order. */
+static void test_strange_chains(void **state) {
+    dem2d_contact_info list[16];
+    (void)state;
+    scene s = led_scene(0, 1); /* kinks of a millionth, as of points with seven digits */
+    for (int i = 0; i < 10; i++) {
+        const double y = i % 3 * 3e-9, next = (i + 1) % 3 * 3e-9;
+        add_segment(&s, vec(0.02 * i - 0.1, y), vec(0.02 * (i + 1) - 0.1, next));
+    }
+    add_shape(&s, make_box(0.1, 0.04), DEM2D_FREE, vec(0, 0.0199), 0, vec(0, 0), 0);
+    step(&s, 1);
+    assert_int_equal(contacts_of(&s, list, 16), 1);
+    assert_near(energy_of(&s).normal, KN * 1e-8, 1e-3);
+    close_scene(&s);
+    s = led_scene(0, 1); /* a closed square, clockwise, as parts in a mixed order */
+    const dem2d_vec p[4] = {{0, 0}, {0, 1}, {1, 1}, {1, 0}};
+    add_segment(&s, p[2], p[3]), add_segment(&s, p[0], p[1]);
+    add_segment(&s, p[0], p[3]), add_segment(&s, p[2], p[1]);
+    add_shape(&s, make_disc(0.1), DEM2D_FREE, vec(0.0999, 0.0998), 0, vec(0, 0), 0);
+    add_shape(&s, make_disc(0.1), DEM2D_FREE, vec(-0.0705, -0.0705), 0, vec(0, 0), 0);
+    step(&s, 1);
+    const int count = contacts_of(&s, list, 16);
+    assert_int_equal(count, 3); /* two sides inside, one corner outside */
+    close_scene(&s);
+}
+
+/* Grains run over a chain of kinks with friction and dashpots: the same for any skin, and for a
+   world that was saved and loaded on the way; the ledger closes. */
+static void test_runs(void **state) {
+    (void)state;
+    for (int kind = 0; kind < SHAPES; kind++)
+        for (int damped = 0; damped < 2; damped++) {
+            uint64_t hash[3] = {0, 0, 0};
+            for (int run = 0; run < 3; run++) {
+                dem2d_material_desc material = stone_desc(KN / 2, 0.4);
+                dem2d_world_desc desc = {0};
+                material.damping_ratio = damped * 0.2, material.rolling_friction = damped * 0.05;
+                desc.time_step = 2e-5, desc.gravity = vec(0, -9.81), desc.ledger = true;
+                desc.skin = run == 1 ? 0.3 : 0;
+                scene s = open_scene(&desc, &material);
+                const lines l = arc(0.04, 0.03, 12);
+                add_lines(&s, &l);
+                const dem2d_particle_id id =
+                    add_shape(&s, make_kind(kind), DEM2D_FREE, vec(-0.1, 0.12), 0.2, vec(1, 0), 3);
+                for (int i = 0; i < 8; i++) {
+                    step(&s, 1000);
+                    if (run < 2) continue;
+                    scene_bytes bytes = scene_save(s.world);
+                    const scene next = scene_load(&s, &bytes);
+                    free(bytes.bytes);
+                    close_scene(&s);
+                    s = next;
+                }
+                const dem2d_ledger ledger = ledger_of(&s);
+                assert_within(ledger.closure, 0, 2e-3 * ledger.given);
+                const dem2d_particle_info g = grain_of(&s, id);
+                assert_true(fabs(g.pose.position.x) < 0.3 && g.pose.position.y > 0);
+                hash[run] = dem2d_world_hash(s.world);
+                close_scene(&s);
+            }
+            assert_true(hash[1] == hash[0]);
+            assert_true(hash[2] == hash[0]);
+        }
+}
+
+/* A disc that is dragged over a shallow reflex vertex hands its spring on: the sum of the shear
+   forces is that on one plane. */
+static void test_springs(void **state) {
+    (void)state;
+    for (int bend = -1; bend <= 1; bend++) {
+        scene s = led_scene(5, 1);
+        dem2d_contact_info list[8];
+        const lines l = kink(0.002 * bend);
+        add_lines(&s, &l);
+        const double way = 1e-7;
+        add_shape(&s, make_disc(0.05), DEM2D_FREE, vec(-2e-4, 0.0499), 0, vec(way, 0), 0);
+        for (int i = 1; i < 4000; i++) {
+            step(&s, 1);
+            const int count = contacts_of(&s, list, 8);
+            double shear = 0;
+            for (int c = 0; c < count; c++) shear += list[c].tangential_force;
+            if (i == 1) continue; /* half a step */
+            assert_near(fabs(shear), KN / 2 * way * i, 2e-3);
+        }
+        close_scene(&s);
+    }
+}
+
 int main(void) {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(test_kinks),        cmocka_unit_test(test_arcs),
-        cmocka_unit_test(test_junctions),    cmocka_unit_test(test_discs),
-        cmocka_unit_test(test_shallow_kink), cmocka_unit_test(test_drum),
-        cmocka_unit_test(test_slides),       cmocka_unit_test(test_rest),
+        cmocka_unit_test(test_kinks),
+        cmocka_unit_test(test_arcs),
+        cmocka_unit_test(test_junctions),
+        cmocka_unit_test(test_discs),
+        cmocka_unit_test(test_shallow_kink),
+        cmocka_unit_test(test_drum),
+        cmocka_unit_test(test_slides),
+        cmocka_unit_test(test_rest),
         cmocka_unit_test(test_corner),
+        cmocka_unit_test(test_moving),
+        cmocka_unit_test(test_edits_of_joints),
+        cmocka_unit_test(test_strange_chains),
+        cmocka_unit_test(test_runs),
+        cmocka_unit_test(test_springs),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }
