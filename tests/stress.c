@@ -1,12 +1,13 @@
 /* stress [--quick] [CASE] - tries to break the solver: steps at their limit, ratios of stiffness,
    mass and size, speeds, overlaps, long runs, tall piles, needles, far places, units, changes in
    the middle of a run, jamming, servo walls; motion there and back, in turning frames, under load
-   cycles and in its modes (stress_motion.h). Each row has a criterion that was fixed before it was
-   first run; a row that fails stays, and is told. CASE: only those whose name begins so. Exit
-   status: 0, 1 if a row failed, 2 for bad usage. */
+   cycles and in its modes (stress_motion.h); slides over joined segments (stress_joints.h). Each
+   row has a criterion that was fixed before it was first run; a row that fails stays, and is told.
+   CASE: only those whose name begins so. Exit status: 0, 1 if a row failed, 2 for bad usage. */
 #define DEM2D_IMPLEMENTATION
 #include "dem2d.h"
 #include "stress.h"
+#include "stress_joints.h"
 #include "stress_motion.h"
 
 #include <time.h>
@@ -1022,6 +1023,7 @@ static const stress_case cases[] = {
     {"objectivity", case_objectivity},
     {"ratcheting", case_ratcheting},
     {"spectrum", case_spectrum},
+    {"joints", case_joints},
 };
 
 int main(int argc, char **argv) {
