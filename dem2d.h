@@ -302,6 +302,7 @@ HOW TO
                          what overlaps; dem2d_world_cast_ray for the first hit of a ray,
                          dem2d_world_cast_ray_all for all; dem2d_world_nearest. Also before the
                          first step. dem2d_world_particle_contacts: contacts of one particle.
+    change a grain       dem2d_world_set_material, dem2d_world_set_shape (template and scale).
     choose who meets     groups of particles and walls: category and mask. dem2d_world_set_groups,
       whom               dem2d_world_set_wall. dem2d_world_set_user_data keeps a number of yours.
     detect without       groups.sensor of a particle or wall, then dem2d_world_particle_overlaps or
@@ -315,10 +316,12 @@ HOW TO
                          walls. Its normal points to the grains it presses on; so does a
                          segment's, which grains may touch from both sides.
     stop and go on       dem2d_world_save, dem2d_world_load: the run continues to the same bits.
-    compare two runs     dem2d_world_hash after as many steps.
-    draw                 dem2d_world_write_svg, or dem2d_shape_outline for your own pictures.
-    measure a sample     dem2d_world_stress with the sample's area (of one grain:
-                         dem2d_world_particle_stress), then dem2d_stress_principal for p and q;
+What there is in a world: dem2d_world_particles, dem2d_world_walls, dem2d_world_shapes,
+dem2d_world_materials, and their descs: dem2d_world_get_desc, dem2d_world_get_wall_desc,
+dem2d_world_get_pair, dem2d_world_get_particle_desc, dem2d_world_get_material_desc. compare two runs
+dem2d_world_hash after as many steps. draw                 dem2d_world_write_svg, or
+dem2d_shape_outline for your own pictures. measure a sample     dem2d_world_stress with the sample's
+area (of one grain: dem2d_world_particle_stress), then dem2d_stress_principal for p and q;
                          dem2d_strain of its sides; dem2d_world_porosity of a box inside it;
                          dem2d_world_packing: coordination number, overlaps, rattlers.
     tell it is at rest   dem2d_world_equilibrium: unbalanced below 1e-3, a small kinetic_ratio.
@@ -1588,6 +1591,31 @@ DEM2D_API dem2d_result dem2d_world_set_gravity(dem2d_world *world, dem2d_vec gra
 DEM2D_API dem2d_result dem2d_world_set_damping(dem2d_world *world, double local, double global);
 /// Change the time step (s, > 0) from the next move on.
 DEM2D_API dem2d_result dem2d_world_set_time_step(dem2d_world *world, double time_step);
+/// Give a particle another material: mass and inertia change, its contacts keep their springs.
+DEM2D_API dem2d_result dem2d_world_set_material(dem2d_world *world, dem2d_particle_id id,
+                                                dem2d_material_id material);
+/// Give a particle another template or scale (> 0): radius, mass and inertia change, position,
+/// angle and velocities stay, its contacts lose their history. Errors: OUT_OF_RANGE (also a mass
+/// that is not a normal number).
+DEM2D_API dem2d_result dem2d_world_set_shape(dem2d_world *world, dem2d_particle_id id,
+                                             dem2d_shape_id shape, double scale);
+/// The desc of a world as it is now: a world created from it has the same settings. Capacities and
+/// env are 0, the skin is 0 if it is tuned, callbacks are those that the world has.
+DEM2D_API dem2d_result dem2d_world_get_desc(const dem2d_world *world, dem2d_world_desc *desc);
+/// The desc of a material, as given.
+DEM2D_API dem2d_result dem2d_world_get_material_desc(const dem2d_world *world, dem2d_material_id id,
+                                                     dem2d_material_desc *desc);
+/// Properties of contacts of two materials: those of dem2d_world_set_pair, or their mean.
+DEM2D_API dem2d_result dem2d_world_get_pair(const dem2d_world *world, dem2d_material_id a,
+                                            dem2d_material_id b, dem2d_pair_desc *desc);
+/// The desc of a particle as it is now: a particle added from it is the same, without contacts. The
+/// angle is in (-pi, pi].
+DEM2D_API dem2d_result dem2d_world_get_particle_desc(const dem2d_world *world, dem2d_particle_id id,
+                                                     dem2d_particle_desc *desc);
+/// The desc of a wall, as given, but for its place, which is that of now, and its normal, which has
+/// unit length: a run goes on with the same bits when dem2d_world_set_wall sets it again.
+DEM2D_API dem2d_result dem2d_world_get_wall_desc(const dem2d_world *world, dem2d_wall_id id,
+                                                 dem2d_wall_desc *desc);
 /// Bounds of the stable time step (s) for the contacts of the last force pass. While these contacts
 /// stay, a time step at or below `safe` is stable, one above `limit` is not. Without contacts
 /// `limit` is HUGE_VAL, and `safe` assumes one contact per particle. Nearly flat arcs under a force
@@ -1734,6 +1762,15 @@ DEM2D_API dem2d_result dem2d_world_stats(const dem2d_world *world, dem2d_stats *
 /// Ids of all particles, sorted by index: the first `capacity` of them go into ids (may be NULL if
 /// capacity is 0); count gets the number of particles. Errors: OUT_OF_RANGE (capacity below 0).
 DEM2D_API dem2d_result dem2d_world_particles(const dem2d_world *world, dem2d_particle_id *ids,
+                                             int capacity, int *count);
+/// The same for walls.
+DEM2D_API dem2d_result dem2d_world_walls(const dem2d_world *world, dem2d_wall_id *ids, int capacity,
+                                         int *count);
+/// The same for templates.
+DEM2D_API dem2d_result dem2d_world_shapes(const dem2d_world *world, dem2d_shape_id *ids,
+                                          int capacity, int *count);
+/// The same for materials.
+DEM2D_API dem2d_result dem2d_world_materials(const dem2d_world *world, dem2d_material_id *ids,
                                              int capacity, int *count);
 /// Contacts of the last force pass, first of two particles, then with walls, each sorted by A, then
 /// by B, in the order of names and ids: the first `capacity` of them go into contacts (may be NULL
@@ -12875,6 +12912,14 @@ static double dem2di_body_inertia(const dem2d_world *world, const dem2di_body *b
     return world->materials[body->material].density * moment * square * square;
 }
 
+/* Mass and inertia are normal numbers. */
+static dem2d_result dem2di_check_masses(const dem2d_world *world, const dem2di_body *body) {
+    double mass = dem2di_body_mass(world, body), inertia = dem2di_body_inertia(world, body);
+    if (mass > 0 && inertia > 0 && dem2di_finite(mass) && dem2di_finite(inertia)) return DEM2D_OK;
+    return dem2di_fail(&world->env, DEM2D_OUT_OF_RANGE, -1, "scale = %g gives mass %g", body->scale,
+                       mass);
+}
+
 static dem2di_inverse dem2di_inverse_of(const dem2d_world *world, const dem2di_body *body) {
     dem2di_inverse inverse = {0, 0};
     if (body->motion != DEM2D_FREE) return inverse;
@@ -12974,10 +13019,8 @@ DEM2D_API dem2d_result dem2d_world_add_particle(dem2d_world *world, const dem2d_
     body.shape_index = (int)desc->shape.index;
     body.material = (uint16_t)desc->material.index;
     body.motion = (uint8_t)desc->motion;
-    double mass = dem2di_body_mass(world, &body), inertia = dem2di_body_inertia(world, &body);
-    if (!(mass > 0 && inertia > 0 && dem2di_finite(mass) && dem2di_finite(inertia)))
-        return dem2di_fail(&world->env, DEM2D_OUT_OF_RANGE, -1, "scale = %g gives mass %g",
-                           desc->scale, mass);
+    result = dem2di_check_masses(world, &body);
+    if (result != DEM2D_OK) return result;
     int slot = world->body_count;
     if (slot == 1 << 30)
         return dem2di_fail(&world->env, DEM2D_OUT_OF_RANGE, -1, "more than %d particles", slot);
@@ -13684,6 +13727,119 @@ DEM2D_API dem2d_result dem2d_world_set_time_step(dem2d_world *world, double time
     return DEM2D_OK;
 }
 
+/* --- descs of what is there, and edits of what particles are -----------------------------------
+ */
+
+DEM2D_API dem2d_result dem2d_world_set_material(dem2d_world *world, dem2d_particle_id id,
+                                                dem2d_material_id material) {
+    if (world == NULL) return DEM2D_NULL_ARGUMENT;
+    int slot = dem2di_slot(world, id);
+    if (slot < 0) return dem2di_stale(world, "particle", id.index);
+    if (!dem2di_material_lives(world, material))
+        return dem2di_stale(world, "material", material.index);
+    dem2di_body changed = world->bodies[slot];
+    changed.material = (uint16_t)material.index;
+    dem2d_result result = dem2di_check_masses(world, &changed);
+    if (result != DEM2D_OK || changed.material == world->bodies[slot].material) return result;
+    world->bodies[slot] = changed;
+    world->inverse[slot] = dem2di_inverse_of(world, &changed);
+    world->check_due = world->ledger.edited = true;
+    dem2di_edited(world);
+    return DEM2D_OK;
+}
+
+DEM2D_API dem2d_result dem2d_world_set_shape(dem2d_world *world, dem2d_particle_id id,
+                                             dem2d_shape_id shape, double scale) {
+    if (world == NULL) return DEM2D_NULL_ARGUMENT;
+    int slot = dem2di_slot(world, id);
+    if (slot < 0) return dem2di_stale(world, "particle", id.index);
+    if (!dem2di_shape_lives(world, shape)) return dem2di_stale(world, "shape", shape.index);
+    dem2di_body changed = world->bodies[slot];
+    const dem2di_body old = changed;
+    changed.shape_index = (int)shape.index;
+    changed.scale = scale;
+    dem2d_result result = dem2di_check_number(&world->env, "scale", scale, DEM2DI_POSITIVE);
+    if (result == DEM2D_OK) result = dem2di_check_masses(world, &changed);
+    if (result != DEM2D_OK) return result;
+    if (changed.shape_index == old.shape_index && changed.scale == old.scale) return DEM2D_OK;
+    world->templates[old.shape_index].users--;
+    world->templates[changed.shape_index].users++;
+    world->bodies[slot] = changed;
+    world->inverse[slot] = dem2di_inverse_of(world, &changed);
+    double radius = dem2di_shape_of(world, &changed)->circumscribed * scale;
+    world->now[slot].radius = world->before[slot].radius = radius;
+    dem2di_forget(world, slot);
+    world->tree.made = false;
+    world->check_due = true;
+    dem2di_edited(world);
+    return DEM2D_OK;
+}
+
+DEM2D_API dem2d_result dem2d_world_get_desc(const dem2d_world *world, dem2d_world_desc *desc) {
+    if (world == NULL || desc == NULL) return DEM2D_NULL_ARGUMENT;
+    memset(desc, 0, sizeof *desc);
+    desc->time_step = world->time_step;
+    desc->gravity = world->gravity;
+    desc->local_damping = world->local_damping;
+    desc->global_damping = world->global_damping;
+    desc->skin = world->skin_fixed ? world->skin : 0;
+    desc->contact_tolerance = world->tolerance;
+    desc->max_iterations = world->max_iterations;
+    desc->solver = world->solver;
+    desc->faces = world->faces;
+    desc->skip_time_step_check = !world->check_time_step;
+    desc->ledger = world->ledger.kept;
+    desc->law = world->law;
+    desc->law_user = world->law_user;
+    desc->law_tag = world->law_tag;
+    desc->parallel_for = world->parallel_for;
+    desc->parallel_user = world->parallel_user;
+    desc->gather = world->gather;
+    desc->commit = world->commit;
+    desc->exchange_user = world->exchange_user;
+    desc->loads = world->set_loads;
+    desc->loads_user = world->loads_user;
+    return DEM2D_OK;
+}
+
+DEM2D_API dem2d_result dem2d_world_get_material_desc(const dem2d_world *world, dem2d_material_id id,
+                                                     dem2d_material_desc *desc) {
+    if (world == NULL || desc == NULL) return DEM2D_NULL_ARGUMENT;
+    if (!dem2di_material_lives(world, id)) return dem2di_stale(world, "material", id.index);
+    *desc = world->materials[id.index];
+    return DEM2D_OK;
+}
+
+DEM2D_API dem2d_result dem2d_world_get_pair(const dem2d_world *world, dem2d_material_id a,
+                                            dem2d_material_id b, dem2d_pair_desc *desc) {
+    if (world == NULL || desc == NULL) return DEM2D_NULL_ARGUMENT;
+    if (!dem2di_material_lives(world, a)) return dem2di_stale(world, "material", a.index);
+    if (!dem2di_material_lives(world, b)) return dem2di_stale(world, "material", b.index);
+    *desc = *dem2di_law(world, (int)a.index, (int)b.index);
+    return DEM2D_OK;
+}
+
+DEM2D_API dem2d_result dem2d_world_get_particle_desc(const dem2d_world *world, dem2d_particle_id id,
+                                                     dem2d_particle_desc *desc) {
+    dem2d_particle_info info;
+    if (world == NULL || desc == NULL) return DEM2D_NULL_ARGUMENT;
+    dem2d_result result = dem2d_world_get_particle(world, id, &info);
+    if (result != DEM2D_OK) return result;
+    memset(desc, 0, sizeof *desc);
+    desc->scale = info.pose.scale;
+    desc->shape = info.shape;
+    desc->material = info.material;
+    desc->motion = info.motion;
+    desc->position = info.pose.position;
+    desc->angle = dem2d_rot_angle(info.pose.rotation);
+    desc->velocity = info.velocity;
+    desc->angular_velocity = info.angular_velocity;
+    desc->name = info.name;
+    desc->groups = info.groups;
+    desc->user_data = info.user_data;
+    return DEM2D_OK;
+}
+
 /* ============================================================================================
    >>walls  Walls: their descs, parts and places
    uses: config, math, memory, fields, shapes, broad, world, objects
@@ -13854,8 +14010,10 @@ static dem2d_vec dem2di_surface_end(const dem2di_surface *surface, double extent
  */
 static void dem2di_wall_place(dem2d_world *world, int slot, const dem2d_wall_desc *desc) {
     dem2di_wall *wall = &world->walls[slot];
+    dem2d_vec normal = wall->desc.normal; /* set again, it keeps its bits */
+    bool same = normal.x == desc->normal.x && normal.y == desc->normal.y;
     wall->desc = *desc;
-    if (!desc->segment) (void)dem2di_unit(desc->normal, &wall->desc.normal);
+    if (!desc->segment && !same) (void)dem2di_unit(desc->normal, &wall->desc.normal);
     dem2di_parts_rank(world, slot);
     dem2di_parts_resize(world, slot, 1);
     world->parts[wall->first].wall = slot;
@@ -14064,6 +14222,21 @@ static double dem2di_wall_length(const dem2d_world *world, const dem2di_wall_sta
         return wall->desc.segment ? world->parts[wall->first].extent : wall->desc.length;
     dem2d_vec across = dem2di_sub(states[wall->span[1]].point, states[wall->span[0]].point);
     return fabs(dem2di_dot(across, world->walls[wall->span[0]].desc.normal));
+}
+
+DEM2D_API dem2d_result dem2d_world_get_wall_desc(const dem2d_world *world, dem2d_wall_id id,
+                                                 dem2d_wall_desc *desc) {
+    if (world == NULL || desc == NULL) return DEM2D_NULL_ARGUMENT;
+    if (!dem2di_wall_lives(world, id)) return dem2di_stale(world, "wall", id.index);
+    const dem2di_wall *wall = &world->walls[id.index];
+    dem2d_vec point = world->wall_now[id.index].point;
+    bool moved = point.x != wall->desc.point.x || point.y != wall->desc.point.y;
+    *desc = wall->desc;
+    desc->point = point;
+    if (desc->segment && moved)
+        desc->end =
+            dem2di_surface_end(&world->surfaces[wall->first], world->parts[wall->first].extent);
+    return DEM2D_OK;
 }
 
 DEM2D_API dem2d_result dem2d_world_get_wall(const dem2d_world *world, dem2d_wall_id id,
@@ -17929,12 +18102,18 @@ DEM2D_API dem2d_result dem2d_world_stats(const dem2d_world *world, dem2d_stats *
     return DEM2D_OK;
 }
 
+/* Room for results is there, unless none is asked for. */
+static dem2d_result dem2di_check_room(const dem2d_world *world, const char *name, const void *room,
+                                      int capacity) {
+    if (room == NULL && capacity > 0) return dem2di_fail_null(&world->env, name);
+    return dem2di_check_number(&world->env, "capacity", capacity, DEM2DI_COUNT);
+}
+
 DEM2D_API dem2d_result dem2d_world_particles(const dem2d_world *world, dem2d_particle_id *ids,
                                              int capacity, int *count) {
     if (world == NULL || count == NULL) return DEM2D_NULL_ARGUMENT;
-    if (ids == NULL && capacity > 0) return dem2di_fail_null(&world->env, "ids");
-    if (capacity < 0)
-        return dem2di_fail(&world->env, DEM2D_OUT_OF_RANGE, -1, "capacity = %d", capacity);
+    dem2d_result result = dem2di_check_room(world, "ids", ids, capacity);
+    if (result != DEM2D_OK) return result;
     int alive = 0;
     for (int index = 0; index < world->id_count; index++) {
         int slot = world->ids[index].slot;
@@ -17942,6 +18121,52 @@ DEM2D_API dem2d_result dem2d_world_particles(const dem2d_world *world, dem2d_par
         alive += slot >= 0;
     }
     *count = alive;
+    return DEM2D_OK;
+}
+
+DEM2D_API dem2d_result dem2d_world_walls(const dem2d_world *world, dem2d_wall_id *ids, int capacity,
+                                         int *count) {
+    if (world == NULL || count == NULL) return DEM2D_NULL_ARGUMENT;
+    dem2d_result result = dem2di_check_room(world, "ids", ids, capacity);
+    if (result != DEM2D_OK) return result;
+    int alive = 0;
+    for (int j = 0; j < world->wall_count; j++) {
+        if (!world->walls[j].alive) continue;
+        if (alive < capacity) ids[alive] = dem2di_wall_id(world, j);
+        alive++;
+    }
+    *count = alive;
+    return DEM2D_OK;
+}
+
+DEM2D_API dem2d_result dem2d_world_shapes(const dem2d_world *world, dem2d_shape_id *ids,
+                                          int capacity, int *count) {
+    if (world == NULL || count == NULL) return DEM2D_NULL_ARGUMENT;
+    dem2d_result result = dem2di_check_room(world, "ids", ids, capacity);
+    if (result != DEM2D_OK) return result;
+    int alive = 0;
+    for (int i = 0; i < world->template_count; i++) {
+        if (world->templates[i].shape == NULL) continue;
+        if (alive < capacity) {
+            ids[alive].index = (uint32_t)i;
+            ids[alive].generation = world->templates[i].generation;
+        }
+        alive++;
+    }
+    *count = alive;
+    return DEM2D_OK;
+}
+
+DEM2D_API dem2d_result dem2d_world_materials(const dem2d_world *world, dem2d_material_id *ids,
+                                             int capacity, int *count) {
+    if (world == NULL || count == NULL) return DEM2D_NULL_ARGUMENT;
+    dem2d_result result = dem2di_check_room(world, "ids", ids, capacity);
+    if (result != DEM2D_OK) return result;
+    for (int i = 0; i < world->material_count && i < capacity; i++) {
+        ids[i].index = (uint32_t)i;
+        ids[i].generation = 1;
+    }
+    *count = world->material_count;
     return DEM2D_OK;
 }
 
@@ -17976,9 +18201,8 @@ static dem2d_contact_info dem2di_contact_of(const dem2d_world *world,
 DEM2D_API dem2d_result dem2d_world_contacts(const dem2d_world *world, dem2d_contact_info *contacts,
                                             int capacity, int *count) {
     if (world == NULL || count == NULL) return DEM2D_NULL_ARGUMENT;
-    if (contacts == NULL && capacity > 0) return dem2di_fail_null(&world->env, "contacts");
-    if (capacity < 0)
-        return dem2di_fail(&world->env, DEM2D_OUT_OF_RANGE, -1, "capacity = %d", capacity);
+    dem2d_result result = dem2di_check_room(world, "contacts", contacts, capacity);
+    if (result != DEM2D_OK) return result;
     int open = 0;
     dem2di_contact_iterator iterator = dem2di_contacts_start(false);
     for (; dem2di_next_contact(world, &iterator); open++)
@@ -19219,13 +19443,6 @@ static void dem2di_found_sort(const dem2di_tree *tree, int count) {
         for (; k > 0 && tree->found[k - 1].key > own.key; k--) tree->found[k] = tree->found[k - 1];
         tree->found[k] = own;
     }
-}
-
-/* Room for results is there, unless none is asked for. */
-static dem2d_result dem2di_check_room(const dem2d_world *world, const char *name, const void *room,
-                                      int capacity) {
-    if (room == NULL && capacity > 0) return dem2di_fail_null(&world->env, name);
-    return dem2di_check_number(&world->env, "capacity", capacity, DEM2DI_COUNT);
 }
 
 /* All that overlaps a region. */
@@ -21700,6 +21917,9 @@ DEM2D_API dem2d_result dem2d_world_write_csv(const dem2d_world *world, const dem
             (dem2d_contact_info.feature, sign). Segments that move against each other are no longer
             joined while their ends happen to meet. Segments have the force along a face that slides
             off their end, so that energy is conserved there.
+            What there is: dem2d_world_walls, _shapes, _materials; as descs: dem2d_world_get_desc,
+            _get_wall_desc, _get_particle_desc, _get_material_desc, _get_pair. New edits of a
+            particle: dem2d_world_set_material, dem2d_world_set_shape.
      0.6.0  Runs differ from those of 0.5.0 with friction between circles, dashpots, polybeziers,
             two contact points with friction, and servo walls. Snapshots (version 4) name their
             arrays and fields, so that later headers read them; earlier snapshots are refused. The

@@ -864,6 +864,28 @@ typedef struct function {
       LOGS, IN_WORLD, ARG(particle, "particle", PARTICLE_ID))                                     \
     F(world_set_user_data, dem2d_world_set_user_data(v->world, v->particle, v->hash),             \
       LOGS, IN_WORLD, ARG(particle, "particle", PARTICLE_ID))                                     \
+    F(world_walls, dem2d_world_walls(v->world, v->out, v->count, v->second),                      \
+      LOGS, IN_WORLD, OUT, CAPACITY, SECOND)                                                      \
+    F(world_shapes, dem2d_world_shapes(v->world, v->out, v->count, v->second),                    \
+      LOGS, IN_WORLD, OUT, CAPACITY, SECOND)                                                      \
+    F(world_materials, dem2d_world_materials(v->world, v->out, v->count, v->second),              \
+      LOGS, IN_WORLD, OUT, CAPACITY, SECOND)                                                      \
+    F(world_get_desc, dem2d_world_get_desc(v->world, v->out), LOGS, IN_WORLD, OUT)                \
+    F(world_get_material_desc, dem2d_world_get_material_desc(v->world, v->material, v->out),      \
+      LOGS, IN_WORLD, ARG(material, "material", MATERIAL_ID), OUT)                                \
+    F(world_get_pair, dem2d_world_get_pair(v->world, v->material, v->material_b, v->out),         \
+      LOGS, IN_WORLD, ARG(material, "material", MATERIAL_ID),                                     \
+      ARG(material_b, "material", MATERIAL_ID), OUT)                                              \
+    F(world_get_particle_desc, dem2d_world_get_particle_desc(v->world, v->particle, v->out),      \
+      LOGS, IN_WORLD, ARG(particle, "particle", PARTICLE_ID), OUT)                                \
+    F(world_get_wall_desc, dem2d_world_get_wall_desc(v->world, v->wall, v->out),                  \
+      LOGS, IN_WORLD, ARG(wall, "wall", WALL_ID), OUT)                                            \
+    F(world_set_material, dem2d_world_set_material(v->world, v->particle, v->material),           \
+      LOGS, IN_WORLD, ARG(particle, "particle", PARTICLE_ID),                                     \
+      ARG(material, "material", MATERIAL_ID))                                                     \
+    F(world_set_shape, dem2d_world_set_shape(v->world, v->particle, v->shape_id, v->x),           \
+      LOGS, IN_WORLD, ARG(particle, "particle", PARTICLE_ID), ARG(shape_id, "shape", SHAPE_ID),   \
+      ARG(x, "scale", POSITIVE))                                                                  \
     F(world_particle_contacts,                                                                    \
       dem2d_world_particle_contacts(v->world, v->particle, v->out, v->count, v->second),          \
       LOGS, IN_WORLD, ARG(particle, "particle", PARTICLE_ID), OUT, CAPACITY, SECOND)
