@@ -20819,7 +20819,7 @@ static void dem2di_load_parts(dem2di_loader *loader) {
     for (int j = 0; j < w->wall_count; j++) count += w->walls[j].alive;
     dem2di_load_room(loader, dem2di_group_reserve(w, DEM2DI_PARTS, count));
     if (!dem2di_load_good(loader)) return;
-    memset(w->joints, 0, (size_t)count * sizeof *w->joints);
+    if (count > 0) memset(w->joints, 0, (size_t)count * sizeof *w->joints);
     for (int place = 0; place < w->wall_count; place++) {
         int j = w->walls[place].placed;
         w->walls[j].first = w->part_count;
