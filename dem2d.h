@@ -18393,8 +18393,8 @@ static double dem2di_mean_held(double a, double b, double low, double high) {
     return (p * (p - a) + (p + q) / 2 * (q - p) + q * (b - q)) / (b - a);
 }
 
-/* Integral of y dx, held within a box, along the edge from p to q. Summed around a polygon against
-   the clock it is the area of its part inside; no polygon is stored for that. */
+/* Integral of y dx, held within a box, along the edge from p to q. Minus its sum over the edges of
+   a counter-clockwise polygon is the area of the polygon's part inside the box. */
 static double dem2di_edge_held(dem2d_vec p, dem2d_vec q, const dem2d_box *box) {
     double left = dem2di_clamp(p.x, box->lower.x, box->upper.x);
     double right = dem2di_clamp(q.x, box->lower.x, box->upper.x);
@@ -18489,9 +18489,9 @@ static double dem2di_cos_twice(dem2d_vec n, dem2d_rot axis) {
     return (along - across) * (along + across);
 }
 
-/* Least relative number of contacts in a direction that means are corrected by: above a_c = 0.9
-   the second order foretells none or less somewhere, and the few contacts there would outweigh all
-   others. */
+/* Least relative number of contacts in a direction by which means are corrected: above a_c = 0.9
+   the second order predicts nearly none in some directions, and the few contacts there would
+   outweigh all others. */
 #define DEM2DI_DENSITY_LEAST 0.1
 
 /* Means over contacts, with and without the correction for their number by direction. */
@@ -18561,8 +18561,7 @@ DEM2D_API dem2d_result dem2d_world_fabric(const dem2d_world *world, dem2d_fabric
 /* --- histograms ---------------------------------------------------------------------------------
  */
 
-/* The bin of a direction among those that share out a turn (or half a turn, and then of an axis).
- */
+/* The bin of a direction. The bins divide a full turn, or half a turn for axes. */
 static int dem2di_bin(dem2d_vec direction, double turn, int bins) {
     dem2d_rot q;
     q.c = direction.x;
@@ -20014,10 +20013,10 @@ static dem2d_result dem2di_writer_close(const dem2d_env *env, const char *path,
          list, measures, output
    ============================================================================================ */
 
-/* To save, load, check and hash one number more, give it a line in the table of fields of its
-   struct; an array more, a line in dem2di_columns. A number that a snapshot does not have is 0, and
-   what is 0 is not hashed: older snapshots can be read, and hashes stay what they were, if 0 means
-   what was the case before there was the number.
+/* To save, load, check and hash another number, add a row to the table of fields of its struct; for
+   another array, a line to dem2di_columns. A number that a snapshot does not have is 0, and numbers
+   that are 0 are not hashed: older snapshots stay readable and hashes stay the same if 0 means what
+   earlier versions did.
 
    A snapshot is a sequence of words of 8 bytes, little-endian: doubles by their bits, whole numbers
    in two's complement, names as 24 characters with zeros at the end. First a mark, a version and
@@ -20026,10 +20025,10 @@ static dem2d_result dem2di_writer_close(const dem2d_env *env, const char *path,
        name, number of rows, number of fields;
        of each field the name, and how many numbers it has, plus 256 if they are doubles;
        row by row the numbers.
-   Columns and fields that are 0 all over are left out. How many rows a column has is known from the
-   records before it. A name that is not known here is an error that tells it: a later version has
-   written it, and its state must not be lost in silence. The number of the version changes only
-   when these rules do. */
+   Columns and fields whose numbers are all 0 are left out. The records before a column say how many
+   rows it has. An unknown name is an error, and the log gets the name: a later version wrote it,
+   and its state must not be dropped in silence. The version number changes only when these rules
+   change. */
 #define DEM2DI_SNAPSHOT_MARK 0x0A0D64326D65648Du /* 8D "dem2d" 0D 0A */
 #define DEM2DI_SNAPSHOT_VERSION 4u
 #define DEM2DI_SNAPSHOT_HEAD 24 /* bytes: mark, version, size */
@@ -20037,9 +20036,9 @@ static dem2d_result dem2di_writer_close(const dem2d_env *env, const char *path,
 #define DEM2DI_NAME_WORDS 3
 #define DEM2DI_FIELDS 64 /* of a column at most */
 
-#define DEM2DI_HASH_START 0x243F6A8885A308D3u /* pi - 3: not 0, of which zeros would make 0 */
+#define DEM2DI_HASH_START 0x243F6A8885A308D3u /* pi - 3: words of 0 would leave 0 as it is */
 
-/* One to one in either argument, so that no change of a single word can be lost. */
+/* Invertible in either argument: a change of a single word always changes the hash. */
 static uint64_t dem2di_hash_word(uint64_t hash, uint64_t word) {
     hash = (hash ^ word) * 0x9E3779B97F4A7C15u; /* 2^64 / golden ratio */
     return hash ^ hash >> 32;
@@ -20117,7 +20116,7 @@ static bool dem2di_number_fits(const dem2di_field *field, uint64_t all) {
 /* --- rows ---------------------------------------------------------------------------------------
  */
 
-/* How many there are of a column in its object, a world or a slot_shape. */
+/* Number of rows of a column in its object, a world or a slot_shape. */
 static int dem2di_rows(const void *object, const dem2di_column *column) {
     int rows[DEM2DI_GROUPS] = {0};
     if (column->group >= DEM2DI_SHAPE) {
@@ -20169,7 +20168,7 @@ static void dem2di_for_columns(const dem2d_world *w, dem2di_column_fn *act, void
     }
 }
 
-/* Row 0 of a column: one that is alone is the object itself. */
+/* Row 0 of a column. In groups of one row it is the object itself. */
 static void *dem2di_rows_start(const void *object, const dem2di_column *column) {
     void *itself;
     memcpy(&itself, &object, sizeof itself);
@@ -20200,7 +20199,7 @@ static void dem2di_hash_row(dem2di_hashing *hashing, uint64_t place, const void 
     }
 }
 
-/* Fields by name, so that one that is new, and 0 all over, leaves no trace. */
+/* Fields are hashed with their names. A field whose numbers are all 0 changes nothing. */
 static void dem2di_hash_fields(dem2di_hashing *hashing) {
     for (int f = 0; f < hashing->column->count; f++) {
         if (hashing->field[f] == 0) continue;
@@ -20213,7 +20212,7 @@ static void dem2di_hash_fields(dem2di_hashing *hashing) {
     }
 }
 
-/* A row that is made for the hash. */
+/* A row that is computed for the hash. */
 typedef union dem2di_row {
     dem2di_state state;
     dem2di_key key;
@@ -20320,7 +20319,7 @@ DEM2D_API uint64_t dem2d_world_hash(const dem2d_world *world) {
 
 #define DEM2DI_CHUNK 4096 /* bytes written at once */
 
-/* Words on their way, or only their number. */
+/* Words that are written, or only counted. */
 typedef struct dem2di_saver {
     bool counts;
     uint64_t words, hash;
@@ -20354,7 +20353,8 @@ static void dem2di_put_name(dem2di_saver *saver, const char *name) {
 
 /* Which fields of a column have a number that is not 0: bits. */
 static uint64_t dem2di_fields_used(const void *object, const dem2di_column *column) {
-    uint64_t used = (column->treatment & DEM2DI_FIRST) != 0; /* one tells how many rows there are */
+    uint64_t used =
+        (column->treatment & DEM2DI_FIRST) != 0; /* saved in any case: shows the number of rows */
     const char *row = (const char *)dem2di_rows_start(object, column);
     for (int left = dem2di_rows(object, column); left > 0; left--, row += column->size)
         for (int f = 0; f < column->count; f++)
@@ -20390,7 +20390,7 @@ static void dem2di_put_column(void *context, const void *object, const dem2di_co
     dem2di_put_rows(saver, object, column, used);
 }
 
-/* To where the saver writes, which is closed. */
+/* Write a world to the saver, and close its writer. */
 static dem2d_result dem2di_save(const dem2d_world *world, const char *path, dem2di_saver *saver) {
     dem2di_saver sizing;
     dem2di_saver_start(&sizing, true);
@@ -20404,7 +20404,7 @@ static dem2d_result dem2di_save(const dem2d_world *world, const char *path, dem2
     return dem2di_writer_close(&world->env, path, &saver->writer);
 }
 
-/* Aside first: whatever happens, the path holds the old file or all of the new one. */
+/* Write another file first, then rename it: the path always has the old file or all of the new. */
 static dem2d_result dem2di_save_aside(const dem2d_world *world, const char *path, const char *aside,
                                       dem2di_saver *saver) {
     const dem2d_env *env = &world->env;
@@ -20429,7 +20429,7 @@ DEM2D_API dem2d_result dem2d_world_save(const dem2d_world *world, const dem2d_sa
     const dem2d_env *env = &world->env;
     dem2di_saver saver;
     dem2di_saver_start(&saver, false);
-    if (path == NULL || desc->write != NULL) { /* or neither, or both: that is told there */
+    if (path == NULL || desc->write != NULL) { /* the writer refuses neither and both */
         dem2d_result result =
             dem2di_writer_open(env, desc->write, desc->user, path, false, &saver.writer);
         return result == DEM2D_OK ? dem2di_save(world, path, &saver) : result;
@@ -20468,7 +20468,7 @@ static void dem2di_load_expect(dem2di_loader *loader, bool holds, const char *el
         loader->result = dem2di_fail(loader->env, DEM2D_FORMAT, -1, "snapshot: %s", else_what);
 }
 
-/* A check has failed, and has told the log. */
+/* For the result of a check that writes to the log when it fails. */
 static void dem2di_load_check(dem2di_loader *loader, dem2d_result result) {
     if (dem2di_load_good(loader) && result != DEM2D_OK) loader->result = DEM2D_FORMAT;
 }
@@ -20539,7 +20539,7 @@ static void dem2di_take_field(dem2di_loader *loader, dem2di_record *record) {
     record->given |= (uint64_t)1 << f;
 }
 
-/* May the fields that are not `given` be 0? */
+/* Fields that are not `given` are 0: is 0 in their range? */
 static void dem2di_load_zeros(dem2di_loader *loader, const dem2di_column *column, uint64_t given) {
     for (int f = 0; f < column->count; f++)
         if (!(given >> f & 1) && !dem2di_number_fits(&column->fields[f], 0))
@@ -20568,8 +20568,8 @@ static void dem2di_take_rows(dem2di_loader *loader, const dem2di_record *record)
             }
 }
 
-/* Columns that the snapshot does not have are 0. The first of a group must be there: its bytes show
-   that there are so many rows. */
+/* Columns that the snapshot does not have are 0. The first of a group must be there: it proves that
+   the number of rows is true. */
 static void dem2di_load_missing(dem2di_loader *loader, const void *object, bool shape) {
     for (int k = 0; k < DEM2DI_COLUMNS && dem2di_load_good(loader); k++) {
         const dem2di_column *column = &dem2di_columns[k];
@@ -20583,7 +20583,7 @@ static void dem2di_load_missing(dem2di_loader *loader, const void *object, bool 
     }
 }
 
-/* Before the next shape, and after the last: has it all arrays of its type? */
+/* For the end of each shape: does it have all arrays of its type? */
 static void dem2di_load_shape_end(dem2di_loader *loader) {
     if (loader->shape.shape.circumscribed > 0) dem2di_load_missing(loader, &loader->shape, true);
     memset(&loader->shape, 0, sizeof loader->shape);
@@ -20649,7 +20649,7 @@ static void dem2di_load_shape(dem2di_loader *loader) {
     if (!dem2di_load_good(loader)) return;
     dem2d_shape *shape = dem2di_shape_allocate(&w->env, type, count, parts);
     if (shape == NULL) {
-        loader->result = DEM2D_OUT_OF_MEMORY; /* the log knows */
+        loader->result = DEM2D_OUT_OF_MEMORY; /* it is in the log */
         return;
     }
     w->templates[slot].shape = shape;
@@ -20682,7 +20682,7 @@ static void dem2di_load_record(dem2di_loader *loader) {
     if (dem2di_load_good(loader) && column->group == DEM2DI_SHAPE) dem2di_load_shape(loader);
 }
 
-/* --- what has been loaded: does it fit together, and what follows of it --------------------------
+/* --- after loading: consistency, and what follows from the columns -------------------------------
  */
 
 static void dem2di_check_settings(dem2di_loader *loader) {
@@ -20721,7 +20721,7 @@ static void dem2di_finish_shapes(dem2di_loader *loader) {
     }
 }
 
-/* A particle has a template and a material, and what follows of them. */
+/* Check the template and material of a particle, and compute what follows from them. */
 static void dem2di_finish_body(dem2di_loader *loader, int slot) {
     dem2d_world *w = loader->world;
     const dem2di_body *body = &w->bodies[slot];
@@ -20797,7 +20797,7 @@ static void dem2di_finish_wall(dem2di_loader *loader, int slot, int first) {
     dem2di_load_check(loader, dem2di_check_wall(w, &wall->desc));
     dem2di_load_expect(loader, dem2di_is_unit(n.x, n.y), "a normal is not of unit length");
     if (dem2di_load_good(loader) && !dem2di_line_make(w, &wall->desc))
-        loader->result = DEM2D_OUT_OF_MEMORY; /* the log knows */
+        loader->result = DEM2D_OUT_OF_MEMORY; /* it is in the log */
     dem2di_load_expect(loader, wall->first < w->part_count && w->parts[wall->first].wall == slot,
                        "a wall without a part");
     if (!dem2di_load_good(loader)) return;
@@ -20866,7 +20866,7 @@ static void dem2di_finish_walls(dem2di_loader *loader) {
     dem2di_finish_joints(loader);
 }
 
-/* A contact is of two that live, in the kind it is listed in; a forgotten one may be anything. */
+/* Is a key of two that exist, and listed with its kind? A forgotten key may be anything. */
 static bool dem2di_key_sound(const dem2d_world *w, int contact) {
     const dem2di_key *key = &w->list.keys[contact];
     if (key->a < 0) return w->list_stale && !(w->list.contacts.depth[contact] > 0);
@@ -20882,7 +20882,7 @@ static bool dem2di_key_sound(const dem2d_world *w, int contact) {
     return a != b && round == (contact < w->list.discs) && (round || w->plan.turns);
 }
 
-/* May the next step go by the plan without a look at the scene? */
+/* May the next step use the plan without examining the scene? */
 static bool dem2di_plan_holds(const dem2d_world *w) {
     const dem2di_plan *plan = &w->plan;
     if (w->list_stale || w->body_count == 0) return true;
@@ -20953,7 +20953,7 @@ static dem2d_result dem2di_source_take(dem2di_source *source, unsigned char *byt
     return dem2di_fail(desc->env, DEM2D_FORMAT, -1, "snapshot: cut short");
 }
 
-/* Memory grows with what has really come, whatever size the snapshot says it has. */
+/* Memory grows with the bytes that have arrived, whatever size the snapshot claims. */
 static dem2d_result dem2di_source_grow(dem2di_source *source, size_t size) {
     const dem2d_env *env = source->desc->env;
     size_t more = source->size < DEM2DI_CHUNK ? DEM2DI_CHUNK : source->size;
@@ -20970,7 +20970,7 @@ static dem2d_result dem2di_source_grow(dem2di_source *source, size_t size) {
     return result;
 }
 
-/* All bytes, found to be those that were written. */
+/* Read all bytes, and verify the checksum. */
 static dem2d_result dem2di_source_read(dem2di_source *source) {
     const dem2d_load_desc *desc = source->desc;
     const dem2d_env *env = desc->env;
