@@ -47,7 +47,7 @@ static int print_pairs(void) {
 /* The script of a world, in short. */
 static void tell(uint64_t seed, int64_t index) {
     static const char *const events[EVENT_KINDS] = {
-        "add",         "remove", "move",    "drive",   "add wall",  "set wall",
+        "add",         "remove", "move",    "load",    "drive",     "add wall", "set wall",
         "remove wall", "pair",   "gravity", "damping", "time step", "refused"};
     static world_script s;
     world_make_script(seed, index, &s);

@@ -58,6 +58,7 @@ enum {
     WITH_ADDED,
     WITH_REMOVED,
     WITH_MOVED,
+    WITH_LOADS,
     WITH_WALLS,
     WITH_PAIR,
     WITH_TIME_STEP,
@@ -76,11 +77,12 @@ enum {
 };
 
 static const char *const world_features[WITH_COUNT] = {
-    "dashpot", "rolling",     "caller's law", "two points", "one point",  "GJK, EPA", "servo",
-    "moving",  "turned wall", "segment",      "chain",      "driven",     "fixed",    "added",
-    "removed", "moved",       "walls come",   "set_pair",   "time step",  "gravity",  "damping",
-    "refused", "skin",        "ledger",       "new list",   "no memory",  "snapshot", "threads",
-    "queries", "circle",      "ellipse",      "polygon",    "polybezier", "Fourier",  "custom"};
+    "dashpot",  "rolling",   "caller's law", "two points", "one point", "GJK, EPA",
+    "servo",    "moving",    "turned wall",  "segment",    "chain",     "driven",
+    "fixed",    "added",     "removed",      "moved",      "loads",     "walls come",
+    "set_pair", "time step", "gravity",      "damping",    "refused",   "skin",
+    "ledger",   "new list",  "no memory",    "snapshot",   "threads",   "queries",
+    "circle",   "ellipse",   "polygon",      "polybezier", "Fourier",   "custom"};
 
 /* --- sizes: of radii and forces of 1 -----------------------------------------------------------
  */
@@ -114,6 +116,7 @@ enum {
     EVENT_ADD, /* particle `which` comes */
     EVENT_REMOVE,
     EVENT_MOVE,
+    EVENT_LOAD,
     EVENT_DRIVE,
     EVENT_ADD_WALL,
     EVENT_SET_WALL,
@@ -384,6 +387,7 @@ static void world_make_script(uint64_t seed, int64_t index, world_script *s) {
     s->desc.skip_time_step_check = world_once_in(r, 4);
     s->desc.ledger = world_once_in(r, 2);
     s->desc.contact_tolerance = WORLD_TOLERANCE;
+    if (s->seed & 1) s->desc.event_capacity = 20; /* without another random number */
     s->law = world_once_in(r, 8);
     s->material_count = 1 + random_below(r, MOST_MATERIALS);
     s->shape_count = 1 + random_below(r, MOST_SHAPES);
@@ -403,6 +407,8 @@ static void world_make_script(uint64_t seed, int64_t index, world_script *s) {
     s->grains_at_first = s->grain_count - random_below(r, 3) / 2;
     world_make_walls(r, s);
     world_make_events(r, s);
+    for (int i = 0; i < s->grain_count && (s->seed & 2); i++) /* names that are in no order */
+        s->grains[i].name = (uint64_t)(i + 1) * 0x9E3779B97F4A7C15u;
 }
 
 /* --- runs --------------------------------------------------------------------------------------
@@ -889,6 +895,11 @@ static void world_event_apply(world_run *run, const world_event *e) {
         world_must(run, dem2d_world_move_particle(run->world, *id, to, e->angle * world_sense(v)),
                    "move_particle");
         world_met(run, WITH_MOVED);
+    } else if (e->kind == EVENT_LOAD) {
+        const double torque = e->angle * world_sense(v) * world_force(v) * world_length(v);
+        const dem2d_vec force = world_map(v, vec(9 * e->at.x, 9 * e->at.y), world_force(v));
+        world_must(run, dem2d_world_set_load(run->world, *id, force, torque), "set_load");
+        world_met(run, WITH_LOADS);
     } else {
         const double go = e->motion == DEM2D_FIXED ? 0 : 1;
         const dem2d_vec to = world_map(v, vec(go * e->at.x, go * e->at.y), world_speed(v));
@@ -1090,17 +1101,20 @@ static void world_check_grain(world_run *run, int i, const world_before *before,
         world_fault(run, "forces of the contacts are not the force on grain %d", i);
     if (is.motion == DEM2D_FIXED) world_met(run, WITH_FIXED);
     if (is.motion == DEM2D_DRIVEN) world_met(run, WITH_DRIVEN);
-    const dem2d_vec g = run->gravity;
+    /* without contacts: gravity and loads */
+    const dem2d_vec g =
+        vec(run->gravity.x + is.load.x / is.mass, run->gravity.y + is.load.y / is.mass);
+    const double turn = is.load_torque / is.inertia;
     if (is.motion != DEM2D_FREE) {
         if (was->velocity.x != is.velocity.x || was->velocity.y != is.velocity.y ||
             was->angular_velocity != is.angular_velocity)
             world_fault(run, "grain %d is not free, but its velocity changes", i);
     } else if (!world_moves(run, was->velocity.x, is.velocity.x, is.force.x / is.mass + g.x,
-                            size / is.mass + fabs(g.x)) ||
+                            size / is.mass + fabs(run->gravity.x) + fabs(is.load.x) / is.mass) ||
                !world_moves(run, was->velocity.y, is.velocity.y, is.force.y / is.mass + g.y,
-                            size / is.mass + fabs(g.y)) ||
-               !world_moves(run, was->angular_velocity, is.angular_velocity, is.torque / is.inertia,
-                            4 * size / is.inertia)) {
+                            size / is.mass + fabs(run->gravity.y) + fabs(is.load.y) / is.mass) ||
+               !world_moves(run, was->angular_velocity, is.angular_velocity,
+                            is.torque / is.inertia + turn, 4 * size / is.inertia + fabs(turn))) {
         world_fault(run, "grain %d does not move as the forces on it say", i);
     }
 }
