@@ -17803,9 +17803,30 @@ DEM2D_API dem2d_result dem2d_world_time_step_bounds(const dem2d_world *world, do
    add up the impulses of those that stay closed and count the others, which are few. These are told
    one after the other, and sorted, as the list is in no order that a caller may know of. */
 
-/* The step in progress changes contact i: it closes, or it opens. */
+/* The step in progress changes contact i: it closes, or it opens. Those of sign -1 are parts of
+   others. */
 static inline bool dem2di_touch_changes(const dem2d_world *world, int i) {
-    return (world->list.contacts.depth[i] > 0) != (world->touches[i].since != 0);
+    return (world->list.contacts.depth[i] > 0) != (world->touches[i].since != 0) &&
+           dem2di_sign_of(world, i) > 0;
+}
+
+/* A contact with a face stays closed while it is listed with one segment after the other. */
+static void dem2di_touches_follow(dem2d_world *world) {
+    const dem2di_list *list = &world->list;
+    for (int i = list->pairs; i < list->count && world->plan.joints; i++) {
+        if (!(list->contacts.depth[i] > 0) || !dem2di_touch_changes(world, i)) continue;
+        const dem2di_wall_rows rows = dem2di_wall_rows_of(world, list->keys[i].a);
+        for (int k = 0; k < rows.count; k++) {
+            int other = rows.contact[k];
+            if (world->touches[other].since == 0 || list->contacts.depth[other] > 0 ||
+                dem2di_face_of(world, other) < 0 ||
+                dem2di_face_of(world, other) != dem2di_face_of(world, i))
+                continue;
+            world->touches[i] = world->touches[other];
+            memset(&world->touches[other], 0, sizeof *world->touches);
+            break;
+        }
+    }
 }
 
 static inline void dem2di_touch_press(const dem2d_world *world, int i, dem2di_touch *touch) {
@@ -17858,6 +17879,7 @@ static int dem2di_event_compare(const void *a, const void *b) {
 static void dem2di_observe_touches(dem2d_world *world) {
     int blocks = dem2di_blocks(world->list.count, DEM2DI_BLOCK), known = world->event_count;
     if (!world->plan.events) return;
+    dem2di_touches_follow(world);
     dem2di_run(world, DEM2D_PHASE_CONTACTS, blocks, dem2di_touch_task, world);
     for (int block = 0; block < blocks; block++) {
         int first = block * DEM2DI_BLOCK;

@@ -679,6 +679,33 @@ static void test_springs(void **state) {
     }
 }
 
+/* A grain that slides over joints of a floor stays in one contact, as events tell: it closes once.
+   At a reflex vertex it closes with the second face, and the contact of sign -1 is told by none. */
+static void test_events(void **state) {
+    dem2d_contact_event events[16];
+    (void)state;
+    for (int kind = 0; kind < SHAPES; kind++)
+        for (int bend = 0; bend < 2; bend++) {
+            const dem2d_material_desc material = material_desc(1e30, KN, 0, 0);
+            dem2d_world_desc desc = {0};
+            int count;
+            desc.time_step = 1, desc.event_capacity = 100;
+            scene s = open_scene(&desc, &material);
+            const lines l = bend ? kink(0.01) : arc(0, 0.02, 20);
+            add_lines(&s, &l);
+            dem2d_shape *shape = make_kind(kind);
+            const double y = height_of(shape, 0) - 1e-4;
+            add_shape(&s, shape, DEM2D_FREE, vec(-0.1, y), 0, vec(2e-4, 0), 0);
+            step(&s, 900);
+            assert_ok(dem2d_world_events(s.world, events, 16, &count, NULL));
+            assert_int_equal(count, bend ? 3 : 1);
+            assert_int_equal(events[0].kind, DEM2D_CONTACT_CLOSED);
+            if (bend) assert_int_equal(events[1].kind, DEM2D_CONTACT_CLOSED);
+            if (bend) assert_int_equal(events[2].kind, DEM2D_CONTACT_OPENED);
+            close_scene(&s);
+        }
+}
+
 int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(test_kinks),
@@ -695,6 +722,7 @@ int main(void) {
         cmocka_unit_test(test_strange_chains),
         cmocka_unit_test(test_runs),
         cmocka_unit_test(test_springs),
+        cmocka_unit_test(test_events),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }
