@@ -5,6 +5,15 @@
 
 #define MOST 4096 /* points of an outline */
 
+/* The folder of real outlines that DATA names; NULL without one, and the test is skipped. */
+PART const char *data_folder(void) {
+    const char *folder = getenv("DATA");
+    if (folder && *folder) return folder;
+    print_message("DATA names no folder of outlines\n");
+    skip();
+    return NULL;
+}
+
 typedef struct crossing {
     double x;
     int of; /* outline 0 or 1 */

@@ -125,16 +125,6 @@ typedef struct heap {
     bool refuse;
 } heap;
 
-static void run_parts(void *user, dem2d_phase phase, int count, dem2d_task_fn *task,
-                      void *context) {
-    const int threads = *(const int *)user;
-    (void)phase;
-    for (int k = threads - 1; k >= 0; k--) {
-        const int begin = count * k / threads, end = count * (k + 1) / threads;
-        if (begin < end) task(context, begin, end);
-    }
-}
-
 static dem2d_result agree(void *user, dem2d_result result) {
     (void)result;
     return *(const bool *)user ? DEM2D_IO : DEM2D_OK;

@@ -1266,12 +1266,8 @@ static void add_outline(const char *folder, const outline *o, sums *sum) {
 
 static void real_outlines(void **state) {
     (void)state;
-    const char *folder = getenv("DATA");
-    if (!folder || !*folder) {
-        print_message("DATA names no folder of outlines\n");
-        skip();
-        return;
-    }
+    const char *folder = data_folder();
+    if (!folder) return;
     static outline o;
     static sums sum;
     DIR *dir = opendir(folder);

@@ -534,12 +534,8 @@ static int read_outline(const char *folder, const char *name, dem2d_vec *points)
 
 static void real_outlines(void **state) {
     (void)state;
-    const char *folder = getenv("DATA");
-    if (!folder || !*folder) {
-        print_message("DATA names no folder of outlines\n");
-        skip();
-        return;
-    }
+    const char *folder = data_folder();
+    if (!folder) return;
     DIR *dir = opendir(folder);
     assert_non_null(dir);
     int count = 0;

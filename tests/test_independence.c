@@ -27,17 +27,6 @@ static const variant variants[] = {
     {"8 threads", 0.3, 0, false, 8},
 };
 
-/* All parts of the work, the last one first. */
-static void run_parts(void *user, dem2d_phase phase, int count, dem2d_task_fn *task,
-                      void *context) {
-    const int threads = *(const int *)user;
-    (void)phase;
-    for (int k = threads - 1; k >= 0; k--) {
-        const int begin = count * k / threads, end = count * (k + 1) / threads;
-        if (begin < end) task(context, begin, end);
-    }
-}
-
 /* --- edits on the way --------------------------------------------------------------------------
  */
 

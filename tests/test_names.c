@@ -37,17 +37,6 @@ static uint64_t name_of(int i) {
     return ((uint64_t)i + 1) * 0x9E3779B97F4A7C15u;
 }
 
-/* All parts of the work, the last one first. */
-static void run_parts(void *user, dem2d_phase phase, int count, dem2d_task_fn *task,
-                      void *context) {
-    const int threads = *(const int *)user;
-    (void)phase;
-    for (int k = threads - 1; k >= 0; k--) {
-        const int begin = count * k / threads, end = count * (k + 1) / threads;
-        if (begin < end) task(context, begin, end);
-    }
-}
-
 /* A spring, a dashpot, and a moment that depends on who is A. */
 static void simple_law(void *user, const dem2d_law_input *in, dem2d_law_output *out) {
     (void)user;

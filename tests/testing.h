@@ -211,4 +211,18 @@ PART void test_logged(const test_env *env, dem2d_result result, int index, const
 #define assert_logged(env, result, index, word) \
     test_logged((env), (result), (index), (word), __FILE__, __LINE__)
 
+/* --- parallel work ------------------------------------------------------------------------------
+ */
+
+/* A dem2d_parallel_fn for as many threads as the user's int says, without threads: all their parts
+   of the work, the last one first. */
+PART void run_parts(void *user, dem2d_phase phase, int count, dem2d_task_fn *task, void *context) {
+    const int threads = *(const int *)user;
+    (void)phase;
+    for (int k = threads - 1; k >= 0; k--) {
+        const int begin = count * k / threads, end = count * (k + 1) / threads;
+        if (begin < end) task(context, begin, end);
+    }
+}
+
 #endif
