@@ -195,14 +195,18 @@ CONCEPTS
                 second has less where the common part is short. Their forces are the gradient of an
                 energy and grow from zero, so that energy is conserved and piles come to rest.
     Wall        A half-plane: its normal points into the grains. Or a segment, which has two sides.
-                Segments that meet and do not move against each other are joined: in line they are
-one face, and the energy of a particle depends on their union, not on how it is cut. A wall stands
-still, moves at a velocity, or is servo-controlled to a stress. Name        Of the two of a pair, A
-is the one with the lower id, and sums over contacts and particles go by ids, walls last.
-dem2d_particle_desc.name and dem2d_wall_desc.name (64 bits, 0: none) replace this order: first by
-name, then by id. With the same names, worlds that were built in another order, or that hold a part
-of a scene each, get the same bits. Names need not be unique; they take 16 bytes a particle in
-worlds that have some, and nothing in others. dem2d_world_particles keeps the order of ids.
+                Or a chain of segments. Segments that meet and do not move against each other are
+                joined: in line they are one face, and the energy of a particle depends on their
+                union, not on how it is cut. A wall stands still, moves at a velocity and turns
+                about a pivot, or is servo-controlled to a stress. Its parts (segments of a chain)
+                are numbered; contacts name them.
+    Name        Of the two of a pair, A is the one with the lower id, and sums over contacts and
+                particles go by ids, walls last. dem2d_particle_desc.name and dem2d_wall_desc.name
+                (64 bits, 0: none) replace this order: first by name, then by id. With the same
+                names, worlds that were built in another order, or that hold a part of a scene
+                each, get the same bits. Names need not be unique; they take 16 bytes a particle
+                in worlds that have some, and nothing in others. dem2d_world_particles keeps the
+                order of ids.
     Immovable   Two particles that are fixed or driven have no contact with each other, nor with a
                 wall without servo control: they may overlap, and have no force, energy or stress.
     Force       On B, along the normal at each contact point: kn times depth, and a dashpot if the
@@ -291,11 +295,13 @@ HOW TO
       materials meet     friction of a pair. With friction 0, for example, a wall is smooth.
     change a world       Between steps: dem2d_world_set_gravity, dem2d_world_set_damping,
                          dem2d_world_set_time_step, dem2d_world_set_wall (where, how fast, stress);
-                         dem2d_world_drive_particle (velocity, motion), dem2d_world_move_particle.
+                         dem2d_world_drive_wall (velocity, spin); dem2d_world_drive_particle
+                         (velocity, motion), dem2d_world_move_particle.
     remove from a world  dem2d_world_remove_particle, dem2d_world_remove_wall,
                          dem2d_world_remove_shape.
     read a world         dem2d_world_particles for the ids, dem2d_world_get_particle for the state
-                         of one, dem2d_world_shape for its template; dem2d_world_get_wall;
+                         of one, dem2d_world_shape for its template; dem2d_world_get_wall,
+                         dem2d_world_get_wall_part for the force on each segment of a chain;
                          dem2d_world_contacts for contact points and forces; dem2d_world_stats for
                          counters and time.
     ask what is where    dem2d_world_query_box, dem2d_world_query_point, dem2d_world_query_shape for
@@ -307,7 +313,11 @@ HOW TO
       whom               dem2d_world_set_wall. dem2d_world_set_user_data keeps a number of yours.
     detect without       groups.sensor of a particle or wall, then dem2d_world_particle_overlaps or
       pushing            dem2d_world_wall_overlaps as often as you want to know.
-    build a hopper       walls with segment: where two meet, a particle has one contact.
+    build a hopper       a wall with points: a chain of segments. Or walls with segment: where two
+                         meet, a particle has one contact.
+    turn a drum          a closed chain, MOVING, with an angular_velocity about its pivot; a mixer's
+                         blade likewise. dem2d_world_drive_wall changes it.
+    run a belt           a wall with a surface_speed: it stands still, its surface does not.
     follow the energy    dem2d_world_energy for what is stored. dem2d_world_desc.ledger, then
                          dem2d_world_ledger: what gravity, walls and you put in, where it went, and
                          the error of the sum.
@@ -1387,12 +1397,20 @@ typedef enum dem2d_wall_mode {
     DEM2D_WALL_SERVO   ///< along its normal, so that force = stress * length: see dem2d_wall_desc
 } dem2d_wall_mode;
 
-/// A half-plane, or a segment. Segments push to both sides and at their ends. Segments are joined
+/// A half-plane, a segment, or a chain of segments. Segments push to both sides and at their ends.
+/// A chain has no crossings, no segment of length 0 and none that turns straight back (errors name
+/// the index of the point), and no servo control; leave the first point out at the end of a closed
+/// one. Segments are joined
 /// where their ends meet, or one ends at the side of another, within a millionth of the shorter
-/// one's length, if both walls stand still or move at the same velocity. Joined segments in line,
+/// one's length, if both are of one wall, or their walls stand still or move at the same velocity
+/// and do not turn. Joined segments in line,
 /// of one material, are one face: a particle has the contact that it would have with one long
 /// segment. At a vertex of two faces, E(both) = E(one) + E(other) - E(their common point): see
 /// dem2d_contact_info.sign.
+///
+/// A MOVING wall turns about its pivot, which moves with it: a drum is a closed chain with an
+/// angular_velocity. Its parts are placed by the angle, so that its shape stays the same to
+/// rounding however long it turns. A step may turn it by less than half a turn.
 ///
 /// A servo wall moves along its normal so that particles press on it with F = stress * length. In
 /// each step it chooses the speed V for which the springs and dashpots of its contacts have the sum
@@ -1422,10 +1440,18 @@ typedef struct dem2d_wall_desc {
     dem2d_vec velocity;         ///< m/s, for MOVING, else 0
     double stress;              ///< Pa, for SERVO, else 0; compression positive
     double max_speed; ///< m/s, >= 0, for SERVO > 0: greatest speed, taken before first contact
-    dem2d_wall_id spans[2]; ///< the length is the distance between these walls; or both zero
-    uint64_t name;          ///< orders contacts and sums: see Name in the manual; 0: none
-    dem2d_groups groups;    ///< whom it meets; all zero: everyone
-    uint64_t user_data;     ///< the caller's: kept and saved
+    dem2d_wall_id spans[2];  ///< the length is the distance between these walls; or both zero
+    dem2d_vec pivot;         ///< m, in the plane: the wall turns about it, and moves with it
+    double angular_velocity; ///< rad/s, for MOVING; the pivot moves at `velocity`
+    /// m/s, of the surface along itself while the wall stays where it is, as of a belt: along the
+    /// normal turned by -90 degrees, of a segment from point to end. It runs around segments.
+    double surface_speed;
+    const dem2d_vec *points; ///< m, of a chain of segments, copied; `point` to `end` are ignored
+    int count;               ///< of points, 2 to 268435456; 0 without
+    bool closed;             ///< chain: one segment more from the last point to the first
+    uint64_t name;           ///< orders contacts and sums: see Name in the manual; 0: none
+    dem2d_groups groups;     ///< whom it meets; all zero: everyone
+    uint64_t user_data;      ///< the caller's: kept and saved
 } dem2d_wall_desc;
 
 /// State of a wall.
@@ -1435,16 +1461,34 @@ typedef struct dem2d_wall_info {
     dem2d_vec point;            ///< m, on the surface, now
     dem2d_vec normal;           ///< unit, towards the grains; of a segment to its left
     bool segment;               ///< from point to end
-    dem2d_vec end;              ///< m, now; of a half-plane the point
+    dem2d_vec end;              ///< m, now, of the last segment; of a half-plane the point
     dem2d_vec velocity;         ///< m/s, of a servo wall half a step before the point; else as set
     dem2d_vec force;            ///< N/m, of the particles on the wall in the last force pass
     double length;              ///< m, at the last force pass; 0 when neither length nor spans
-    double stress;              ///< Pa, -force . normal / length; 0 when there is no length
+    double stress;              ///< Pa, -force . normal / length; 0 when there is no length. Of a
+                                ///< chain the sum over its parts, each with its own normal
     double target;              ///< Pa, for SERVO
+    dem2d_vec pivot;            ///< m, now
+    double angle;               ///< rad in [-pi, pi], turned about the pivot since it was placed
+    double angular_velocity;    ///< rad/s, as set; 0 unless MOVING
+    double torque;              ///< N, of the particles on the wall about the pivot, likewise
+    double surface_speed;       ///< m/s, as given
+    int parts;                  ///< 1, or the number of a chain's segments
     uint64_t name;              ///< as given
     dem2d_groups groups;        ///< as given
     uint64_t user_data;         ///< as given
 } dem2d_wall_info;
+
+/// State of a part of a wall: a half-plane, a segment, or a segment of a chain.
+typedef struct dem2d_wall_part_info {
+    dem2d_vec point;  ///< m, on the surface, now; of a segment the start
+    dem2d_vec end;    ///< m, now; of a half-plane the point
+    dem2d_vec normal; ///< unit, now; of a segment to its left
+    double length;    ///< m, of a segment; 0 of a half-plane
+    dem2d_vec force;  ///< N/m, of the particles on it, by the contacts of the last force pass
+    double torque;    ///< N, likewise, about the wall's pivot
+    double stress;    ///< Pa, -force . normal / length; 0 of a half-plane
+} dem2d_wall_part_info;
 
 /// One contact of the last force pass.
 typedef struct dem2d_contact_info {
@@ -1580,11 +1624,20 @@ DEM2D_API dem2d_result dem2d_world_add_wall(dem2d_world *world, const dem2d_wall
 /// angle or more, or changes between half-plane and segment.
 DEM2D_API dem2d_result dem2d_world_set_wall(dem2d_world *world, dem2d_wall_id id,
                                             const dem2d_wall_desc *desc);
+/// Set the velocity (m/s, of the pivot) and the angular velocity (rad/s) of a wall from its next
+/// move on; it is MOVING then. It stays where it is, and its contacts keep their history. Errors:
+/// STALE_ID, NOT_FINITE, OUT_OF_RANGE (a servo wall).
+DEM2D_API dem2d_result dem2d_world_drive_wall(dem2d_world *world, dem2d_wall_id id,
+                                              dem2d_vec velocity, double angular_velocity);
 /// Remove a wall that no other wall spans to (else IN_USE).
 DEM2D_API dem2d_result dem2d_world_remove_wall(dem2d_world *world, dem2d_wall_id id);
 /// State of a wall.
 DEM2D_API dem2d_result dem2d_world_get_wall(const dem2d_world *world, dem2d_wall_id id,
                                             dem2d_wall_info *info);
+/// State of a part of a wall: 0, or of a chain the number of the segment from points[part] on.
+/// Errors: STALE_ID, OUT_OF_RANGE (part).
+DEM2D_API dem2d_result dem2d_world_get_wall_part(const dem2d_world *world, dem2d_wall_id id,
+                                                 int part, dem2d_wall_part_info *info);
 /// Change gravity (m/s2).
 DEM2D_API dem2d_result dem2d_world_set_gravity(dem2d_world *world, dem2d_vec gravity);
 /// Change local ([0, 1)) and global (1/s, >= 0) damping.
@@ -1613,7 +1666,8 @@ DEM2D_API dem2d_result dem2d_world_get_pair(const dem2d_world *world, dem2d_mate
 DEM2D_API dem2d_result dem2d_world_get_particle_desc(const dem2d_world *world, dem2d_particle_id id,
                                                      dem2d_particle_desc *desc);
 /// The desc of a wall, as given, but for its place, which is that of now, and its normal, which has
-/// unit length: a run goes on with the same bits when dem2d_world_set_wall sets it again.
+/// unit length: a run goes on with the same bits when dem2d_world_set_wall sets it again. Of a
+/// chain `points` is NULL: dem2d_world_get_wall_part gives them, one for each segment.
 DEM2D_API dem2d_result dem2d_world_get_wall_desc(const dem2d_world *world, dem2d_wall_id id,
                                                  dem2d_wall_desc *desc);
 /// Bounds of the stable time step (s) for the contacts of the last force pass. While these contacts
@@ -11014,7 +11068,8 @@ static uint64_t dem2di_curve_place(dem2d_vec corner, double size, dem2d_vec poin
 
 /* The contact point from the centres of A and B: components along the contact's normal and along
    its tangent perp(normal). Those of a circle along the tangent are exactly 0: kernels of circles,
-   which leave them out, give the same bits. Walls do not turn: their b is not used. */
+   which leave them out, give the same bits. B of a wall that turns is its pivot; of other walls b
+   is 0. */
 typedef struct dem2di_arms {
     double a_n, a_t, b_n, b_t; /* m */
 } dem2di_arms;
@@ -11064,8 +11119,9 @@ enum {
 /* How the two of a contact moved against each other in the step that was made, half a step before
    its force. */
 typedef struct dem2di_relative_motion {
-    dem2d_vec v;   /* of B's centre against A's */
-    double wa, wb; /* a wall's is 0 */
+    dem2d_vec v; /* of B's centre against A's; of a wall's pivot */
+    double wa, wb;
+    double surface; /* of B along the tangent: of a belt */
 } dem2di_relative_motion;
 
 /* A vector in the plane of a contact whose components along normal and tangent are given. */
@@ -11095,7 +11151,7 @@ static inline double dem2di_velocity_t(const dem2di_contact *contact,
                                        const dem2di_relative_motion *motion) {
     const dem2di_arms *arms = &contact->arms;
     return dem2di_cross(contact->normal, motion->v) -
-           (arms->a_n * motion->wa - arms->b_n * motion->wb);
+           (arms->a_n * motion->wa - arms->b_n * motion->wb) + motion->surface;
 }
 
 /* The same along the normal: below 0 the two approach. */
@@ -11557,8 +11613,11 @@ typedef struct dem2di_wall {
     dem2d_wall_desc desc; /* normal of unit length */
     int span[2];          /* indices, or -1 */
     int first, count;     /* its parts; a free slot has none */
-    dem2d_vec listed[3];  /* point, end (segments) and normal when the list was built */
+    dem2d_vec listed[3];  /* when the list was built: point of the surface, end and normal of a wall
+                             of one part; of others the wall's point, and rotation in the last */
     bool reshaped;        /* has been turned, or become longer or shorter, since */
+    bool turns;           /* has been given a spin: its point is the pivot, else that of the desc */
+    double radius;        /* of the ends of segments, from the wall's point */
     double skin;          /* how far it may move before the next time */
     uint32_t generation;
     int users; /* walls that span to it */
@@ -11571,7 +11630,7 @@ typedef struct dem2di_wall {
    the order of the walls' ranks, so that sums go by the numbers of parts. */
 typedef struct dem2di_part {
     dem2d_vec start; /* m, from the wall's point: of a segment the start, else on the surface */
-    dem2d_rot along; /* direction of the surface, whose normal is to the left */
+    dem2d_rot along; /* direction of the surface, whose normal is to the left; both at angle 0 */
     double extent;   /* m, length of a segment; 0 of a half-plane */
     int wall;
 } dem2di_part;
@@ -11610,6 +11669,11 @@ typedef struct dem2di_wall_state {
     dem2d_vec force;        /* of the particles on it */
     double drift;           /* servo: mean speed along the normal that holds the force, */
     dem2di_backing backing; /* and what there was at the last contact */
+    double angle, rest;     /* rad, turned; what its rounding has left */
+    dem2d_rot q;            /* by the angle */
+    double w, surface;      /* of the step that was made, as velocity */
+    double torque, shear;   /* sums over the contacts, about the point and along the surface: for
+                               the ledger */
 } dem2di_wall_state;
 
 /* A contact of a servo wall in the next force pass: it presses with force + rise V, not below 0,
@@ -11964,6 +12028,12 @@ static const dem2di_field dem2di_wall_fields[] = {
     DEM2DI_ROW(dem2d_wall_desc, stress, DEM2DI_FINITE, "Pa 0; SERVO only"),
     DEM2DI_ROW(dem2d_wall_desc, max_speed, DEM2DI_FROM_0, "m/s none; > 0 for SERVO"),
     DEM2DI_ROW(dem2d_wall_desc, spans, DEM2DI_HANDLE, "- none; two walls, or both zero"),
+    DEM2DI_ROW(dem2d_wall_desc, pivot, DEM2DI_VECTOR, "m 0"),
+    DEM2DI_ROW(dem2d_wall_desc, angular_velocity, DEM2DI_FINITE, "rad/s 0; MOVING only"),
+    DEM2DI_ROW(dem2d_wall_desc, surface_speed, DEM2DI_FINITE, "m/s 0"),
+    DEM2DI_ROW(dem2d_wall_desc, points, DEM2DI_OPTIONAL, "- NULL; of a chain, copied"),
+    DEM2DI_ROW(dem2d_wall_desc, count, DEM2DI_WHOLE_OR_0(2, 1 << 28), "- 0; of points"),
+    DEM2DI_ROW(dem2d_wall_desc, closed, DEM2DI_SWITCH, "- false; chain"),
     DEM2DI_ROW(dem2d_wall_desc, name, DEM2DI_WORD, "- 0"),
     DEM2DI_ROW(dem2d_wall_desc, groups.category, DEM2DI_TAG, "- 0"),
     DEM2DI_ROW(dem2d_wall_desc, groups.mask, DEM2DI_TAG, "- 0"),
@@ -12131,7 +12201,8 @@ static const dem2di_field dem2di_velocity_fields[] = {
 
 static const dem2di_field dem2di_wall_id_fields[] = {
     DEM2DI_SAVED("alive", dem2di_wall, alive, DEM2DI_SWITCH),
-    DEM2DI_SAVED("generation", dem2di_wall, generation, DEM2DI_HANDLE)};
+    DEM2DI_SAVED("generation", dem2di_wall, generation, DEM2DI_HANDLE),
+    DEM2DI_SAVED("turns", dem2di_wall, turns, DEM2DI_SWITCH)};
 
 static const dem2di_field dem2di_wall_list_fields[] = {
     DEM2DI_SAVED("listed", dem2di_wall, listed, DEM2DI_VECTOR),
@@ -12162,7 +12233,11 @@ static const dem2di_field dem2di_wall_state_fields[] = {
     DEM2DI_SAVED("drift", dem2di_wall_state, drift, DEM2DI_FINITE),
     DEM2DI_SAVED("stiffness", dem2di_wall_state, backing.stiffness, DEM2DI_MAY_OVERFLOW),
     DEM2DI_SAVED("impedance", dem2di_wall_state, backing.impedance, DEM2DI_MAY_OVERFLOW),
-    DEM2DI_SAVED("mass", dem2di_wall_state, backing.mass, DEM2DI_MAY_OVERFLOW)};
+    DEM2DI_SAVED("mass", dem2di_wall_state, backing.mass, DEM2DI_MAY_OVERFLOW),
+    DEM2DI_SAVED("angle", dem2di_wall_state, angle, DEM2DI_NUMBER(-4, 4, 0)),
+    DEM2DI_SAVED("angle_rest", dem2di_wall_state, rest, DEM2DI_NUMBER(-1, 1, 0)),
+    DEM2DI_SAVED("angular_velocity", dem2di_wall_state, w, DEM2DI_FINITE),
+    DEM2DI_SAVED("surface_speed", dem2di_wall_state, surface, DEM2DI_FINITE)};
 
 static const dem2di_field dem2di_key_fields[] = {
     DEM2DI_SAVED("a", dem2di_key, a, DEM2DI_WHOLE(-1, 1 << 30)),
@@ -13842,7 +13917,7 @@ DEM2D_API dem2d_result dem2d_world_get_particle_desc(const dem2d_world *world, d
 
 /* ============================================================================================
    >>walls  Walls: their descs, parts and places
-   uses: config, math, memory, fields, shapes, broad, world, objects
+   uses: config, math, memory, fields, shapes, broad, law, world, objects
    ============================================================================================ */
 
 static dem2d_result dem2di_check_spans(const dem2d_world *world, const dem2d_wall_desc *desc) {
@@ -13858,6 +13933,121 @@ static dem2d_result dem2di_check_spans(const dem2d_world *world, const dem2d_wal
     if (desc->mode == DEM2D_WALL_SERVO && given == 0 && !desc->segment)
         return dem2di_check_number(&world->env, "length", desc->length, DEM2DI_POSITIVE);
     return DEM2D_OK;
+}
+
+/* --- descs -------------------------------------------------------------------------------------
+ */
+
+static int dem2di_parts_described(const dem2d_wall_desc *desc) {
+    if (desc->points == NULL) return 1;
+    return desc->closed ? desc->count : desc->count - 1;
+}
+
+/* The ends of segment k of a chain. */
+static void dem2di_chain_ends(const dem2d_wall_desc *desc, int k, dem2d_vec ends[2]) {
+    ends[0] = desc->points[k];
+    ends[1] = desc->points[k + 1 < desc->count ? k + 1 : 0];
+}
+
+/* Is a segment of a chain without length, or does it turn straight back, by an angle that no grain
+   can tell? */
+static dem2d_result dem2di_check_chain_segment(const dem2d_env *env, const dem2d_wall_desc *desc,
+                                               int k) {
+    dem2d_vec ends[2], along, next;
+    dem2di_chain_ends(desc, k, ends);
+    double length = dem2di_length(dem2di_sub(ends[1], ends[0]));
+    if (length == 0 && k + 1 == desc->count)
+        return dem2di_fail(env, DEM2D_OUT_OF_RANGE, k,
+                           "points[%d] is points[0] again: leave it out, the chain is closed", k);
+    if (!(length > 0 && dem2di_finite(length)))
+        return dem2di_fail(env, DEM2D_OUT_OF_RANGE, k, "points[%d]: a segment of length %g from it",
+                           k, length);
+    (void)dem2di_unit(dem2di_sub(ends[1], ends[0]), &along);
+    int parts = dem2di_parts_described(desc), after = (k + 1) % parts;
+    if (k + 1 == parts && !desc->closed) return DEM2D_OK;
+    dem2di_chain_ends(desc, after, ends);
+    if (!dem2di_unit(dem2di_sub(ends[1], ends[0]), &next)) return DEM2D_OK; /* told by itself */
+    if (dem2di_dot(along, next) > 0 || fabs(dem2di_cross(along, next)) > 1e-8) return DEM2D_OK;
+    return dem2di_fail(env, DEM2D_OUT_OF_RANGE, (k + 1) % desc->count,
+                       "points[%d]: the chain turns straight back", (k + 1) % desc->count);
+}
+
+/* What a segment of a chain covers in x. */
+typedef struct dem2di_extent_x {
+    double low, high;
+    int segment;
+} dem2di_extent_x;
+
+static int dem2di_extent_x_order(const void *a, const void *b) {
+    const dem2di_extent_x *one = (const dem2di_extent_x *)a, *other = (const dem2di_extent_x *)b;
+    if (one->low != other->low) return one->low < other->low ? -1 : 1;
+    return one->segment - other->segment;
+}
+
+/* Have two segments a point in common, to rounding? */
+static bool dem2di_segments_cross(const dem2d_vec a[2], const dem2d_vec b[2]) {
+    dem2d_vec u = dem2di_sub(a[1], a[0]), v = dem2di_sub(b[1], b[0]);
+    double side[4];
+    if (dem2di_max(a[0].y, a[1].y) < dem2di_min(b[0].y, b[1].y) ||
+        dem2di_max(b[0].y, b[1].y) < dem2di_min(a[0].y, a[1].y))
+        return false;
+    side[0] = dem2di_cross(u, dem2di_sub(b[0], a[0]));
+    side[1] = dem2di_cross(u, dem2di_sub(b[1], a[0]));
+    side[2] = dem2di_cross(v, dem2di_sub(a[0], b[0]));
+    side[3] = dem2di_cross(v, dem2di_sub(a[1], b[0]));
+    return !((side[0] > 0 && side[1] > 0) || (side[0] < 0 && side[1] < 0) ||
+             (side[2] > 0 && side[3] > 0) || (side[2] < 0 && side[3] < 0));
+}
+
+/* Segments in the order of their least x against those that begin before they end. */
+static dem2d_result dem2di_check_crossings(const dem2d_env *env, const dem2d_wall_desc *desc,
+                                           dem2di_extent_x *extents) {
+    int parts = dem2di_parts_described(desc);
+    for (int k = 0; k < parts; k++) {
+        dem2d_vec ends[2];
+        dem2di_chain_ends(desc, k, ends);
+        extents[k].low = dem2di_min(ends[0].x, ends[1].x);
+        extents[k].high = dem2di_max(ends[0].x, ends[1].x);
+        extents[k].segment = k;
+    }
+    qsort(extents, (size_t)parts, sizeof *extents, dem2di_extent_x_order);
+    for (int i = 0; i < parts; i++)
+        for (int j = i + 1; j < parts && extents[j].low <= extents[i].high; j++) {
+            int a = extents[i].segment, b = extents[j].segment, low = a < b ? a : b;
+            int apart = a < b ? b - a : a - b;
+            dem2d_vec one[2], other[2];
+            if (apart == 1 || (desc->closed && apart == parts - 1)) continue;
+            dem2di_chain_ends(desc, a, one);
+            dem2di_chain_ends(desc, b, other);
+            if (dem2di_segments_cross(one, other))
+                return dem2di_fail(env, DEM2D_OUT_OF_RANGE, low,
+                                   "points: the segments from points[%d] and points[%d] cross", low,
+                                   low + apart);
+        }
+    return DEM2D_OK;
+}
+
+static dem2d_result dem2di_check_chain(const dem2d_world *world, const dem2d_wall_desc *desc) {
+    const dem2d_env *env = &world->env;
+    if (desc->mode == DEM2D_WALL_SERVO)
+        return dem2di_fail(env, DEM2D_OUT_OF_RANGE, -1, "mode: a chain can't be a servo wall");
+    if (desc->count < (desc->closed ? 3 : 2))
+        return dem2di_fail(env, DEM2D_OUT_OF_RANGE, -1, "count = %d points of a chain",
+                           desc->count);
+    for (int k = 0; k < desc->count; k++)
+        if (!dem2di_vec_finite(desc->points[k]))
+            return dem2di_fail(env, DEM2D_NOT_FINITE, k, "points[%d] is not finite", k);
+    int parts = dem2di_parts_described(desc);
+    for (int k = 0; k < parts; k++) {
+        dem2d_result result = dem2di_check_chain_segment(env, desc, k);
+        if (result != DEM2D_OK) return result;
+    }
+    dem2di_extent_x *extents =
+        (dem2di_extent_x *)dem2di_allocate(&world->user_env, (size_t)parts, sizeof *extents);
+    if (extents == NULL) return dem2di_out_of_memory(world, "the check of a chain");
+    dem2d_result result = dem2di_check_crossings(env, desc, extents);
+    dem2di_release(&world->user_env, extents, (size_t)parts, sizeof *extents);
+    return result;
 }
 
 static dem2d_result dem2di_check_segment(const dem2d_world *world, const dem2d_wall_desc *desc) {
@@ -13876,6 +14066,14 @@ static dem2d_result dem2di_check_wall(const dem2d_world *world, const dem2d_wall
     if (result == DEM2D_OK && desc->mode == DEM2D_WALL_SERVO)
         result = dem2di_check_number(env, "max_speed", desc->max_speed, DEM2DI_POSITIVE);
     if (result != DEM2D_OK) return result;
+    if (desc->mode == DEM2D_WALL_SERVO && desc->angular_velocity != 0)
+        return dem2di_fail(env, DEM2D_OUT_OF_RANGE, -1, "angular_velocity = %g of a servo wall",
+                           desc->angular_velocity);
+    if (desc->points == NULL && desc->count != 0) return dem2di_fail_null(env, "points");
+    if (desc->points != NULL) {
+        result = dem2di_check_chain(world, desc);
+        return result == DEM2D_OK ? dem2di_check_spans(world, desc) : result;
+    }
     if (desc->segment) result = dem2di_check_segment(world, desc);
     if (result != DEM2D_OK) return result;
     if (!desc->segment && !dem2di_unit(desc->normal, &unit))
@@ -13905,6 +14103,15 @@ static void dem2di_wall_rank(dem2d_world *world, int slot, int count) {
     walls[slot].rank = place;
 }
 
+/* Room for so many parts more. */
+static dem2d_result dem2di_parts_reserve(dem2d_world *world, int parts) {
+    if (parts >= DEM2DI_VERTEX - world->part_count)
+        return dem2di_fail(&world->env, DEM2D_OUT_OF_RANGE, -1, "more than %d parts of walls",
+                           DEM2DI_VERTEX - 1);
+    if (dem2di_group_reserve(world, DEM2DI_PARTS, world->part_count + parts)) return DEM2D_OK;
+    return dem2di_out_of_memory(world, "parts of a wall");
+}
+
 /* A wall gets so many parts, for which there is room: those of the walls after it move, and with
    them the keys of their contacts. */
 static void dem2di_parts_resize(dem2d_world *world, int slot, int count) {
@@ -13930,8 +14137,10 @@ static void dem2di_parts_resize(dem2d_world *world, int slot, int count) {
 /* Where a part, or a face, is when its wall is in one of its states. */
 static dem2di_surface dem2di_surface_at(const dem2di_wall_state *states, const dem2di_part *own) {
     dem2di_surface surface;
-    surface.point = dem2di_add(states[own->wall].point, own->start);
-    surface.along = own->along;
+    const dem2di_wall_state *state = &states[own->wall];
+    dem2d_vec along = dem2di_vec(own->along.c, own->along.s);
+    surface.point = dem2di_add(state->point, dem2di_turn(state->q, own->start));
+    surface.along = dem2di_rot(dem2di_turn(state->q, along));
     return surface;
 }
 
@@ -13972,21 +14181,58 @@ static void dem2di_parts_rank(dem2d_world *world, int slot) {
     world->joints_due = true;
 }
 
-/* The part of a wall that has one, by its desc with a normal of unit length; a segment's follows.
- */
-static void dem2di_part_describe(dem2di_wall *wall, dem2di_part *part) {
-    dem2d_vec chord = dem2di_sub(wall->desc.end, wall->desc.point), along;
-    part->start = dem2di_vec(0, 0);
-    part->extent = 0;
-    if (wall->desc.segment) {
-        (void)dem2di_unit(chord, &along);
-        part->extent = dem2di_length(chord);
-        wall->desc.normal = dem2di_perp(along);
-    } else {
-        along = dem2di_vec(wall->desc.normal.y, -wall->desc.normal.x);
+/* A checked desc in the form that is kept: a normal of unit length, a chain by its first segment.
+   A normal that is the old one keeps its bits. */
+static dem2d_wall_desc dem2di_wall_settled(const dem2d_wall_desc *desc, dem2d_vec old) {
+    dem2d_wall_desc settled = *desc;
+    dem2d_vec ends[2], along;
+    if (desc->points != NULL) {
+        dem2di_chain_ends(desc, 0, ends);
+        settled.segment = true;
+        settled.point = ends[0];
+        settled.end = ends[1];
     }
-    part->along.c = along.x;
-    part->along.s = along.y;
+    if (settled.segment) {
+        (void)dem2di_unit(dem2di_sub(settled.end, settled.point), &along);
+        settled.normal = dem2di_perp(along);
+    } else if (desc->normal.x != old.x || desc->normal.y != old.y) {
+        (void)dem2di_unit(desc->normal, &settled.normal);
+    }
+    return settled;
+}
+
+/* Part k by a settled desc. */
+static dem2di_part dem2di_part_described(const dem2d_wall_desc *desc, int slot, int k) {
+    dem2d_vec ends[2], along = dem2di_vec(desc->normal.y, -desc->normal.x);
+    dem2di_part part;
+    part.start = dem2di_vec(0, 0);
+    part.extent = 0;
+    part.wall = slot;
+    ends[0] = desc->point;
+    ends[1] = desc->end;
+    if (desc->points != NULL) {
+        dem2di_chain_ends(desc, k, ends);
+        part.start = dem2di_sub(ends[0], desc->point);
+    }
+    if (desc->segment) {
+        (void)dem2di_unit(dem2di_sub(ends[1], ends[0]), &along);
+        part.extent = dem2di_length(dem2di_sub(ends[1], ends[0]));
+    }
+    part.along = dem2di_rot(along);
+    return part;
+}
+
+/* The radius of a wall, when its parts or its point have changed. */
+static void dem2di_radius_set(dem2d_world *world, int slot) {
+    dem2di_wall *wall = &world->walls[slot];
+    wall->radius = 0;
+    for (int k = wall->first; k < wall->first + wall->count; k++) {
+        const dem2di_part *part = &world->parts[k];
+        dem2d_vec along = dem2di_vec(part->along.c, part->along.s);
+        wall->radius = dem2di_max(wall->radius, dem2di_length(part->start));
+        wall->radius =
+            dem2di_max(wall->radius, dem2di_length(dem2di_along(part->start, part->extent, along)));
+    }
 }
 
 static void dem2di_surfaces_set(dem2d_world *world, int wall) {
@@ -14006,37 +14252,68 @@ static dem2d_vec dem2di_surface_end(const dem2di_surface *surface, double extent
     return dem2di_along(surface->point, extent, dem2di_vec(surface->along.c, surface->along.s));
 }
 
-/* A checked description into a slot, for whose parts there is room; users of its spans are counted.
+/* Angular velocity of a wall from now on. */
+static double dem2di_wall_spin(const dem2d_wall_desc *desc) {
+    return desc->mode == DEM2D_WALL_MOVING ? desc->angular_velocity : 0;
+}
+
+/* From now on a wall may turn: its point is the pivot, from which its parts start. */
+static void dem2di_wall_turn(dem2d_world *world, int slot) {
+    dem2di_wall *wall = &world->walls[slot];
+    dem2d_vec pivot = dem2di_sub(wall->desc.pivot, wall->desc.point);
+    dem2di_wall_state *now = &world->wall_now[slot], *before = &world->wall_before[slot];
+    if (wall->turns) return;
+    wall->turns = true;
+    for (int k = wall->first; k < wall->first + wall->count; k++) {
+        dem2di_part *face = &world->joints[k].face;
+        world->parts[k].start = dem2di_sub(world->parts[k].start, pivot);
+        face->start = dem2di_sub(face->start, pivot);
+    }
+    now->point = dem2di_add(now->point, pivot);
+    before->point = dem2di_add(before->point, pivot);
+    if (wall->count > 1) wall->listed[0] = dem2di_add(wall->listed[0], pivot);
+    dem2di_radius_set(world, slot);
+    dem2di_surfaces_set(world, slot);
+}
+
+/* A settled description into a slot, for whose parts there is room; users of its spans are counted.
  */
 static void dem2di_wall_place(dem2d_world *world, int slot, const dem2d_wall_desc *desc) {
     dem2di_wall *wall = &world->walls[slot];
-    dem2d_vec normal = wall->desc.normal; /* set again, it keeps its bits */
-    bool same = normal.x == desc->normal.x && normal.y == desc->normal.y;
     wall->desc = *desc;
-    if (!desc->segment && !same) (void)dem2di_unit(desc->normal, &wall->desc.normal);
+    wall->desc.points = NULL;
+    wall->desc.count = 0;
+    wall->turns = false;
     dem2di_parts_rank(world, slot);
-    dem2di_parts_resize(world, slot, 1);
-    world->parts[wall->first].wall = slot;
-    dem2di_part_describe(wall, &world->parts[wall->first]);
+    dem2di_parts_resize(world, slot, dem2di_parts_described(desc));
+    for (int k = 0; k < wall->count; k++)
+        world->parts[wall->first + k] = dem2di_part_described(desc, slot, k);
     for (int i = 0; i < 2; i++) {
         wall->span[i] = desc->spans[i].generation != 0 ? (int)desc->spans[i].index : -1;
         if (wall->span[i] >= 0) world->walls[wall->span[i]].users++;
     }
     dem2di_wall_state *now = &world->wall_now[slot];
-    now->point = desc->point; /* the velocity stays that of the step that was made */
+    now->point = desc->point; /* the velocities stay those of the step that was made */
+    now->angle = now->rest = 0;
+    now->q = dem2d_rot_make(0);
     if (desc->mode != DEM2D_WALL_SERVO) {
         now->drift = 0;
         memset(&now->backing, 0, sizeof now->backing);
     }
     world->wall_before[slot] = *now;
+    dem2di_radius_set(world, slot);
     dem2di_surfaces_set(world, slot);
+    if (dem2di_wall_spin(desc) != 0)
+        dem2di_wall_turn(world, slot);
+    else
+        now->w = 0;
     world->ledger.edited = true;
     world->joints_due = true;
 }
 
 /* The line that segments are made of, when the first comes. The log knows if there is no memory. */
 static bool dem2di_line_make(dem2d_world *world, const dem2d_wall_desc *desc) {
-    if (!desc->segment || world->line != NULL) return true;
+    if ((!desc->segment && desc->points == NULL) || world->line != NULL) return true;
     dem2d_shape *line = dem2di_shape_allocate(&world->env, DEM2D_POLYGON, 2, 2);
     if (line == NULL) return false;
     for (int k = 0; k < 2; k++) {
@@ -14072,27 +14349,37 @@ static double dem2di_wall_way(const dem2di_wall *wall, dem2d_vec moved) {
 static void dem2di_wall_listed(dem2d_world *world, int slot) {
     dem2di_wall *wall = &world->walls[slot];
     const dem2di_surface *surface = &world->surfaces[wall->first];
-    wall->listed[0] = world->wall_now[slot].point;
+    const dem2di_wall_state *now = &world->wall_now[slot];
+    wall->listed[0] = wall->count == 1 ? surface->point : now->point;
     wall->listed[1] = dem2di_surface_end(surface, world->parts[wall->first].extent);
-    wall->listed[2] = wall->desc.normal;
+    wall->listed[2] =
+        wall->count == 1 ? dem2di_surface_normal(surface) : dem2di_vec(now->q.c, now->q.s);
     wall->reshaped = false;
 }
 
 /* Bound of how far the distance of any particle from a wall has changed since the list was built,
    with the wall in one of its states: of a segment the greater way of its ends; of a half-plane
-   that is turned, the change at the corners of the box that holds all particles. */
+   that is turned, the change at the corners of the box that holds all particles; of a chain the way
+   of its point and that of its farthest end about it. */
 static double dem2di_wall_change(const dem2d_world *world, const dem2di_wall_state *states,
                                  int slot) {
     const dem2di_wall *wall = &world->walls[slot];
     const dem2d_box *box = &world->box;
-    dem2d_vec moved = dem2di_sub(states[slot].point, wall->listed[0]);
-    if (!wall->reshaped) return dem2di_wall_way(wall, moved);
     const dem2di_surface surface = dem2di_surface_of(world, states, wall->first);
+    if (wall->count > 1) {
+        const dem2di_wall_state *state = &states[slot];
+        dem2d_vec q = dem2di_sub(dem2di_vec(state->q.c, state->q.s), wall->listed[2]);
+        return dem2di_length(dem2di_sub(state->point, wall->listed[0])) +
+               wall->radius * dem2di_length(q);
+    }
+    dem2d_vec moved = dem2di_sub(surface.point, wall->listed[0]);
+    if (!wall->reshaped && !wall->turns) return dem2di_wall_way(wall, moved);
     dem2d_vec end = dem2di_surface_end(&surface, world->parts[wall->first].extent);
     end = dem2di_sub(end, wall->listed[1]);
     if (wall->desc.segment) return dem2di_max(dem2di_length(moved), dem2di_length(end));
-    dem2d_vec turned = dem2di_sub(wall->desc.normal, wall->listed[2]);
-    double most = 0, way = dem2di_dot(moved, wall->desc.normal);
+    dem2d_vec normal = dem2di_surface_normal(&surface);
+    dem2d_vec turned = dem2di_sub(normal, wall->listed[2]);
+    double most = 0, way = dem2di_dot(moved, normal);
     for (int k = 0; k < 4; k++) {
         dem2d_vec corner =
             dem2di_vec(k & 1 ? box->upper.x : box->lower.x, k & 2 ? box->upper.y : box->lower.y);
@@ -14109,9 +14396,10 @@ DEM2D_API dem2d_result dem2d_world_add_wall(dem2d_world *world, const dem2d_wall
     if (result != DEM2D_OK) return result;
     int slot = 0;
     while (slot < world->wall_count && world->walls[slot].alive) slot++;
-    if (!dem2di_group_reserve(world, DEM2DI_WALLS, slot + 1) ||
-        !dem2di_group_reserve(world, DEM2DI_PARTS, world->part_count + 1))
+    if (!dem2di_group_reserve(world, DEM2DI_WALLS, slot + 1))
         return dem2di_out_of_memory(world, "a wall");
+    result = dem2di_parts_reserve(world, dem2di_parts_described(desc));
+    if (result != DEM2D_OK) return result;
     if (!dem2di_line_make(world, desc)) return DEM2D_OUT_OF_MEMORY;
     dem2di_wall *wall = &world->walls[slot];
     uint32_t generation = wall->generation + 1;
@@ -14124,7 +14412,10 @@ DEM2D_API dem2d_result dem2d_world_add_wall(dem2d_world *world, const dem2d_wall
     wall->placed = placed;
     world->wall_count += is_new;
     if (desc->mode == DEM2D_WALL_MOVING) world->wall_now[slot].velocity = desc->velocity;
-    dem2di_wall_place(world, slot, desc);
+    world->wall_now[slot].w = dem2di_wall_spin(desc);
+    world->wall_now[slot].surface = desc->surface_speed;
+    const dem2d_wall_desc settled = dem2di_wall_settled(desc, dem2di_vec(0, 0));
+    dem2di_wall_place(world, slot, &settled);
     dem2di_wall_listed(world, slot);
     world->list_stale = world->check_due = true;
     dem2di_edited(world);
@@ -14154,9 +14445,27 @@ static double dem2di_part_distance(const dem2d_world *world, int part, dem2d_vec
 /* May a wall that was set again change the features in use, or the bounds of the motion? */
 static bool dem2di_wall_matters(const dem2d_world *world, const dem2di_wall *old, int slot) {
     const dem2d_wall_desc *desc = &world->walls[slot].desc;
-    double speed = dem2di_size_of(desc->velocity) + desc->max_speed;
+    double speed = dem2di_size_of(desc->velocity) + desc->max_speed + fabs(desc->surface_speed);
+    speed += fabs(desc->angular_velocity) * (world->walls[slot].radius + 1);
     return speed > DEM2DI_SPEED_SURE || fabs(desc->stress) > fabs(old->desc.stress) ||
            desc->length > old->desc.length;
+}
+
+/* Contacts end with parts that a desc turns by a right angle or more, or with all, of a wall that
+   is of another kind. */
+static void dem2di_forget_turned(dem2d_world *world, int slot, const dem2d_wall_desc *settled,
+                                 bool all) {
+    const dem2di_wall *wall = &world->walls[slot];
+    const dem2di_list *list = &world->list;
+    for (int k = 0; k < wall->count; k++) {
+        dem2di_surface *surface = &world->surfaces[wall->first + k];
+        const dem2di_part part = dem2di_part_described(settled, slot, all ? 0 : k);
+        double cosine = part.along.c * surface->along.c + part.along.s * surface->along.s;
+        if (!all && cosine > 0) continue;
+        for (int i = list->pairs; i < list->count; i++)
+            if (list->keys[i].b % DEM2DI_VERTEX == wall->first + k) dem2di_contact_forget(world, i);
+        world->list_stale = true;
+    }
 }
 
 DEM2D_API dem2d_result dem2d_world_set_wall(dem2d_world *world, dem2d_wall_id id,
@@ -14166,20 +14475,22 @@ DEM2D_API dem2d_result dem2d_world_set_wall(dem2d_world *world, dem2d_wall_id id
     dem2d_result result = dem2di_check_wall(world, desc);
     if (result != DEM2D_OK) return result;
     if (!dem2di_line_make(world, desc)) return DEM2D_OUT_OF_MEMORY;
-    dem2di_wall *wall = &world->walls[id.index];
+    int slot = (int)id.index, parts = dem2di_parts_described(desc);
+    result = dem2di_parts_reserve(world, parts);
+    if (result != DEM2D_OK) return result;
+    dem2di_wall *wall = &world->walls[slot];
     const dem2di_wall old = *wall;
+    const dem2d_wall_desc settled = dem2di_wall_settled(desc, wall->desc.normal);
     double extent = world->parts[wall->first].extent;
+    bool other_kind = old.desc.segment != settled.segment || old.count != parts;
     if (old.desc.name != desc->name) world->list_stale = true; /* contacts go by the wall's rank */
     const dem2di_groups met = dem2di_wall_groups(&old);
+    dem2di_forget_turned(world, slot, &settled, other_kind);
     dem2di_wall_unspan(world, wall);
-    dem2di_wall_place(world, (int)id.index, desc);
-    dem2d_vec normal = wall->desc.normal;
-    bool other_kind = old.desc.segment != desc->segment;
+    dem2di_wall_place(world, slot, &settled);
     wall->reshaped = old.reshaped || extent != world->parts[wall->first].extent ||
-                     old.desc.normal.x != normal.x || old.desc.normal.y != normal.y;
-    if (other_kind || !(dem2di_dot(old.desc.normal, normal) > 0))
-        dem2di_forget_wall(world, (int)id.index);
-    if (!(dem2di_wall_change(world, world->wall_now, (int)id.index) <= wall->skin))
+                     old.desc.normal.x != settled.normal.x || old.desc.normal.y != settled.normal.y;
+    if (parts > 1 || old.turns || !(dem2di_wall_change(world, world->wall_now, slot) <= wall->skin))
         world->list_stale = true;
     const dem2di_groups meets = dem2di_wall_groups(wall);
     if (dem2di_meets_others(world, &met, &meets, true)) {
@@ -14191,11 +14502,38 @@ DEM2D_API dem2d_result dem2d_world_set_wall(dem2d_world *world, dem2d_wall_id id
         world->check_due = true;
         dem2di_edited(world);
     }
-    if (old.desc.mode != desc->mode || dem2di_wall_matters(world, &old, (int)id.index))
-        dem2di_edited(world);
+    if (old.desc.mode != desc->mode || dem2di_wall_matters(world, &old, slot)) dem2di_edited(world);
     if (desc->mode == DEM2D_WALL_SERVO && old.desc.mode != DEM2D_WALL_SERVO &&
         (world->plan.held || world->plan_due > 0))
         world->list_stale = true; /* fixed particles have pairs with servo walls alone */
+    return DEM2D_OK;
+}
+
+DEM2D_API dem2d_result dem2d_world_drive_wall(dem2d_world *world, dem2d_wall_id id,
+                                              dem2d_vec velocity, double angular_velocity) {
+    if (world == NULL) return DEM2D_NULL_ARGUMENT;
+    if (!dem2di_wall_lives(world, id)) return dem2di_stale(world, "wall", id.index);
+    const dem2d_env *env = &world->env;
+    int slot = (int)id.index;
+    dem2di_wall *wall = &world->walls[slot];
+    dem2d_result result =
+        dem2di_check_one(env, dem2di_wall_fields, offsetof(dem2d_wall_desc, velocity), &velocity);
+    if (result == DEM2D_OK)
+        result = dem2di_check_one(env, dem2di_wall_fields,
+                                  offsetof(dem2d_wall_desc, angular_velocity), &angular_velocity);
+    if (result != DEM2D_OK) return result;
+    if (wall->desc.mode == DEM2D_WALL_SERVO)
+        return dem2di_fail(env, DEM2D_OUT_OF_RANGE, slot, "mode: a servo wall finds its velocity");
+    const dem2di_wall old = *wall;
+    for (int j = 0; j < world->wall_count; j++) /* it may have rested beside them */
+        if (j != slot && world->walls[j].alive && world->walls[j].desc.segment)
+            world->joints_due = wall->desc.segment || world->joints_due;
+    wall->desc.mode = DEM2D_WALL_MOVING;
+    wall->desc.velocity = velocity;
+    wall->desc.angular_velocity = angular_velocity;
+    if (angular_velocity != 0) dem2di_wall_turn(world, slot);
+    if (old.desc.mode != DEM2D_WALL_MOVING || dem2di_wall_matters(world, &old, slot))
+        dem2di_edited(world);
     return DEM2D_OK;
 }
 
@@ -14215,13 +14553,73 @@ DEM2D_API dem2d_result dem2d_world_remove_wall(dem2d_world *world, dem2d_wall_id
     return DEM2D_OK;
 }
 
-/* Length that carries a wall's stress: between its spans, or as given. */
+/* Length that carries a wall's stress: between its spans, that of its segments, or as given. */
 static double dem2di_wall_length(const dem2d_world *world, const dem2di_wall_state *states, int i) {
     const dem2di_wall *wall = &world->walls[i];
-    if (wall->span[0] < 0)
-        return wall->desc.segment ? world->parts[wall->first].extent : wall->desc.length;
-    dem2d_vec across = dem2di_sub(states[wall->span[1]].point, states[wall->span[0]].point);
-    return fabs(dem2di_dot(across, world->walls[wall->span[0]].desc.normal));
+    double length = 0;
+    if (wall->span[0] >= 0) {
+        dem2di_surface ends[2];
+        for (int k = 0; k < 2; k++)
+            ends[k] = dem2di_surface_of(world, states, world->walls[wall->span[k]].first);
+        dem2d_vec across = dem2di_sub(ends[1].point, ends[0].point);
+        return fabs(dem2di_dot(across, dem2di_surface_normal(&ends[0])));
+    }
+    if (!wall->desc.segment) return wall->desc.length;
+    for (int k = 0; k < wall->count; k++) length += world->parts[wall->first + k].extent;
+    return length;
+}
+
+/* The pivot of a wall now. */
+static dem2d_vec dem2di_wall_pivot(const dem2d_world *world, int slot) {
+    const dem2di_wall *wall = &world->walls[slot];
+    dem2d_vec point = world->wall_now[slot].point;
+    if (wall->turns) return point;
+    return dem2di_add(point, dem2di_sub(wall->desc.pivot, wall->desc.point));
+}
+
+/* Force of the particles on a part, and torque about the wall's pivot, by the contacts of the last
+   force pass. */
+static dem2di_load dem2di_part_load(const dem2d_world *world, int part) {
+    const dem2di_list *list = &world->list;
+    const dem2di_contacts *contacts = &list->contacts;
+    int slot = world->parts[part].wall;
+    const dem2di_wall_state *before = &world->wall_before[slot];
+    dem2d_vec pivot = dem2di_add(
+        before->point, dem2di_sub(dem2di_wall_pivot(world, slot), world->wall_now[slot].point));
+    dem2di_load load = {{0, 0}, 0};
+    for (int i = list->pairs; i < list->count; i++) {
+        dem2di_contact contact;
+        if (list->keys[i].b % DEM2DI_VERTEX != part || list->keys[i].a < 0) continue;
+        if (!dem2di_contact_get(world, contacts, i, &contact)) continue;
+        dem2d_vec force = dem2di_contact_force(&contact);
+        dem2d_vec point = dem2di_add(world->before[list->keys[i].a].x, dem2di_arm_a(&contact));
+        load.force = dem2di_add(load.force, force);
+        load.torque += dem2di_cross(dem2di_sub(point, pivot), force);
+        load.torque += dem2di_moment_of(world, contacts, i);
+    }
+    return load;
+}
+
+DEM2D_API dem2d_result dem2d_world_get_wall_part(const dem2d_world *world, dem2d_wall_id id,
+                                                 int part, dem2d_wall_part_info *info) {
+    if (world == NULL || info == NULL) return DEM2D_NULL_ARGUMENT;
+    if (!dem2di_wall_lives(world, id)) return dem2di_stale(world, "wall", id.index);
+    const dem2di_wall *wall = &world->walls[id.index];
+    if (part < 0 || part >= wall->count)
+        return dem2di_fail(&world->env, DEM2D_OUT_OF_RANGE, part, "part = %d of a wall of %d", part,
+                           wall->count);
+    const dem2di_surface *surface = &world->surfaces[wall->first + part];
+    const dem2di_surface before = dem2di_surface_of(world, world->wall_before, wall->first + part);
+    dem2di_load load = dem2di_part_load(world, wall->first + part);
+    info->point = surface->point;
+    info->length = world->parts[wall->first + part].extent;
+    info->end = dem2di_surface_end(surface, info->length);
+    info->normal = dem2di_surface_normal(surface);
+    info->force = load.force;
+    info->torque = load.torque;
+    info->stress = -dem2di_dot(load.force, dem2di_surface_normal(&before));
+    info->stress = info->length > 0 ? info->stress / info->length : 0;
+    return DEM2D_OK;
 }
 
 DEM2D_API dem2d_result dem2d_world_get_wall_desc(const dem2d_world *world, dem2d_wall_id id,
@@ -14229,13 +14627,16 @@ DEM2D_API dem2d_result dem2d_world_get_wall_desc(const dem2d_world *world, dem2d
     if (world == NULL || desc == NULL) return DEM2D_NULL_ARGUMENT;
     if (!dem2di_wall_lives(world, id)) return dem2di_stale(world, "wall", id.index);
     const dem2di_wall *wall = &world->walls[id.index];
-    dem2d_vec point = world->wall_now[id.index].point;
-    bool moved = point.x != wall->desc.point.x || point.y != wall->desc.point.y;
+    const dem2di_surface *surface = &world->surfaces[wall->first];
+    dem2d_vec point = surface->point;
+    bool moved = point.x != wall->desc.point.x || point.y != wall->desc.point.y || wall->turns;
     *desc = wall->desc;
     desc->point = point;
-    if (desc->segment && moved)
-        desc->end =
-            dem2di_surface_end(&world->surfaces[wall->first], world->parts[wall->first].extent);
+    if (moved) desc->pivot = dem2di_wall_pivot(world, (int)id.index);
+    if (moved && desc->segment)
+        desc->end = dem2di_surface_end(surface, world->parts[wall->first].extent);
+    if (wall->turns) desc->normal = dem2di_surface_normal(surface);
+    if (wall->count > 1) desc->count = desc->closed ? wall->count : wall->count + 1;
     return DEM2D_OK;
 }
 
@@ -14243,23 +14644,39 @@ DEM2D_API dem2d_result dem2d_world_get_wall(const dem2d_world *world, dem2d_wall
                                             dem2d_wall_info *info) {
     if (world == NULL || info == NULL) return DEM2D_NULL_ARGUMENT;
     if (!dem2di_wall_lives(world, id)) return dem2di_stale(world, "wall", id.index);
-    const dem2di_wall *wall = &world->walls[id.index];
-    const dem2di_wall_state *now = &world->wall_now[id.index];
+    const int slot = (int)id.index;
+    const dem2di_wall *wall = &world->walls[slot];
+    const dem2di_wall_state *now = &world->wall_now[slot];
+    const int first = wall->first, last = first + wall->count - 1;
+    const dem2di_surface before = dem2di_surface_of(world, world->wall_before, first);
     info->name = wall->desc.name;
     info->groups = wall->desc.groups;
     info->user_data = wall->desc.user_data;
     info->mode = wall->desc.mode;
     info->material = wall->desc.material;
-    info->point = now->point;
-    info->normal = wall->desc.normal;
+    info->point = world->surfaces[first].point;
+    info->normal = dem2di_surface_normal(&world->surfaces[first]);
     info->segment = wall->desc.segment;
-    info->end = dem2di_surface_end(&world->surfaces[wall->first], world->parts[wall->first].extent);
-    info->velocity = dem2di_wall_velocity(world, (int)id.index);
+    info->end = dem2di_surface_end(&world->surfaces[last], world->parts[last].extent);
+    info->velocity = dem2di_wall_velocity(world, slot);
     info->force = now->force;
-    info->length = dem2di_wall_length(world, world->wall_before, (int)id.index);
-    info->stress = -dem2di_dot(now->force, wall->desc.normal);
-    info->stress = info->length > 0 ? info->stress / info->length : 0;
+    info->length = dem2di_wall_length(world, world->wall_before, slot);
+    info->stress = wall->count > 1 ? 0 : -dem2di_dot(now->force, dem2di_surface_normal(&before));
     info->target = wall->desc.stress;
+    info->pivot = dem2di_wall_pivot(world, slot);
+    info->angle = now->angle;
+    info->angular_velocity = dem2di_wall_spin(&wall->desc);
+    info->surface_speed = wall->desc.surface_speed;
+    info->parts = wall->count;
+    info->torque = 0;
+    for (int part = first; part <= last; part++) {
+        const dem2di_load load = dem2di_part_load(world, part);
+        const dem2di_surface surface = dem2di_surface_of(world, world->wall_before, part);
+        info->torque += load.torque;
+        if (wall->count > 1)
+            info->stress -= dem2di_dot(load.force, dem2di_surface_normal(&surface));
+    }
+    info->stress = info->length > 0 ? info->stress / info->length : 0;
     return DEM2D_OK;
 }
 
@@ -14290,7 +14707,8 @@ DEM2D_API dem2d_result dem2d_world_get_wall(const dem2d_world *world, dem2d_wall
    by 1 - cos(22.5 degrees), 8 % of its radius, to reach X while both feet are on the faces.
 
    A chain's parts are always joined. Of other walls those are that stand still, or move at the same
-   velocity. What follows is found when walls have changed, from their places then. */
+   velocity and do not turn. What follows is found when walls have changed, from their places then.
+ */
 
 /* Ends this near meet, as part of the shorter segment; and vertices of a face are off its line by
    so much at most: a gap that no grain can tell, far above the rounding of walls that move
@@ -14333,6 +14751,7 @@ static bool dem2di_rest_together(const dem2d_world *world, int a, int b) {
     const dem2d_wall_desc *one = &world->walls[world->parts[a].wall].desc;
     const dem2d_wall_desc *other = &world->walls[world->parts[b].wall].desc;
     if (one->mode != other->mode || one->mode == DEM2D_WALL_SERVO) return false;
+    if (dem2di_wall_spin(one) != 0 || dem2di_wall_spin(other) != 0) return false;
     return one->mode == DEM2D_WALL_STILL ||
            (one->velocity.x == other->velocity.x && one->velocity.y == other->velocity.y);
 }
@@ -14474,9 +14893,11 @@ static void dem2di_joint_place(const dem2d_world *world, int part, dem2d_vec fro
     dem2di_wall_joint *joint = &world->joints[part];
     const dem2di_part *own = &world->parts[part];
     dem2d_vec chord = dem2di_sub(to, from), along;
-    (void)dem2di_unit(chord, &along);
+    const dem2d_rot q = world->wall_now[own->wall].q;
+    dem2d_vec before = dem2di_sub(from, world->surfaces[part].point);
+    (void)dem2di_unit(dem2di_turn_back(q, chord), &along);
     joint->face = *own;
-    joint->face.start = dem2di_add(own->start, dem2di_sub(from, world->surfaces[part].point));
+    joint->face.start = dem2di_add(own->start, dem2di_turn_back(q, before));
     joint->face.along.c = along.x;
     joint->face.along.s = along.y;
     joint->face.extent = dem2di_length(chord);
@@ -14939,6 +15360,20 @@ static void dem2di_tune_skin(dem2d_world *world) {
     world->interval = world->skin / speed;
 }
 
+/* Velocity of a wall, or of as great a speed as any point has where it may meet a particle. */
+static dem2d_vec dem2di_wall_speed(const dem2d_world *world, int slot) {
+    const dem2di_wall *wall = &world->walls[slot];
+    dem2d_vec v = dem2di_wall_velocity(world, slot);
+    double spin = fabs(dem2di_wall_spin(&wall->desc)), far = wall->radius;
+    if (spin == 0) return v;
+    if (!wall->desc.segment) { /* it has no end: at the farthest particle */
+        dem2d_vec pivot = world->wall_now[slot].point;
+        far = dem2di_max(dem2di_length(dem2di_sub(world->box.lower, pivot)),
+                         dem2di_length(dem2di_sub(world->box.upper, pivot)));
+    }
+    return dem2di_vec(dem2di_length(v) + spin * far, 0);
+}
+
 /* Skin of one particle or wall of a size: a fast one gets what it needs to last as long as the
    others, up to a quarter of its size. */
 static double dem2di_skin_of(const dem2d_world *world, double size, dem2d_vec v) {
@@ -15311,6 +15746,7 @@ static void dem2di_displacement_task(void *context, int begin, int end) {
 static bool dem2di_bounded(const dem2d_world *world, const dem2di_plan *plan, int contacts) {
     double far = 0, size = 0, heavy = 0, light = 0, slender = 0, stiff = 0, ratio = 0, rolling = 0;
     double speed = DEM2DI_SPEED_SURE, spin = DEM2DI_TURN_SURE / world->time_step;
+    double belt = 0, turn = 0;
     double load = world->loaded ? DEM2DI_LOAD_SURE : 0;
     bool circles = true;
     for (int i = 0; i < world->body_count; i++) {
@@ -15327,7 +15763,9 @@ static bool dem2di_bounded(const dem2d_world *world, const dem2di_plan *plan, in
     }
     for (int j = 0; j < world->wall_count; j++) {
         const dem2d_wall_desc *wall = &world->walls[j].desc;
-        far = dem2di_max(far, dem2di_size_of(world->wall_now[j].point));
+        far = dem2di_max(far, dem2di_size_of(world->wall_now[j].point) + world->walls[j].radius);
+        belt = dem2di_max(belt, fabs(wall->surface_speed));
+        turn = dem2di_max(turn, fabs(dem2di_wall_spin(wall)));
         speed = dem2di_max(speed, dem2di_size_of(dem2di_wall_velocity(world, j)) + wall->max_speed);
         stiff = dem2di_max(stiff, fabs(wall->stress));
         heavy = dem2di_max(heavy, wall->length);
@@ -15339,6 +15777,7 @@ static bool dem2di_bounded(const dem2d_world *world, const dem2di_plan *plan, in
         rolling = dem2di_max(rolling, law->rolling_friction);
     }
     double depth = 2 * (far + 2 * size), time = DEM2DI_LIST_STEPS * world->time_step;
+    speed += belt + turn * depth;
     double closing = 2 * (speed + depth / world->time_step),
            dashpot = 2 * ratio * sqrt(heavy * stiff);
     double force = (contacts + 1.0) * (stiff * depth + dashpot * closing); /* damping doubles */
@@ -15613,7 +16052,7 @@ static dem2d_result dem2di_build_list(dem2d_world *world, const dem2di_plan *pla
         for (int i = 0; i < world->body_count; i++)
             largest = dem2di_max(largest, world->now[i].radius);
         for (int j = 0; j < world->wall_count; j++)
-            world->walls[j].skin = dem2di_skin_of(world, largest, dem2di_wall_velocity(world, j));
+            world->walls[j].skin = dem2di_skin_of(world, largest, dem2di_wall_speed(world, j));
         build.plan = *plan;
         room = !build.plan.turns ||
                dem2di_group_reserve(world, DEM2DI_DISPLACEMENTS, world->body_count);
@@ -15661,9 +16100,17 @@ static inline dem2di_relative_motion dem2di_motion_of(const dem2d_world *world, 
     const bool wall = contact >= world->list.pairs;
     dem2d_vec a = world->now[key->a].v, b;
     dem2di_relative_motion motion;
-    b = wall ? world->wall_now[dem2di_wall_of(world, contact)].velocity : world->now[key->b].v;
     motion.wa = world->now[key->a].w;
-    motion.wb = wall ? 0 : world->now[key->b].w;
+    motion.surface = 0;
+    if (wall) {
+        const dem2di_wall_state *state = &world->wall_now[dem2di_wall_of(world, contact)];
+        b = state->velocity;
+        motion.wb = state->w;
+        motion.surface = state->surface;
+    } else {
+        b = world->now[key->b].v;
+        motion.wb = world->now[key->b].w;
+    }
     if (world->redirected) {
         const dem2di_velocities made_a = dem2di_velocities_made(world, key->a);
         a = made_a.v;
@@ -16435,13 +16882,15 @@ static inline void dem2di_law_room(dem2d_world *world, dem2di_law_rows *rows, de
 
 /* Where contact i has its points, beside it when there are two; B's centre is at d. A circle has
    its point on the line of the normal: at the middle of an overlap, and on a wall at the foot. Both
-   arms are of one point, so that the two torques and the forces' moment add up to nothing. */
+   arms are of one point, so that the two torques and the forces' moment add up to nothing. The
+   centre of a wall that turns is its pivot; that of others is not asked for. */
 static DEM2DI_INLINE void dem2di_contact_place(dem2d_world *world, int i, int count,
                                                const dem2d_contact_point points[2], dem2d_vec d,
                                                dem2di_contact *contact) {
     const dem2di_list *list = &world->list;
     const dem2di_key *key = &list->keys[i];
     const bool wall = i >= list->pairs, turns = world->plan.turns; /* circles have a lever of 0 */
+    const bool pinned = wall && !world->walls[dem2di_wall_of(world, i)].turns;
     const bool circle_a = !turns || world->lever[key->a] == 0;
     const bool circle_b = !wall && (!turns || world->lever[key->b] == 0);
     const double depth = contact->depth;
@@ -16460,8 +16909,8 @@ static DEM2DI_INLINE void dem2di_contact_place(dem2d_world *world, int i, int co
         arms->a_n = along - (world->now[key->b].radius - depth / 2);
         arms->a_t = across;
     }
-    arms->b_n = wall ? 0 : arms->a_n - along;
-    arms->b_t = wall ? 0 : arms->a_t - across;
+    arms->b_n = pinned ? 0 : arms->a_n - along;
+    arms->b_t = pinned ? 0 : arms->a_t - across;
     if (circle_a && circle_b && world->solver != DEM2D_GJK_EPA) { /* as in the kernel of circles */
         arms->b_n = -(world->now[key->b].radius - depth / 2);
         arms->b_t = 0;
@@ -16629,12 +17078,19 @@ static inline bool dem2di_is_segment(const dem2d_world *world, int contact) {
     return world->parts[world->list.keys[contact].b % DEM2DI_VERTEX].extent > 0;
 }
 
+/* The point of a contact with a wall further along the normal. */
+static void dem2di_arms_deepen(dem2di_arms *arms, double by, bool turns) {
+    arms->a_n += by;
+    if (turns) arms->b_n += by;
+}
+
 /* The rows of a contact with a wall whose geometry is known. */
 static void dem2di_wall_add(dem2d_world *world, int i, const dem2di_last *last,
                             dem2di_contact *contact, dem2di_law_rows *rows) {
     bool two = dem2di_point_pair_of(world, &world->list.contacts, i) != NULL;
     if (world->faces == DEM2D_ONE_POINT) /* [P] fig. 4b: from the foot point to the middle */
-        contact->arms.a_n += contact->depth / 2;
+        dem2di_arms_deepen(&contact->arms, contact->depth / 2,
+                           world->walls[dem2di_wall_of(world, i)].turns);
     dem2di_law_add(world, i, last, two, contact, rows);
     dem2di_geometry_put(&world->list, i, contact);
 }
@@ -16665,7 +17121,8 @@ static void dem2di_update_wall_contact(dem2d_world *world, int i, dem2di_law_row
         dem2di_contact_apart(world, i, contact.normal);
         return;
     }
-    dem2di_contact_place(world, i, found, points, dem2di_vec(0, 0), &contact);
+    dem2d_vec pivot = world->wall_now[dem2di_wall_of(world, i)].point;
+    dem2di_contact_place(world, i, found, points, dem2di_sub(pivot, world->now[a].x), &contact);
     if (segment && world->plan.joints)
         dem2di_geometry_put(list, i, &contact);
     else
@@ -17051,12 +17508,15 @@ static void dem2di_wall_sums(dem2d_world *world) {
     for (int j = 0; j < world->wall_count; j++) {
         world->wall_next[j] = world->wall_now[j];
         world->wall_next[j].force = dem2di_vec(0, 0);
+        world->wall_next[j].torque = world->wall_next[j].shear = 0;
     }
     for (int i = list->pairs; i < list->count; i++) {
         dem2di_contact contact;
         if (!dem2di_contact_get(world, &list->contacts, i, &contact)) continue;
         dem2di_wall_state *wall = &world->wall_next[dem2di_wall_of(world, i)];
         wall->force = dem2di_add(wall->force, dem2di_contact_force(&contact));
+        wall->torque += dem2di_torque_b(&contact, dem2di_moment_of(world, &list->contacts, i));
+        wall->shear += contact.shear;
     }
 }
 
@@ -17365,6 +17825,21 @@ static double dem2di_servo_speed(dem2d_world *world, int j, int begin, int end) 
     return speed;
 }
 
+/* A wall turned by less than half a turn. The angle and what its rounding leaves add up without
+   error (Knuth's sum), and 2 pi is taken in two parts: after any number of turns the angle is right
+   to rounding. */
+static void dem2di_wall_rotate(dem2di_wall_state *state, double by) {
+    const double turn = 6.283185307179586, turn_rest = 2.4492935982947064e-16; /* 2 pi */
+    double add = by + state->rest, sum = state->angle + add, back = sum - state->angle;
+    state->rest = (state->angle - (sum - back)) + (add - back);
+    if (fabs(sum) > DEM2DI_PI) {
+        state->rest -= copysign(turn_rest, sum);
+        sum -= copysign(turn, sum);
+    }
+    state->angle = sum;
+    state->q = dem2d_rot_make(sum);
+}
+
 /* New wall velocities and points; true when one has left the reach of the list. Contacts with walls
    are listed in the order of the parts, and so of the walls. */
 static bool dem2di_control_pass(dem2d_world *world) {
@@ -17385,6 +17860,9 @@ static bool dem2di_control_pass(dem2d_world *world) {
             next->velocity = dem2di_wall_velocity(world, j);
         }
         next->point = dem2di_along(next->point, world->time_step, next->velocity);
+        next->w = dem2di_wall_spin(&wall->desc);
+        next->surface = wall->desc.surface_speed;
+        if (next->w != 0) dem2di_wall_rotate(next, next->w * world->time_step);
         stale = stale || !(dem2di_wall_change(world, world->wall_next, j) <= wall->skin);
     }
     return stale;
@@ -17468,8 +17946,11 @@ static void dem2di_observe_motion(dem2d_world *world, const dem2di_ledger *last)
         int j = world->walls[place].placed;
         const dem2di_wall_state *old = &world->wall_now[j], *made = &world->wall_next[j];
         if (!world->walls[j].alive) continue;
-        power[0][DEM2DI_BY_WALLS] -= dem2di_dot(made->force, old->velocity);
-        power[1][DEM2DI_BY_WALLS] -= dem2di_dot(made->force, made->velocity);
+        for (int k = 0; k < 2; k++) {
+            const dem2di_wall_state *half = k == 0 ? old : made;
+            power[k][DEM2DI_BY_WALLS] -= dem2di_dot(made->force, half->velocity) +
+                                         made->torque * half->w + made->shear * half->surface;
+        }
     }
     for (int k = 0; k < DEM2DI_HALVES; k++) {
         ledger->sum[k] += ledger->half[k] + power[0][k] * world->made_step / 2;
@@ -17928,7 +18409,7 @@ static dem2d_result dem2di_check_states(const dem2d_world *world, const dem2di_c
     for (int j = 0; j < world->wall_count; j++)
         if (world->walls[j].alive &&
             !(dem2di_vec_finite(world->wall_next[j].point) &&
-              dem2di_finite(world->wall_next[j].drift) &&
+              dem2di_finite(world->wall_next[j].drift) && fabs(world->wall_next[j].angle) <= 4 &&
               (!free_hand || dem2di_vec_finite(world->wall_next[j].force))))
             return dem2di_fail(&world->env, DEM2D_STATE, j,
                                "wall %d would get a place or a speed that is not finite", j);
@@ -20031,8 +20512,8 @@ static dem2d_result dem2di_writer_close(const dem2d_env *env, const char *path,
 
 /* ============================================================================================
    >>snapshot  State hash, snapshots: both follow the tables of columns and fields
-   uses: config, memory, fields, support, shapes, broad, motion, world, objects, walls, joints,
-         list, measures, output
+   uses: config, math, memory, fields, support, shapes, broad, motion, world, objects, walls,
+   joints, list, measures, output
    ============================================================================================ */
 
 /* To save, load, check and hash another number, add a row to the table of fields of its struct; for
@@ -20246,6 +20727,11 @@ static bool dem2di_of_bodies(dem2di_group group) {
     return group >= DEM2DI_BODIES && group <= DEM2DI_MADE;
 }
 
+/* Does the part of a wall follow from the wall's desc? */
+static bool dem2di_one_part_described(const dem2d_world *w, int wall) {
+    return w->walls[wall].count == 1 && !w->walls[wall].turns;
+}
+
 /* Row of a hashed column for a place in the order of ids; NULL: nothing is there. Poses are as a
    caller sees them: a refused step may have changed how rotations are held. */
 static const void *dem2di_hashed_row(const dem2d_world *w, const dem2di_column *column, int place,
@@ -20257,8 +20743,7 @@ static const void *dem2di_hashed_row(const dem2d_world *w, const dem2di_column *
     if (dem2di_of_bodies(group)) slot = w->ids[place].slot;
     if (slot < 0 || (group == DEM2DI_IDS && w->ids[place].slot < 0)) return NULL;
     if (group == DEM2DI_WALLS && !w->walls[place].alive) return NULL;
-    if (group == DEM2DI_PARTS && w->walls[w->parts[place].wall].count == 1)
-        return NULL; /* follows from the wall's desc */
+    if (group == DEM2DI_PARTS && dem2di_one_part_described(w, w->parts[place].wall)) return NULL;
     if (group == DEM2DI_TEMPLATES && w->templates[place].shape == NULL) return NULL;
     const char *row = start + (size_t)slot * column->size;
     if (column->fields != dem2di_state_fields) return row;
@@ -20808,6 +21293,17 @@ static void dem2di_finish_ranks(dem2di_loader *loader) {
     if (dem2di_load_good(loader)) dem2di_ranks_set(w);
 }
 
+/* Parts are half-planes or segments as the wall's desc says, with a direction. */
+static void dem2di_finish_parts(dem2di_loader *loader, const dem2di_wall *wall) {
+    for (int k = 0; k < wall->count; k++) {
+        const dem2di_part *part = &loader->world->parts[wall->first + k];
+        bool unit = dem2di_is_unit(part->along.c, part->along.s);
+        dem2di_load_expect(loader, unit && wall->desc.segment == (part->extent > 0),
+                           "a part of a wall");
+    }
+    dem2di_load_expect(loader, wall->desc.segment || wall->count == 1, "half-planes in a chain");
+}
+
 /* A wall of one part has that of its desc, of which snapshots before 0.7 say no more. */
 static void dem2di_finish_wall(dem2di_loader *loader, int slot, int first) {
     dem2d_world *w = loader->world;
@@ -20816,6 +21312,8 @@ static void dem2di_finish_wall(dem2di_loader *loader, int slot, int first) {
     wall->span[0] = wall->span[1] = -1;
     if (!wall->alive) return;
     dem2d_vec n = wall->desc.normal;
+    dem2di_load_expect(loader, wall->desc.points == NULL, "points of a wall");
+    if (!dem2di_load_good(loader)) return;
     dem2di_load_check(loader, dem2di_check_wall(w, &wall->desc));
     dem2di_load_expect(loader, dem2di_is_unit(n.x, n.y), "a normal is not of unit length");
     if (dem2di_load_good(loader) && !dem2di_line_make(w, &wall->desc))
@@ -20823,8 +21321,15 @@ static void dem2di_finish_wall(dem2di_loader *loader, int slot, int first) {
     dem2di_load_expect(loader, wall->first < w->part_count && w->parts[wall->first].wall == slot,
                        "a wall without a part");
     if (!dem2di_load_good(loader)) return;
-    wall->count = 1;
-    dem2di_part_describe(wall, &w->parts[wall->first]);
+    while (wall->first + wall->count < w->part_count &&
+           w->parts[wall->first + wall->count].wall == slot)
+        wall->count++;
+    if (dem2di_one_part_described(w, slot))
+        w->parts[wall->first] = dem2di_part_described(&wall->desc, slot, 0);
+    dem2di_finish_parts(loader, wall);
+    w->wall_now[slot].q = dem2d_rot_make(w->wall_now[slot].angle);
+    w->wall_before[slot].q = dem2d_rot_make(w->wall_before[slot].angle);
+    dem2di_radius_set(w, slot);
     dem2di_surfaces_set(w, slot);
     for (int i = 0; i < 2; i++) {
         if (wall->desc.spans[i].generation == 0) continue;
@@ -21925,6 +22430,10 @@ DEM2D_API dem2d_result dem2d_world_write_csv(const dem2d_world *world, const dem
             Units, ranges and defaults of options are said once, in the comments of the descs.
             Particles and walls may have a name of 64 bits, which orders pairs and sums in place of
             the id (name in their descs and infos).
+            Walls turn about a pivot (angular_velocity, dem2d_world_drive_wall), run as belts
+            (surface_speed), and may be chains of segments (points, count, closed), which have
+   forces per part (dem2d_world_get_wall_part, dem2d_contact_info.part_b). Snapshots without parts
+            are read.
             Polygons in contact at one point take a third less time, smooth grains a tenth.
             New: queries of space (dem2d_world_query_box, _query_point, _query_shape, _cast_ray,
             _cast_ray_all, _nearest), and dem2d_world_particle_contacts.

@@ -402,9 +402,12 @@ static void with_custom(args *a, fixture *f) {
     a->d.custom.support = round_support, a->d.custom.mass.area = (double)TEST_PI;
     a->d.custom.mass.polar_moment = (double)TEST_PI / 2;
 }
-static void with_first(args *a, fixture *f) { /* of a set */
+static void with_first(args *a, fixture *f) { /* of a set, of a wall's parts */
     (void)f;
     a->count = 0;
+}
+static void with_floor(args *a, fixture *f) { /* no servo wall */
+    a->wall = f->walls[0];
 }
 static void with_samples(args *a, fixture *f) {
     (void)f;
@@ -752,6 +755,12 @@ typedef struct function {
       LOGS, IN_WORLD, ARG(wall, "wall", WALL_ID))                                                 \
     F(world_get_wall, dem2d_world_get_wall(v->world, v->wall, v->out),                            \
       LOGS, IN_WORLD, ARG(wall, "wall", WALL_ID), OUT)                                            \
+    F(world_get_wall_part, dem2d_world_get_wall_part(v->world, v->wall, v->count, v->out),        \
+      DESCRIBED(NO_DESC, with_first), IN_WORLD, ARG(wall, "wall", WALL_ID),                       \
+      ARG_INT(count, "part", 0, 0, OUT_OF_RANGE), OUT)                                            \
+    F(world_drive_wall, dem2d_world_drive_wall(v->world, v->wall, v->vector, v->x),               \
+      DESCRIBED(NO_DESC, with_floor), IN_WORLD, ARG(wall, "wall", WALL_ID),                       \
+      ARG(vector, "velocity", VECTOR), ARG(x, "angular_velocity", FINITE))                        \
     F(world_set_gravity, dem2d_world_set_gravity(v->world, v->vector),                            \
       LOGS, IN_WORLD, ARG(vector, "gravity", VECTOR))                                             \
     F(world_set_damping, dem2d_world_set_damping(v->world, v->x, v->y),                           \
