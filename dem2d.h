@@ -289,8 +289,9 @@ HOW TO
       out to processes   within reach, with the same names. dem2d_world_desc.gather gives each ghost
                          the force that its owner has found: the worlds then move like one, to the
                          bit. commit lets them agree whether a step is made (tests/test_exchange.c).
-    use a law of yours   dem2d_world_desc.law: it gets the depth, the velocities at the contact and
-                         the state it stored in the step before.
+    use a law of yours   dem2d_world_desc.law: it gets contact points in arrays (dem2d_law_batch),
+                         and writes their forces. dem2d_law_builtin does what the world would do:
+                         call it first and change what it wrote, or change its coefficients before.
     change how two       dem2d_world_set_pair: stiffnesses, friction, damping ratio and rolling
       materials meet     friction of a pair. With friction 0, for example, a wall is smooth.
     change a world       Between steps: dem2d_world_set_gravity, dem2d_world_set_damping,
@@ -438,8 +439,8 @@ THREADS
     results, and sums are taken in the order of names and ids. So neither the number of threads nor
 the distribution of the blocks can change a bit. One thread does the short loops over all particles
     when the list is rebuilt, the sums of the forces on walls, and the speeds of servo walls. All
-    threads call custom support functions and laws (the calling thread also calls a law for the
-    speed of a servo wall); only the thread that called the step allocates and writes to the log.
+    threads call custom support functions and laws; only the thread that called the step allocates
+    and writes to the log.
 
 COSTS (instructions per circle and step of a settled bed with 2.0 contacts each, gcc -O2, by
 `make -C tests bench-cost`; a feature that the scene does not use costs nothing: which features are
@@ -1233,43 +1234,68 @@ typedef struct dem2d_pair_desc {
     double rolling_damping_ratio;
 } dem2d_pair_desc;
 
-/// A contact as a caller's law gets it. Velocities are those of the last step, half a step before
-/// the positions, whatever has been set since.
-typedef struct dem2d_law_input {
-    dem2d_pair_desc pair; ///< properties of contacts of the two materials
-    dem2d_particle_id a;  ///< particle A
-    dem2d_particle_id b;  ///< particle B; generation 0 when B is a wall
-    dem2d_wall_id wall;   ///< wall B; generation 0 when B is a particle
-    dem2d_vec normal;     ///< unit, from A to B
-    double time_step;     ///< s, of the last step: sliding times it is the distance slid
-    double depth;         ///< m, > 0
-    double approach;      ///< m/s, approach speed of A and B along the normal
-    /// m/s, sliding velocity of B relative to A along the normal turned by +90 degrees: mean of the
-    /// step, see Sliding in the manual.
-    double sliding;
-    double spin;             ///< rad/s, spin of B relative to A
-    double mass;             ///< kg/m, reduced; 0 for a servo wall and a particle that is not free
-    double radius;           ///< m, reduced, of the equivalent radii
-    double tangential_force; ///< N/m, in the step before; 0 for a new contact
-    double moment;           ///< N, likewise
-    double state[2];         ///< as the law left it in the step before; 0 for a new contact
-} dem2d_law_input;
+/// Contact points of closed contacts as a caller's law gets them: arrays of `count` elements, one
+/// of each array for a row. A contact of two points has two rows, one after the other; what is of
+/// the contact as a whole is in both, unless said otherwise. Velocities are those of the last step,
+/// half a step before the positions, whatever has been set since. There is no row for a contact
+/// across a gap: a later version may add the reach of a law, and whether it wants to keep a
+/// contact.
+typedef struct dem2d_law_batch {
+    int count;        ///< rows, > 0
+    double time_step; ///< s, of the last step: sliding times it is the distance slid
+    /* to read: */
+    const dem2d_pair_desc *const *pair; ///< properties of contacts of the two materials
+    const dem2d_particle_id *a;         ///< particle A
+    const dem2d_particle_id *b;         ///< particle B; generation 0 when B is a wall
+    const dem2d_wall_id *wall;          ///< wall B; generation 0 when B is a particle
+    const int *point;                   ///< 0; of the second of two points 1
+    const double *normal_x;             ///< unit, from A to B
+    const double *normal_y;             ///< likewise
+    const double *depth;                ///< m, > 0 for one point
+    const double *weight;               ///< part of the stiffness that is at this point: 1 for one
+    const double *sign;                 ///< 1; -1: only the normal force counts, subtracted
+    const double *compression;          ///< m2, energy of the normal springs over the stiffness:
+                                        ///< depth^2/2 for one point, in one row of two
+    const double *approach;             ///< m/s, approach speed along the normal at this point
+    const double *sliding;              ///< m/s, velocity of B against A along the normal turned by
+                                        ///< +90 degrees: mean of the step, see Sliding
+    const double *spin;                 ///< rad/s, of B against A
+    const double *mass;                 ///< kg/m, reduced; 0 where neither is free
+    const double *radius;               ///< m, reduced, of the equivalent radii
+    const double *last_tangential;      ///< N/m, tangential_force less viscous_tangential in the
+                                        ///< step before; 0 for a new contact
+    const double *last_moment;          ///< N, likewise of the moment, in the first row of two
+    /* coefficients of the built-in law, which may be changed before it is called: */
+    double *stiffness; ///< N/m, normal, of weight 1. Servo walls and the bounds of the time
+                       ///< step use it: for another law, how the force rises with depth
+    double *dashpot;   ///< N s/m, normal, of weight 1; used and to be set likewise
+    double *tangential_stiffness; ///< N/m, of weight 1
+    double *tangential_dashpot;   ///< N s/m, of weight 1
+    double *friction;             ///< coefficient
+    double *rolling_stiffness;    ///< N m
+    double *rolling_dashpot;      ///< N m s
+    double *rolling_friction;     ///< m, moment over normal force
+    /* to write, forces on B: */
+    double *normal_force;     ///< N/m, 0 at the call; below 0 it pulls, while the contact is closed
+    double *viscous_normal;   ///< N/m, part of it that is a dashpot's: at the call the built-in's
+    double *tangential_force; ///< N/m, along the normal turned by +90 degrees; 0 at the call
+    double *viscous_tangential; ///< N/m, part of it that is a dashpot's, 0 at the call
+    double *moment;             ///< N, 0 at the call; of two rows the sum counts
+    double *viscous_moment;     ///< N, likewise
+    double *energy;             ///< J/m, stored in the contact; 0 at the call, of two rows the sum
+    double (*state)[2]; ///< as the law left it in the step before; 0 for a new contact. Where
+                        ///< one point becomes two, both go on from its state
+} dem2d_law_batch;
 
-/// Forces that a caller's law returns; at the call all zero, except the state: that of the input.
-typedef struct dem2d_law_output {
-    double normal_force;     ///< N/m, on B along the normal; below 0 it pulls, while depth > 0
-    double tangential_force; ///< N/m, on B along the normal turned by +90 degrees
-    double moment;           ///< N, on B
-    double energy;           ///< J/m, stored in the contact, for the energies
-    double state[2];         ///< for the next step
-} dem2d_law_output;
+/// A contact law: writes the forces of all rows. Each closed contact is in one call of each force
+/// pass, by the threads of parallel_for; results must not depend on which contacts share a call.
+/// When the shapes separate, force and state are dropped.
+typedef void dem2d_law_fn(void *user, dem2d_law_batch *batch);
 
-/// A contact law: forces of a contact. It is called while depth > 0, by the threads of
-/// parallel_for. When the shapes separate, its force ends and its state is dropped. For a contact
-/// with a servo wall it is called once more in each step, by the calling thread, with a little more
-/// depth and approach speed: the wall needs to know how the force will rise, and uses nothing else
-/// of that answer.
-typedef void dem2d_law_fn(void *user, const dem2d_law_input *input, dem2d_law_output *output);
+/// The built-in law for all rows of a batch, for a law that begins or ends with it: springs,
+/// dashpots, friction, rolling friction and their energies by the coefficients of the batch. Writes
+/// all forces and energies; leaves state as it is. NULL is allowed.
+DEM2D_API void dem2d_law_builtin(dem2d_law_batch *batch);
 
 /// Sums of the contact forces of a step, for a callback that may change them. Rows of particles are
 /// by the index of their id, those of walls by the index of the wall's; of free ids they are 0.
@@ -1321,7 +1347,7 @@ typedef struct dem2d_world_desc {
     int pair_capacity;         ///< reserved at creation, 0 to 2^30; 0 grows
     bool skip_time_step_check; ///< no stability check
     bool ledger;               ///< keep the ledger of energies, see dem2d_world_ledger
-    /// Replaces springs, dashpot and friction, and contacts have one point. NULL for the built-in.
+    /// Replaces springs, dashpots and friction. NULL for the built-in law.
     dem2d_law_fn *law;
     void *law_user;                  ///< passed to law
     int law_tag;                     ///< identifies law in snapshots
@@ -11177,6 +11203,11 @@ static inline bool dem2di_has_two_points(const dem2di_point_pair *pair) {
     return pair->weight[0] > 0 || pair->weight[1] > 0;
 }
 
+/* Have the two points changed places: is one end's corner now that of the other end? */
+static bool dem2di_has_crossed(const dem2di_point_pair *last, const dem2di_point_pair *pair) {
+    return pair->corner[0] == last->corner[1] || pair->corner[1] == last->corner[0];
+}
+
 /* The springs of the last step's points, handed on to those of this step. Each stays at its end of
    the common part, whichever shape's corner that is by now; where one end's corner is now that of
    the other end, both have changed sides, as a grain tips over it. A spring of one point is shared
@@ -11190,8 +11221,7 @@ static void dem2di_point_pair_carry(const dem2di_contact *last, const dem2di_poi
         shear[0] = last->shear - shear[1];
         return;
     }
-    bool crossed =
-        pair->corner[0] == last_pair->corner[1] || pair->corner[1] == last_pair->corner[0];
+    bool crossed = dem2di_has_crossed(last_pair, pair);
     shear[0] = last_pair->shear[crossed ? 1 : 0];
     shear[1] = last_pair->shear[crossed ? 0 : 1];
 }
@@ -11284,7 +11314,9 @@ typedef struct dem2di_law_rows {
     int contact[DEM2DI_BATCH]; /* number in the list */
     /* geometry, and how the two moved in the step that was made */
     double depth[DEM2DI_BATCH], approach[DEM2DI_BATCH], sliding[DEM2DI_BATCH], spin[DEM2DI_BATCH];
-    /* of the pair of materials, here: the part of the point, the reduced mass and radius are in */
+    /* part of the contact that is at this point; of the pair of materials, with the reduced masses
+       and the reduced radius in */
+    double weight[DEM2DI_BATCH];
     double stiffness[DEM2DI_BATCH], dashpot[DEM2DI_BATCH], friction[DEM2DI_BATCH];
     double tangential_stiffness[DEM2DI_BATCH], tangential_dashpot[DEM2DI_BATCH];
     double rolling_stiffness[DEM2DI_BATCH], rolling_dashpot[DEM2DI_BATCH];
@@ -11294,7 +11326,15 @@ typedef struct dem2di_law_rows {
     double last_shear[DEM2DI_BATCH], last_moment[DEM2DI_BATCH];
     double force[DEM2DI_BATCH], shear[DEM2DI_BATCH], moment[DEM2DI_BATCH];
     double viscous_shear[DEM2DI_BATCH], viscous_moment[DEM2DI_BATCH]; /* parts of the dashpots */
-    dem2di_two state[DEM2DI_BATCH]; /* what the caller's law keeps */
+    double viscous[DEM2DI_BATCH]; /* part of the normal force that a dashpot has */
+    /* for a caller's law alone: see dem2d_law_batch */
+    const dem2d_pair_desc *pair[DEM2DI_BATCH];
+    dem2d_particle_id a[DEM2DI_BATCH], b[DEM2DI_BATCH];
+    dem2d_wall_id wall[DEM2DI_BATCH];
+    int point[DEM2DI_BATCH];
+    double normal_x[DEM2DI_BATCH], normal_y[DEM2DI_BATCH], sign[DEM2DI_BATCH];
+    double compression[DEM2DI_BATCH], mass[DEM2DI_BATCH], radius[DEM2DI_BATCH];
+    double energy[DEM2DI_BATCH], state[DEM2DI_BATCH][2];
 } dem2di_law_rows;
 
 /* A force held within its limit. */
@@ -11327,14 +11367,19 @@ static DEM2DI_INLINE double dem2di_slider(double stiffness, double dashpot, doub
 static DEM2DI_INLINE void dem2di_law_points(dem2di_law_rows *rows, double time_step, bool normal,
                                             bool tangential) {
     for (int k = 0; k < rows->count; k++) {
-        double force = rows->stiffness[k] * rows->depth[k], rate = rows->sliding[k];
-        double kt = rows->tangential_stiffness[k], last = rows->last_shear[k];
-        if (normal) force = dem2di_damped(force, rows->dashpot[k], rows->approach[k]);
+        const double weight = rows->weight[k],
+                     spring = rows->stiffness[k] * weight * rows->depth[k];
+        double force = spring, rate = rows->sliding[k];
+        double kt = rows->tangential_stiffness[k] * weight, last = rows->last_shear[k];
+        if (normal) {
+            force = dem2di_damped(spring, weight * rows->dashpot[k], rows->approach[k]);
+            rows->viscous[k] = force - spring;
+        }
         double limit = rows->friction[k] * force;
         rows->force[k] = force;
         if (tangential)
-            rows->shear[k] = dem2di_slider(kt, rows->tangential_dashpot[k], rate, time_step, limit,
-                                           last, &rows->viscous_shear[k]);
+            rows->shear[k] = dem2di_slider(kt, weight * rows->tangential_dashpot[k], rate,
+                                           time_step, limit, last, &rows->viscous_shear[k]);
         else
             rows->shear[k] = dem2di_held(limit, last - kt * rate * time_step);
     }
@@ -11380,6 +11425,42 @@ static void dem2di_law_solve(dem2di_law_rows *rows, double time_step, int terms)
         dem2di_law_springs(rows, time_step);
     if (terms & DEM2DI_ROLLING)
         dem2di_law_rolling(rows, time_step, (terms & DEM2DI_ROLLING_DASHPOT) != 0);
+}
+
+/* Energy of a spring that carries a force; 0 without a spring. */
+static double dem2di_spring_energy_of(double stiffness, double force) {
+    return stiffness > 0 ? force * (force / stiffness) / 2 : 0;
+}
+
+/* As dem2di_law_points and dem2di_law_rolling, for one row and the next. */
+static void dem2di_law_builtin_row(dem2d_law_batch *b, int k) {
+    const double weight = b->weight[k], dt = b->time_step;
+    const double spring = b->stiffness[k] * weight * b->depth[k];
+    const double force = dem2di_damped(spring, weight * b->dashpot[k], b->approach[k]);
+    const double kt = b->tangential_stiffness[k] * weight;
+    b->normal_force[k] = force;
+    b->viscous_normal[k] = force - spring;
+    b->tangential_force[k] =
+        dem2di_slider(kt, weight * b->tangential_dashpot[k], b->sliding[k], dt,
+                      b->friction[k] * force, b->last_tangential[k], &b->viscous_tangential[k]);
+    b->energy[k] = b->stiffness[k] * b->compression[k] +
+                   dem2di_spring_energy_of(kt, b->tangential_force[k] - b->viscous_tangential[k]);
+}
+
+DEM2D_API void dem2d_law_builtin(dem2d_law_batch *b) {
+    if (b == NULL) return;
+    for (int k = 0; k < b->count; k++) dem2di_law_builtin_row(b, k);
+    for (int k = 0; k < b->count; k++) {
+        b->moment[k] = b->viscous_moment[k] = 0;
+        if (b->point[k] > 0) continue;
+        bool two = k + 1 < b->count && b->point[k + 1] > 0;
+        double force = two ? b->normal_force[k] + b->normal_force[k + 1] : b->normal_force[k];
+        b->moment[k] =
+            dem2di_slider(b->rolling_stiffness[k], b->rolling_dashpot[k], b->spin[k], b->time_step,
+                          b->rolling_friction[k] * force, b->last_moment[k], &b->viscous_moment[k]);
+        b->energy[k] +=
+            dem2di_spring_energy_of(b->rolling_stiffness[k], b->moment[k] - b->viscous_moment[k]);
+    }
 }
 
 /* --- forces on the two -------------------------------------------------------------------------
@@ -11692,8 +11773,12 @@ typedef struct dem2di_contacts {
     double *moment;        /* on B, N */
     double *viscous_shear; /* parts of shear and moment that dashpots have */
     double *viscous_moment;
-    double *energy;    /* J/m, of the caller's law, */
-    dem2di_two *state; /* and what it keeps */
+    double *viscous;   /* of a caller's law: part of the normal force, */
+    double *stiffness; /* coefficients of its first row, */
+    double *dashpot;
+    double *energy;          /* J/m, */
+    dem2di_two *state;       /* and what it keeps of the first row, */
+    dem2di_two *point_state; /* as point_pairs: of the second */
     /* as point_pairs: parts of the points' normal and tangential forces that dashpots have */
     dem2di_two *point_viscous, *point_viscous_shear;
     double *relief; /* of all but circles, where segments are joined: part of the normal force that
@@ -11852,12 +11937,13 @@ typedef enum dem2di_group {
     DEM2DI_MOMENTS,              /* of all contacts, where plan.terms has DEM2DI_ROLLING, */
     DEM2DI_VISCOUS_SHEARS,       /* DEM2DI_TANGENTIAL_DASHPOT, */
     DEM2DI_VISCOUS_MOMENTS,      /* DEM2DI_ROLLING_DASHPOT, */
-    DEM2DI_CALLERS,              /* DEM2DI_CALLERS_LAW */
+    DEM2DI_CALLERS,              /* or DEM2DI_CALLERS_LAW */
     DEM2DI_TOUCHES,              /* of all contacts, where plan.events */
     DEM2DI_GENERAL,              /* of all but circles */
     DEM2DI_POINT_PAIRS,          /* of these, where plan.faces, */
     DEM2DI_POINT_VISCOUS,        /* and plan.terms has DEM2DI_DASHPOT, */
-    DEM2DI_POINT_VISCOUS_SHEARS, /* or DEM2DI_TANGENTIAL_DASHPOT */
+    DEM2DI_POINT_VISCOUS_SHEARS, /* DEM2DI_TANGENTIAL_DASHPOT, */
+    DEM2DI_POINT_CALLERS,        /* or DEM2DI_CALLERS_LAW */
     DEM2DI_JOINED,               /* where plan.joints */
     DEM2DI_ADJACENCY,
     DEM2DI_BLOCK_RESULTS,
@@ -12425,6 +12511,9 @@ static const dem2di_column dem2di_columns[] = {
     DEM2DI_CONTACT_COLUMN("moment", MOMENTS, moment, finite_field),
     DEM2DI_CONTACT_COLUMN("viscous_shear", VISCOUS_SHEARS, viscous_shear, finite_field),
     DEM2DI_CONTACT_COLUMN("viscous_moment", VISCOUS_MOMENTS, viscous_moment, finite_field),
+    DEM2DI_CONTACT_COLUMN("law_viscous_force", CALLERS, viscous, any_field),
+    DEM2DI_CONTACT_COLUMN("law_stiffness", CALLERS, stiffness, any_field),
+    DEM2DI_CONTACT_COLUMN("law_dashpot", CALLERS, dashpot, any_field),
     DEM2DI_CONTACT_COLUMN("law_energy", CALLERS, energy, any_field), /* the caller's: anything */
     DEM2DI_CONTACT_COLUMN("law_state", CALLERS, state, any_two),
     DEM2DI_CONTACT_COLUMN("arms", GENERAL, arms, arms_fields),
@@ -12432,6 +12521,7 @@ static const dem2di_column dem2di_columns[] = {
                   history_fields),
     DEM2DI_CONTACT_COLUMN("two_points", POINT_PAIRS, point_pairs, point_pair_fields),
     DEM2DI_CONTACT_COLUMN("point_viscous_forces", POINT_VISCOUS, point_viscous, finite_two),
+    DEM2DI_CONTACT_COLUMN("point_law_state", POINT_CALLERS, point_state, any_two),
     DEM2DI_CONTACT_COLUMN("point_viscous_shears", POINT_VISCOUS_SHEARS, point_viscous_shear,
                           finite_two),
     DEM2DI_CONTACT_COLUMN("reliefs", JOINED, relief, finite_field),
@@ -12580,6 +12670,7 @@ static bool dem2di_plan_needs(const dem2di_plan *plan, dem2di_group group) {
     if (group == DEM2DI_TOUCHES) return plan->events;
     if (group == DEM2DI_POINT_PAIRS) return plan->faces;
     if (group == DEM2DI_POINT_VISCOUS) return plan->faces && (terms & DEM2DI_DASHPOT);
+    if (group == DEM2DI_POINT_CALLERS) return plan->faces && (terms & DEM2DI_CALLERS_LAW);
     if (group == DEM2DI_POINT_VISCOUS_SHEARS)
         return plan->faces && (terms & DEM2DI_TANGENTIAL_DASHPOT);
     if (group == DEM2DI_JOINED) return plan->joints;
@@ -13140,13 +13231,16 @@ static void dem2di_terms_clear(dem2d_world *world, int i) {
     if (terms & DEM2DI_TANGENTIAL_DASHPOT) contacts->viscous_shear[i] = 0;
     if (terms & DEM2DI_ROLLING_DASHPOT) contacts->viscous_moment[i] = 0;
     if (terms & DEM2DI_CALLERS_LAW) {
-        contacts->energy[i] = 0;
+        contacts->energy[i] = contacts->viscous[i] = 0;
+        contacts->stiffness[i] = contacts->dashpot[i] = 0;
         memset(&contacts->state[i], 0, sizeof *contacts->state);
     }
     if (!world->plan.faces || at < 0) return;
     memset(&contacts->point_pairs[at], 0, sizeof *contacts->point_pairs);
     if (terms & DEM2DI_DASHPOT)
         memset(&contacts->point_viscous[at], 0, sizeof *contacts->point_viscous);
+    if (terms & DEM2DI_CALLERS_LAW)
+        memset(&contacts->point_state[at], 0, sizeof *contacts->point_state);
     if (terms & DEM2DI_TANGENTIAL_DASHPOT)
         memset(&contacts->point_viscous_shear[at], 0, sizeof *contacts->point_viscous_shear);
 }
@@ -13315,11 +13409,22 @@ static double dem2di_rolling_inverse(const dem2d_world *world, int i) {
     return i >= world->list.pairs ? a : a + world->inverse[key->b].inertia;
 }
 
-/* The dashpots of a contact: normal, tangential, and against rolling. */
-static double dem2di_normal_dashpot(const dem2d_world *world, int i) {
+/* The normal stiffness of a closed contact and its dashpots: normal, of a point of weight 1, as a
+   caller's law has set them, then tangential and against rolling. */
+static double dem2di_normal_stiffness(const dem2d_world *world, int i) {
+    if (world->law != NULL) return dem2di_max(0, world->list.contacts.stiffness[i]);
+    return dem2di_law_of(world, i)->normal_stiffness;
+}
+
+static double dem2di_pair_dashpot(const dem2d_world *world, int i) {
     const dem2d_pair_desc *law = dem2di_law_of(world, i);
     return dem2di_dashpot(law->damping_ratio, law->normal_stiffness,
                           dem2di_reduced_inverse(world, i));
+}
+
+static double dem2di_normal_dashpot(const dem2d_world *world, int i) {
+    if (world->law != NULL) return dem2di_max(0, world->list.contacts.dashpot[i]);
+    return dem2di_pair_dashpot(world, i);
 }
 
 static double dem2di_tangential_dashpot(const dem2d_world *world, int i, const dem2di_arms *arms) {
@@ -13437,10 +13542,11 @@ static inline int dem2di_sign_of(const dem2d_world *world, int i) {
 static double dem2di_viscous_of(const dem2d_world *world, const dem2di_contacts *from, int i,
                                 int k) {
     const int terms = world->plan.terms;
-    if (!(terms & DEM2DI_DASHPOT) || (terms & DEM2DI_CALLERS_LAW)) return 0;
+    if (!(terms & DEM2DI_DASHPOT)) return 0;
     if (dem2di_sign_of(world, i) < 0) return 0;
     if (dem2di_point_pair_of(world, from, i) != NULL)
         return from->point_viscous[i - world->list.discs].at[k];
+    if (terms & DEM2DI_CALLERS_LAW) return k == 0 ? from->viscous[i] : 0;
     return k == 0 ? from->force[i] - dem2di_law_of(world, i)->normal_stiffness * from->depth[i] : 0;
 }
 
@@ -15403,9 +15509,9 @@ typedef struct dem2di_build {
     double softness;
 } dem2di_build;
 
-/* Do two circles take the kernel of circles? It knows friction and the closed form, and no more. */
-static bool dem2di_has_disc_kernel(const dem2d_world *world, const dem2di_plan *plan) {
-    return world->solver == DEM2D_CERTIFIED && !(plan->terms & DEM2DI_CALLERS_LAW);
+/* Are two circles taken by the closed form? GJK and EPA take every pair. */
+static bool dem2di_has_discs(const dem2d_world *world) {
+    return world->solver == DEM2D_CERTIFIED;
 }
 
 /* Terms of the law for two materials, beside springs and friction. */
@@ -15454,8 +15560,7 @@ static dem2di_plan dem2di_plan_make(const dem2d_world *world) {
     plan.joints = world->joined;
     plan.terms_made = world->plan.terms_made;
     plan.terms = plan.terms_now | plan.terms_made;
-    plan.faces = plan.faces && world->law == NULL;
-    plan.turns = plan.turns || !dem2di_has_disc_kernel(world, &plan);
+    plan.turns = plan.turns || !dem2di_has_discs(world);
     plan.turns = plan.turns || (world->plan.turns && bodies > 0);
     plan.events = world->event_capacity > 0;
     plan.spin = plan.spin || plan.turns || plan.friction || world->gather != NULL || world->twisted;
@@ -15485,8 +15590,8 @@ static void dem2di_disc_task(void *context, int begin, int end) {
             disc->centre = world->now[i].x;
             disc->reach = world->now[i].radius + skin;
             disc->fixed = body->motion == DEM2D_FIXED;
-            disc->circle = dem2di_shape_of(world, body)->type == DEM2D_CIRCLE &&
-                           dem2di_has_disc_kernel(world, &build->plan);
+            disc->circle =
+                dem2di_shape_of(world, body)->type == DEM2D_CIRCLE && dem2di_has_discs(world);
             largest = dem2di_max(largest, disc->reach);
         }
         world->block_results[block].most = largest;
@@ -15912,14 +16017,14 @@ static bool dem2di_is_soft(const dem2d_world *world, double softness) {
 }
 
 /* May the next step look back on the contacts of the last force pass once those of its own are
-   there? The ledger, joints and a caller's law do, and a step that may be refused: by the caller,
+   there? The ledger and joints do, and a step that may be refused: by the caller,
    for a time step that some particle may not stand, or a state that may become infinite. */
 static bool dem2di_looks_back(const dem2d_world *world, const dem2di_plan *plan, bool bounded,
                               double softness) {
     bool soft = dem2di_is_soft(world, softness);
     bool checked = world->check_time_step && dem2di_check_is_due(world);
-    return world->ledger.kept || plan->joints || world->law != NULL || !bounded ||
-           world->gather != NULL || world->commit != NULL || (checked && !soft);
+    return world->ledger.kept || plan->joints || !bounded || world->gather != NULL ||
+           world->commit != NULL || (checked && !soft);
 }
 
 /* Scratch memory for the search and for what it finds. Contacts on their way come over the grid. */
@@ -16170,12 +16275,14 @@ static double dem2di_sliding_dashpots_work(const dem2d_world *world, int i) {
 /* One contact between the last force pass and this: forces act half at each, so that the energy
    they take is their mean times the way; where it opens or closes in between, the force of the one
    pass times the way by the contact's own geometry there. What sliding and rolling take is that
-   less what the springs gained. */
+   less what the springs gained. Of a caller's law, whose springs are not known, all that is taken
+   is: of one point the normal force times the change of the depth, of two times the way. */
 static void dem2di_observe_contact(const dem2d_world *world, int i, dem2di_ledger *ledger) {
     const dem2di_contacts *pass[2]; /* the last, this */
     dem2di_stored gained = {0, 0, 0};
     bool closed[2];
-    double slide = 0, shear = 0, moment = 0, force = 0, deeper = 0;
+    double slide = 0, shear = 0, moment = 0, force = 0, deeper = 0, pressed = 0, dashed = 0;
+    bool two = false;
     const dem2di_relative_motion motion = dem2di_motion_of(world, i);
     const double turning = motion.wb - motion.wa;
     pass[0] = &world->list.last;
@@ -16192,15 +16299,16 @@ static void dem2di_observe_contact(const dem2d_world *world, int i, dem2di_ledge
         shear += contact.shear / 2;
         force += contact.force / 2;
         deeper += k == 1 ? contact.depth : -contact.depth;
+        pressed += contact.force / 2 * closing * world->made_step;
+        two = two || dem2di_point_pair_of(world, pass[k], i) != NULL;
         moment += dem2di_moment_of(world, pass[k], i) / 2;
-        ledger->sum[DEM2DI_BY_DASHPOTS] +=
-            dem2di_dashpot_work(world, pass[k], i, contact.depth, closing, turning);
+        dashed += dem2di_dashpot_work(world, pass[k], i, contact.depth, closing, turning);
     }
     if (closed[0] && closed[1]) slide /= 2;
     const double damped = closed[1] ? dem2di_sliding_dashpots_work(world, i) : 0;
-    ledger->sum[DEM2DI_BY_DASHPOTS] += damped;
+    ledger->sum[DEM2DI_BY_DASHPOTS] += dashed + damped;
     double taken = -(shear * slide + moment * turning * world->made_step);
-    if (world->law != NULL) taken += force * deeper - gained.normal;
+    if (world->law != NULL) taken += (two ? pressed : force * deeper) - gained.normal - dashed;
     ledger->sum[DEM2DI_BY_FRICTION] += taken - gained.tangential - gained.rolling - damped;
 }
 
@@ -16606,19 +16714,6 @@ static int dem2di_collide_shapes(const dem2d_world *world, dem2di_pair *pair,
     return 1;
 }
 
-/* Two circles that overlap, among the others for the full law. */
-static int dem2di_collide_circles(const dem2di_state *a, const dem2di_state *b,
-                                  dem2di_contact *contact, dem2d_contact_point points[2],
-                                  dem2di_count *count) {
-    dem2di_round round = dem2di_round_make(dem2di_disc_line(a, b), a->radius, b->radius, 1);
-    contact->normal = round.normal;
-    contact->depth = round.depth;
-    points[0].position = dem2di_vec(0, 0); /* what circles have follows from the depth */
-    count->collisions++;
-    count->proofs[DEM2D_BY_FORM]++;
-    return round.depth > 0;
-}
-
 /* Geometry of one pair at the present positions. Returns the number of points that carry the
    contact, 0 when it is apart. */
 static int dem2di_collide_pair(const dem2d_world *world, int a, int b, const dem2di_contact *last,
@@ -16636,9 +16731,6 @@ static int dem2di_collide_pair(const dem2d_world *world, int a, int b, const dem
     dem2di_pair pair;
     pair.a = dem2di_shape_of(world, body_a);
     pair.b = dem2di_shape_of(world, body_b);
-    if (pair.a->type == DEM2D_CIRCLE && pair.b->type == DEM2D_CIRCLE &&
-        world->solver != DEM2D_GJK_EPA)
-        return dem2di_collide_circles(state_a, state_b, contact, points, count);
     pair.ra = state_a->q;
     pair.rb = state_b->q;
     pair.scale_a = body_a->scale;
@@ -16679,6 +16771,54 @@ static inline void dem2di_last_get(const dem2d_world *world, const dem2di_contac
         last->pair.shear[k] -= from->point_viscous_shear[at].at[k];
 }
 
+/* The rest of what a caller's law reads, of the rows from `first` on. */
+static void dem2di_law_add_callers(const dem2d_world *world, int i, const dem2di_last *last,
+                                   const dem2di_contact *contact, double radius, int first,
+                                   dem2di_law_rows *rows) {
+    const dem2di_key *key = &world->list.keys[i];
+    const dem2di_contacts *contacts = &world->list.contacts;
+    const dem2d_pair_desc *law = dem2di_law_of(world, i);
+    const int at = i - world->list.discs, last_at = last->at - world->list.discs;
+    const bool wall = i >= world->list.pairs, two = rows->count - first == 2;
+    const bool springs =
+        law->tangential_stiffness > 0; /* without, the built-in law has no friction */
+    const bool from_two = two && dem2di_has_two_points(&last->pair);
+    const bool crossed = from_two && dem2di_has_crossed(&last->pair, &contacts->point_pairs[at]);
+    const double inverse = dem2di_reduced_inverse(world, i);
+    const dem2d_particle_id no_particle = {0, 0};
+    const dem2d_wall_id no_wall = {0, 0};
+    for (int k = first; k < rows->count; k++) {
+        const bool second = k > first;
+        rows->pair[k] = law;
+        rows->a[k] = dem2di_particle_id(world, key->a);
+        rows->b[k] = wall ? no_particle : dem2di_particle_id(world, key->b);
+        rows->wall[k] = wall ? dem2di_wall_id(world, dem2di_wall_of(world, i)) : no_wall;
+        rows->point[k] = second;
+        rows->normal_x[k] = contact->normal.x;
+        rows->normal_y[k] = contact->normal.y;
+        rows->sign[k] = dem2di_sign_of(world, i);
+        rows->mass[k] = inverse > 0 ? 1 / inverse : 0;
+        rows->radius[k] = radius;
+        rows->compression[k] = contact->depth * contact->depth / 2;
+        if (!springs) rows->friction[k] = 0;
+        const dem2di_two *state = &last->from->state[last->at];
+        if (from_two && second != crossed) state = &last->from->point_state[last_at];
+        memcpy(rows->state[k], state->at, sizeof rows->state[k]);
+        if (!second) continue;
+        rows->spin[k] = rows->spin[first];
+        rows->rolling_stiffness[k] = rows->rolling_stiffness[first];
+        rows->rolling_dashpot[k] = rows->rolling_dashpot[first];
+        rows->rolling_friction[k] = rows->rolling_friction[first];
+        rows->last_moment[k] = 0;
+    }
+    if (!springs)
+        for (int k = first; k < rows->count; k++) rows->rolling_friction[k] = 0;
+    if (!two) return;
+    const bool carried = contacts->point_pairs[at].weight[0] > 0; /* by the first row? */
+    rows->compression[first] = carried ? contacts->point_pairs[at].energy : 0;
+    rows->compression[first + 1] = carried ? 0 : contacts->point_pairs[at].energy;
+}
+
 /* Terms of the law beside springs and friction, of the rows from `first` on. */
 static void dem2di_law_add_terms(const dem2d_world *world, int i, const dem2di_last *last,
                                  const dem2di_contact *contact,
@@ -16686,7 +16826,7 @@ static void dem2di_law_add_terms(const dem2d_world *world, int i, const dem2di_l
                                  dem2di_law_rows *rows) {
     const dem2d_pair_desc *law = dem2di_law_of(world, i);
     const double spin = motion->wb - motion->wa, approach = -dem2di_velocity_n(contact, motion);
-    const double dashpot = dem2di_normal_dashpot(world, i);
+    const double dashpot = dem2di_pair_dashpot(world, i);
     rows->approach[first] = approach;
     rows->dashpot[first] = dashpot;
     rows->tangential_dashpot[first] = dem2di_tangential_dashpot(world, i, &contact->arms);
@@ -16695,20 +16835,21 @@ static void dem2di_law_add_terms(const dem2d_world *world, int i, const dem2di_l
         double sliding = rows->tangential_dashpot[first];
         for (int k = 0; k < 2; k++) {
             rows->approach[first + k] = approach + spin * pair->offset[k];
-            rows->dashpot[first + k] = pair->weight[k] * dashpot;
-            rows->tangential_dashpot[first + k] = pair->weight[k] * sliding;
+            rows->dashpot[first + k] = dashpot;
+            rows->tangential_dashpot[first + k] = sliding;
         }
     }
     if (!(world->plan.terms & DEM2DI_ROLLING)) return;
-    double radius = law->rolling_friction > 0 ? dem2di_reduced_radius(world, i) : 0;
+    bool rolls = law->rolling_friction > 0 || world->law != NULL;
+    double radius = rolls ? dem2di_reduced_radius(world, i) : 0;
     rows->spin[first] = spin;
     rows->rolling_stiffness[first] = dem2di_rolling_stiffness(law, radius);
     rows->rolling_friction[first] = law->rolling_friction * radius;
     rows->last_moment[first] =
         last->from->moment[last->at] - dem2di_viscous_moment_of(world, last->from, last->at);
     if (world->plan.terms & DEM2DI_ROLLING_DASHPOT)
-        rows->rolling_dashpot[first] = radius > 0 ? dem2di_rolling_dashpot(world, i) : 0;
-    if (world->law != NULL) rows->state[first] = last->from->state[last->at];
+        rows->rolling_dashpot[first] = rolls ? dem2di_rolling_dashpot(world, i) : 0;
+    if (world->law != NULL) dem2di_law_add_callers(world, i, last, contact, radius, first, rows);
 }
 
 /* One row of springs and friction. */
@@ -16719,8 +16860,9 @@ static DEM2DI_INLINE void dem2di_law_add_row(const dem2d_pair_desc *law, int i, 
     rows->contact[k] = i;
     rows->depth[k] = depth;
     rows->sliding[k] = slip;
-    rows->stiffness[k] = law->normal_stiffness * weight;
-    rows->tangential_stiffness[k] = law->tangential_stiffness * weight;
+    rows->weight[k] = weight;
+    rows->stiffness[k] = law->normal_stiffness;
+    rows->tangential_stiffness[k] = law->tangential_stiffness;
     rows->friction[k] = law->friction;
     rows->last_shear[k] = last_shear;
 }
@@ -16757,7 +16899,15 @@ static DEM2DI_INLINE void dem2di_law_add(const dem2d_world *world, int i, const 
     if (terms) dem2di_law_add_terms(world, i, last, contact, &motion, first, rows);
 }
 
-/* Forces of a contact of two points into the columns. Dashpots may move its centre. */
+/* Are the normal forces of two points those of their springs alone? */
+static bool dem2di_is_elastic(const dem2di_law_rows *rows, int k) {
+    for (int p = k; p < k + 2; p++)
+        if (rows->force[p] != rows->stiffness[p] * rows->weight[p] * rows->depth[p]) return false;
+    return true;
+}
+
+/* Forces of a contact of two points into the columns. Its centre is that of the normal forces: it
+   moves where these are not those of the springs alone. */
 static void dem2di_law_put_two(dem2d_world *world, int i, const dem2di_law_rows *rows, int k,
                                dem2di_contact *contact) {
     const int at = i - world->list.discs;
@@ -16770,10 +16920,8 @@ static void dem2di_law_put_two(dem2d_world *world, int i, const dem2di_law_rows 
         for (int p = 0; p < 2; p++)
             world->list.contacts.point_viscous_shear[at].at[p] = rows->viscous_shear[k + p];
     if (!(world->plan.terms & DEM2DI_DASHPOT)) return;
-    for (int p = 0; p < 2; p++)
-        world->list.contacts.point_viscous[at].at[p] =
-            force[p] - rows->stiffness[k + p] * rows->depth[k + p];
-    if (!(contact->force > 0)) return;
+    for (int p = 0; p < 2; p++) world->list.contacts.point_viscous[at].at[p] = rows->viscous[k + p];
+    if (contact->force == 0 || dem2di_is_elastic(rows, k)) return;
     double move =
         force[0] / contact->force * pair->offset[0] + force[1] / contact->force * pair->offset[1];
     dem2di_arms_shift(&contact->arms, move);
@@ -16796,6 +16944,23 @@ static DEM2DI_INLINE void dem2di_force_put(dem2d_world *world, int i, const dem2
     if (!world->bounded) count->load = dem2di_max(count->load, sum);
 }
 
+/* What a caller's law says of the contact of row k beside its forces, into the columns. */
+static void dem2di_law_put_callers(dem2d_world *world, int i, bool two, int k,
+                                   const dem2di_law_rows *rows) {
+    const dem2di_contacts *to = &world->list.contacts;
+    const int first = two && !(rows->weight[k] > 0) ? k + 1 : k;
+    to->viscous[i] = rows->viscous[k];
+    to->stiffness[i] = rows->stiffness[first];
+    to->dashpot[i] = rows->dashpot[first];
+    to->energy[i] = rows->energy[k];
+    memcpy(to->state[i].at, rows->state[k], sizeof to->state[i].at);
+    if (!two) return;
+    to->energy[i] += rows->energy[k + 1];
+    to->moment[i] += rows->moment[k + 1];
+    to->viscous_moment[i] += rows->viscous_moment[k + 1];
+    memcpy(to->point_state[i - world->list.discs].at, rows->state[k + 1], sizeof to->state[i].at);
+}
+
 /* Forces of the contact of row k into the columns, and its loads. Returns the number of its rows.
  */
 static DEM2DI_INLINE int dem2di_law_put(dem2d_world *world, const dem2di_law_rows *rows, int k,
@@ -16815,58 +16980,72 @@ static DEM2DI_INLINE int dem2di_law_put(dem2d_world *world, const dem2di_law_row
             rows->viscous_shear[k] + (two ? rows->viscous_shear[k + 1] : 0);
     if (world->plan.terms & DEM2DI_ROLLING_DASHPOT)
         contacts->viscous_moment[i] = rows->viscous_moment[k];
+    if (world->law != NULL) {
+        dem2di_law_put_callers(world, i, two, k, rows);
+        moment = contacts->moment[i];
+    }
     dem2di_force_put(world, i, &contact, moment, count);
     return two ? 2 : 1;
 }
 
-/* What the caller's law says of contact i, in row k, at a depth and an approach speed. */
-static void dem2di_ask_law(const dem2d_world *world, const dem2di_law_rows *rows, int k,
-                           double depth, double approach, dem2d_law_output *output) {
-    const dem2di_list *list = &world->list;
-    const int i = rows->contact[k];
-    const dem2di_key *key = &list->keys[i];
-    const double inverse = dem2di_reduced_inverse(world, i);
-    dem2d_law_input input;
-    memset(&input, 0, sizeof input);
-    memset(output, 0, sizeof *output);
-    input.pair = *dem2di_law_of(world, i);
-    input.a = dem2di_particle_id(world, key->a);
-    if (i < list->pairs)
-        input.b = dem2di_particle_id(world, key->b);
-    else
-        input.wall = dem2di_wall_id(world, dem2di_wall_of(world, i));
-    input.normal = dem2di_vec(list->contacts.normal_x[i], list->contacts.normal_y[i]);
-    input.time_step = world->made_step;
-    input.depth = depth;
-    input.approach = approach;
-    input.sliding = rows->sliding[k];
-    input.spin = rows->spin[k];
-    input.mass = inverse > 0 ? 1 / inverse : 0;
-    input.radius = dem2di_reduced_radius(world, i);
-    input.tangential_force = rows->last_shear[k];
-    input.moment = rows->last_moment[k];
-    memcpy(input.state, &rows->state[k], sizeof input.state);
-    memcpy(output->state, input.state, sizeof output->state);
-    world->law(world->law_user, &input, output);
+/* The rows as a caller's law gets them. */
+static dem2d_law_batch dem2di_law_batch_of(const dem2d_world *world, dem2di_law_rows *rows) {
+    dem2d_law_batch b;
+    b.count = rows->count;
+    b.time_step = world->made_step;
+    b.pair = rows->pair;
+    b.a = rows->a;
+    b.b = rows->b;
+    b.wall = rows->wall;
+    b.point = rows->point;
+    b.normal_x = rows->normal_x;
+    b.normal_y = rows->normal_y;
+    b.depth = rows->depth;
+    b.weight = rows->weight;
+    b.sign = rows->sign;
+    b.compression = rows->compression;
+    b.approach = rows->approach;
+    b.sliding = rows->sliding;
+    b.spin = rows->spin;
+    b.mass = rows->mass;
+    b.radius = rows->radius;
+    b.last_tangential = rows->last_shear;
+    b.last_moment = rows->last_moment;
+    b.stiffness = rows->stiffness;
+    b.dashpot = rows->dashpot;
+    b.tangential_stiffness = rows->tangential_stiffness;
+    b.tangential_dashpot = rows->tangential_dashpot;
+    b.friction = rows->friction;
+    b.rolling_stiffness = rows->rolling_stiffness;
+    b.rolling_dashpot = rows->rolling_dashpot;
+    b.rolling_friction = rows->rolling_friction;
+    b.normal_force = rows->force;
+    b.viscous_normal = rows->viscous;
+    b.tangential_force = rows->shear;
+    b.viscous_tangential = rows->viscous_shear;
+    b.moment = rows->moment;
+    b.viscous_moment = rows->viscous_moment;
+    b.energy = rows->energy;
+    b.state = rows->state;
+    return b;
 }
 
 /* The caller's law for all rows. */
-static void dem2di_law_ask(dem2d_world *world, dem2di_law_rows *rows) {
-    const dem2di_contacts *contacts = &world->list.contacts;
+static void dem2di_law_ask(const dem2d_world *world, dem2di_law_rows *rows) {
+    dem2d_law_batch batch = dem2di_law_batch_of(world, rows);
     for (int k = 0; k < rows->count; k++) {
-        dem2d_law_output output;
-        dem2di_ask_law(world, rows, k, rows->depth[k], rows->approach[k], &output);
-        rows->force[k] = output.normal_force;
-        rows->shear[k] = output.tangential_force;
-        rows->moment[k] = output.moment;
+        double weight = rows->weight[k], spring = rows->stiffness[k] * weight * rows->depth[k];
+        double damped = dem2di_damped(spring, weight * rows->dashpot[k], rows->approach[k]);
+        rows->viscous[k] = damped - spring;
+        rows->force[k] = rows->shear[k] = rows->moment[k] = rows->energy[k] = 0;
         rows->viscous_shear[k] = rows->viscous_moment[k] = 0;
-        contacts->energy[rows->contact[k]] = output.energy;
-        memcpy(&contacts->state[rows->contact[k]], output.state, sizeof output.state);
     }
+    world->law(world->law_user, &batch);
 }
 
 /* The law for the rows: their forces into the columns. */
 static void dem2di_law_apply(dem2d_world *world, dem2di_law_rows *rows, dem2di_count *count) {
+    if (rows->count == 0) return;
     if (world->law != NULL)
         dem2di_law_ask(world, rows);
     else
@@ -16911,10 +17090,6 @@ static DEM2DI_INLINE void dem2di_contact_place(dem2d_world *world, int i, int co
     }
     arms->b_n = pinned ? 0 : arms->a_n - along;
     arms->b_t = pinned ? 0 : arms->a_t - across;
-    if (circle_a && circle_b && world->solver != DEM2D_GJK_EPA) { /* as in the kernel of circles */
-        arms->b_n = -(world->now[key->b].radius - depth / 2);
-        arms->b_t = 0;
-    }
 }
 
 static inline void dem2di_no_load(dem2d_world *world, int i) {
@@ -17364,9 +17539,12 @@ static void dem2di_joined_subtract(dem2d_world *world, int i, dem2di_contact *co
     contact->force = -rows.stiffness[0] * contact->depth;
     contact->shear = 0;
     if (world->law != NULL) {
+        rows.dashpot[0] = rows.tangential_dashpot[0] = rows.rolling_dashpot[0] = 0;
+        rows.friction[0] = rows.rolling_friction[0] = 0;
         dem2di_law_ask(world, &rows);
         contact->force = -rows.force[0];
-        contacts->energy[i] = -contacts->energy[i];
+        contacts->energy[i] = -rows.energy[0];
+        memcpy(contacts->state[i].at, rows.state[0], sizeof contacts->state[i].at);
     }
     dem2di_force_put(world, i, contact, 0, count);
 }
@@ -17455,6 +17633,41 @@ static void dem2di_others_range(dem2d_world *world, int begin, int end, dem2di_c
     dem2di_law_apply(world, &rows, count);
 }
 
+/* Pairs of circles by rows, for a caller's law. */
+static void dem2di_discs_by_rows(dem2d_world *world, int begin, int end, dem2di_count *count) {
+    dem2di_list *list = &world->list;
+    dem2di_law_rows rows;
+    rows.count = 0;
+    for (int i = begin; i < end; i++) {
+        const dem2di_state *a = &world->now[list->keys[i].a], *b = &world->now[list->keys[i].b];
+        const bool held = world->immovable && dem2di_immovable(world, i);
+        dem2di_round r = dem2di_round_make(dem2di_disc_line(a, b), held ? 0 : a->radius,
+                                           held ? 0 : b->radius, 1);
+        dem2di_contact contact;
+        dem2di_last last;
+        last.from = &list->contacts;
+        last.at = i;
+        (void)dem2di_contact_get(world, &list->contacts, i, &last.contact);
+        last.contact.shear -= list->contacts.viscous_shear[i];
+        contact.normal = r.normal;
+        contact.depth = r.depth;
+        contact.arms.a_n = r.arm_a;
+        contact.arms.b_n = -r.arm_b;
+        contact.arms.a_t = contact.arms.b_t = 0;
+        if (r.depth > 0) {
+            dem2di_law_room(world, &rows, count);
+            dem2di_law_add(world, i, &last, false, &contact, &rows);
+            count->collisions++;
+            count->proofs[DEM2D_BY_FORM]++;
+        } else {
+            dem2di_contact_clear(world, i);
+            dem2di_no_load(world, i);
+        }
+        dem2di_geometry_put(list, i, &contact);
+    }
+    dem2di_law_apply(world, &rows, count);
+}
+
 /* Blocks of the three kinds of contacts, one kind after the other. */
 static void dem2di_force_task(void *context, int begin, int end) {
     dem2d_world *world = (dem2d_world *)context;
@@ -17468,7 +17681,9 @@ static void dem2di_force_task(void *context, int begin, int end) {
         int last = dem2di_block_end(first, size, round ? list->discs : list->count);
         memset(count, 0, sizeof *count);
         if (world->keeps_last) dem2di_contacts_keep(world, first, last, false);
-        if (round)
+        if (round && world->law != NULL)
+            dem2di_discs_by_rows(world, first, last, count);
+        else if (round)
             dem2di_disc_range(world, first, last, count);
         else
             dem2di_others_range(world, first, last, count);
@@ -17674,28 +17889,10 @@ static double dem2di_servo_forgets(const dem2di_backing *backing, double time_st
     return DEM2DI_SERVO_MEMORY * dem2di_min(1, times);
 }
 
-/* A caller's law is asked how its force rises with the speed: for a contact that closes a little
-   faster and is as much deeper. `elastic` is k dt. */
-static void dem2di_push_ask(const dem2d_world *world, int i, const dem2di_contact *contact,
-                            double elastic, double *impedance, double *spring) {
-    dem2di_last last;
-    dem2di_law_rows rows;
-    rows.count = 0;
-    dem2di_last_get(world, &world->list.last, i, &last);
-    dem2di_law_add(world, i, &last, false, contact, &rows);
-    double closing = rows.approach[0], deeper = contact->depth / 16;
-    double faster = deeper / world->time_step;
-    dem2d_law_output output;
-    dem2di_ask_law(world, &rows, 0, contact->depth + deeper, closing + faster, &output);
-    *impedance = dem2di_max((output.normal_force - contact->force) / faster, *impedance);
-    *spring = contact->force - (*impedance - elastic) * closing;
-}
-
 /* A contact of a servo wall in the next pass; what it adds to the wall's backing. */
 static dem2di_push dem2di_push_make(const dem2d_world *world, int i, const dem2di_contact *contact,
                                     dem2d_vec normal, dem2di_backing *backing) {
     const dem2di_list *list = &world->list;
-    const dem2d_pair_desc *law = dem2di_law_of(world, i);
     const dem2di_point_pair *pair = dem2di_point_pair_of(world, &list->contacts, i);
     int a = list->keys[i].a;
     double inverse = world->inverse[a].mass;
@@ -17706,13 +17903,12 @@ static dem2di_push dem2di_push_make(const dem2d_world *world, int i, const dem2d
         double offset = pair->weight[0] * pair->offset[0] + pair->weight[1] * pair->offset[1];
         dem2di_arms_shift(&arms, offset / weight);
     }
-    double stiffness = weight * law->normal_stiffness;
+    double stiffness = weight * dem2di_normal_stiffness(world, i);
     double elastic = stiffness * world->time_step;
     double impedance = elastic + weight * dem2di_normal_dashpot(world, i);
     if (world->plan.terms & DEM2DI_DASHPOT)
         spring -= dem2di_viscous_of(world, &list->contacts, i, 0) +
                   dem2di_viscous_of(world, &list->contacts, i, 1);
-    if (world->law != NULL) dem2di_push_ask(world, i, contact, elastic, &impedance, &spring);
     dem2di_state next = dem2di_foresee(world, a);
     double leaves = dem2di_dot(contact->normal, next.v) - arms.a_t * next.w;
     dem2di_push push;
@@ -18116,7 +18312,7 @@ static dem2di_stiffness dem2di_stiffness_sum(const dem2d_world *world, const dem
                                              int slot, int bound, dem2di_stiffness *damping) {
     const dem2di_list *list = &world->list;
     dem2di_stiffness sum = {0, 0, 0, 0, 0, 0};
-    const int damped = world->law == NULL ? world->plan.terms & ~DEM2DI_ROLLING : 0;
+    const int damped = world->plan.terms & ~DEM2DI_ROLLING;
     memset(damping, 0, sizeof *damping);
     for (int k = list->first[slot]; k < list->first[slot + 1]; k++) {
         int i = list->adjacent[k], side = k < list->own[slot];
@@ -18132,7 +18328,7 @@ static dem2di_stiffness dem2di_stiffness_sum(const dem2d_world *world, const dem
         bool sticks =
             world->law == NULL && fabs(contact.shear) < left * law->friction * contact.force;
         bool rubs = law->friction > 0 || world->law != NULL;
-        double f = bound == 1 && shared ? 2 : 1, kn = f * law->normal_stiffness;
+        double f = bound == 1 && shared ? 2 : 1, kn = f * dem2di_normal_stiffness(world, i);
         double slide = sticks || (bound == 1 && rubs) ? f * law->tangential_stiffness : 0;
         double arm_n = side ? contact.arms.b_n : contact.arms.a_n;
         double arm_t = side ? contact.arms.b_t : contact.arms.a_t;
@@ -20512,8 +20708,8 @@ static dem2d_result dem2di_writer_close(const dem2d_env *env, const char *path,
 
 /* ============================================================================================
    >>snapshot  State hash, snapshots: both follow the tables of columns and fields
-   uses: config, math, memory, fields, support, shapes, broad, motion, world, objects, walls,
-   joints, list, measures, output
+   uses: config, math, memory, fields, support, shapes, broad, law, motion, world, objects, walls,
+         joints, list, measures, output
    ============================================================================================ */
 
 /* To save, load, check and hash another number, add a row to the table of fields of its struct; for
@@ -21202,6 +21398,12 @@ static void dem2di_check_settings(dem2di_loader *loader) {
                        "kinds of contacts");
     dem2di_load_expect(loader, w->plan.material < (w->material_count > 0 ? w->material_count : 1),
                        "material of the plan");
+    int terms = w->plan.terms;
+    bool callers = (terms & DEM2DI_CALLERS_LAW) != 0;
+    dem2di_load_expect(loader,
+                       callers ? w->has_law && terms == DEM2DI_TERMS - 1
+                               : !w->has_law || w->list.count == 0,
+                       "terms of the law");
     if (!dem2di_load_good(loader) || !w->has_law) return;
     if (desc->law == NULL || desc->law_tag != w->law_tag) {
         const char *what = desc->law == NULL ? "law is NULL: law_tag" : "law_tag";
@@ -21405,7 +21607,7 @@ static bool dem2di_key_sound(const dem2d_world *w, int contact) {
     if (key->b >= w->body_count || w->bodies[key->b].shape_index < 0) return false;
     const dem2di_body *a = &w->bodies[key->a], *b = &w->bodies[key->b];
     bool round = dem2di_shape_of(w, a)->type == DEM2D_CIRCLE &&
-                 dem2di_shape_of(w, b)->type == DEM2D_CIRCLE && dem2di_has_disc_kernel(w, &w->plan);
+                 dem2di_shape_of(w, b)->type == DEM2D_CIRCLE && dem2di_has_discs(w);
     return a != b && round == (contact < w->list.discs) && (round || w->plan.turns);
 }
 
@@ -22415,6 +22617,10 @@ DEM2D_API dem2d_result dem2d_world_write_csv(const dem2d_world *world, const dem
             Dashpots beside the tangential spring and that against rolling:
             tangential_damping_ratio and rolling_damping_ratio of materials and pairs. In the safe
             time step each dashpot adds its lag to its own spring only.
+            A caller's law gets contact points in arrays (dem2d_law_batch), also of contacts of two
+            points, each contact once in a step, and may call dem2d_law_builtin. It replaces
+            dem2d_law_input and dem2d_law_output. For servo walls and the bounds of the time step
+            the law sets stiffness and dashpot where they are not those of the materials.
             Circles with dashpots and rolling friction are nearly as fast as those without. A step
             that would give circles a state that is not finite is refused.
             A tangential spring of one contact point is shared out to two by the forces of their

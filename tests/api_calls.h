@@ -4,6 +4,8 @@
 #ifndef API_CALLS_H
 #define API_CALLS_H
 
+#include "row_law.h"
+
 #include <float.h>
 #include <limits.h>
 
@@ -525,10 +527,14 @@ static const dem2d_custom_desc *find_custom(void *user, int tag) {
     return desc;
 }
 
-static void soft_law(void *user, const dem2d_law_input *in, dem2d_law_output *out) {
+static void soft_law_row(void *user, const row_in *in, row_out *out) {
     (void)user;
     out->normal_force = in->pair.normal_stiffness * in->depth;
     out->tangential_force = 1e-3 * out->normal_force, out->state[0] += 1;
+}
+
+static void soft_law(void *user, dem2d_law_batch *batch) {
+    for_rows(user, batch, soft_law_row);
 }
 
 static void with_load(args *a, fixture *f) { /* two round grains in contact, by a law */

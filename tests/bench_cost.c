@@ -114,15 +114,17 @@ static const scene *find_scene(const char *name) {
 }
 
 /* Spring and friction, as the world has them. */
-static void spring_law(void *user, const dem2d_law_input *in, dem2d_law_output *out) {
+static void spring_law(void *user, dem2d_law_batch *b) {
     (void)user;
-    const double force = in->pair.normal_stiffness * in->depth;
-    const double limit = in->pair.friction * force;
-    double along = in->tangential_force - in->pair.tangential_stiffness * in->sliding * in->time_step;
-    if (along > limit) along = limit;
-    if (along < -limit) along = -limit;
-    out->normal_force = force, out->tangential_force = along;
-    out->energy = 0.5 * force * in->depth;
+    for (int k = 0; k < b->count; k++) {
+        const double force = b->stiffness[k] * b->weight[k] * b->depth[k];
+        const double limit = b->friction[k] * force, slid = b->sliding[k] * b->time_step;
+        double along = b->last_tangential[k] - b->tangential_stiffness[k] * b->weight[k] * slid;
+        if (along > limit) along = limit;
+        if (along < -limit) along = -limit;
+        b->normal_force[k] = force, b->tangential_force[k] = along;
+        b->energy[k] = b->stiffness[k] * b->compression[k];
+    }
 }
 
 /* On a square lattice, in a box that holds them at area fraction 0.6. */

@@ -25,6 +25,7 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "row_law.h"
 #include "world_scene.h"
 
 enum {
@@ -535,7 +536,7 @@ static const dem2d_custom_desc *world_custom(void *user, int tag) {
 }
 
 /* A spring, a dashpot that may pull, friction, rolling drag. Without units of its own. */
-static void world_law(void *user, const dem2d_law_input *in, dem2d_law_output *out) {
+static void world_law_row(void *user, const row_in *in, row_out *out) {
     const double spring = in->pair.normal_stiffness * in->depth;
     const double drag = 0.25 * sqrt(in->mass * in->pair.normal_stiffness);
     const double limit = in->pair.friction * spring;
@@ -547,6 +548,10 @@ static void world_law(void *user, const dem2d_law_input *in, dem2d_law_output *o
     out->moment = -0.125 * drag * in->radius * (in->spin * in->radius);
     out->energy = spring * in->depth / 2;
     out->state[0] = in->state[0] + 1;
+}
+
+static void world_law(void *user, dem2d_law_batch *batch) {
+    for_rows(user, batch, world_law_row);
 }
 
 /* --- from the script to a view and back --------------------------------------------------------

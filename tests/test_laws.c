@@ -2,6 +2,8 @@
    the ledger of energies, which has to close. */
 #include "dem2d.h"
 #include "testing.h"
+#include "row_law.h"
+#include "snapshot_scenes.h"
 #include "world_scene.h"
 
 #include <float.h>
@@ -160,7 +162,7 @@ typedef struct law_calls {
 } law_calls;
 
 /* The built-in law once more; with a dashpot that is not clipped. */
-static void same_law(void *user, const dem2d_law_input *in, dem2d_law_output *out) {
+static void same_law_row(void *user, const row_in *in, row_out *out) {
     law_calls *seen = user;
     const double limit = in->pair.friction * in->pair.normal_stiffness * in->depth;
     seen->calls++;
@@ -176,6 +178,10 @@ static void same_law(void *user, const dem2d_law_input *in, dem2d_law_output *ou
         out->energy +=
             out->tangential_force * out->tangential_force / (2 * in->pair.tangential_stiffness);
     out->state[0] = in->state[0] + 1;
+}
+
+static void same_law(void *user, dem2d_law_batch *batch) {
+    for_rows(user, batch, same_law_row);
 }
 
 /* Grains of three kinds in a box; the last of them are the last added. */
@@ -225,6 +231,128 @@ static void test_callers_law(void **state) {
     assert_near(b.friction, a.friction, 1e-6);
     assert_within(b.closure, 0, 1e-3 * b.given);
     for (int k = 0; k < 2; k++) dem2d_world_destroy(s[k].world);
+}
+
+/* --- the built-in law as a caller's ---------------------------------------------------------- */
+
+typedef struct law_count {
+    int rows, contacts, points; /* of them second points */
+    double bad;
+} law_count;
+
+/* Forgets nothing, and counts. */
+static void builtin_law(void *user, dem2d_law_batch *b) {
+    law_count *seen = user;
+    for (int k = 0; k < b->count; k++) {
+        const bool second = b->point[k] > 0;
+        seen->rows++, seen->points += second, seen->contacts += !second;
+        if (b->normal_force[k] != 0 || b->tangential_force[k] != 0 || b->moment[k] != 0)
+            seen->bad = 1;
+        if (second && (k == 0 || b->a[k].index != b->a[k - 1].index)) seen->bad = 2;
+        if (!(b->weight[k] >= 0 && fabs(b->sign[k]) == 1 && b->stiffness[k] > 0)) seen->bad = 3;
+        if ((b->b[k].generation > 0) == (b->wall[k].generation > 0)) seen->bad = 4;
+    }
+    dem2d_law_builtin(b);
+}
+
+/* The same by own arithmetic, without tangential dashpots. */
+static void own_builtin_law(void *user, dem2d_law_batch *b) {
+    (void)user;
+    for (int k = 0; k < b->count; k++) {
+        const dem2d_pair_desc *pair = b->pair[k];
+        const double kn = pair->normal_stiffness * b->weight[k];
+        const double kt = pair->tangential_stiffness * b->weight[k], spring = kn * b->depth[k];
+        const double dashpot =
+            b->mass[k] > 0 ? 2 * pair->damping_ratio * sqrt(b->mass[k] * pair->normal_stiffness)
+                           : 0;
+        const double force = spring + b->weight[k] * dashpot * b->approach[k];
+        b->normal_force[k] = force > 0 ? force : 0;
+        const double limit = pair->friction * b->normal_force[k];
+        const double shear = b->last_tangential[k] - kt * b->sliding[k] * b->time_step;
+        b->tangential_force[k] = fmax(-limit, fmin(limit, shear));
+    }
+    for (int k = 0; k < b->count; k++) {
+        const dem2d_pair_desc *pair = b->pair[k];
+        const bool two = k + 1 < b->count && b->point[k + 1] == 1;
+        const double force = two ? b->normal_force[k] + b->normal_force[k + 1] : b->normal_force[k];
+        const double kr = pair->tangential_stiffness * b->radius[k] * b->radius[k];
+        const double limit = pair->rolling_friction * b->radius[k] * force;
+        const double moment = b->last_moment[k] - kr * b->spin[k] * b->time_step;
+        b->moment[k] = fmax(-limit, fmin(limit, moment));
+        k += two;
+    }
+}
+
+static void set_dashpots(const snapshot_scene *s, double tangential, double rolling) {
+    const dem2d_material_id ids[2] = {s->stone, s->rubber};
+    for (int i = 0; i < 2; i++)
+        for (int j = i; j < 2; j++) {
+            dem2d_pair_desc pair = {.normal_stiffness = 1e6 / (1 + i + j),
+                                    .tangential_stiffness = 7e5 / (1 + i + j),
+                                    .friction = 0.5,
+                                    .damping_ratio = 0.1 + 0.2 * i + 0.1 * j,
+                                    .rolling_friction = 0.0625,
+                                    .tangential_damping_ratio = tangential * (1 + j),
+                                    .rolling_damping_ratio = rolling * (1 + i)};
+            assert_ok(dem2d_world_set_pair(s->world, ids[i], ids[j], &pair));
+        }
+}
+
+static bool same_world(const snapshot_scene *a, const snapshot_scene *b, int count) {
+    for (int i = 0; i < count; i++) {
+        dem2d_particle_info p, q;
+        const dem2d_particle_id id = {(uint32_t)i, 1};
+        assert_ok(dem2d_world_get_particle(a->world, id, &p));
+        assert_ok(dem2d_world_get_particle(b->world, id, &q));
+        if (!(p.pose.position.x == q.pose.position.x && p.pose.position.y == q.pose.position.y &&
+              p.velocity.x == q.velocity.x && p.velocity.y == q.velocity.y &&
+              p.angular_velocity == q.angular_velocity && p.torque == q.torque))
+            return false;
+    }
+    for (int i = 0; i < SCENE_WALLS; i++) {
+        dem2d_wall_info p, q;
+        assert_ok(dem2d_world_get_wall(a->world, a->walls[i], &p));
+        assert_ok(dem2d_world_get_wall(b->world, b->walls[i], &q));
+        if (!(p.force.x == q.force.x && p.force.y == q.force.y && p.point.y == q.point.y))
+            return false;
+    }
+    return true;
+}
+
+/* The same bits for circles, other shapes, two points, walls, servo walls and joints; and each
+   contact is in one call of a step. */
+static void test_builtin_law(void **state) {
+    (void)state;
+    enum { GRAINS = 40 };
+    static const int kinds[] = {SCENE_CIRCLES, SCENE_RUBBING, SCENE_MIXED, SCENE_GJK,
+                                SCENE_DASHED,  SCENE_FULL,    SCENE_CHAIN};
+    for (int i = 0; i < COUNT_OF(kinds); i++)
+        for (int way = 0; way < 3; way++) { /* springs; all dashpots; own arithmetic */
+            snapshot_scene s[2];
+            law_count seen = {0};
+            int points = 0;
+            for (int k = 0; k < 2; k++) {
+                dem2d_world_desc desc = scene_desc(kinds[i]);
+                if (k == 1) desc.law = way == 2 ? own_builtin_law : builtin_law;
+                if (k == 1) desc.law_user = &seen;
+                scene_make(&s[k], kinds[i], GRAINS, &desc);
+                if (way > 0) set_dashpots(&s[k], way == 1 ? 0.2 : 0, way == 1 ? 0.1 : 0);
+            }
+            for (int step = 0; step < 400; step++) {
+                dem2d_stats stats;
+                memset(&seen, 0, sizeof seen);
+                for (int k = 0; k < 2; k++) assert_ok(dem2d_world_step(s[k].world, 1, NULL));
+                assert_ok(dem2d_world_stats(s[1].world, &stats));
+                assert_true(seen.bad == 0);
+                if (way < 2) assert_int_equal(seen.contacts, stats.contacts + stats.wall_contacts);
+                assert_true(same_world(&s[0], &s[1], GRAINS));
+                points += seen.points;
+            }
+            const bool flat =
+                kinds[i] == SCENE_MIXED || kinds[i] == SCENE_FULL || kinds[i] == SCENE_CHAIN;
+            assert_true(way == 2 || (points > 0) == flat);
+            for (int k = 0; k < 2; k++) dem2d_world_destroy(s[k].world);
+        }
 }
 
 /* A dashpot that may pull: e = exp(-pi zeta/s) at any speed. */
@@ -425,10 +553,11 @@ static void test_damped_time_step(void **state) {
 enum { PILE = 60 };
 
 /* Circles of two sizes and two materials rub and roll in a box; some lie on each other at the
-   start. Far away a circle is held that touches nothing. Where its material has a dashpot, all
-   pairs take the way of the full law instead of the kernel for circles. */
-static scene pile_make(double far_dashpot, dem2d_particle_id ids[PILE]) {
+   start. Far away a circle is held that touches nothing, whose material may have a dashpot. With
+   a caller's law circles go through the law by rows instead of the kernel for circles. */
+static scene pile_make(dem2d_law_fn *law, double far_dashpot, dem2d_particle_id ids[PILE]) {
     dem2d_world_desc desc = {0};
+    desc.law = law;
     desc.time_step = 1e-5, desc.gravity = vec(0.5, -9.81), desc.local_damping = 0.05;
     scene s = make_scene(desc, stone_desc(0.8 * KN, 0.4));
     dem2d_material_desc other = stone_desc(0.5 * KN, 0.9), far = stone_desc(0, 0);
@@ -484,22 +613,31 @@ static int count_different_contacts(const scene *a, const scene *b) {
     return different;
 }
 
+static void plain_law(void *user, dem2d_law_batch *batch) {
+    (void)user;
+    dem2d_law_builtin(batch);
+}
+
 /* The kernel for circles leaves out arms along the tangent: it must not change a bit. */
 static void test_circles_two_ways(void **state) {
     (void)state;
+    enum { WAYS = 3 };
     dem2d_particle_id ids[PILE];
-    const scene s[2] = {pile_make(0, ids), pile_make(0.3, ids)};
+    const scene s[WAYS] = {pile_make(NULL, 0, ids), pile_make(NULL, 0.3, ids),
+                           pile_make(plain_law, 0, ids)};
     for (int i = 0; i < 300; i++) {
-        for (int k = 0; k < 2; k++) {
+        for (int k = 0; k < WAYS; k++) {
             if (i == 100) /* another velocity than that of the step that was made */
                 assert_ok(
                     dem2d_world_drive_particle(s[k].world, ids[11], DEM2D_FREE, vec(2, 3), 50));
             assert_ok(dem2d_world_step(s[k].world, i < 10 ? 1 : 20, NULL));
         }
-        for (int j = 0; j < PILE; j++) assert_true(same_particle(&s[0], &s[1], ids[j]));
-        assert_int_equal(count_different_contacts(&s[0], &s[1]), 0);
+        for (int k = 1; k < WAYS; k++) {
+            for (int j = 0; j < PILE; j++) assert_true(same_particle(&s[0], &s[k], ids[j]));
+            assert_int_equal(count_different_contacts(&s[0], &s[k]), 0);
+        }
     }
-    for (int k = 0; k < 2; k++) dem2d_world_destroy(s[k].world);
+    for (int k = 0; k < WAYS; k++) dem2d_world_destroy(s[k].world);
 }
 
 /* Two circles with a spring so stiff that the step would throw them to infinity: it is refused. */
@@ -523,10 +661,11 @@ int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(test_damping_ratio),    cmocka_unit_test(test_restitution),
         cmocka_unit_test(test_rolling),          cmocka_unit_test(test_callers_law),
-        cmocka_unit_test(test_tension),          cmocka_unit_test(test_ledger_order),
-        cmocka_unit_test(test_ledger_closes),    cmocka_unit_test(test_ledger_edits),
-        cmocka_unit_test(test_law_changes),      cmocka_unit_test(test_damped_time_step),
-        cmocka_unit_test(test_circles_two_ways), cmocka_unit_test(test_infinite_circles),
+        cmocka_unit_test(test_builtin_law),      cmocka_unit_test(test_tension),
+        cmocka_unit_test(test_ledger_order),     cmocka_unit_test(test_ledger_closes),
+        cmocka_unit_test(test_ledger_edits),     cmocka_unit_test(test_law_changes),
+        cmocka_unit_test(test_damped_time_step), cmocka_unit_test(test_circles_two_ways),
+        cmocka_unit_test(test_infinite_circles),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -535,7 +535,8 @@ static void test_all_functions(void **state) {
                                          "world_destroy",
                                          "world_shape",
                                          "strain",
-                                         "world_hash"};
+                                         "world_hash",
+                                         "law_builtin"};
     char line[256];
     int found = 0, missing = 0;
     (void)state;

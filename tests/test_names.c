@@ -3,6 +3,7 @@
 #include "dem2d.h"
 #include "inside.h"
 #include "testing.h"
+#include "row_law.h"
 #include "world_scene.h"
 
 enum { GRAINS = 48, LATE = 12, WALLS = 7, STEPS = 1500 };
@@ -38,12 +39,16 @@ static uint64_t name_of(int i) {
 }
 
 /* A spring, a dashpot, and a moment that depends on who is A. */
-static void simple_law(void *user, const dem2d_law_input *in, dem2d_law_output *out) {
+static void simple_law_row(void *user, const row_in *in, row_out *out) {
     (void)user;
     out->normal_force = in->pair.normal_stiffness * in->depth + 20 * in->mass * in->approach;
     out->tangential_force = -100 * in->sliding;
     out->moment = -1e-5 * in->spin * out->normal_force;
     out->energy = in->pair.normal_stiffness * in->depth * in->depth / 2;
+}
+
+static void simple_law(void *user, dem2d_law_batch *batch) {
+    for_rows(user, batch, simple_law_row);
 }
 
 static void shuffle(int *items, int count, uint64_t seed) {

@@ -5,6 +5,7 @@
 #include "dem2d.h"
 #include "inside.h"
 #include "testing.h"
+#include "row_law.h"
 
 #include <pthread.h>
 
@@ -316,7 +317,7 @@ static void add_chain(run *r) {
 }
 
 /* A spring and a dashpot, friction, a moment against turning, a state that grows. */
-static void own_law(void *user, const dem2d_law_input *in, dem2d_law_output *out) {
+static void own_law_row(void *user, const row_in *in, row_out *out) {
     const double spring = in->pair.normal_stiffness * in->depth, limit = 0.3 * spring;
     const double shear =
         in->tangential_force - in->pair.tangential_stiffness * in->sliding * in->time_step;
@@ -326,6 +327,10 @@ static void own_law(void *user, const dem2d_law_input *in, dem2d_law_output *out
     out->moment = -1e-3 * in->radius * in->radius * in->spin * in->mass + 1e-6 * in->state[0];
     out->energy = spring * in->depth / 2;
     out->state[0] = in->state[0] + in->depth, out->state[1] = in->moment;
+}
+
+static void own_law(void *user, dem2d_law_batch *batch) {
+    for_rows(user, batch, own_law_row);
 }
 
 static void add_walls(run *r, const scene_row *s) {

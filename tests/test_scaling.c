@@ -3,6 +3,7 @@
    caller's law, chains of segments and the ledger; test_world.c has plain scenes. */
 #include "dem2d.h"
 #include "testing.h"
+#include "row_law.h"
 
 enum { GRAINS = 36, KINDS = 6, LINKS = 20, WALLS = 4 + LINKS, ROOM = 12000 };
 
@@ -61,7 +62,7 @@ static dem2d_shape *make_shape(int kind, double f) {
 }
 
 /* Its state is a length. */
-static void own_law(void *user, const dem2d_law_input *in, dem2d_law_output *out) {
+static void own_law_row(void *user, const row_in *in, row_out *out) {
     const double spring = in->pair.normal_stiffness * in->depth, limit = 0.3 * spring;
     const double shear =
         in->tangential_force - in->pair.tangential_stiffness * in->sliding * in->time_step;
@@ -71,6 +72,10 @@ static void own_law(void *user, const dem2d_law_input *in, dem2d_law_output *out
     out->moment = -in->radius * in->radius * in->spin * in->mass;
     out->energy = (spring + in->pair.normal_stiffness * in->state[0] / 128) * in->depth / 2;
     out->state[0] = in->state[0] + in->depth;
+}
+
+static void own_law(void *user, dem2d_law_batch *batch) {
+    for_rows(user, batch, own_law_row);
 }
 
 static void add_walls(dem2d_world *world, const scene_row *s, dem2d_material_id material,

@@ -1447,10 +1447,14 @@ static void test_law(void **state) {
 }
 
 /* The energy that a law tells is the caller's business, as its state is. */
-static void strange_law(void *user, const dem2d_law_input *in, dem2d_law_output *out) {
-    scene_law(user, in, out);
+static void strange_law_row(void *user, const row_in *in, row_out *out) {
+    scene_law_row(user, in, out);
     out->energy = NAN;
     out->state[0] = HUGE_VAL;
+}
+
+static void strange_law(void *user, dem2d_law_batch *batch) {
+    for_rows(user, batch, strange_law_row);
 }
 
 static void test_strange_law(void **state) {

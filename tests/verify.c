@@ -10,6 +10,7 @@
 #define _POSIX_C_SOURCE 200809L
 #define DEM2D_IMPLEMENTATION
 #include "dem2d.h"
+#include "row_law.h"
 #include "verify.h"
 
 /* --- impacts --------------------------------------------------------------------------------- */
@@ -28,9 +29,13 @@ typedef struct head_on {
 
 static double *pulling; /* ratio of a dashpot that may pull; NULL: the library's law */
 
-static void pulling_law(void *user, const dem2d_law_input *in, dem2d_law_output *out) {
+static void pulling_law_row(void *user, const row_in *in, row_out *out) {
     const double zeta = *(const double *)user, k = in->pair.normal_stiffness;
     out->normal_force = k * in->depth + 2 * zeta * sqrt(in->mass * k) * in->approach;
+}
+
+static void pulling_law(void *user, dem2d_law_batch *batch) {
+    for_rows(user, batch, pulling_law_row);
 }
 
 /* One body falls on another without gravity, so that the first touch is inside a step. */
