@@ -22177,44 +22177,22 @@ static int dem2di_item_points(const dem2d_world *world, const dem2di_item *item)
                                item->outline_points);
 }
 
-/* An array of cell data: integers of 32 bits, or doubles. */
-typedef struct dem2di_array {
-    const char *name; /* NULL after the last */
-    int components;
-    bool whole;
-} dem2di_array;
-
 /* Greatest number of components of all arrays of a part. */
 #define DEM2DI_ITEM_NUMBERS 21
 
-static const dem2di_array *dem2di_arrays_of(dem2d_vtp_part part) {
-    static const dem2di_array particles[] = {{"id", 1, true},
-                                             {"type", 1, true},
-                                             {"material", 1, true},
-                                             {"motion", 1, true},
-                                             {"contacts", 1, true},
-                                             {"velocity", 3, false},
-                                             {"angular_velocity", 1, false},
-                                             {"angle", 1, false},
-                                             {"mass", 1, false},
-                                             {"radius", 1, false},
-                                             {"stress", 9, false},
-                                             {NULL, 0, false}};
-    static const dem2di_array contacts[] = {{"a", 1, true},
-                                            {"b", 1, true},
-                                            {"wall", 1, true},
-                                            {"points", 1, true},
-                                            {"normal", 3, false},
-                                            {"force", 3, false},
-                                            {"position", 3, false},
-                                            {"normal_force", 1, false},
-                                            {"tangential_force", 1, false},
-                                            {"moment", 1, false},
-                                            {"depth", 1, false},
-                                            {NULL, 0, false}};
-    static const dem2di_array walls[] = {{"id", 1, true},        {"mode", 1, true},
-                                         {"velocity", 3, false}, {"force", 3, false},
-                                         {"stress", 1, false},   {NULL, 0, false}};
+/* The arrays of cell data of a part, NULL after the last. The first letter is the kind: i integers
+   of 32 bits, d doubles, v vectors, t tensors. */
+static const char *const *dem2di_arrays_of(dem2d_vtp_part part) {
+    static const char *const particles[] = {
+        "i id",       "i type",     "i material",         "i motion",
+        "i contacts", "v velocity", "d angular_velocity", "d angle",
+        "d mass",     "d radius",   "t stress",           NULL};
+    static const char *const contacts[] = {
+        "i a",     "i b",        "i wall",         "i points",           "v normal",
+        "v force", "v position", "d normal_force", "d tangential_force", "d moment",
+        "d depth", NULL};
+    static const char *const walls[] = {"i id",    "i mode",   "v velocity",
+                                        "v force", "d stress", NULL};
     return part == DEM2D_VTP_PARTICLES ? particles : part == DEM2D_VTP_CONTACTS ? contacts : walls;
 }
 
@@ -22337,18 +22315,20 @@ static void dem2di_vtp_cell_data(const dem2d_world *world, const dem2d_vtp_desc 
     double numbers[DEM2DI_ITEM_NUMBERS];
     int first = 0; /* of the array's among the numbers of an item */
     dem2di_put(writer, "<CellData>\n");
-    for (const dem2di_array *array = dem2di_arrays_of(desc->part); array->name != NULL; array++) {
+    for (const char *const *array = dem2di_arrays_of(desc->part); *array != NULL; array++) {
         dem2di_item item = dem2di_item_start(world, desc);
-        dem2di_vtp_tag(writer, array->whole ? "Int32" : "Float64", array->name, array->components);
+        char kind = **array;
+        int components = kind == 'v' ? 3 : kind == 't' ? 9 : 1;
+        dem2di_vtp_tag(writer, kind == 'i' ? "Int32" : "Float64", *array + 2, components);
         while (dem2di_item_next(world, &item)) {
             dem2di_item_numbers(world, &item, numbers);
-            if (array->whole)
+            if (kind == 'i')
                 dem2di_print(writer, "%d\n", (int)numbers[first]);
             else
-                dem2di_vtp_doubles(writer, numbers + first, array->components);
+                dem2di_vtp_doubles(writer, numbers + first, components);
         }
         dem2di_put(writer, "</DataArray>\n");
-        first += array->components;
+        first += components;
     }
     dem2di_put(writer, "</CellData>\n");
 }
