@@ -1359,7 +1359,7 @@ typedef struct dem2d_world_desc {
     void *exchange_user;             ///< passed to gather and commit
     dem2d_loads_fn *loads;           ///< sets external loads in each step; NULL: none
     void *loads_user;                ///< passed to loads
-    int event_capacity;              ///< of events for dem2d_world_events, 0 to 2^30; 0: none
+    int event_capacity;              ///< of events that are kept, 0 to 2^30; 0: none
 } dem2d_world_desc;
 
 /// How a particle moves. Two particles that are not free have no contact with each other, nor with
@@ -2033,7 +2033,7 @@ typedef struct dem2d_contact_arrays {
 
 /// Read numbers of all particles: the first `capacity` rows go into the arrays, count gets the
 /// number of particles. Forces have the bits of dem2d_world_get_particle; after their first reading
-/// steps store them (24 bytes and some 5 % of a step). Allocates nothing while the number of
+/// steps store them (24 bytes and 2 % of a step). Allocates nothing while the number of
 /// contacts does not grow. Errors: OUT_OF_RANGE (capacity, stride), OUT_OF_MEMORY.
 DEM2D_API dem2d_result dem2d_world_read_particles(dem2d_world *world,
                                                   const dem2d_particle_arrays *arrays, int capacity,
@@ -11792,12 +11792,6 @@ typedef struct dem2di_touch {
     double speed, impulse, greatest;
 } dem2di_touch;
 
-/* An event, and its place among those of a step: walls behind, ranks of A and of B. */
-typedef struct dem2di_event {
-    dem2d_contact_event event;
-    int order[3];
-} dem2di_event;
-
 /* The listed pairs: of two circles, of two other particles, of particles and parts of walls (in the
    order of the part, then of the particle's rank), and their contacts as the last force pass left
    them. */
@@ -12015,10 +12009,11 @@ struct dem2d_world {
 
     int body_count; /* slots in use, holes too */
     int holes, id_count, free_id;
-    dem2di_id_slot *ids;  /* by the index of an id */
-    bool named;           /* a particle has had a name: the next two are there */
-    bool order_due;       /* particles have come since the order of names was found */
-    dem2di_ranked *order; /* all ids, free ones too */
+    dem2di_id_slot *ids;       /* by the index of an id */
+    bool named;                /* a particle has had a name: the next two are there */
+    bool order_due;            /* particles have come since the order of names was found */
+    dem2di_ranked *order;      /* all ids, free ones too: of the last step that was made, */
+    dem2di_ranked *order_next; /* and of the step in progress when particles have come */
     uint64_t *names;
     dem2di_state *before, *now; /* at the last force pass, present; the next come over before */
     dem2di_body *bodies;
@@ -12041,8 +12036,10 @@ struct dem2d_world {
     int wall_count, part_count;
 
     dem2di_list list;
-    dem2di_touch *touches; /* of contacts */
-    dem2di_event *events;  /* that nobody has taken yet, the oldest first */
+    dem2di_touch *touches;                 /* of contacts */
+    dem2di_order *changes, *changes_spare; /* contacts that close or open: in scratch, */
+    int change_count;                      /* so many */
+    dem2d_contact_event *events;           /* that nobody has taken yet, the oldest first */
     int event_count, event_capacity;
     int64_t events_lost;
     double *load_x, *load_y; /* force on the B of each contact, on A against it; in scratch, as: */
@@ -12357,17 +12354,17 @@ static const dem2di_field dem2di_touch_fields[] = {
     DEM2DI_SAVED("greatest", dem2di_touch, greatest, DEM2DI_ANY_NUMBER)};
 
 static const dem2di_field dem2di_event_fields[] = {
-    DEM2DI_SAVED("step", dem2di_event, event.step, DEM2DI_COUNTER),
-    DEM2DI_SAVED("since", dem2di_event, event.since, DEM2DI_COUNTER),
-    DEM2DI_SAVED("kind", dem2di_event, event.kind, DEM2DI_CHOICE(DEM2D_CONTACT_OPENED + 1)),
-    DEM2DI_SAVED("a", dem2di_event, event.a, DEM2DI_HANDLE),
-    DEM2DI_SAVED("b", dem2di_event, event.b, DEM2DI_HANDLE),
-    DEM2DI_SAVED("wall", dem2di_event, event.wall, DEM2DI_HANDLE),
-    DEM2DI_SAVED("point", dem2di_event, event.point, DEM2DI_VECTOR),
-    DEM2DI_SAVED("normal", dem2di_event, event.normal, DEM2DI_VECTOR),
-    DEM2DI_SAVED("speed", dem2di_event, event.speed, DEM2DI_ANY_NUMBER),
-    DEM2DI_SAVED("impulse", dem2di_event, event.impulse, DEM2DI_ANY_NUMBER),
-    DEM2DI_SAVED("greatest_force", dem2di_event, event.greatest_force, DEM2DI_ANY_NUMBER)};
+    DEM2DI_SAVED("step", dem2d_contact_event, step, DEM2DI_COUNTER),
+    DEM2DI_SAVED("since", dem2d_contact_event, since, DEM2DI_COUNTER),
+    DEM2DI_SAVED("kind", dem2d_contact_event, kind, DEM2DI_CHOICE(DEM2D_CONTACT_OPENED + 1)),
+    DEM2DI_SAVED("a", dem2d_contact_event, a, DEM2DI_HANDLE),
+    DEM2DI_SAVED("b", dem2d_contact_event, b, DEM2DI_HANDLE),
+    DEM2DI_SAVED("wall", dem2d_contact_event, wall, DEM2DI_HANDLE),
+    DEM2DI_SAVED("point", dem2d_contact_event, point, DEM2DI_VECTOR),
+    DEM2DI_SAVED("normal", dem2d_contact_event, normal, DEM2DI_VECTOR),
+    DEM2DI_SAVED("speed", dem2d_contact_event, speed, DEM2DI_ANY_NUMBER),
+    DEM2DI_SAVED("impulse", dem2d_contact_event, impulse, DEM2DI_ANY_NUMBER),
+    DEM2DI_SAVED("greatest_force", dem2d_contact_event, greatest_force, DEM2DI_ANY_NUMBER)};
 
 static const dem2di_field dem2di_any_field[] = {DEM2DI_PLAIN("value", double, DEM2DI_ANY_NUMBER)};
 static const dem2di_field dem2di_finite_field[] = {DEM2DI_PLAIN("value", double, DEM2DI_FINITE)};
@@ -12470,6 +12467,7 @@ static const dem2di_column dem2di_columns[] = {
     DEM2DI_COLUMN("ids", IDS, ids, DEM2DI_FIRST | DEM2DI_HASHED, id_fields),
     DEM2DI_COLUMN("slots", IDS, ids, DEM2DI_SHARES, slot_fields),
     DEM2DI_COLUMN("order", RANKS, order, DEM2DI_FIRST, ranked_fields),
+    DEM2DI_UNSAVED(RANKS, order_next, 0),
     DEM2DI_COLUMN("particles", BODIES, bodies, DEM2DI_FIRST | DEM2DI_MOVES | DEM2DI_HASHED,
                   body_fields),
     DEM2DI_COLUMN("last_states", BODIES, before, DEM2DI_MOVES | DEM2DI_SWAPS | DEM2DI_HASHED,
@@ -13255,48 +13253,37 @@ static inline void dem2di_contact_clear(dem2d_world *world, int i) {
    The touch of a contact holds what events tell of it while it is closed. Steps write it once they
    can't be refused any more; edits that end a contact tell it at once. */
 
-/* One event more. There is room in the array, or it is lost. */
+/* One event more, if the caller wants as many. Steps have made room for all of these before. */
 static void dem2di_event_add(dem2d_world *world, dem2d_event_kind kind, int64_t step, int i) {
     const dem2di_key *key = &world->list.keys[i];
     const dem2di_touch *touch = &world->touches[i];
-    const bool wall = i >= world->list.pairs, opened = kind == DEM2D_CONTACT_OPENED;
-    if (!dem2di_group_reserve(world, DEM2DI_EVENTS, world->event_count + 1)) {
+    const bool opened = kind == DEM2D_CONTACT_OPENED;
+    if (world->event_count >= world->event_capacity ||
+        !dem2di_group_reserve(world, DEM2DI_EVENTS, world->event_count + 1)) {
         world->events_lost++;
         return;
     }
-    dem2di_event *made = &world->events[world->event_count++];
+    dem2d_contact_event *made = &world->events[world->event_count++];
     memset((void *)made, 0, sizeof *made);
-    made->event.step = step;
-    made->event.since = touch->since;
-    made->event.kind = kind;
-    made->event.a = dem2di_particle_id(world, key->a);
-    if (wall)
-        made->event.wall = dem2di_wall_id(world, dem2di_wall_of(world, i));
+    made->step = step;
+    made->since = touch->since;
+    made->kind = kind;
+    made->a = dem2di_particle_id(world, key->a);
+    if (i >= world->list.pairs)
+        made->wall = dem2di_wall_id(world, dem2di_wall_of(world, i));
     else
-        made->event.b = dem2di_particle_id(world, key->b);
-    made->event.point = touch->point;
-    made->event.normal = touch->normal;
-    made->event.speed = touch->speed;
-    made->event.impulse = opened ? touch->impulse : 0;
-    made->event.greatest_force = opened ? touch->greatest : 0;
-    made->order[0] = wall;
-    made->order[1] = world->bodies[key->a].rank;
-    made->order[2] = wall ? key->b : world->bodies[key->b].rank;
-}
-
-/* No more events than the caller wants: the last ones are lost. */
-static void dem2di_events_trim(dem2d_world *world) {
-    int over = world->event_count - world->event_capacity;
-    if (over <= 0) return;
-    world->event_count -= over;
-    world->events_lost += over;
+        made->b = dem2di_particle_id(world, key->b);
+    made->point = touch->point;
+    made->normal = touch->normal;
+    made->speed = touch->speed;
+    made->impulse = opened ? touch->impulse : 0;
+    made->greatest_force = opened ? touch->greatest : 0;
 }
 
 /* An edit ends a contact. */
 static void dem2di_touch_end(dem2d_world *world, int i) {
     if (!world->plan.events || world->touches[i].since == 0) return;
     dem2di_event_add(world, DEM2D_CONTACT_OPENED, world->steps, i);
-    dem2di_events_trim(world);
     memset(&world->touches[i], 0, sizeof *world->touches);
 }
 
@@ -15267,10 +15254,10 @@ static bool dem2di_block_results_reserve(dem2d_world *world, int discs, int coun
 /* --- the order of names ----------------------------------------------------------------------- */
 
 /* Ranks of the particles and of the free ids: their places in the order. */
-static void dem2di_ranks_set(dem2d_world *world) {
+static void dem2di_ranks_set(dem2d_world *world, dem2di_ranked *order) {
     for (int place = 0; place < world->id_count; place++) {
-        int index = world->order[place].index, slot = world->ids[index].slot;
-        world->order[index].rank = place;
+        int index = order[place].index, slot = world->ids[index].slot;
+        order[index].rank = place;
         if (slot >= 0) world->bodies[slot].rank = place;
     }
 }
@@ -15286,7 +15273,7 @@ static void dem2di_order_task(void *context, int begin, int end) {
     (void)begin;
     (void)end;
     for (int index = world->id_count - 1; index >= 0; index--)
-        if (world->ids[index].slot < 0) world->order[--left].index = index;
+        if (world->ids[index].slot < 0) world->order_next[--left].index = index;
     for (int index = 0; index < world->id_count; index++) {
         int slot = world->ids[index].slot;
         if (slot < 0) continue;
@@ -15294,11 +15281,12 @@ static void dem2di_order_task(void *context, int begin, int end) {
         items[count++].value = index;
     }
     dem2di_sort(items, spare, count);
-    for (int k = 0; k < count; k++) world->order[k].index = items[k].value;
-    dem2di_ranks_set(world);
+    for (int k = 0; k < count; k++) world->order_next[k].index = items[k].value;
+    dem2di_ranks_set(world, world->order_next);
 }
 
-/* The order of names when particles have come. Those that were there keep their order. */
+/* The order of names when particles have come. Those that were there keep their order. Queries go
+   on with the last order until a step is made: one that fails changes no sum. */
 static bool dem2di_order_names(dem2d_world *world) {
     dem2di_cutter cutter = {NULL, 0};
     if (!world->order_due) return true;
@@ -15306,8 +15294,16 @@ static bool dem2di_order_names(dem2d_world *world) {
         (void)dem2di_cut(&cutter, (size_t)world->id_count, sizeof(dem2di_order));
     if (!dem2di_scratch_reserve(world, cutter.used)) return false;
     dem2di_run(world, DEM2D_PHASE_LIST, 1, dem2di_order_task, world);
-    world->order_due = false;
     return true;
+}
+
+/* The step that found the order will be made. */
+static void dem2di_order_commit(dem2d_world *world) {
+    dem2di_ranked *order = world->order;
+    if (!world->order_due) return;
+    world->order = world->order_next;
+    world->order_next = order;
+    world->order_due = false;
 }
 
 /* --- the contacts of each particle ------------------------------------------------------------ */
@@ -15961,6 +15957,9 @@ static size_t dem2di_step_cut(dem2d_world *world, char *memory, int discs, int p
         (dem2di_push *)dem2di_cut(&cutter, (size_t)(count - pairs), sizeof *world->pushes);
     if (plan->joints)
         world->pools = (int *)dem2di_cut(&cutter, (size_t)(count - pairs), sizeof *world->pools);
+    size_t changes = plan->events ? (size_t)count : 0;
+    world->changes = (dem2di_order *)dem2di_cut(&cutter, changes, sizeof *world->changes);
+    world->changes_spare = (dem2di_order *)dem2di_cut(&cutter, changes, sizeof *world->changes);
     for (int k = 0; k < DEM2DI_COLUMNS && back; k++) {
         const dem2di_column *column = &dem2di_columns[k];
         if (!(column->treatment & DEM2DI_KEPT)) continue;
@@ -18477,8 +18476,9 @@ DEM2D_API dem2d_result dem2d_world_time_step_bounds(const dem2d_world *world, do
 
 /* --- events -------------------------------------------------------------------------------------
    The observe pass of contacts that close and open, after the checks and before the motion: blocks
-   add up the impulses of those that stay closed and count the others, which are few. These are told
-   one after the other, and sorted, as the list is in no order that a caller may know of. */
+   add up the impulses of those that stay closed and count the others. These are few; they are
+   sorted by the ranks of the two, as the list is in no order that a caller may know of, and told
+   one after the other. */
 
 /* The step in progress changes contact i: it closes, or it opens. Those of sign -1 are parts of
    others. */
@@ -18527,6 +18527,15 @@ static void dem2di_touch_task(void *context, int begin, int end) {
     }
 }
 
+/* Where contact i is among the events of a step: walls behind, by the ranks of A and B. */
+static uint64_t dem2di_touch_place(const dem2d_world *world, int i) {
+    const dem2di_key *key = &world->list.keys[i];
+    const bool wall = i >= world->list.pairs;
+    uint64_t a = (uint64_t)world->bodies[key->a].rank;
+    uint64_t b = (uint64_t)(wall ? key->b : world->bodies[key->b].rank);
+    return (uint64_t)wall << 62 | a << 31 | b;
+}
+
 /* Contact i closes or opens in the step. */
 static void dem2di_touch_change(dem2d_world *world, int i) {
     dem2di_touch *touch = &world->touches[i];
@@ -18546,28 +18555,32 @@ static void dem2di_touch_change(dem2d_world *world, int i) {
     dem2di_touch_press(world, i, touch);
 }
 
-static int dem2di_event_compare(const void *a, const void *b) {
-    const int *one = ((const dem2di_event *)a)->order, *other = ((const dem2di_event *)b)->order;
-    for (int k = 0; k < 3; k++)
-        if (one[k] != other[k]) return one[k] < other[k] ? -1 : 1;
-    return 0;
-}
-
-static void dem2di_observe_touches(dem2d_world *world) {
-    int blocks = dem2di_blocks(world->list.count, DEM2DI_BLOCK), known = world->event_count;
-    if (!world->plan.events) return;
-    dem2di_touches_follow(world);
-    dem2di_run(world, DEM2D_PHASE_CONTACTS, blocks, dem2di_touch_task, world);
+static void dem2di_touch_sort_task(void *context, int begin, int end) {
+    dem2d_world *world = (dem2d_world *)context;
+    int blocks = dem2di_blocks(world->list.count, DEM2DI_BLOCK), count = 0;
+    (void)begin;
+    (void)end;
     for (int block = 0; block < blocks; block++) {
         int first = block * DEM2DI_BLOCK;
         int last = dem2di_block_end(first, DEM2DI_BLOCK, world->list.count);
-        for (int i = first; i < last && world->block_results[block].changes > 0; i++)
-            if (dem2di_touch_changes(world, i)) dem2di_touch_change(world, i);
+        for (int i = first; i < last && world->block_results[block].changes > 0; i++) {
+            if (!dem2di_touch_changes(world, i)) continue;
+            world->changes[count].key = dem2di_touch_place(world, i);
+            world->changes[count++].value = i;
+        }
     }
-    if (world->event_count - known > 1)
-        qsort(world->events + known, (size_t)(world->event_count - known), sizeof *world->events,
-              dem2di_event_compare);
-    dem2di_events_trim(world);
+    dem2di_sort(world->changes, world->changes_spare, count);
+    world->change_count = count;
+}
+
+static void dem2di_observe_touches(dem2d_world *world) {
+    int blocks = dem2di_blocks(world->list.count, DEM2DI_BLOCK);
+    if (!world->plan.events) return;
+    dem2di_touches_follow(world);
+    dem2di_run(world, DEM2D_PHASE_CONTACTS, blocks, dem2di_touch_task, world);
+    dem2di_run(world, DEM2D_PHASE_CONTACTS, 1, dem2di_touch_sort_task, world);
+    for (int k = 0; k < world->change_count; k++)
+        dem2di_touch_change(world, world->changes[k].value);
 }
 
 /* --- the step ------------------------------------------------------------------------------------
@@ -18621,12 +18634,14 @@ typedef struct dem2di_trial {
 /* The passes that may be refused, up to the last check. */
 static dem2d_result dem2di_step_try(dem2d_world *world, dem2di_trial *trial) {
     if (world->set_loads != NULL) world->set_loads(world->loads_user, world);
+    if (!dem2di_sums_reserve(world)) return dem2di_out_of_memory(world, "sums of forces");
+    if (!dem2di_group_reserve(world, DEM2DI_EVENTS, world->event_capacity))
+        return dem2di_out_of_memory(world, "events");
     dem2d_result result = dem2di_prepare(world, &trial->listed);
     if (result != DEM2D_OK) return result;
     world->list_stale = trial->listed; /* if the step fails, the next try builds a list as well */
     bool due = dem2di_check_is_due(world);
     bool back = dem2di_looks_back(world, &world->plan, world->bounded, world->softness);
-    if (!dem2di_sums_reserve(world)) return dem2di_out_of_memory(world, "sums of forces");
     if (back && !dem2di_keep_last(world)) return dem2di_out_of_memory(world, "contacts");
     world->keeps_last = trial->back = back;
     dem2di_force_pass(world, &trial->count);
@@ -18652,7 +18667,8 @@ static dem2d_result dem2di_step(dem2d_world *world) {
         return result;
     }
     const dem2di_ledger ledger = world->ledger;
-    if (ledger.kept) dem2di_observe_contacts(world); /* nothing fails from here on */
+    dem2di_order_commit(world); /* nothing fails from here on */
+    if (ledger.kept) dem2di_observe_contacts(world);
     dem2di_observe_touches(world);
     double path = dem2di_integrate_pass(world);
     if (ledger.kept) dem2di_observe_motion(world, &ledger);
@@ -18697,7 +18713,7 @@ DEM2D_API dem2d_result dem2d_world_events(dem2d_world *world, dem2d_contact_even
                              "event_capacity = 0: this world keeps no events");
     if (result != DEM2D_OK) return result;
     int taken = capacity < world->event_count ? capacity : world->event_count;
-    for (int i = 0; i < taken; i++) events[i] = world->events[i].event;
+    for (int i = 0; i < taken; i++) events[i] = world->events[i];
     world->event_count -= taken;
     if (world->event_count > 0)
         memmove((void *)world->events, (const void *)(world->events + taken),
@@ -21492,7 +21508,7 @@ static void dem2di_finish_ranks(dem2di_loader *loader) {
         dem2di_load_expect(loader, once, "no order of ids");
         if (once) w->order[index].rank = i;
     }
-    if (dem2di_load_good(loader)) dem2di_ranks_set(w);
+    if (dem2di_load_good(loader)) dem2di_ranks_set(w, w->order);
 }
 
 /* Parts are half-planes or segments as the wall's desc says, with a direction. */

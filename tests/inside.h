@@ -56,9 +56,9 @@ static bool inside_ranks_hold(const dem2d_world *w) {
     for (int place = 0; place < w->id_count; place++) {
         const int index = w->named ? w->order[place].index : place, slot = w->ids[index].slot;
         if (w->named && w->order[index].rank != place) return inside_fail("rank of an id", index);
-        if (slot < 0) continue;
+        if (slot < 0 || w->order_due) continue;
         if (w->bodies[slot].rank != place) return inside_fail("rank of a particle", index);
-        if (!w->named || w->order_due) continue;
+        if (!w->named) continue;
         if (w->names[slot] < last) return inside_fail("names are out of order", index);
         last = w->names[slot];
     }

@@ -158,6 +158,7 @@ static dem2d_result life_grain(life *l, int i) {
     d.material = l->materials[i % LIFE_MATERIALS];
     d.position = vec(0.06 + 0.1 * (i % 8), 0.06 + 0.1 * (i / 8));
     d.velocity = vec(3.0 * (i % 3) - 3, 2.0 * (i % 2));
+    if (i >= 10) d.name = (uint64_t)(GRAINS - i);
     if (l->desc->rush) {
         d.scale /= 2;
         d.velocity = vec(50 * (0.4 - d.position.x), 50 * (0.3 - d.position.y));
@@ -179,6 +180,23 @@ static dem2d_result life_remove(life *l, int i) {
 
 static dem2d_result life_move(life *l, int i) {
     return dem2d_world_move_particle(l->world, l->grains[i], vec(0.3, 0.75), 1);
+}
+
+static dem2d_result life_load(life *l, int i) {
+    return dem2d_world_set_load(l->world, l->grains[i], vec(i, -1), 0.01);
+}
+
+/* All forces; then velocities and loads of three grains. */
+static dem2d_result life_arrays(life *l, int i) {
+    static dem2d_vec forces[GRAINS], velocities[3] = {{1, 0}, {0, 1}, {0, 0}};
+    dem2d_particle_arrays a;
+    int count;
+    memset(&a, 0, sizeof a);
+    a.forces = forces;
+    const dem2d_result result = dem2d_world_read_particles(l->world, &a, GRAINS, &count);
+    if (result != DEM2D_OK) return result;
+    a.forces = NULL, a.ids = &l->grains[i], a.velocities = a.loads = velocities;
+    return dem2d_world_write_particles(l->world, &a, 3);
 }
 
 static dem2d_result life_rub(life *l, int i) {
@@ -235,6 +253,9 @@ static const life_event events[] = {
     {"remove grain", life_remove, 3, 6},
     {"set pair", life_rub, 0, LIFE_MATERIALS - 1},
     {"move grain", life_move, 12, 12},
+    {"load", life_load, 12, 14},
+    {"step", life_step, 0, 3},
+    {"arrays", life_arrays, 20, 20},
     {"step", life_step, 0, 30},
     {"save and load", life_reload, 0, 0},
     {"add wall", life_wall, WALLS - 1, WALLS - 1},
