@@ -16707,7 +16707,8 @@ static int dem2di_collide_shapes(const dem2d_world *world, dem2di_pair *pair,
     }
     count->proofs[search.proof]++;
     contact->depth = search.upper;
-    if (world->plan.faces && !search.alone) return dem2di_pair_points(pair, &search, points);
+    bool faces = world->plan.faces && pair->a->flat && pair->b->flat;
+    if (faces && !search.alone) return dem2di_pair_points(pair, &search, points);
     points[0].position.x = (search.a.x + (search.b.x + pair->d.x)) * 0.5;
     points[0].position.y = (search.a.y + (search.b.y + pair->d.y)) * 0.5;
     return 1;
