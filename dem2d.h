@@ -309,6 +309,8 @@ HOW TO
                          what overlaps; dem2d_world_cast_ray for the first hit of a ray,
                          dem2d_world_cast_ray_all for all; dem2d_world_nearest. Also before the
                          first step. dem2d_world_particle_contacts: contacts of one particle.
+    put grains in        dem2d_world_overlap_at tells how deep a new particle would be in others;
+                         dem2d_world_relax moves those that overlap apart, without speed.
     change a grain       dem2d_world_set_material, dem2d_world_set_shape (template and scale).
     choose who meets     groups of particles and walls: category and mask. dem2d_world_set_groups,
       whom               dem2d_world_set_wall. dem2d_world_set_user_data keeps a number of yours.
@@ -1980,6 +1982,30 @@ DEM2D_API dem2d_result dem2d_world_cast_ray_all(dem2d_world *world, dem2d_vec or
 /// dem2d_world_query_box.
 DEM2D_API dem2d_result dem2d_world_nearest(dem2d_world *world, dem2d_vec point, double range,
                                            const dem2d_query_desc *desc, dem2d_hit *hit);
+/// Greatest overlap (m) that a new particle would have with particles and walls that it meets; 0 if
+/// it touches none. Above a few percent of its radius, it would be thrown out at high speed: see
+/// dem2d_world_relax. Errors: those of dem2d_world_add_particle.
+DEM2D_API dem2d_result dem2d_world_overlap_at(dem2d_world *world, const dem2d_particle_desc *desc,
+                                              double *overlap);
+
+/// What dem2d_world_relax has done.
+typedef struct dem2d_relaxation {
+    int sweeps;     ///< number of them
+    int moved;      ///< particles that are elsewhere now
+    int overlaps;   ///< pairs that still overlap by more than the tolerance: 0 on success
+    double overlap; ///< m, the greatest overlap that is left
+} dem2d_relaxation;
+
+/// Moves free particles apart that overlap each other, or other particles and walls, by more than a
+/// tolerance (of the smaller bounding radius, in (0, 1)), in at most `sweeps` sweeps (>= 0). In
+/// each sweep all such pairs move apart along their normals until half of the tolerance is left:
+/// both by half of that, or the one that is free by all of it; what has several overlaps moves by
+/// the mean of these moves times 1.5. Angles and velocities stay, so that no speed comes of it.
+/// Contacts of particles that have moved lose their history, smaller overlaps stay as they are.
+/// Where there is no room, the last overlaps remain: relaxation->overlaps tells. The ledger counts
+/// the change as given.
+DEM2D_API dem2d_result dem2d_world_relax(dem2d_world *world, double tolerance, int sweeps,
+                                         dem2d_relaxation *relaxation);
 /// Contacts of one particle in the last force pass, as dem2d_world_contacts describes them (the
 /// particle is A or B), in the order in which their forces are summed, walls last: the first
 /// `capacity` of them go into contacts (may be NULL if capacity is 0); count gets their number.
@@ -11806,6 +11832,13 @@ typedef struct dem2di_list {
     int *own;      /* of a slot's as A */
 } dem2di_list;
 
+/* How overlaps move a particle: the sum of the moves of a sweep and their number, and of all sweeps
+   together. */
+typedef struct dem2di_apart {
+    dem2d_vec sum, way;
+    int count;
+} dem2di_apart;
+
 /* What queries of space search, made by the first of them: see the section on queries. */
 typedef struct dem2di_tree {
     bool made; /* of the particles as they are now */
@@ -11943,8 +11976,9 @@ typedef enum dem2di_group {
     DEM2DI_BLOCK_RESULTS,
     DEM2DI_TREE, /* particles and walls, where queries are asked; as many nodes are enough */
     DEM2DI_EVENTS,
-    DEM2DI_SCRATCH, /* lines */
-    DEM2DI_SHAPE,   /* one row: a shape itself; its columns by its count, its parts, ... */
+    DEM2DI_MOVES_APART, /* of bodies, where they have been relaxed */
+    DEM2DI_SCRATCH,     /* lines */
+    DEM2DI_SHAPE,       /* one row: a shape itself; its columns by its count, its parts, ... */
     DEM2DI_SHAPE_COUNT,
     DEM2DI_SHAPE_PARTS,
     DEM2DI_SHAPE_BLOCKS,
@@ -12054,6 +12088,7 @@ struct dem2d_world {
     bool grouped;         /* a particle has had groups or user data: */
     dem2di_groups *groups;
     dem2di_tree tree;
+    dem2di_apart *apart;
     dem2di_block_result *block_results;
 
     int capacity[DEM2DI_GROUPS]; /* elements that the columns of a group have room for */
@@ -12527,6 +12562,7 @@ static const dem2di_column dem2di_columns[] = {
     DEM2DI_COLUMN("events", EVENTS, events, DEM2DI_FIRST, event_fields),
     DEM2DI_UNSAVED(ADJACENCY, list.adjacent, 0),
     DEM2DI_UNSAVED(BLOCK_RESULTS, block_results, 0),
+    DEM2DI_UNSAVED(MOVES_APART, apart, 0),
     DEM2DI_UNSAVED(TREE, tree.boxes, 0),
     DEM2DI_UNSAVED(TREE, tree.items, 0),
     DEM2DI_UNSAVED(TREE, tree.found, 0),
@@ -20332,6 +20368,158 @@ DEM2D_API dem2d_result dem2d_world_nearest(dem2d_world *world, dem2d_vec point, 
     return result;
 }
 
+/* --- overlaps ----------------------------------------------------------------------------------
+ */
+
+/* Overlap of the region of a question with an item, and the normal towards the item. */
+static double dem2di_overlap_with(const dem2di_question *question, int item, dem2d_vec *normal) {
+    const dem2d_world *world = question->world;
+    dem2d_contact_desc desc;
+    dem2d_contact contact;
+    dem2d_result result;
+    memset(&desc, 0, sizeof desc);
+    desc.skip_points = true;
+    if (item >= 0) {
+        dem2d_pose there = dem2di_pose_of(world, world->now, item);
+        result = dem2d_pair_contact(question->shape, question->pose,
+                                    dem2di_shape_of(world, &world->bodies[item]), there, &desc,
+                                    &contact);
+    } else {
+        const dem2di_surface *surface = &world->surfaces[-1 - item];
+        double extent = world->parts[-1 - item].extent;
+        dem2d_vec along = dem2di_vec(surface->along.c, surface->along.s);
+        dem2d_pose there;
+        there.position = dem2di_along(surface->point, extent / 2, along);
+        there.rotation = surface->along;
+        there.scale = extent;
+        result = extent > 0 ? dem2d_pair_contact(question->shape, question->pose, world->line,
+                                                 there, &desc, &contact)
+                            : dem2d_wall_contact(question->shape, question->pose, surface->point,
+                                                 dem2di_surface_normal(surface), &contact);
+    }
+    if (result != DEM2D_OK) return 0; /* of sizes that numbers have no squares of */
+    *normal = contact.normal;
+    return contact.depth;
+}
+
+DEM2D_API dem2d_result dem2d_world_overlap_at(dem2d_world *world, const dem2d_particle_desc *desc,
+                                              double *overlap) {
+    if (world == NULL || desc == NULL || overlap == NULL) return DEM2D_NULL_ARGUMENT;
+    dem2d_result result = dem2di_check_particle(world, desc);
+    if (result != DEM2D_OK) return result;
+    dem2di_question question = dem2di_question_make(world, DEM2DI_ASK_REGION, NULL);
+    question.shape = world->templates[desc->shape.index].shape;
+    question.groups = dem2di_groups_of(&desc->groups, desc->user_data);
+    question.pose.position = desc->position;
+    question.pose.rotation = dem2d_rot_make(desc->angle);
+    question.pose.scale = desc->scale;
+    double radius = question.shape->circumscribed * desc->scale, greatest = 0;
+    dem2d_vec reach = dem2di_vec(radius, radius), normal;
+    question.box.lower = dem2di_sub(desc->position, reach);
+    question.box.upper = dem2di_add(desc->position, reach);
+    question.desc.skip_sensors = question.all = true;
+    if (!question.groups.sensor) result = dem2di_question_ask(&question);
+    if (result != DEM2D_OK) return result;
+    for (int i = 0; i < question.count; i++)
+        greatest = dem2di_max(greatest,
+                              dem2di_overlap_with(&question, world->tree.found[i].value, &normal));
+    *overlap = greatest;
+    return DEM2D_OK;
+}
+
+/* The share of an overlap that a particle is moved by, against somebody who is free or not. */
+static void dem2di_apart_add(dem2d_world *world, int slot, bool shared, double depth,
+                             dem2d_vec normal) {
+    dem2di_apart *apart = &world->apart[slot];
+    if (!(world->inverse[slot].mass > 0)) return;
+    apart->sum = dem2di_along(apart->sum, shared ? depth / 2 : depth, normal);
+    apart->count++;
+}
+
+/* The overlaps of a particle with those of higher id and with walls. */
+static dem2d_result dem2di_apart_find(dem2d_world *world, int slot, double tolerance,
+                                      dem2d_relaxation *relaxation) {
+    dem2di_question question = dem2di_question_make(world, DEM2DI_ASK_REGION, NULL);
+    question.self = slot;
+    question.groups = dem2di_groups_at(world, slot);
+    question.desc.skip_sensors = question.all = true;
+    dem2di_region_set(&question, slot);
+    dem2d_result result = dem2di_question_ask(&question);
+    if (result != DEM2D_OK) return result;
+    dem2di_found_sort(&world->tree, question.count);
+    for (int i = 0; i < question.count; i++) {
+        int item = world->tree.found[i].value;
+        bool own = world->inverse[slot].mass > 0;
+        bool other = item >= 0 && world->inverse[item].mass > 0;
+        dem2d_vec normal = dem2di_vec(0, 0);
+        if (item >= 0 && world->bodies[item].index < world->bodies[slot].index) continue;
+        if (!own && !other) continue;
+        double radius = world->now[slot].radius;
+        if (item >= 0) radius = dem2di_min(radius, world->now[item].radius);
+        double depth = dem2di_overlap_with(&question, item, &normal);
+        relaxation->overlap = dem2di_max(relaxation->overlap, depth);
+        if (!(depth > tolerance * radius)) continue;
+        relaxation->overlaps++;
+        depth -= tolerance * radius / 2;
+        dem2di_apart_add(world, slot, other, depth, dem2di_negate(normal));
+        if (item >= 0) dem2di_apart_add(world, item, own, depth, normal);
+    }
+    return DEM2D_OK;
+}
+
+/* All overlaps as the particles are now, and how they would move these. */
+static dem2d_result dem2di_apart_sweep(dem2d_world *world, double tolerance,
+                                       dem2d_relaxation *relaxation) {
+    dem2d_result result = DEM2D_OK;
+    relaxation->overlaps = 0;
+    relaxation->overlap = 0;
+    for (int i = 0; i < world->body_count; i++) {
+        world->apart[i].sum = dem2di_vec(0, 0);
+        world->apart[i].count = 0;
+    }
+    for (int place = 0, slot; result == DEM2D_OK && (slot = dem2di_next_grain(world, &place)) >= 0;)
+        result = dem2di_apart_find(world, slot, tolerance, relaxation);
+    return result;
+}
+
+DEM2D_API dem2d_result dem2d_world_relax(dem2d_world *world, double tolerance, int sweeps,
+                                         dem2d_relaxation *relaxation) {
+    dem2d_relaxation done;
+    if (world == NULL || relaxation == NULL) return DEM2D_NULL_ARGUMENT;
+    const dem2d_env *env = &world->env;
+    dem2d_result result = dem2di_check_number(env, "tolerance", tolerance, 0, 1,
+                                              DEM2DI_ABOVE | DEM2DI_BELOW, DEM2DI_DOUBLE);
+    if (result == DEM2D_OK) result = dem2di_check_number(env, "sweeps", sweeps, DEM2DI_COUNT);
+    if (result != DEM2D_OK) return result;
+    memset(&done, 0, sizeof done);
+    if (!dem2di_group_reserve(world, DEM2DI_MOVES_APART, world->body_count))
+        return dem2di_out_of_memory(world, "moves");
+    if (world->body_count > 0)
+        memset(world->apart, 0, (size_t)world->body_count * sizeof *world->apart);
+    result = dem2di_apart_sweep(world, tolerance, &done); /* later ones need no more memory */
+    for (; result == DEM2D_OK && done.overlaps > 0 && done.sweeps < sweeps; done.sweeps++) {
+        for (int i = 0; i < world->body_count; i++) {
+            const dem2di_apart *apart = &world->apart[i];
+            if (apart->count == 0) continue;
+            double share = apart->count > 1 ? 1.5 / apart->count : 1;
+            world->apart[i].way = dem2di_along(apart->way, share, apart->sum);
+            world->now[i].x = dem2di_along(world->now[i].x, share, apart->sum);
+        }
+        world->tree.made = false;
+        result = dem2di_apart_sweep(world, tolerance, &done);
+    }
+    if (result != DEM2D_OK) return result;
+    for (int i = 0; i < world->body_count; i++) {
+        dem2d_vec way = world->apart[i].way;
+        if (way.x == 0 && way.y == 0) continue;
+        world->before[i] = world->now[i];
+        dem2di_moved(world, i, way);
+        done.moved++;
+    }
+    *relaxation = done;
+    return DEM2D_OK;
+}
+
 DEM2D_API dem2d_result dem2d_world_particle_contacts(const dem2d_world *world, dem2d_particle_id id,
                                                      dem2d_contact_info *contacts, int capacity,
                                                      int *count) {
@@ -22654,6 +22842,7 @@ DEM2D_API dem2d_result dem2d_world_write_csv(const dem2d_world *world, const dem
             What there is: dem2d_world_walls, _shapes, _materials; as descs: dem2d_world_get_desc,
             _get_wall_desc, _get_particle_desc, _get_material_desc, _get_pair. New edits of a
             particle: dem2d_world_set_material, dem2d_world_set_shape.
+            dem2d_world_overlap_at and dem2d_world_relax, so that new particles do not explode.
      0.6.0  Runs differ from those of 0.5.0 with friction between circles, dashpots, polybeziers,
             two contact points with friction, and servo walls. Snapshots (version 4) name their
             arrays and fields, so that later headers read them; earlier snapshots are refused. The

@@ -901,6 +901,12 @@ typedef struct function {
     F(world_set_shape, dem2d_world_set_shape(v->world, v->particle, v->shape_id, v->x),           \
       LOGS, IN_WORLD, ARG(particle, "particle", PARTICLE_ID), ARG(shape_id, "shape", SHAPE_ID),   \
       ARG(x, "scale", POSITIVE))                                                                  \
+    F(world_overlap_at, dem2d_world_overlap_at(v->world, v->desc, v->out),                        \
+      DESCRIBED(PARTICLE, with_particle), IN_WORLD, THE_DESC, OUT)                                \
+    F(world_relax, dem2d_world_relax(v->world, v->x, v->count, v->out),                           \
+      LOGS, IN_WORLD,                                                                             \
+      ARG(x, "tolerance", NUMBER, .high = 1, .above = true, .below = true),                       \
+      ARG_INT(count, "sweeps", 0, INT_MAX, OUT_OF_RANGE), OUT)                                    \
     F(world_particle_contacts,                                                                    \
       dem2d_world_particle_contacts(v->world, v->particle, v->out, v->count, v->second),          \
       LOGS, IN_WORLD, ARG(particle, "particle", PARTICLE_ID), OUT, CAPACITY, SECOND)

@@ -1,0 +1,209 @@
+/* Overlaps of new particles: how deep one would be, and moving them apart without speed. */
+#include "dem2d.h"
+#include "testing.h"
+#include "world_scene.h"
+#include "inside.h"
+
+#define RADIUS 0.05
+
+static scene make_scene(dem2d_vec gravity) {
+    const dem2d_material_desc material = stone_desc(5e5, 0.3);
+    dem2d_world_desc desc = {0};
+    desc.time_step = 1e-4, desc.gravity = gravity, desc.ledger = true;
+    return open_scene(&desc, &material);
+}
+
+static dem2d_shape *make_kind(int kind) {
+    const double a[4] = {0.09, 0, 0, 0.003}, b[4] = {0, 0, 0, 0};
+    const double reach[4] = {0.05, 0.03, 0.04, 0.06};
+    if (kind == 0) return make_disc(RADIUS);
+    if (kind == 1) return make_ellipse(0.06, 0.03);
+    if (kind == 2) return make_box(0.09, 0.06);
+    if (kind == 3) return make_series(a, b, 3);
+    return make_oval(reach, 0.5522847498);
+}
+
+static dem2d_relaxation relax(const scene *s, double tolerance, int sweeps) {
+    dem2d_relaxation done;
+    assert_ok(dem2d_world_relax(s->world, tolerance, sweeps, &done));
+    assert_true(inside_holds(s->world));
+    return done;
+}
+
+static double fastest(const scene *s) {
+    dem2d_equilibrium equilibrium;
+    assert_ok(dem2d_world_equilibrium(s->world, &equilibrium));
+    return equilibrium.max_speed;
+}
+
+static void test_overlap_at(void **state) {
+    (void)state;
+    scene s = make_scene(vec(0, 0));
+    const dem2d_shape_id disc = give_shape(&s, make_disc(RADIUS));
+    dem2d_particle_desc desc = grain_desc(&s, disc, 1, vec(0, 0));
+    double overlap = -1;
+    assert_ok(dem2d_world_overlap_at(s.world, &desc, &overlap)); /* an empty world */
+    assert_true(overlap == 0);
+    desc.groups.category = 2;
+    add_grain(&s, &desc);
+    add_plane(&s, 0, -1, 0, 1);
+    add_segment(&s, vec(1, -1), vec(1, 1));
+    desc.groups.category = 0;
+    const struct {
+        dem2d_vec at;
+        double scale, overlap;
+    } cases[] = {{{0, 0.02}, 1, 0.08},     {{0.3, 0}, 1, 0}, {{0.3, -0.98}, 1, 0.03},
+                 {{0.99, 0.5}, 1, 0.04},   {{0, 0}, 1, 0.1}, {{0.3, -3}, 1, 2.05},
+                 {{0.9, -0.95}, 2.4, 0.07}};
+    for (int i = 0; i < COUNT_OF(cases); i++) {
+        desc.position = cases[i].at, desc.scale = cases[i].scale;
+        assert_ok(dem2d_world_overlap_at(s.world, &desc, &overlap));
+        assert_within(overlap, cases[i].overlap, 1e-12);
+    }
+    desc.position = vec(0, 0.02), desc.scale = 1, desc.groups.mask = 1; /* does not meet it */
+    assert_ok(dem2d_world_overlap_at(s.world, &desc, &overlap));
+    assert_true(overlap == 0);
+    desc.groups.mask = 0, desc.groups.sensor = true;
+    assert_ok(dem2d_world_overlap_at(s.world, &desc, &overlap));
+    assert_true(overlap == 0);
+    close_scene(&s);
+}
+
+/* One disc 80 % in another leaves at 12 m/s; relaxed, both stay. */
+static void test_two(void **state) {
+    (void)state;
+    double speed[2];
+    for (int k = 0; k < 2; k++) {
+        scene s = make_scene(vec(0, 0));
+        const dem2d_shape_id disc = give_shape(&s, make_disc(RADIUS));
+        dem2d_particle_desc desc = grain_desc(&s, disc, 1, vec(0, 0));
+        const dem2d_particle_id one = add_grain(&s, &desc);
+        desc.position = vec(0.02, 0), desc.angle = 1;
+        const dem2d_particle_id two = add_grain(&s, &desc);
+        if (k == 1) {
+            const dem2d_relaxation done = relax(&s, 1e-3, 100);
+            assert_int_equal(done.overlaps, 0);
+            assert_int_equal(done.moved, 2);
+            assert_int_equal(done.sweeps, 1);
+            const double gap =
+                grain_of(&s, two).pose.position.x - grain_of(&s, one).pose.position.x;
+            assert_between(gap, 2 * RADIUS * (1 - 1e-3), 2 * RADIUS);
+            assert_near(angle_of(&s, two), 1, 1e-14);
+        }
+        step(&s, 1000);
+        speed[k] = grain_of(&s, two).velocity.x;
+        const dem2d_ledger ledger = ledger_of(&s);
+        assert_true(fabs(ledger.closure) <= 1e-2 * (ledger.turnover + fabs(ledger.given)));
+        close_scene(&s);
+    }
+    assert_true(speed[0] > 10);
+    assert_between(speed[1], 0, 0.02 * speed[0]);
+}
+
+/* A hundred grains of each kind at random places in a box that has room for them. */
+static void test_hundred(void **state) {
+    (void)state;
+    for (int kind = 0; kind < 6; kind++) {
+        scene s = make_scene(vec(0, 0));
+        uint64_t random = 11;
+        dem2d_shape_id shapes[5];
+        for (int k = 0; k < 5; k++) shapes[k] = give_shape(&s, make_kind(k));
+        add_plane(&s, 0, 0, 0, 1), add_plane(&s, 0, 0, 1, 0), add_plane(&s, 1.3, 0, -1, 0);
+        add_plane(&s, 0, 1.3, 0, -1);
+        for (int i = 0; i < 100; i++) {
+            const double x = random_between(&random, 0.4, 0.9);
+            dem2d_particle_desc desc = grain_desc(&s, shapes[kind < 5 ? kind : i % 5], 1,
+                                                  vec(x, random_between(&random, 0.1, 0.6)));
+            desc.angle = i;
+            add_grain(&s, &desc);
+        }
+        const dem2d_relaxation done = relax(&s, 1e-3, 4000);
+        assert_int_equal(done.overlaps, 0);
+        assert_true(done.overlap <= 1e-3 * 0.0671);
+        step(&s, 200);
+        assert_true(fastest(&s) < 0.1);
+        assert_true(packing_of(&s).max_overlap < 0.02);
+        close_scene(&s);
+    }
+}
+
+/* New grains in a settled bed under a servo wall: what did not move keeps its springs. */
+static void test_bed(void **state) {
+    (void)state;
+    scene s = make_scene(vec(0, -9.81));
+    const dem2d_shape_id disc = give_shape(&s, make_disc(RADIUS));
+    add_floor(&s);
+    const dem2d_wall_id left = add_plane(&s, 0, 0, 1, 0), right = add_plane(&s, 0.52, 0, -1, 0);
+    dem2d_wall_desc lid = plane_desc(&s, vec(0, 0.6), vec(0, -1));
+    lid.mode = DEM2D_WALL_SERVO, lid.stress = 1000, lid.max_speed = 0.5;
+    lid.spans[0] = left, lid.spans[1] = right;
+    const dem2d_wall_id top = add_wall(&s, &lid);
+    assert_ok(dem2d_world_set_damping(s.world, 0.5, 0));
+    dem2d_particle_desc desc = grain_desc(&s, disc, 1, vec(0, 0));
+    for (int i = 0; i < 20; i++) {
+        desc.position = vec(0.06 + 0.1 * (i % 5) + 0.004 * (i / 5 % 2), 0.05 + 0.1 * (i / 5));
+        add_grain(&s, &desc);
+    }
+    step(&s, 15000);
+    const dem2d_relaxation none = relax(&s, 0.01, 100); /* nothing to do */
+    assert_int_equal(none.moved + none.sweeps + none.overlaps, 0);
+    const int before = stats_of(&s).contacts;
+    desc.position = vec(0.25, wall_of(&s, top).point.y - 0.02), desc.scale = 0.4;
+    const dem2d_particle_id added = add_grain(&s, &desc);
+    double overlap;
+    assert_ok(dem2d_world_overlap_at(s.world, &desc, &overlap));
+    assert_true(overlap > 0.005);
+    const dem2d_relaxation done = relax(&s, 0.01, 5000);
+    assert_int_equal(done.overlaps, 0);
+    assert_true(done.moved < 21 || stats_of(&s).contacts < before);
+    assert_true(grain_of(&s, added).pose.position.y < wall_of(&s, top).point.y);
+    step(&s, 20000);
+    assert_true(packing_of(&s).max_overlap < 0.01);
+    assert_near(wall_of(&s, top).stress, 1000, 0.02);
+    close_scene(&s);
+}
+
+/* No room: what remains is told, and no speed comes of it; fixed ones do not move. */
+static void test_jammed(void **state) {
+    (void)state;
+    scene s = make_scene(vec(0, 0));
+    const dem2d_shape_id disc = give_shape(&s, make_disc(RADIUS));
+    add_plane(&s, 0, 0, 0, 1), add_plane(&s, 0, 0, 1, 0), add_plane(&s, 0.15, 0, -1, 0);
+    add_plane(&s, 0, 0.15, 0, -1);
+    dem2d_particle_desc desc = grain_desc(&s, disc, 1, vec(0.075, 0.075));
+    for (int i = 0; i < 5; i++) add_grain(&s, &desc); /* at the same place */
+    dem2d_relaxation done = relax(&s, 0.01, 300);
+    assert_int_equal(done.sweeps, 300);
+    assert_true(done.overlaps > 0 && done.overlap > 0.01);
+    for (uint32_t i = 0; i < 5; i++) {
+        const dem2d_particle_id id = {i, 1};
+        const dem2d_vec at = grain_of(&s, id).pose.position;
+        assert_between(at.x, 0, 0.15);
+        assert_between(at.y, 0, 0.15);
+        assert_true(grain_of(&s, id).velocity.x == 0 && grain_of(&s, id).velocity.y == 0);
+    }
+    done = relax(&s, 0.01, 0); /* asks only */
+    assert_true(done.sweeps == 0 && done.moved == 0 && done.overlaps > 0);
+    close_scene(&s);
+
+    s = make_scene(vec(0, 0));
+    const dem2d_shape_id other = give_shape(&s, make_disc(RADIUS));
+    const dem2d_particle_id fixed =
+        add_copy(&s, dem2d_world_shape(s.world, other), DEM2D_FIXED, vec(0, 0), 0, vec(0, 0), 0);
+    const dem2d_particle_id free_one =
+        add_copy(&s, dem2d_world_shape(s.world, other), DEM2D_FREE, vec(0, 0.03), 0, vec(0, 0), 0);
+    done = relax(&s, 1e-3, 10);
+    assert_int_equal(done.overlaps, 0);
+    assert_true(grain_of(&s, fixed).pose.position.y == 0);
+    assert_near(grain_of(&s, free_one).pose.position.y, 2 * RADIUS, 1e-3);
+    close_scene(&s);
+}
+
+int main(void) {
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(test_overlap_at), cmocka_unit_test(test_two),
+        cmocka_unit_test(test_hundred),    cmocka_unit_test(test_bed),
+        cmocka_unit_test(test_jammed),
+    };
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}
