@@ -458,7 +458,9 @@ in use is decided after an edit)
     polygons for a tenth of the circles                 +521
     energy and stress queried in every step            +1810
     the ledger of energies                             +1791
-    a dashpot, rolling friction, a law of your own     +1239    circles then take the general path
+    a dashpot                                            +70    with friction; as the next two rows:
+    a dashpot and rolling friction                      +240    in beds of bench-guard
+    a law of your own, springs and friction             +780    by rows, called for all at once
     a pair of circles listed but apart                    75    same as in contact: no branch
     another pair listed but apart, known gap              70    colliding it costs 700 to 2000
     a region without particles, a pair of fixed ones       0
@@ -16807,52 +16809,58 @@ static inline void dem2di_last_get(const dem2d_world *world, const dem2di_contac
         last->pair.shear[k] -= from->point_viscous_shear[at].at[k];
 }
 
-/* The rest of what a caller's law reads, of the rows from `first` on. */
-static void dem2di_law_add_callers(const dem2d_world *world, int i, const dem2di_last *last,
-                                   const dem2di_contact *contact, double radius, int first,
-                                   dem2di_law_rows *rows) {
+/* The rest of what a caller's law reads, of row k. Without a tangential spring the built-in law has
+   no friction. */
+static DEM2DI_INLINE void dem2di_law_row_callers(const dem2d_world *world, int i,
+                                                 const dem2d_pair_desc *law,
+                                                 const dem2di_contact *contact, double radius,
+                                                 const dem2di_two *state, int k,
+                                                 dem2di_law_rows *rows) {
     const dem2di_key *key = &world->list.keys[i];
-    const dem2di_contacts *contacts = &world->list.contacts;
-    const dem2d_pair_desc *law = dem2di_law_of(world, i);
-    const int at = i - world->list.discs, last_at = last->at - world->list.discs;
-    const bool wall = i >= world->list.pairs, two = rows->count - first == 2;
-    const bool springs =
-        law->tangential_stiffness > 0; /* without, the built-in law has no friction */
-    const bool from_two = two && dem2di_has_two_points(&last->pair);
-    const bool crossed = from_two && dem2di_has_crossed(&last->pair, &contacts->point_pairs[at]);
     const double inverse = dem2di_reduced_inverse(world, i);
-    const dem2d_particle_id no_particle = {0, 0};
-    const dem2d_wall_id no_wall = {0, 0};
-    for (int k = first; k < rows->count; k++) {
-        const bool second = k > first;
-        rows->pair[k] = law;
-        rows->a[k] = dem2di_particle_id(world, key->a);
-        rows->b[k] = wall ? no_particle : dem2di_particle_id(world, key->b);
-        rows->wall[k] = wall ? dem2di_wall_id(world, dem2di_wall_of(world, i)) : no_wall;
-        rows->point[k] = second;
-        rows->normal_x[k] = contact->normal.x;
-        rows->normal_y[k] = contact->normal.y;
-        rows->sign[k] = dem2di_sign_of(world, i);
-        rows->mass[k] = inverse > 0 ? 1 / inverse : 0;
-        rows->radius[k] = radius;
-        rows->compression[k] = contact->depth * contact->depth / 2;
-        if (!springs) rows->friction[k] = 0;
-        const dem2di_two *state = &last->from->state[last->at];
-        if (from_two && second != crossed) state = &last->from->point_state[last_at];
-        memcpy(rows->state[k], state->at, sizeof rows->state[k]);
-        if (!second) continue;
-        rows->spin[k] = rows->spin[first];
-        rows->rolling_stiffness[k] = rows->rolling_stiffness[first];
-        rows->rolling_dashpot[k] = rows->rolling_dashpot[first];
-        rows->rolling_friction[k] = rows->rolling_friction[first];
-        rows->last_moment[k] = 0;
+    rows->pair[k] = law;
+    rows->a[k] = dem2di_particle_id(world, key->a);
+    if (i < world->list.pairs) {
+        rows->b[k] = dem2di_particle_id(world, key->b);
+        rows->wall[k].index = rows->wall[k].generation = 0;
+    } else {
+        rows->b[k].index = rows->b[k].generation = 0;
+        rows->wall[k] = dem2di_wall_id(world, dem2di_wall_of(world, i));
     }
-    if (!springs)
-        for (int k = first; k < rows->count; k++) rows->rolling_friction[k] = 0;
-    if (!two) return;
-    const bool carried = contacts->point_pairs[at].weight[0] > 0; /* by the first row? */
-    rows->compression[first] = carried ? contacts->point_pairs[at].energy : 0;
-    rows->compression[first + 1] = carried ? 0 : contacts->point_pairs[at].energy;
+    rows->point[k] = 0;
+    rows->normal_x[k] = contact->normal.x;
+    rows->normal_y[k] = contact->normal.y;
+    rows->sign[k] = dem2di_sign_of(world, i);
+    rows->mass[k] = inverse > 0 ? 1 / inverse : 0;
+    rows->radius[k] = radius;
+    rows->compression[k] = contact->depth * contact->depth / 2;
+    rows->state[k][0] = state->at[0];
+    rows->state[k][1] = state->at[1];
+    if (!(law->tangential_stiffness > 0)) rows->friction[k] = rows->rolling_friction[k] = 0;
+}
+
+/* The same for the second of two points, in row k. */
+static void dem2di_law_row_second(const dem2d_world *world, int i, const dem2di_last *last,
+                                  const dem2di_contact *contact, int k, dem2di_law_rows *rows) {
+    const int at = i - world->list.discs, last_at = last->at - world->list.discs, first = k - 1;
+    const dem2di_point_pair *pair = &world->list.contacts.point_pairs[at];
+    const dem2di_two *state = &last->from->state[last->at], *second = state;
+    rows->spin[k] = rows->spin[first];
+    rows->rolling_stiffness[k] = rows->rolling_stiffness[first];
+    rows->rolling_dashpot[k] = rows->rolling_dashpot[first];
+    rows->rolling_friction[k] = rows->rolling_friction[first];
+    rows->last_moment[k] = 0;
+    if (dem2di_has_two_points(&last->pair)) {
+        const bool crossed = dem2di_has_crossed(&last->pair, pair);
+        second = crossed ? state : &last->from->point_state[last_at];
+        if (crossed) memcpy(rows->state[first], last->from->point_state[last_at].at, sizeof *state);
+    }
+    dem2di_law_row_callers(world, i, rows->pair[first], contact, rows->radius[first], second, k,
+                           rows);
+    rows->point[k] = 1;
+    const bool carried = pair->weight[0] > 0; /* by the first row? */
+    rows->compression[first] = carried ? pair->energy : 0;
+    rows->compression[k] = carried ? 0 : pair->energy;
 }
 
 /* Terms of the law beside springs and friction, of the rows from `first` on. */
@@ -16862,7 +16870,7 @@ static void dem2di_law_add_terms(const dem2d_world *world, int i, const dem2di_l
                                  dem2di_law_rows *rows) {
     const dem2d_pair_desc *law = dem2di_law_of(world, i);
     const double spin = motion->wb - motion->wa, approach = -dem2di_velocity_n(contact, motion);
-    const double dashpot = dem2di_pair_dashpot(world, i);
+    const double dashpot = law->damping_ratio > 0 ? dem2di_pair_dashpot(world, i) : 0;
     rows->approach[first] = approach;
     rows->dashpot[first] = dashpot;
     rows->tangential_dashpot[first] = dem2di_tangential_dashpot(world, i, &contact->arms);
@@ -16884,8 +16892,12 @@ static void dem2di_law_add_terms(const dem2d_world *world, int i, const dem2di_l
     rows->last_moment[first] =
         last->from->moment[last->at] - dem2di_viscous_moment_of(world, last->from, last->at);
     if (world->plan.terms & DEM2DI_ROLLING_DASHPOT)
-        rows->rolling_dashpot[first] = rolls ? dem2di_rolling_dashpot(world, i) : 0;
-    if (world->law != NULL) dem2di_law_add_callers(world, i, last, contact, radius, first, rows);
+        rows->rolling_dashpot[first] =
+            rolls && law->rolling_damping_ratio > 0 ? dem2di_rolling_dashpot(world, i) : 0;
+    if (world->law == NULL) return;
+    dem2di_law_row_callers(world, i, law, contact, radius, &last->from->state[last->at], first,
+                           rows);
+    if (rows->count - first == 2) dem2di_law_row_second(world, i, last, contact, first + 1, rows);
 }
 
 /* One row of springs and friction. */
@@ -17069,12 +17081,15 @@ static dem2d_law_batch dem2di_law_batch_of(const dem2d_world *world, dem2di_law_
 /* The caller's law for all rows. */
 static void dem2di_law_ask(const dem2d_world *world, dem2di_law_rows *rows) {
     dem2d_law_batch batch = dem2di_law_batch_of(world, rows);
+    const size_t bytes = (size_t)rows->count * sizeof(double);
+    double *const zero[] = {rows->viscous, rows->force,         rows->shear,         rows->moment,
+                            rows->energy,  rows->viscous_shear, rows->viscous_moment};
+    for (int z = 0; z < 7; z++) memset(zero[z], 0, bytes);
     for (int k = 0; k < rows->count; k++) {
         double weight = rows->weight[k], spring = rows->stiffness[k] * weight * rows->depth[k];
-        double damped = dem2di_damped(spring, weight * rows->dashpot[k], rows->approach[k]);
-        rows->viscous[k] = damped - spring;
-        rows->force[k] = rows->shear[k] = rows->moment[k] = rows->energy[k] = 0;
-        rows->viscous_shear[k] = rows->viscous_moment[k] = 0;
+        if (!(rows->dashpot[k] > 0)) continue;
+        rows->viscous[k] =
+            dem2di_damped(spring, weight * rows->dashpot[k], rows->approach[k]) - spring;
     }
     world->law(world->law_user, &batch);
 }
@@ -17669,6 +17684,33 @@ static void dem2di_others_range(dem2d_world *world, int begin, int end, dem2di_c
     dem2di_law_apply(world, &rows, count);
 }
 
+/* Two circles that overlap, as a row for a caller's law: as dem2di_law_add. */
+static DEM2DI_INLINE void dem2di_disc_add(const dem2d_world *world, int i,
+                                          const dem2di_contact *contact, dem2di_law_rows *rows) {
+    const dem2di_contacts *from = &world->list.contacts;
+    const dem2di_key *key = &world->list.keys[i];
+    const dem2d_pair_desc *law = dem2di_law_of(world, i);
+    const double radius_a = world->now[key->a].radius, radius_b = world->now[key->b].radius;
+    const double radius = radius_a * (radius_b / (radius_a + radius_b));
+    const dem2di_relative_motion motion = dem2di_motion_of(world, i);
+    const int k = rows->count;
+    dem2di_contact last;
+    (void)dem2di_contact_get(world, from, i, &last);
+    dem2di_law_add_row(law, i, 1, contact->depth, dem2di_slip(&last, contact, &motion),
+                       last.shear - from->viscous_shear[i], rows);
+    rows->approach[k] = -dem2di_velocity_n(contact, &motion);
+    rows->spin[k] = motion.wb - motion.wa;
+    rows->dashpot[k] = law->damping_ratio > 0 ? dem2di_pair_dashpot(world, i) : 0;
+    rows->tangential_dashpot[k] =
+        law->tangential_damping_ratio > 0 ? dem2di_tangential_dashpot(world, i, &contact->arms) : 0;
+    rows->rolling_dashpot[k] =
+        law->rolling_damping_ratio > 0 ? dem2di_rolling_dashpot(world, i) : 0;
+    rows->rolling_stiffness[k] = dem2di_rolling_stiffness(law, radius);
+    rows->rolling_friction[k] = law->rolling_friction * radius;
+    rows->last_moment[k] = from->moment[i] - from->viscous_moment[i];
+    dem2di_law_row_callers(world, i, law, contact, radius, &from->state[i], k, rows);
+}
+
 /* Pairs of circles by rows, for a caller's law. */
 static void dem2di_discs_by_rows(dem2d_world *world, int begin, int end, dem2di_count *count) {
     dem2di_list *list = &world->list;
@@ -17680,11 +17722,6 @@ static void dem2di_discs_by_rows(dem2d_world *world, int begin, int end, dem2di_
         dem2di_round r = dem2di_round_make(dem2di_disc_line(a, b), held ? 0 : a->radius,
                                            held ? 0 : b->radius, 1);
         dem2di_contact contact;
-        dem2di_last last;
-        last.from = &list->contacts;
-        last.at = i;
-        (void)dem2di_contact_get(world, &list->contacts, i, &last.contact);
-        last.contact.shear -= list->contacts.viscous_shear[i];
         contact.normal = r.normal;
         contact.depth = r.depth;
         contact.arms.a_n = r.arm_a;
@@ -17692,7 +17729,7 @@ static void dem2di_discs_by_rows(dem2d_world *world, int begin, int end, dem2di_
         contact.arms.a_t = contact.arms.b_t = 0;
         if (r.depth > 0) {
             dem2di_law_room(world, &rows, count);
-            dem2di_law_add(world, i, &last, false, &contact, &rows);
+            dem2di_disc_add(world, i, &contact, &rows);
             count->collisions++;
             count->proofs[DEM2D_BY_FORM]++;
         } else {

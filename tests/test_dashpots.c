@@ -268,11 +268,84 @@ static void test_nothing_to_damp(void **state) {
     }
 }
 
+/* --- snapshots ----------------------------------------------------------------------------------
+ */
+
+static void builtin(void *user, dem2d_law_batch *batch) {
+    (void)user;
+    dem2d_law_builtin(batch);
+    for (int k = 0; k < batch->count; k++) batch->state[k][batch->point[k]] += 1;
+}
+
+/* A box on its face and a disc, saved in the middle of their impacts, go on to the same hash: with
+   each dashpot alone, with all, and with a caller's law. */
+static void test_snapshots(void **state) {
+    (void)state;
+    for (int i = 0; i < 6; i++) {
+        const impact c = {"",
+                          i == 0 || i > 2 ? 0.1 : 0,
+                          i == 1 || i > 2 ? 0.2 : 0,
+                          i == 2 || i > 2 ? 0.3 : 0,
+                          0.5,
+                          0.2,
+                          0.7,
+                          5};
+        dem2d_world_desc desc = {0};
+        const dem2d_material_desc material = material_of(&c);
+        desc.time_step = contact_time() / 100, desc.ledger = i == 4, desc.skin = 0.2;
+        if (i == 5) desc.law = builtin, desc.law_tag = 3;
+        scene s = open_scene(&desc, &material), t;
+        add_plane(&s, 0, 0, 0, 1);
+        add_shape(&s, make_disc(RADIUS), DEM2D_FREE, vec(0, RADIUS + 1e-4), 0, vec(0.7, -1), 5);
+        add_shape(&s, make_box(0.1, 0.06), DEM2D_FREE, vec(1, 0.03 + 1e-4), 1e-4, vec(0.7, -1), 0);
+        assert_ok(dem2d_world_step(s.world, 30, NULL));
+        scene_bytes bytes = scene_save(s.world);
+        dem2d_load_desc load = {0};
+        load.read = scene_read, load.user = &bytes, load.law = builtin, load.law_tag = 3;
+        t = s;
+        assert_ok(dem2d_world_load(&load, NULL, &t.world));
+        assert_true(dem2d_world_hash(s.world) == dem2d_world_hash(t.world));
+        for (int k = 0; k < 2; k++) assert_ok(dem2d_world_step((k ? t : s).world, 100, NULL));
+        assert_true(dem2d_world_hash(s.world) == dem2d_world_hash(t.world));
+        free(bytes.bytes);
+        close_scene(&s), close_scene(&t);
+    }
+}
+
+/* A refused step leaves all as it was: a force that is not finite, by a law that breaks down. */
+static void breaking(void *user, dem2d_law_batch *batch) {
+    const int *broken = user;
+    builtin(NULL, batch);
+    for (int k = 0; k < batch->count && *broken; k++) batch->tangential_force[k] = (double)NAN;
+}
+
+static void test_refused(void **state) {
+    (void)state;
+    const impact c = {"", 0.1, 0.2, 0.3, 0.5, 0.2, 0.7, 5};
+    dem2d_world_desc desc = {0};
+    const dem2d_material_desc material = material_of(&c);
+    int broken = 0;
+    desc.time_step = contact_time() / 100, desc.law = breaking, desc.law_user = &broken;
+    scene s = open_scene(&desc, &material);
+    add_plane(&s, 0, 0, 0, 1);
+    add_shape(&s, make_disc(RADIUS), DEM2D_FREE, vec(0, RADIUS + 1e-4), 0, vec(0.7, -1), 5);
+    add_shape(&s, make_box(0.1, 0.06), DEM2D_FREE, vec(1, 0.03 + 1e-4), 1e-4, vec(0.7, -1), 0);
+    assert_ok(dem2d_world_step(s.world, 30, NULL));
+    const uint64_t hash = dem2d_world_hash(s.world);
+    broken = 1;
+    assert_result(dem2d_world_step(s.world, 1, NULL), DEM2D_STATE);
+    assert_true(dem2d_world_hash(s.world) == hash);
+    broken = 0;
+    assert_ok(dem2d_world_step(s.world, 1, NULL));
+    close_scene(&s);
+}
+
 int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(test_impacts),         cmocka_unit_test(test_energies),
         cmocka_unit_test(test_bounds),          cmocka_unit_test(test_safe_step),
-        cmocka_unit_test(test_nothing_to_damp),
+        cmocka_unit_test(test_nothing_to_damp), cmocka_unit_test(test_snapshots),
+        cmocka_unit_test(test_refused),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }
