@@ -20829,7 +20829,7 @@ DEM2D_API dem2d_result dem2d_world_write_particles(dem2d_world *world,
                                                    const dem2d_particle_arrays *arrays, int count) {
     if (world == NULL || arrays == NULL) return DEM2D_NULL_ARGUMENT;
     dem2d_result result = dem2di_check_rows(world, arrays, count);
-    if (result != DEM2D_OK) return result;
+    if (result != DEM2D_OK || count == 0) return result;
     bool moves = arrays->positions != NULL || arrays->angles != NULL;
     bool drives = arrays->velocities != NULL || arrays->angular_velocities != NULL;
     bool loads = arrays->loads != NULL || arrays->load_torques != NULL;

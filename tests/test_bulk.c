@@ -299,7 +299,12 @@ static void test_refused(void **state) {
     dem2d_vec v[2] = {{1, 2}, {0, 3}};
     dem2d_particle_arrays a;
     memset(&a, 0, sizeof a);
-    a.velocities = v;
+    a.velocities = a.loads = v;
+    const scene empty = open_scene(&desc, &stone);
+    assert_ok(dem2d_world_write_particles(empty.world, &a, 0)); /* of none */
+    assert_result(dem2d_world_write_particles(empty.world, &a, 1), DEM2D_OUT_OF_RANGE);
+    close_scene(&empty);
+    a.loads = NULL;
     const uint64_t before = dem2d_world_hash(s.world);
     assert_result(dem2d_world_write_particles(s.world, &a, 2), DEM2D_OUT_OF_RANGE);
     assert_logged(&env, DEM2D_OUT_OF_RANGE, 1, "velocities");
