@@ -22494,6 +22494,13 @@ static void dem2di_wall_numbers(const dem2d_world *world, int part, double *numb
     int j = world->parts[part].wall;
     dem2d_wall_info info;
     (void)dem2d_world_get_wall(world, dem2di_wall_id(world, j), &info);
+    if (world->walls[j].count > 1) { /* each segment of a chain has its own */
+        dem2d_wall_part_info own;
+        (void)dem2d_world_get_wall_part(world, dem2di_wall_id(world, j),
+                                        part - world->walls[j].first, &own);
+        info.force = own.force;
+        info.stress = own.stress;
+    }
     dem2d_vec v = dem2di_add(world->wall_before[j].velocity, world->wall_now[j].velocity);
     const double all[] = {(double)j,    (double)info.mode, v.x / 2, v.y / 2,    0,
                           info.force.x, info.force.y,      0,       info.stress};
