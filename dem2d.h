@@ -271,7 +271,8 @@ HOW TO
     repeat the papers    dem2d_world_desc.solver = DEM2D_GJK_EPA, faces = DEM2D_ONE_POINT; templates
                          by DEM2D_FIT_REDUCTION and DEM2D_FIT_SWARM, unbounded; local_damping = 0.7
                          ([P]) or global_damping = 0.7 ([F]). Example: examples/biaxial.c --papers.
-    choose a time step   dem2d_world_time_step_bounds on a settled scene. The world checks its time
+    choose a time step   dem2d_world_choose_time_step before the first step;
+                         dem2d_world_time_step_bounds on a settled scene. The world checks its time
                          step in the first step, after edits that can matter, and in every 160th.
     lose energy          damping_ratio of the materials, from dem2d_damping_ratio(restitution);
                          tangential_damping_ratio against swinging tangential springs;
@@ -1713,6 +1714,18 @@ DEM2D_API dem2d_result dem2d_world_get_wall_desc(const dem2d_world *world, dem2d
 DEM2D_API dem2d_result dem2d_world_time_step_bounds(const dem2d_world *world, double *safe,
                                                     double *limit,
                                                     dem2d_particle_id *limit_particle);
+/// A time step from masses and stiffnesses alone, also before the first step: a fraction (in (0,
+/// 1]) of a step that is stable for every free particle with contact points in Z = 6 places,
+/// wherever these are, each with the stiffest spring and the strongest dashpot that its material
+/// has with those in use. It is the least over the particles of 2/(g + sqrt(g^2 + l)), with the
+/// bounds l of the eigenvalues of M^-1 K and 2 g of those of M^-1 C:
+///     l = 2 Z (kn (1/m + a^2/I) + kt (1/m + R^2/I)),
+///     2 g the same of the dashpots, 2 zeta sqrt(m kn) and 2 zeta sqrt(m kt) in place of kn and kt,
+/// R the bounding radius, a the greatest lever of a normal force, 2 for partners that move as well;
+/// faces have two points in each place. HUGE_VAL without free particles. A fraction of 0.1 to 0.3
+/// is usual: see dem2d_world_time_step_bounds for energy, and for flat arcs under large forces.
+DEM2D_API dem2d_result dem2d_world_choose_time_step(const dem2d_world *world, double fraction,
+                                                    double *time_step);
 /// Take count >= 0 steps; done (may be NULL) gets the number taken, also on failure. Errors: STATE,
 /// TIME_STEP, OUT_OF_MEMORY, OUT_OF_RANGE, IN_USE (called by a callback of this world), what
 /// dem2d_world_desc.commit returns; the world then is as it was before the step that failed.
@@ -18657,6 +18670,63 @@ static void dem2di_observe_touches(dem2d_world *world) {
         dem2di_touch_change(world, world->changes[k].value);
 }
 
+/* Places with contact points of a particle for which a time step is chosen. */
+#define DEM2DI_CHOSEN_PLACES 6
+
+/* The strongest laws that a particle's material has with those in use, each number by itself. */
+static dem2d_pair_desc dem2di_strongest_law(const dem2d_world *world, const bool *used,
+                                            int material) {
+    dem2d_pair_desc most;
+    memset(&most, 0, sizeof most);
+    for (int other = 0; other < world->material_count; other++) {
+        const dem2d_pair_desc *law = dem2di_law(world, material, other);
+        if (!used[other]) continue;
+        double normal = law->damping_ratio * sqrt(law->normal_stiffness);
+        double tangential = dem2di_max(law->tangential_damping_ratio, law->rolling_damping_ratio) *
+                            sqrt(law->tangential_stiffness);
+        most.normal_stiffness = dem2di_max(most.normal_stiffness, law->normal_stiffness);
+        most.tangential_stiffness =
+            dem2di_max(most.tangential_stiffness, law->tangential_stiffness);
+        most.damping_ratio = dem2di_max(most.damping_ratio, normal);
+        most.tangential_damping_ratio = dem2di_max(most.tangential_damping_ratio, tangential);
+    }
+    return most; /* the ratios times the roots of the stiffnesses */
+}
+
+DEM2D_API dem2d_result dem2d_world_choose_time_step(const dem2d_world *world, double fraction,
+                                                    double *time_step) {
+    if (world == NULL || time_step == NULL) return DEM2D_NULL_ARGUMENT;
+    dem2d_result result =
+        dem2di_check_number(&world->env, "fraction", fraction, 0, 1, DEM2DI_ABOVE, DEM2DI_DOUBLE);
+    if (result != DEM2D_OK) return result;
+    bool used[DEM2DI_MATERIALS_MAX] = {false};
+    double least = HUGE_VAL;
+    for (int i = 0; i < world->body_count; i++)
+        if (world->bodies[i].shape_index >= 0) used[world->bodies[i].material] = true;
+    for (int j = 0; j < world->wall_count; j++)
+        if (world->walls[j].alive) used[world->walls[j].desc.material.index] = true;
+    for (int i = 0; i < world->body_count; i++) {
+        const dem2di_body *body = &world->bodies[i];
+        if (body->shape_index < 0 || body->motion != DEM2D_FREE) continue;
+        if (dem2di_groups_at(world, i).sensor) continue; /* it has no contacts */
+        const dem2d_shape *shape = dem2di_shape_of(world, body);
+        const dem2d_pair_desc law = dem2di_strongest_law(world, used, body->material);
+        double mass = dem2di_body_mass(world, body), inertia = dem2di_body_inertia(world, body);
+        double radius = world->now[i].radius, lever = dem2di_lever_of(world, i);
+        double points = shape->flat && world->faces == DEM2D_TWO_POINTS ? 2 : 1;
+        double count = 2 * points * DEM2DI_CHOSEN_PLACES, root = sqrt(mass);
+        double normal = 1 / mass + lever * lever / inertia;
+        double tangential = 1 / mass + radius * radius / inertia;
+        double stiff =
+            count * (law.normal_stiffness * normal + law.tangential_stiffness * tangential);
+        double damped =
+            count * root * (law.damping_ratio * normal + law.tangential_damping_ratio * tangential);
+        least = dem2di_min(least, 2 / (damped + sqrt(damped * damped + stiff)));
+    }
+    *time_step = fraction * least;
+    return DEM2D_OK;
+}
+
 /* --- the step ------------------------------------------------------------------------------------
  */
 
@@ -22887,6 +22957,7 @@ DEM2D_API dem2d_result dem2d_world_write_csv(const dem2d_world *world, const dem
             _get_wall_desc, _get_particle_desc, _get_material_desc, _get_pair. New edits of a
             particle: dem2d_world_set_material, dem2d_world_set_shape.
             dem2d_world_overlap_at and dem2d_world_relax, so that new particles do not explode.
+            dem2d_world_choose_time_step, from masses and stiffnesses alone.
      0.6.0  Runs differ from those of 0.5.0 with friction between circles, dashpots, polybeziers,
             two contact points with friction, and servo walls. Snapshots (version 4) name their
             arrays and fields, so that later headers read them; earlier snapshots are refused. The

@@ -907,6 +907,8 @@ typedef struct function {
       LOGS, IN_WORLD,                                                                             \
       ARG(x, "tolerance", NUMBER, .high = 1, .above = true, .below = true),                       \
       ARG_INT(count, "sweeps", 0, INT_MAX, OUT_OF_RANGE), OUT)                                    \
+    F(world_choose_time_step, dem2d_world_choose_time_step(v->world, v->x, v->out),               \
+      LOGS, IN_WORLD, ARG(x, "fraction", PORTION), OUT)                                           \
     F(world_particle_contacts,                                                                    \
       dem2d_world_particle_contacts(v->world, v->particle, v->out, v->count, v->second),          \
       LOGS, IN_WORLD, ARG(particle, "particle", PARTICLE_ID), OUT, CAPACITY, SECOND)

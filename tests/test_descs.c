@@ -224,12 +224,58 @@ static void test_setters(void **state) {
     close_scene(&s);
 }
 
+/* A time step is chosen before the first step: of one disc by hand; in packings of all shapes, with
+   walls, two sizes and dashpots, it is below the safe bound, but not far below. */
+static void test_choose(void **state) {
+    (void)state;
+    for (int kind = 0; kind < 8; kind++) {
+        const double a[4] = {0.08, 0, 0, 0.002}, b[4] = {0, 0, 0, 0};
+        const double reach[4] = {0.05, 0.04, 0.045, 0.06};
+        dem2d_material_desc material = stone_desc(5e6, 0.3);
+        dem2d_world_desc desc = {0};
+        double before, after, safe, limit;
+        if (kind == 6) material.damping_ratio = 0.3;
+        desc.time_step = 1e-4, desc.gravity = vec(0, -9.81), desc.local_damping = 0.3;
+        scene s = open_scene(&desc, &material);
+        dem2d_shape *made[5] = {make_disc(0.05), make_ellipse(0.055, 0.04), make_box(0.09, 0.07),
+                                make_series(a, b, 3), make_oval(reach, 0.5522847498)};
+        dem2d_shape_id shapes[5];
+        for (int k = 0; k < 5; k++) shapes[k] = give_shape(&s, made[k]);
+        assert_ok(dem2d_world_choose_time_step(s.world, 0.1, &before));
+        assert_true(before == HUGE_VAL); /* nothing moves */
+        add_floor(&s), add_plane(&s, 0, 0, 1, 0), add_plane(&s, 0.62, 0, -1, 0);
+        for (int i = 0; i < 60; i++) {
+            dem2d_particle_desc grain = grain_desc(
+                &s,
+                shapes[kind < 5    ? kind
+                       : kind == 5 ? i % 5
+                                   : 0],
+                kind == 7 && i % 2 ? 0.3 : 1, vec(0.06 + 0.122 * (i % 5), 0.06 + 0.12 * (i / 5)));
+            grain.angle = i;
+            add_grain(&s, &grain);
+        }
+        assert_ok(dem2d_world_choose_time_step(s.world, 1, &before));
+        assert_ok(dem2d_world_choose_time_step(s.world, 0.25, &after));
+        assert_near(after, before / 4, 1e-15);
+        if (kind == 0) { /* I = m R^2/2: 12 (kn + 3 kt)/m */
+            const double mass = 2700 * (double)TEST_PI * 0.05 * 0.05;
+            assert_near(before, 2 / sqrt(12 * (1e7 + 3 * 5e6) / mass), 1e-12);
+        }
+        assert_ok(dem2d_world_set_time_step(s.world, after));
+        step(&s, (int)(2 / after)); /* at rest */
+        assert_ok(dem2d_world_time_step_bounds(s.world, &safe, &limit, NULL));
+        assert_ok(dem2d_world_choose_time_step(s.world, 1, &after));
+        assert_same_bits(after, before); /* whatever the contacts are */
+        assert_between(before, safe / 6, safe);
+        close_scene(&s);
+    }
+}
+
 int main(void) {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(test_continued),
-        cmocka_unit_test(test_set_again),
-        cmocka_unit_test(test_rebuilt),
-        cmocka_unit_test(test_setters),
+        cmocka_unit_test(test_continued), cmocka_unit_test(test_set_again),
+        cmocka_unit_test(test_rebuilt),   cmocka_unit_test(test_setters),
+        cmocka_unit_test(test_choose),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }
