@@ -1045,7 +1045,7 @@ static void world_add_force(world_sums *sums, int i, dem2d_vec arm, dem2d_vec fo
 static void world_sum_contact(world_run *run, const dem2d_contact_info *c,
                               const dem2d_vec at[MOST_GRAINS], world_sums *sums) {
     const dem2d_vec n = c->normal, p = c->point;
-    const double fn = c->normal_force, ft = c->tangential_force;
+    const double fn = c->sign * c->normal_force, ft = c->sign * c->tangential_force;
     const dem2d_vec on_b = vec(fn * n.x - ft * n.y, fn * n.y + ft * n.x);
     const dem2d_vec on_a = vec(-on_b.x, -on_b.y);
     const int a = world_grain_of(run, c->a), b = world_grain_of(run, c->b);
