@@ -9086,9 +9086,11 @@ static DEM2DI_INLINE bool dem2di_corner_alone(const dem2di_pair *pair, const dem
     double cosine_before = dem2di_cross(v, other->tangents[before]);
     dem2d_vec last = own->tangents[dem2di_before(own->count, edge)];
     bool distinct = fabs(dem2di_cross(last, own->tangents[edge])) > 4 * DEM2DI_ROUNDOFF;
-    return distinct &
-           dem2di_side_apart(at, at->sine[0], cosine_after, rise_after, -at->low, unsure) &
-           dem2di_side_apart(at, at->sine[1], cosine_before, rise_before, at->high, unsure);
+    bool after_apart =
+        dem2di_side_apart(at, at->sine[0], cosine_after, rise_after, -at->low, unsure);
+    bool before_apart =
+        dem2di_side_apart(at, at->sine[1], cosine_before, rise_before, at->high, unsure);
+    return distinct & after_apart & before_apart;
 }
 
 /* An edge of one core and the corner of the other that is farthest along its normal n. They are the
