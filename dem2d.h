@@ -22935,6 +22935,7 @@ DEM2D_API dem2d_result dem2d_world_write_csv(const dem2d_world *world, const dem
             Several processes: dem2d_world_desc.gather may change the sums of the contact forces in
             each step, commit may refuse a step.
             Units, ranges and defaults of options are said once, in the comments of the descs.
+            Fits of ellipses and polygons take 40 % fewer instructions.
             Particles and walls may have a name of 64 bits, which orders pairs and sums in place of
             the id (name in their descs and infos).
             Walls turn about a pivot (angular_velocity, dem2d_world_drive_wall), run as belts
