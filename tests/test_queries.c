@@ -743,11 +743,57 @@ static void test_pile(void **state) {
     assert_true(hash[0] == hash[1]);
 }
 
+/* A game: 60 pictures a second of 200 grains. A ray from above picks the top grain, and a spring to
+   the mouse lifts it out of the heap; there it hangs with its weight on the spring. */
+static void test_game(void **state) {
+    (void)state;
+    enum { GRAINS = 200, STEPS = 167 };
+    const dem2d_material_desc material = stone_desc(1e6, 0.5);
+    const dem2d_query_desc grains = {.skip_walls = true};
+    dem2d_world_desc desc = {0};
+    dem2d_hit picked;
+    dem2d_vec mouse = vec(1, 0);
+    desc.time_step = 1.0 / 60 / STEPS, desc.gravity.y = -9.81, desc.global_damping = 1;
+    scene s = open_scene(&desc, &material);
+    dem2d_shape_id shapes[KINDS];
+    for (int k = 0; k < KINDS; k++) shapes[k] = give_shape(&s, make_kind(k));
+    add_floor(&s), add_plane(&s, 0, 0, 1, 0), add_plane(&s, 2, 0, -1, 0);
+    for (int i = 0; i < GRAINS; i++) {
+        dem2d_particle_desc grain = grain_desc(&s, shapes[i % KINDS], 1,
+                                               vec(0.07 + 0.13 * (i % 15), 0.07 + 0.13 * (i / 15)));
+        grain.angle = i;
+        add_grain(&s, &grain);
+    }
+    for (int frame = 0; frame < 60; frame++) step(&s, STEPS); /* they fall */
+    assert_ok(dem2d_world_cast_ray(s.world, vec(1, 9), vec(0, -1), 0, &grains, &picked));
+    const dem2d_particle_id id = picked.found.particle;
+    assert_int_not_equal(id.generation, 0);
+    const double mass = grain_of(&s, id).mass, k = 200 * mass, c = 20 * mass; /* 1/s2, 1/s */
+    for (int frame = 0; frame < 180; frame++) {
+        const double share = frame < 60 ? frame / 60.0 : 1;
+        mouse = vec(1, picked.point.y + share * (3 - picked.point.y));
+        for (int n = 0; n < STEPS; n += 10) { /* the spring follows the grain */
+            const dem2d_particle_info info = grain_of(&s, id);
+            const dem2d_vec to = minus(mouse, info.pose.position);
+            const dem2d_vec force =
+                vec(k * to.x - c * info.velocity.x, k * to.y - c * info.velocity.y);
+            assert_ok(dem2d_world_set_load(s.world, id, force, 0));
+            step(&s, n + 10 <= STEPS ? 10 : STEPS - n);
+        }
+    }
+    assert_within(grain_of(&s, id).pose.position.y, 3 - mass * 9.81 / k, 1e-3);
+    assert_within(grain_of(&s, id).pose.position.x, 1, 1e-3);
+    assert_ok(dem2d_world_nearest(s.world, mouse, 0.2, &grains, &picked));
+    assert_memory_equal(&picked.found.particle, &id, sizeof id);
+    close_scene(&s);
+}
+
 int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(test_random),      cmocka_unit_test(test_rays),
         cmocka_unit_test(test_custom_rays), cmocka_unit_test(test_contract),
         cmocka_unit_test(test_extremes),    cmocka_unit_test(test_pile),
+        cmocka_unit_test(test_game),
     };
     return cmocka_run_group_tests(tests, oracle_make, NULL);
 }
