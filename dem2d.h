@@ -10891,51 +10891,76 @@ typedef struct dem2di_key {
     int a, b;
 } dem2di_key;
 
+/* The bounding circle of a particle and its skin. */
 typedef struct dem2di_disc {
     dem2d_vec centre;
-    double reach; /* bounding radius and skin */
-    int level;    /* its cells are 2^-level of the largest, at least twice its reach */
-    bool fixed;   /* two fixed ones are no pair */
-    bool circle;  /* two circles are a pair of the first kind, others of the second */
+    double reach;  /* bounding radius and skin */
+    int slot;      /* of the particle */
+    uint8_t level; /* its cells are 2^-level of the largest, at least twice its reach */
+    bool fixed;    /* two fixed ones are no pair */
+    bool circle;   /* two circles are a pair of the first kind, others of the second */
 } dem2di_disc;
 
-/* The discs sorted by the cells of their centres, with a hash table of cells. The arrays are the
-   caller's. */
-typedef struct dem2di_grid {
-    dem2di_disc *discs;
-    int *slot;   /* for each disc its slot of the table; after the sort its index in sorted */
-    int *sorted; /* discs by slot */
-    int *heads;  /* table + 1: where each slot begins in sorted */
-    int count, table;
-    double size;      /* of the cells of level 0 */
-    dem2d_vec origin; /* cells are counted from here, so that distant scenes keep their digits */
-    uint32_t levels;  /* bit mask of the levels in use */
-} dem2di_grid;
-
 #define DEM2DI_LEVELS 31
+
+/* The discs sorted by the cells of their centres. Each level has cells of its own size. On the
+   first levels all cells of the box have a head, row by row, with a ring of empty cells around
+   them. Finer cells may be far more than discs: they share a hash table, whose heads come behind
+   these. The arrays are the caller's. */
+typedef struct dem2di_grid {
+    dem2di_disc *discs;  /* by slot of the particle */
+    dem2di_disc *sorted; /* by cell */
+    int *place; /* for each disc the head of its cell; after the sort its index in sorted */
+    int *heads; /* cells + 1: where each cell begins in sorted */
+    int count, cells, table;  /* discs; heads of all cells, of the hash table */
+    int dense;                /* levels that are not in the hash table: */
+    int first[DEM2DI_LEVELS]; /* head of their first cell, */
+    int width[DEM2DI_LEVELS]; /* and cells in a row */
+    double size;              /* of the cells of level 0 */
+    dem2d_box box;   /* holds the centres: cells are counted from its lower corner, so that distant
+                        scenes keep their digits */
+    uint32_t levels; /* bit mask of the levels in use */
+} dem2di_grid;
 
 /* Cells are a little wider than two reaches, so that in spite of rounding errors of cell numbers up
    to 2^42 two discs that overlap are at most one cell apart. */
 #define DEM2DI_CELL (2 * (1 + 1.0 / 1024))
 
-/* Slots for `count` discs: a power of two, with about one disc in each slot. */
-static int dem2di_grid_table(int count) {
-    int table = 64;
-    while (table < count) table *= 2;
-    return table;
+/* The finest level of all cells is that with at most so many for each disc: to clear and add up
+   their heads takes less time than to place the disc. All levels together have a third more. */
+#define DEM2DI_CELLS_PER_DISC 4.0
+
+/* The heads that discs in the box need when these are the least and the greatest reach. The hash
+   table has about one disc in each slot. */
+static void dem2di_grid_plan(dem2di_grid *grid, double least, double most) {
+    double size = most * DEM2DI_CELL, limit = DEM2DI_CELLS_PER_DISC * grid->count + 64;
+    dem2d_vec side = dem2di_sub(grid->box.upper, grid->box.lower);
+    grid->size = size;
+    grid->dense = grid->cells = grid->table = 0;
+    for (int level = 0; level < DEM2DI_LEVELS; level++, size /= 2) {
+        double columns = floor(side.x / size) + 3, rows = floor(side.y / size) + 3;
+        if (!(columns * rows <= limit)) {
+            for (grid->table = 64; grid->table < grid->count;) grid->table *= 2;
+            break;
+        }
+        grid->first[level] = grid->cells;
+        grid->width[level] = (int)columns;
+        grid->cells += (int)(columns * rows);
+        grid->dense++;
+        if (!(least * (2 * DEM2DI_CELL) <= size)) break; /* no disc is on a finer level */
+    }
+    grid->cells += grid->table;
 }
 
 static double dem2di_cell_size(const dem2di_grid *grid, int level) {
     return grid->size / (double)((uint32_t)1 << level);
 }
 
-/* Cell number of a coordinate. From 2^62 cells on all coordinates share a cell: slow but
+/* Cell number of a coordinate in the box. From 2^62 cells on all coordinates share a cell: slow but
    correct. */
 static inline int64_t dem2di_cell_of(double coordinate, double size) {
-    double cell = coordinate / size, limit = 4611686018427387904.0;
-    if (!(fabs(cell) < limit)) return cell > 0 ? (int64_t)1 << 62 : -((int64_t)1 << 62);
-    int64_t whole = (int64_t)cell;
-    return whole - (cell < (double)whole);
+    double cell = coordinate / size;
+    return cell < 4611686018427387904.0 ? (int64_t)cell : (int64_t)1 << 62;
 }
 
 typedef struct dem2di_cell {
@@ -10944,24 +10969,26 @@ typedef struct dem2di_cell {
 
 static inline dem2di_cell dem2di_cell_at(const dem2di_grid *grid, dem2d_vec point, double size) {
     dem2di_cell cell;
-    cell.x = dem2di_cell_of(point.x - grid->origin.x, size);
-    cell.y = dem2di_cell_of(point.y - grid->origin.y, size);
+    cell.x = dem2di_cell_of(point.x - grid->box.lower.x, size);
+    cell.y = dem2di_cell_of(point.y - grid->box.lower.y, size);
     return cell;
 }
 
-/* Slot of a cell: a hash scatters squares of 8 x 8 cells; the cells of a square are consecutive, so
-   that neighbours in space are neighbours in memory. No two of 8 cells in a row share a slot,
-   whatever the hash is. */
-static int dem2di_cell_slot(const dem2di_grid *grid, int64_t x, int64_t y, int level) {
+/* Head of a cell. In the hash table a hash scatters squares of 8 x 8 cells; the cells of a square
+   are consecutive, so that neighbours in space are neighbours in memory. No two of 8 cells in a row
+   share a head, whatever the hash is. */
+static inline int dem2di_cell_head(const dem2di_grid *grid, int64_t x, int64_t y, int level) {
+    if (level < grid->dense)
+        return grid->first[level] + (int)((y + 1) * grid->width[level] + x + 1);
     uint64_t cx = (uint64_t)x, cy = (uint64_t)y;
     uint64_t h = (cx >> 3) * 0x9E3779B97F4A7C15u; /* 2^64 / golden ratio, and a shift between */
     h = (h ^ (h >> 32) ^ (cy >> 3)) * 0x9E3779B97F4A7C15u;
     h = (h ^ (h >> 29) ^ (uint64_t)level) * 0x9E3779B97F4A7C15u;
     uint64_t slot = (h >> 32) << 6 | (cy & 7) << 3 | (cx & 7);
-    return (int)(slot & (uint64_t)(grid->table - 1));
+    return grid->cells - grid->table + (int)(slot & (uint64_t)(grid->table - 1));
 }
 
-/* Level and slot of the discs from begin to end. */
+/* Level and cell of the discs from begin to end. */
 static void dem2di_grid_place(const dem2di_grid *grid, int begin, int end) {
     for (int i = begin; i < end; i++) {
         dem2di_disc *disc = &grid->discs[i];
@@ -10972,7 +10999,7 @@ static void dem2di_grid_place(const dem2di_grid *grid, int begin, int end) {
             disc->level++;
         }
         dem2di_cell cell = dem2di_cell_at(grid, disc->centre, size);
-        grid->slot[i] = dem2di_cell_slot(grid, cell.x, cell.y, disc->level);
+        grid->place[i] = dem2di_cell_head(grid, cell.x, cell.y, disc->level);
     }
 }
 
@@ -10987,23 +11014,20 @@ static int dem2di_starts(int *numbers, int count) {
     return sum;
 }
 
-/* Counting sort by slot; in a slot the order of the discs stays. */
+/* Counting sort by cell; in a cell the order of the discs stays. */
 static void dem2di_grid_sort(dem2di_grid *grid) {
     grid->levels = 0;
-    memset(grid->heads, 0, ((size_t)grid->table + 1) * sizeof *grid->heads);
+    memset(grid->heads, 0, ((size_t)grid->cells + 1) * sizeof *grid->heads);
     for (int i = 0; i < grid->count; i++) {
         grid->levels |= (uint32_t)1 << grid->discs[i].level;
-        grid->heads[grid->slot[i] + 1]++;
+        grid->heads[grid->place[i]]++;
     }
-    for (int s = 0; s < grid->table; s++) grid->heads[s + 1] += grid->heads[s];
+    for (int sum = 0, c = 0; c <= grid->cells; c++) grid->heads[c] = sum += grid->heads[c];
     for (int i = grid->count - 1; i >= 0; i--) {
-        int place = --grid->heads[grid->slot[i] + 1];
-        grid->sorted[place] = i;
-        grid->slot[i] = place;
+        int place = --grid->heads[grid->place[i]];
+        grid->sorted[place] = grid->discs[i];
+        grid->place[i] = place;
     }
-    /* the start of slot s now stands at s + 1 */
-    memmove(grid->heads, grid->heads + 1, (size_t)grid->table * sizeof *grid->heads);
-    grid->heads[grid->table] = grid->count;
 }
 
 /* Who is in which groups and meets which: 0 stands for all. */
@@ -11023,73 +11047,88 @@ static inline bool dem2di_meet(const dem2di_groups *a, const dem2di_groups *b) {
            dem2di_in_groups(b->mask, a->category);
 }
 
-/* The partners of a disc that were found: counted by kind, and written as (own, other) if there is
-   an array. */
+/* What a block of the search finds: pairs of circles as (a, b), of others as (a, ~b), particles and
+   parts of walls as (~a, b). What there is no room for is only counted. */
 typedef struct dem2di_finds {
-    int own, count[2];
-    dem2di_key *to[2];           /* or NULL */
-    const dem2di_groups *groups; /* of the discs; NULL: all meet */
+    dem2di_key *to; /* room + 1: the last is written over */
+    int room, count;
+    int others, walls;           /* of these pairs that are not of two circles; with walls */
+    const dem2di_groups *groups; /* of the slots; NULL: all meet */
 } dem2di_finds;
 
-/* One more partner; circles or not. */
-static inline void dem2di_find_pair(dem2di_finds *finds, int other, bool circles) {
-    int kind = !circles;
-    if (finds->to[kind] != NULL) {
-        finds->to[kind][finds->count[kind]].a = finds->own;
-        finds->to[kind][finds->count[kind]].b = other;
-    }
-    finds->count[kind]++;
+static inline void dem2di_find(dem2di_finds *finds, int a, int b) {
+    dem2di_key *to = &finds->to[finds->count < finds->room ? finds->count : finds->room];
+    to->a = a;
+    to->b = b;
+    finds->count++;
+    finds->others += b < 0;
+    finds->walls += a < 0;
 }
 
-/* Find partners among the sorted discs from begin to end. */
-static inline void dem2di_grid_range(const dem2di_grid *grid, int begin, int end, int level,
-                                     dem2di_finds *finds) {
-    const dem2di_disc *own = &grid->discs[finds->own];
+static inline bool dem2di_discs_near(const dem2di_disc *a, const dem2di_disc *b) {
+    dem2d_vec d = dem2di_sub(b->centre, a->centre);
+    double both = a->reach + b->reach;
+    return (dem2di_dot(d, d) < both * both) & !(a->fixed & b->fixed);
+}
+
+/* Find partners among the sorted discs from begin to end: without branches, as half of these discs
+   are partners. */
+static inline void dem2di_grid_range(const dem2di_grid *grid, const dem2di_disc *own, int begin,
+                                     int end, int level, dem2di_finds *finds) {
+    int count = finds->count, others = finds->others;
     for (int k = begin; k < end; k++) {
-        int j = grid->sorted[k];
-        const dem2di_disc *other = &grid->discs[j];
-        dem2d_vec d = dem2di_sub(other->centre, own->centre);
-        double both = own->reach + other->reach;
-        if (!(dem2di_dot(d, d) < both * both) || other->level != level) continue;
-        if (own->fixed && other->fixed) continue;
-        if (finds->groups != NULL && !dem2di_meet(&finds->groups[finds->own], &finds->groups[j]))
-            continue;
-        dem2di_find_pair(finds, j, own->circle && other->circle);
+        const dem2di_disc *other = &grid->sorted[k];
+        int near = dem2di_discs_near(own, other) & (other->level == level);
+        int apart = !(own->circle & other->circle); /* kinds */
+        if (finds->groups != NULL && near)
+            near = dem2di_meet(&finds->groups[own->slot], &finds->groups[other->slot]);
+        dem2di_key *to = &finds->to[count < finds->room ? count : finds->room];
+        to->a = own->slot;
+        to->b = other->slot ^ -apart;
+        count += near;
+        others += near & apart;
     }
+    finds->count = count;
+    finds->others = others;
 }
 
-/* Find partners in the cells of a row from x0 to x1; the cells of a square are done together. */
-static void dem2di_grid_row(const dem2di_grid *grid, int64_t x0, int64_t x1, int64_t y, int level,
-                            dem2di_finds *finds) {
-    while (x0 <= x1) {
-        int64_t run = 8 - (x0 & 7), left = x1 - x0 + 1;
-        if (run > left) run = left;
-        int slot = dem2di_cell_slot(grid, x0, y, level);
-        dem2di_grid_range(grid, grid->heads[slot], grid->heads[slot + run], level, finds);
-        x0 += run;
+/* Cells of a row from x to `last`, as many as have their discs together: from begin to end in
+   sorted. Returns the cell behind them. */
+static inline int64_t dem2di_grid_run(const dem2di_grid *grid, int64_t x, int64_t last, int64_t y,
+                                      int level, int *begin, int *end) {
+    int64_t run = last - x + 1, left = 8 - (x & 7);
+    if (level >= grid->dense && run > left) run = left;
+    int head = dem2di_cell_head(grid, x, y, level);
+    *begin = grid->heads[head];
+    *end = grid->heads[head + run];
+    return x + run;
+}
+
+/* Find partners in the cells of a row from x0 to x1, in the first of them from `after` on. */
+static inline void dem2di_grid_row(const dem2di_grid *grid, const dem2di_disc *own, int64_t x0,
+                                   int64_t x1, int64_t y, int level, int after,
+                                   dem2di_finds *finds) {
+    for (int64_t x = x0; x <= x1; after = 0) {
+        int begin, end;
+        x = dem2di_grid_run(grid, x, x1, y, level, &begin, &end);
+        dem2di_grid_range(grid, own, begin > after ? begin : after, end, level, finds);
     }
 }
 
 /* Find the partners of a disc so that each pair is found once: on its own level the discs after it
    in its cell, and those in cells to the right and above; on coarser levels all around. Discs that
    overlap are at most one cell apart, so the cost is linear for any mixture of sizes. */
-static void dem2di_grid_partners(const dem2di_grid *grid, dem2di_finds *finds) {
-    const dem2di_disc *own = &grid->discs[finds->own];
-    finds->count[0] = finds->count[1] = 0;
+static void dem2di_grid_partners(const dem2di_grid *grid, int disc, dem2di_finds *finds) {
+    const dem2di_disc *own = &grid->discs[disc];
     for (int level = 0; level <= own->level; level++) {
         if (!(grid->levels >> level & 1)) continue;
-        double size = dem2di_cell_size(grid, level);
-        dem2di_cell cell = dem2di_cell_at(grid, own->centre, size);
+        dem2di_cell cell = dem2di_cell_at(grid, own->centre, dem2di_cell_size(grid, level));
         int64_t x = cell.x, y = cell.y;
-        dem2di_grid_row(grid, x - 1, x + 1, y + 1, level, finds);
-        if (level < own->level) {
-            dem2di_grid_row(grid, x - 1, x + 1, y, level, finds);
-            dem2di_grid_row(grid, x - 1, x + 1, y - 1, level, finds);
-            continue;
-        }
-        int slot = dem2di_cell_slot(grid, x, y, level), place = grid->slot[finds->own];
-        dem2di_grid_range(grid, place + 1, grid->heads[slot + 1], level, finds);
-        dem2di_grid_row(grid, x + 1, x + 1, y, level, finds);
+        bool same = level == own->level;
+        dem2di_grid_row(grid, own, same ? x : x - 1, x + 1, y, level,
+                        same ? grid->place[disc] + 1 : 0, finds);
+        dem2di_grid_row(grid, own, x - 1, x + 1, y + 1, level, 0, finds);
+        if (!same) dem2di_grid_row(grid, own, x - 1, x + 1, y - 1, level, 0, finds);
     }
 }
 
@@ -11883,10 +11922,16 @@ typedef struct dem2di_stiffest {
 typedef struct dem2di_block_result {
     dem2di_count count;
     dem2di_stiffest stiffest;
-    double most;    /* greatest reach of the discs; greatest square of speed over skin */
-    int fast;       /* slot of the one of least rank that may pass through others, or -1 */
-    int64_t spread; /* sum of the distances in memory of the partners found */
-    int changes;    /* contacts that close or open */
+    double most;   /* greatest reach of the discs; greatest square of speed over skin */
+    double least;  /* least reach of the discs */
+    dem2d_box box; /* of their centres */
+    bool strayed;  /* contacts of the last force pass may be off the list: see dem2di_find_lost */
+    int finds, found, room; /* of the search: the first of what it found, how many; room for the
+                               next list's */
+    int starts[3];          /* where these go in the list, by kinds */
+    int fast;               /* slot of the one of least rank that may pass through others, or -1 */
+    int64_t spread;         /* sum of the distances in memory of the partners found */
+    int changes;            /* contacts that close or open */
 } dem2di_block_result;
 
 /* The features in use: decided after an edit, not per contact. See dem2di_prepare. */
@@ -15297,11 +15342,17 @@ static int dem2di_force_blocks(int discs, int count) {
     return dem2di_blocks(discs, DEM2DI_BLOCK) + dem2di_blocks(count - discs, DEM2DI_BLOCK_OTHERS);
 }
 
+/* Blocks of the search for the list: of particles, of parts of walls, and one for contacts that
+   have come apart. */
+static int dem2di_search_blocks(const dem2d_world *world) {
+    return dem2di_blocks(world->body_count, DEM2DI_BLOCK) +
+           dem2di_blocks(world->part_count, DEM2DI_BLOCK_OTHERS) + 1;
+}
+
 /* Room for what the blocks find. */
 static bool dem2di_block_results_reserve(dem2d_world *world, int discs, int count) {
-    int blocks = dem2di_force_blocks(discs, count);
-    int bodies = dem2di_blocks(world->body_count, DEM2DI_BLOCK);
-    return dem2di_group_reserve(world, DEM2DI_BLOCK_RESULTS, blocks > bodies ? blocks : bodies);
+    int blocks = dem2di_force_blocks(discs, count), search = dem2di_search_blocks(world);
+    return dem2di_group_reserve(world, DEM2DI_BLOCK_RESULTS, blocks > search ? blocks : search);
 }
 
 /* --- the order of names ----------------------------------------------------------------------- */
@@ -15548,7 +15599,10 @@ typedef struct dem2di_build {
     dem2d_world *world;
     dem2di_plan plan;
     dem2di_grid grid;
-    int *count[DEM2DI_KINDS]; /* of each particle's finds; then where they go */
+    int *planes, plane_count; /* parts that are half-planes */
+    dem2di_key *finds;        /* of the search, block by block */
+    int room;                 /* for these */
+    bool strayed;             /* as in the blocks' results */
     int total[DEM2DI_KINDS];
     dem2di_key *keys;                    /* as in the list, */
     int *old;                            /* and its contact in the old list, or -1 */
@@ -15624,27 +15678,68 @@ static bool dem2di_plan_fits(const dem2di_plan *one, const dem2di_plan *other) {
            one->joints == other->joints && one->events == other->events;
 }
 
-static void dem2di_disc_task(void *context, int begin, int end) {
-    dem2di_build *build = (dem2di_build *)context;
+/* The disc of a particle. Returns whether a contact that it had in the last force pass may be out
+   of reach now: it has been moved further than a step does, or has another size. */
+static bool dem2di_disc_make(const dem2di_build *build, int slot, dem2di_disc *disc) {
     dem2d_world *world = build->world;
+    const dem2di_body *body = &world->bodies[slot];
+    const dem2di_state *now = &world->now[slot], *before = &world->before[slot];
+    double skin =
+        dem2di_max(dem2di_skin_of(world, now->radius, now->v), DEM2DI_ROUNDOFF * now->radius);
+    dem2d_vec moved = dem2di_sub(now->x, before->x);
+    world->inverse_skin_squared[slot] = 1 / (skin * skin);
+    disc->centre = now->x;
+    disc->reach = now->radius + skin;
+    disc->slot = slot;
+    disc->fixed = body->motion == DEM2D_FIXED;
+    disc->circle = dem2di_shape_of(world, body)->type == DEM2D_CIRCLE && dem2di_has_discs(world);
+    return disc->fixed || before->radius != now->radius ||
+           !(dem2di_dot(moved, moved) < skin * skin / 4);
+}
+
+static void dem2di_disc_task(void *context, int begin, int end) {
+    const dem2di_build *build = (const dem2di_build *)context;
     for (int block = begin; block < end; block++) {
+        dem2di_block_result *result = &build->world->block_results[block];
         int first = block * DEM2DI_BLOCK;
-        double largest = 0;
-        for (int i = first; i < dem2di_block_end(first, DEM2DI_BLOCK, world->body_count); i++) {
-            const dem2di_body *body = &world->bodies[i];
+        int last = dem2di_block_end(first, DEM2DI_BLOCK, build->grid.count);
+        dem2d_box box = {build->world->now[first].x, build->world->now[first].x};
+        double least = HUGE_VAL, most = 0;
+        bool strayed = false;
+        for (int i = first; i < last; i++) {
             dem2di_disc *disc = &build->grid.discs[i];
-            double skin = dem2di_max(dem2di_skin_of(world, world->now[i].radius, world->now[i].v),
-                                     DEM2DI_ROUNDOFF * world->now[i].radius);
-            world->inverse_skin_squared[i] = 1 / (skin * skin);
-            disc->centre = world->now[i].x;
-            disc->reach = world->now[i].radius + skin;
-            disc->fixed = body->motion == DEM2D_FIXED;
-            disc->circle =
-                dem2di_shape_of(world, body)->type == DEM2D_CIRCLE && dem2di_has_discs(world);
-            largest = dem2di_max(largest, disc->reach);
+            strayed |= dem2di_disc_make(build, i, disc);
+            least = dem2di_min(least, disc->reach);
+            most = dem2di_max(most, disc->reach);
+            box.lower.x = dem2di_min(box.lower.x, disc->centre.x);
+            box.lower.y = dem2di_min(box.lower.y, disc->centre.y);
+            box.upper.x = dem2di_max(box.upper.x, disc->centre.x);
+            box.upper.y = dem2di_max(box.upper.y, disc->centre.y);
         }
-        world->block_results[block].most = largest;
+        result->least = least;
+        result->most = most;
+        result->box = box;
+        result->strayed = strayed;
     }
+}
+
+/* The blocks' discs together, and the cells that they need. */
+static void dem2di_discs_survey(dem2di_build *build) {
+    dem2di_grid *grid = &build->grid;
+    const dem2di_block_result *results = build->world->block_results;
+    double least = HUGE_VAL, most = 0;
+    for (int k = 0; k < dem2di_blocks(grid->count, DEM2DI_BLOCK); k++) {
+        const dem2d_box *box = &results[k].box;
+        if (k == 0) grid->box = *box;
+        grid->box.lower.x = dem2di_min(grid->box.lower.x, box->lower.x);
+        grid->box.lower.y = dem2di_min(grid->box.lower.y, box->lower.y);
+        grid->box.upper.x = dem2di_max(grid->box.upper.x, box->upper.x);
+        grid->box.upper.y = dem2di_max(grid->box.upper.y, box->upper.y);
+        least = dem2di_min(least, results[k].least);
+        most = dem2di_max(most, results[k].most);
+        build->strayed |= results[k].strayed;
+    }
+    if (grid->count > 0) dem2di_grid_plan(grid, least, most);
 }
 
 static void dem2di_place_task(void *context, int begin, int end) {
@@ -15655,9 +15750,13 @@ static void dem2di_place_task(void *context, int begin, int end) {
 }
 
 static void dem2di_grid_task(void *context, int begin, int end) {
+    dem2di_build *build = (dem2di_build *)context;
     (void)begin;
     (void)end;
-    dem2di_grid_sort(&((dem2di_build *)context)->grid);
+    dem2di_grid_sort(&build->grid);
+    build->plane_count = 0;
+    for (int j = 0; j < build->world->part_count; j++)
+        if (!(build->world->parts[j].extent > 0)) build->planes[build->plane_count++] = j;
 }
 
 /* Is a part of a wall within the skins of a particle, and may be a contact? A segment is within its
@@ -15683,15 +15782,6 @@ static inline bool dem2di_vertex_is_near(const dem2d_world *world, const dem2di_
     return dem2di_dot(from, from) < reach * reach;
 }
 
-static void dem2di_find_add(const dem2d_world *world, int slot, int number, dem2di_order *to,
-                            int *count) {
-    if (to != NULL) {
-        to[*count].key = (uint64_t)number << 32 | (uint64_t)world->bodies[slot].rank;
-        to[*count].value = slot;
-    }
-    (*count)++;
-}
-
 /* May a particle have a contact with a part? */
 static bool dem2di_meets_part(const dem2d_world *world, int slot, int part) {
     const dem2di_groups groups = dem2di_groups_at(world, slot);
@@ -15699,58 +15789,156 @@ static bool dem2di_meets_part(const dem2d_world *world, int slot, int part) {
     return dem2di_meet(&groups, &wall);
 }
 
-/* The parts of walls near a particle, and those that it had a contact with in the last force pass,
-   wherever they are now: these stay listed for the queries. Counted, and written where there is
-   room. */
-static int dem2di_find_walls(const dem2d_world *world, const dem2di_disc *disc, int slot,
-                             dem2di_order *to) {
+/* The same for a contact's number: a part, or a vertex of one. */
+static bool dem2di_number_is_near(const dem2d_world *world, const dem2di_disc *disc, int number) {
+    return dem2di_part_is_near(world, disc, number % DEM2DI_VERTEX) &&
+           (number < DEM2DI_VERTEX || dem2di_vertex_is_near(world, disc, number));
+}
+
+/* A part that is near a particle, and its vertices that are. */
+static void dem2di_find_part(const dem2d_world *world, const dem2di_disc *disc, int part,
+                             dem2di_finds *finds) {
+    if (!dem2di_meets_part(world, disc->slot, part)) return;
+    dem2di_find(finds, ~disc->slot, part);
+    for (int k = 1; k <= 2 && world->joined; k++)
+        if (dem2di_vertex_is_near(world, disc, part + k * DEM2DI_VERTEX))
+            dem2di_find(finds, ~disc->slot, part + k * DEM2DI_VERTEX);
+}
+
+/* Partners of the particles of a block, and those near half-planes, most blocks being far from them
+   as a whole. */
+static void dem2di_search_particles(const dem2di_build *build, int block, dem2di_finds *finds) {
+    const dem2d_world *world = build->world;
+    const dem2di_block_result *result = &world->block_results[block];
+    const dem2di_disc *discs = build->grid.discs;
+    int first = block * DEM2DI_BLOCK,
+        last = dem2di_block_end(first, DEM2DI_BLOCK, world->body_count);
+    for (int i = first; i < last; i++) dem2di_grid_partners(&build->grid, i, finds);
+    for (int k = 0; k < build->plane_count; k++) {
+        int part = build->planes[k];
+        dem2d_vec normal = dem2di_surface_normal(&world->surfaces[part]), nearest;
+        nearest.x = normal.x > 0 ? result->box.lower.x : result->box.upper.x;
+        nearest.y = normal.y > 0 ? result->box.lower.y : result->box.upper.y;
+        if (!(dem2di_part_distance(world, part, nearest) <
+              result->most + world->walls[world->parts[part].wall].skin))
+            continue;
+        for (int i = first; i < last; i++)
+            if (dem2di_part_is_near(world, &discs[i], part))
+                dem2di_find_part(world, &discs[i], part, finds);
+    }
+}
+
+/* Particles near a segment among the discs of some cells, from begin to end in sorted. A head of
+   the hash table may have discs of other cells, which a segment meets elsewhere or not at all. */
+static void dem2di_search_cells(const dem2di_build *build, int part, int begin, int end, int level,
+                                const dem2di_cell cells[2], dem2di_finds *finds) {
+    const dem2d_world *world = build->world;
+    const dem2di_grid *grid = &build->grid;
+    for (int k = begin; k < end; k++) {
+        const dem2di_disc *disc = &grid->sorted[k];
+        if (disc->level != level || !dem2di_part_is_near(world, disc, part)) continue;
+        dem2di_cell at = dem2di_cell_at(grid, disc->centre, dem2di_cell_size(grid, level));
+        if (at.x < cells[0].x || at.x > cells[1].x || at.y < cells[0].y || at.y > cells[1].y)
+            continue;
+        dem2di_find_part(world, disc, part, finds);
+    }
+}
+
+/* From the lower corner of the box: the rectangle within r of a piece of a segment, from its point
+   at t0 to that at t1, cut to the box. Returns false when it is outside. */
+static bool dem2di_around_piece(const dem2d_box *box, const dem2di_surface *surface, double t0,
+                                double t1, double r, dem2d_vec corner[2]) {
+    dem2d_vec along = dem2di_vec(surface->along.c, surface->along.s);
+    dem2d_vec start = dem2di_sub(surface->point, box->lower);
+    dem2d_vec a = dem2di_along(start, t0, along), b = dem2di_along(start, t1, along);
+    dem2d_vec side = dem2di_sub(box->upper, box->lower);
+    corner[0].x = dem2di_max(0, dem2di_min(a.x, b.x) - r);
+    corner[0].y = dem2di_max(0, dem2di_min(a.y, b.y) - r);
+    corner[1].x = dem2di_min(side.x, dem2di_max(a.x, b.x) + r);
+    corner[1].y = dem2di_min(side.y, dem2di_max(a.y, b.y) + r);
+    return corner[0].x <= corner[1].x && corner[0].y <= corner[1].y;
+}
+
+/* Particles near a segment, row by row of the cells along it. The reach of discs is below half a
+   cell, the rest of 0.51 is for the rounding of cell numbers. A segment that crosses more rows and
+   columns than there are particles is compared with all of them. */
+static void dem2di_search_segment(const dem2di_build *build, int part, dem2di_finds *finds) {
+    const dem2d_world *world = build->world;
+    const dem2di_grid *grid = &build->grid;
+    const dem2di_surface *surface = &world->surfaces[part];
+    double extent = world->parts[part].extent, way = surface->along.s;
+    double from = surface->point.y - grid->box.lower.y;
+    for (int level = 0; level < DEM2DI_LEVELS; level++) {
+        double size = dem2di_cell_size(grid, level);
+        double r = 0.51 * size + world->walls[world->parts[part].wall].skin;
+        dem2di_cell cells[2];
+        dem2d_vec corner[2];
+        if (!(grid->levels >> level & 1) ||
+            !dem2di_around_piece(&grid->box, surface, 0, extent, r, corner))
+            continue;
+        for (int k = 0; k < 2; k++) {
+            cells[k].x = dem2di_cell_of(corner[k].x, size);
+            cells[k].y = dem2di_cell_of(corner[k].y, size);
+        }
+        if (cells[1].x - cells[0].x >= grid->count - (cells[1].y - cells[0].y)) {
+            dem2di_search_cells(build, part, 0, grid->count, level, cells, finds);
+            continue;
+        }
+        for (int64_t y = cells[0].y; y <= cells[1].y; y++) {
+            double t0 = ((double)y * size - r - from) / way, t1 = t0 + (size + 2 * r) / way;
+            double low = dem2di_max(0, dem2di_min(extent, dem2di_min(t0, t1)));
+            double high = dem2di_min(extent, dem2di_max(0, dem2di_max(t0, t1)));
+            if (!(fabs(way) > 0)) low = 0, high = extent;
+            if (!dem2di_around_piece(&grid->box, surface, low, high, r, corner)) continue;
+            int64_t x = dem2di_cell_of(corner[0].x, size), last = dem2di_cell_of(corner[1].x, size);
+            while (x <= last) {
+                int begin, end;
+                dem2di_cell run[2] = {{x, y}, {0, y}};
+                x = dem2di_grid_run(grid, x, last, y, level, &begin, &end);
+                run[1].x = x - 1;
+                dem2di_search_cells(build, part, begin, end, level, run, finds);
+            }
+        }
+    }
+}
+
+/* Contacts of the last force pass whose partners are out of reach by now stay listed for the
+   queries and the ledger. Particles only get there when some have strayed or are fixed. */
+static void dem2di_find_lost(const dem2di_build *build, dem2di_finds *finds) {
+    const dem2d_world *world = build->world;
     const dem2di_list *list = &world->list;
-    int count = 0;
-    for (int j = 0; j < world->part_count; j++) {
-        if (!dem2di_part_is_near(world, disc, j) || !dem2di_meets_part(world, slot, j)) continue;
-        dem2di_find_add(world, slot, j, to, &count);
-        for (int k = 1; k <= 2 && world->joined; k++)
-            if (dem2di_vertex_is_near(world, disc, j + k * DEM2DI_VERTEX))
-                dem2di_find_add(world, slot, j + k * DEM2DI_VERTEX, to, &count);
-    }
-    for (int k = list->first[slot]; k < list->first[slot + 1]; k++) {
-        int contact = list->adjacent[k], number = list->keys[contact].b;
-        if (contact < list->pairs || !(list->contacts.depth[contact] > 0)) continue;
-        bool vertex = number >= DEM2DI_VERTEX;
-        if (!dem2di_part_is_near(world, disc, number % DEM2DI_VERTEX) ||
-            (vertex && !dem2di_vertex_is_near(world, disc, number)))
-            dem2di_find_add(world, slot, number, to, &count);
-    }
-    return count;
-}
-
-/* The partners of a particle: those within both skins, and those that it was in contact with in the
-   last force pass and has left since, which stay listed for the queries and the ledger. */
-static void dem2di_find_partners(const dem2di_build *build, dem2di_finds *finds) {
-    const dem2di_list *list = &build->world->list;
-    const dem2di_disc *discs = build->grid.discs, *own = &discs[finds->own];
-    dem2di_grid_partners(&build->grid, finds);
-    for (int k = list->own[finds->own]; k < list->first[finds->own + 1]; k++) {
-        int contact = list->adjacent[k], b = list->keys[contact].b;
-        if (contact >= list->pairs || !(list->contacts.depth[contact] > 0)) continue;
-        dem2d_vec d = dem2di_sub(discs[b].centre, own->centre);
-        double both = own->reach + discs[b].reach;
-        bool fixed = own->fixed && discs[b].fixed;
-        if (!fixed && dem2di_dot(d, d) < both * both) continue; /* the grid has found it */
-        dem2di_find_pair(finds, b, own->circle && discs[b].circle);
+    const dem2di_disc *discs = build->grid.discs;
+    for (int i = build->strayed ? 0 : list->pairs; i < list->count; i++) {
+        int a = list->keys[i].a, b = list->keys[i].b;
+        if (!(list->contacts.depth[i] > 0)) continue;
+        if (i >= list->pairs && !dem2di_number_is_near(world, &discs[a], b))
+            dem2di_find(finds, ~a, b);
+        else if (i < list->pairs && !dem2di_discs_near(&discs[a], &discs[b]))
+            dem2di_find(finds, a, discs[a].circle && discs[b].circle ? b : ~b);
     }
 }
 
-static void dem2di_count_task(void *context, int begin, int end) {
+static void dem2di_search_task(void *context, int begin, int end) {
     const dem2di_build *build = (const dem2di_build *)context;
-    int last = dem2di_block_end((end - 1) * DEM2DI_BLOCK, DEM2DI_BLOCK, build->grid.count);
-    for (int i = begin * DEM2DI_BLOCK; i < last; i++) {
-        dem2di_finds finds = {i, {0, 0}, {NULL, NULL}, dem2di_groups_used(build->world)};
-        dem2di_find_partners(build, &finds);
-        build->count[DEM2DI_DISCS][i] = finds.count[0];
-        build->count[DEM2DI_OTHERS][i] = finds.count[1];
-        build->count[DEM2DI_WALL_CONTACTS][i] =
-            dem2di_find_walls(build->world, &build->grid.discs[i], i, NULL);
+    const dem2d_world *world = build->world;
+    int bodies = dem2di_blocks(world->body_count, DEM2DI_BLOCK);
+    for (int block = begin; block < end; block++) {
+        dem2di_block_result *result = &world->block_results[block];
+        int first = (block - bodies) * DEM2DI_BLOCK_OTHERS;
+        dem2di_finds finds = {build->finds + result->finds, result->room, 0, 0, 0,
+                              dem2di_groups_used(world)};
+        if (block < bodies)
+            dem2di_search_particles(build, block, &finds);
+        else if (first >= world->part_count)
+            dem2di_find_lost(build, &finds);
+        else
+            for (int j = first; j < dem2di_block_end(first, DEM2DI_BLOCK_OTHERS, world->part_count);
+                 j++)
+                if (world->parts[j].extent > 0) dem2di_search_segment(build, j, &finds);
+        result->found = finds.count;
+        result->starts[DEM2DI_DISCS] = finds.count - finds.others - finds.walls;
+        result->starts[DEM2DI_OTHERS] = finds.others;
+        result->starts[DEM2DI_WALL_CONTACTS] = finds.walls;
     }
 }
 
@@ -15759,7 +15947,7 @@ static int dem2di_listed(const dem2d_world *world, const dem2di_key *key, bool w
     const dem2di_list *list = &world->list;
     for (int k = list->own[key->a]; k < list->first[key->a + 1]; k++) {
         int contact = list->adjacent[k];
-        const dem2di_key *old = &list->keys[contact];
+        const dem2di_key *old = &list->keys[contact]; /* a < 0 if it was forgotten */
         if (old->a == key->a && old->b == key->b && (contact >= list->pairs) == wall)
             return contact;
     }
@@ -15783,7 +15971,12 @@ static void dem2di_carry_task(void *context, int begin, int end) {
     for (int i = begin * DEM2DI_BLOCK; i < last; i++) {
         int old = carry->old[carry->begin + i];
         char *to = carry->to + (size_t)i * size;
-        if (old >= carry->old_begin)
+        if (size == sizeof(double)) { /* most columns: without calls */
+            double value = 0;
+            if (old >= carry->old_begin)
+                memcpy(&value, carry->from + (size_t)(old - carry->old_begin) * size, sizeof value);
+            memcpy(to, &value, sizeof value);
+        } else if (old >= carry->old_begin)
             memcpy(to, carry->from + (size_t)(old - carry->old_begin) * size, size);
         else
             memset(to, 0, size);
@@ -15827,37 +16020,32 @@ static void dem2di_carry_others(const dem2di_build *build, int discs, int pairs)
     }
 }
 
+/* What the search found, by kinds, with the contacts in the old list. */
 static void dem2di_fill_task(void *context, int begin, int end) {
     const dem2di_build *build = (const dem2di_build *)context;
     const dem2d_world *world = build->world;
     const dem2di_body *bodies = world->bodies;
     for (int block = begin; block < end; block++) {
-        int first = block * DEM2DI_BLOCK;
+        dem2di_block_result *result = &world->block_results[block];
+        const dem2di_key *finds = build->finds + result->finds;
         int64_t spread = 0;
-        for (int i = first; i < dem2di_block_end(first, DEM2DI_BLOCK, build->grid.count); i++) {
-            dem2di_finds finds;
-            finds.own = i;
-            finds.groups = dem2di_groups_used(world);
-            finds.to[0] = build->keys + build->count[DEM2DI_DISCS][i];
-            finds.to[1] = build->keys + build->total[DEM2DI_DISCS] + build->count[DEM2DI_OTHERS][i];
-            dem2di_find_partners(build, &finds);
-            for (int kind = 0; kind < 2; kind++)
-                for (int k = 0; k < finds.count[kind]; k++) {
-                    dem2di_key *key = &finds.to[kind][k];
-                    int a = key->a, b = key->b;
-                    spread += a < b ? b - a : a - b;
-                    bool turned = bodies[a].rank > bodies[b].rank;
-                    key->a = turned ? b : a;
-                    key->b = turned ? a : b;
-                    build->old[key - build->keys] = dem2di_listed(world, key, false);
-                }
-            const int *walls = &build->count[DEM2DI_WALL_CONTACTS][i];
-            if (*walls <
-                (i + 1 < build->grid.count ? walls[1] : build->total[DEM2DI_WALL_CONTACTS]))
-                (void)dem2di_find_walls(world, &build->grid.discs[i], i,
-                                        build->wall_contacts + *walls);
+        for (int k = 0; k < result->found; k++) {
+            int a = finds[k].a, b = finds[k].b, kind = b < 0 ? DEM2DI_OTHERS : DEM2DI_DISCS;
+            if (a < 0) {
+                dem2di_order *item = &build->wall_contacts[result->starts[DEM2DI_WALL_CONTACTS]++];
+                item->key = (uint64_t)b << 32 | (uint64_t)bodies[~a].rank;
+                item->value = ~a;
+                continue;
+            }
+            if (b < 0) b = ~b;
+            int at = result->starts[kind]++;
+            bool turned = bodies[a].rank > bodies[b].rank;
+            build->keys[at].a = turned ? b : a;
+            build->keys[at].b = turned ? a : b;
+            build->old[at] = dem2di_listed(world, &build->keys[at], false);
+            spread += a < b ? b - a : a - b;
         }
-        world->block_results[block].spread = spread;
+        result->spread = spread;
     }
 }
 
@@ -16079,7 +16267,8 @@ static bool dem2di_looks_back(const dem2d_world *world, const dem2di_plan *plan,
            world->commit != NULL || (checked && !soft);
 }
 
-/* Scratch memory for the search and for what it finds. Contacts on their way come over the grid. */
+/* Scratch memory for the search and for what it finds, as far as is known. Contacts on their way
+   come over what the search needs. */
 static bool dem2di_build_cut(dem2di_build *build) {
     dem2d_world *world = build->world;
     size_t n = (size_t)build->grid.count, walls = (size_t)build->total[DEM2DI_WALL_CONTACTS];
@@ -16090,11 +16279,11 @@ static bool dem2di_build_cut(dem2di_build *build) {
         dem2di_grid *grid = &build->grid;
         build->column = cutter.memory;
         grid->discs = (dem2di_disc *)dem2di_cut(&cutter, n, sizeof *grid->discs);
-        grid->slot = (int *)dem2di_cut(&cutter, n, sizeof *grid->slot);
-        grid->sorted = (int *)dem2di_cut(&cutter, n, sizeof *grid->sorted);
-        grid->heads = (int *)dem2di_cut(&cutter, (size_t)grid->table + 1, sizeof *grid->heads);
-        for (int kind = 0; kind < DEM2DI_KINDS; kind++)
-            build->count[kind] = (int *)dem2di_cut(&cutter, n, sizeof(int));
+        grid->sorted = (dem2di_disc *)dem2di_cut(&cutter, n, sizeof *grid->sorted);
+        grid->place = (int *)dem2di_cut(&cutter, n, sizeof *grid->place);
+        build->planes = (int *)dem2di_cut(&cutter, (size_t)world->part_count, sizeof(int));
+        grid->heads = (int *)dem2di_cut(&cutter, (size_t)grid->cells + 1, sizeof *grid->heads);
+        build->finds = (dem2di_key *)dem2di_cut(&cutter, (size_t)build->room, sizeof(dem2di_key));
         size_t column = dem2di_contacts_largest(&build->plan, discs, count);
         if (column > cutter.used) (void)dem2di_cut(&cutter, column - cutter.used, 1);
         build->keys = (dem2di_key *)dem2di_cut(&cutter, (size_t)count, sizeof *build->keys);
@@ -16109,31 +16298,62 @@ static bool dem2di_build_cut(dem2di_build *build) {
     return true;
 }
 
-/* How many partners there are, and room for them. */
+/* One pass of the search, each block with room for an eighth more than it found for the last list:
+   a second one when some found even more. Where the finds go, and how many there are. */
+static bool dem2di_search_pass(dem2di_build *build, bool *full) {
+    const dem2d_world *world = build->world;
+    int blocks = dem2di_search_blocks(world);
+    int64_t room = 0, total = 0;
+    for (int k = 0; k < blocks; k++) {
+        dem2di_block_result *result = &world->block_results[k];
+        result->finds = (int)room;
+        room += (int64_t)result->room + 1;
+        if (room > INT_MAX) return false;
+    }
+    build->room = (int)room;
+    if (!dem2di_build_cut(build)) return false;
+    dem2di_run(build->world, DEM2D_PHASE_LIST, blocks, dem2di_search_task, build);
+    *full = false;
+    for (int k = 0; k < blocks; k++) {
+        dem2di_block_result *result = &world->block_results[k];
+        *full = *full || result->found > result->room;
+        total += result->found;
+        if (total > INT_MAX / 2) return false;
+        result->room = result->found + result->found / 8 + 8;
+    }
+    for (int kind = 0, start = 0; kind < DEM2DI_KINDS; kind++) {
+        if (kind == DEM2DI_WALL_CONTACTS) start = 0; /* these are sorted first */
+        int first = start;
+        for (int k = 0; k < blocks; k++) {
+            int number = world->block_results[k].starts[kind];
+            world->block_results[k].starts[kind] = start;
+            start += number;
+        }
+        build->total[kind] = start - first;
+    }
+    return true;
+}
+
+/* The partners of all, and room for them. */
 static bool dem2di_build_search(dem2di_build *build) {
     dem2d_world *world = build->world;
     int blocks = dem2di_blocks(world->body_count, DEM2DI_BLOCK);
-    int64_t total = 0;
+    bool full = true;
     build->grid.count = world->body_count;
-    build->grid.table = dem2di_grid_table(world->body_count);
     if (!dem2di_build_cut(build)) return false;
     dem2di_run(world, DEM2D_PHASE_LIST, blocks, dem2di_disc_task, build);
-    for (int k = 0; k < blocks; k++)
-        build->grid.size = dem2di_max(build->grid.size, world->block_results[k].most * DEM2DI_CELL);
-    if (world->body_count > 0) build->grid.origin = world->now[0].x;
+    dem2di_discs_survey(build);
+    if (!dem2di_build_cut(build)) return false;
     dem2di_run(world, DEM2D_PHASE_LIST, blocks, dem2di_place_task, build);
     dem2di_run(world, DEM2D_PHASE_LIST, 1, dem2di_grid_task, build);
-    dem2di_run(world, DEM2D_PHASE_LIST, blocks, dem2di_count_task, build);
-    for (int kind = 0; kind < DEM2DI_KINDS; kind++) {
-        for (int i = 0; i < world->body_count; i++) total += build->count[kind][i];
-        if (total > INT_MAX / 2) return false;
-        build->total[kind] = dem2di_starts(build->count[kind], world->body_count);
-    }
+    while (full)
+        if (!dem2di_search_pass(build, &full)) return false;
     if (!dem2di_build_cut(build)) return false;
-    int discs = build->total[DEM2DI_DISCS];
-    return dem2di_list_reserve(world, &build->plan, discs, (int)total) &&
-           dem2di_adjacency_reserve(world, discs + build->total[DEM2DI_OTHERS], (int)total) &&
-           dem2di_block_results_reserve(world, discs, (int)total);
+    int discs = build->total[DEM2DI_DISCS], pairs = discs + build->total[DEM2DI_OTHERS];
+    int count = pairs + build->total[DEM2DI_WALL_CONTACTS];
+    return dem2di_list_reserve(world, &build->plan, discs, count) &&
+           dem2di_adjacency_reserve(world, pairs, count) &&
+           dem2di_block_results_reserve(world, discs, count);
 }
 
 /* Rotations for angles when the first particle that is no circle comes: what queries say stays the
@@ -16215,8 +16435,7 @@ static dem2d_result dem2di_build_list(dem2d_world *world, const dem2di_plan *pla
                dem2di_group_reserve(world, DEM2DI_DISPLACEMENTS, world->body_count);
     }
     if (!room || !dem2di_build_search(&build)) return dem2di_list_failed(world, skin, interval);
-    int blocks = dem2di_blocks(world->body_count, DEM2DI_BLOCK);
-    dem2di_run(world, DEM2D_PHASE_LIST, blocks, dem2di_fill_task, &build);
+    dem2di_run(world, DEM2D_PHASE_LIST, dem2di_search_blocks(world), dem2di_fill_task, &build);
     dem2di_run(world, DEM2D_PHASE_LIST, 1, dem2di_wall_contacts_task, &build);
     build.bounded = dem2di_bounded(world, &build.plan,
                                    build.total[DEM2DI_DISCS] + build.total[DEM2DI_OTHERS] +
