@@ -15419,8 +15419,27 @@ static uint32_t dem2di_adjacency_rank(const dem2d_world *world, int slot, int co
     return (uint32_t)world->bodies[key->a == slot ? key->b : key->a].rank;
 }
 
-/* Each particle's contacts in order, by Shell's sort (Ciura's gaps): most have a handful, one that
-   is a hundred times larger than its neighbours has hundreds. */
+/* Up to so many contacts of a particle are sorted with their ranks beside them. */
+#define DEM2DI_FEW_CONTACTS 16
+
+/* The contacts of a particle by insertion: most have a handful. Returns of how many it is B. */
+static int dem2di_adjacency_sort_few(const dem2d_world *world, int slot, int *run, int count) {
+    uint64_t ranked[DEM2DI_FEW_CONTACTS];
+    int as_b = 0;
+    for (int i = 0; i < count; i++) {
+        uint64_t rank = dem2di_adjacency_rank(world, slot, run[i]);
+        uint64_t contact = rank << 32 | (uint32_t)run[i];
+        int k = i;
+        for (; k > 0 && ranked[k - 1] > contact; k--) ranked[k] = ranked[k - 1];
+        ranked[k] = contact;
+        as_b += rank < (uint64_t)world->bodies[slot].rank;
+    }
+    for (int i = 0; i < count; i++) run[i] = (int)(uint32_t)ranked[i];
+    return as_b;
+}
+
+/* Each particle's contacts in order; many by Shell's sort (Ciura's gaps): a particle that is a
+   hundred times larger than its neighbours has hundreds. */
 static void dem2di_adjacency_sort_task(void *context, int begin, int end) {
     static const int gaps[] = {301, 132, 57, 23, 10, 4, 1};
     const dem2d_world *world = (const dem2d_world *)context;
@@ -15429,7 +15448,12 @@ static void dem2di_adjacency_sort_task(void *context, int begin, int end) {
     for (int slot = begin * DEM2DI_BLOCK; slot < last; slot++) {
         int *run = list->adjacent + list->first[slot];
         int count = list->first[slot + 1] - list->first[slot], as_b = 0;
-        for (int g = count > 10 ? 0 : 5; g < 7; g++) {
+        if (count <= DEM2DI_FEW_CONTACTS) {
+            as_b = dem2di_adjacency_sort_few(world, slot, run, count);
+            list->own[slot] = list->first[slot] + as_b;
+            continue;
+        }
+        for (int g = 0; g < 7; g++) {
             for (int i = gaps[g]; i < count; i++) {
                 int contact = run[i], k = i;
                 uint32_t rank = dem2di_adjacency_rank(world, slot, contact);
@@ -16136,7 +16160,7 @@ static bool dem2di_bounded(const dem2d_world *world, const dem2di_plan *plan, in
 /* How far the rounding of a position moves a particle in a step, and the box that holds all centres
    while the list lasts. */
 static void dem2di_extent_set(dem2d_world *world) {
-    double far = 0, size = 0, inverse = 0, skin = 0;
+    double far = 0, size = 0, inverse = 0, least = HUGE_VAL;
     dem2d_box *box = &world->box;
     for (int i = 0; i < world->body_count; i++) {
         dem2d_vec x = world->now[i].x;
@@ -16147,8 +16171,9 @@ static void dem2di_extent_set(dem2d_world *world) {
         far = dem2di_max(far, dem2di_size_of(x));
         size = dem2di_max(size, world->now[i].radius);
         inverse = dem2di_max(inverse, world->inverse_skin_squared[i]);
-        skin = dem2di_max(skin, 1 / sqrt(world->inverse_skin_squared[i]));
+        least = dem2di_min(least, world->inverse_skin_squared[i]);
     }
+    double skin = 1 / sqrt(least); /* the greatest */
     box->lower = dem2di_sub(box->lower, dem2di_vec(skin, skin));
     box->upper = dem2di_add(box->upper, dem2di_vec(skin, skin));
     world->rounding =
@@ -16162,23 +16187,22 @@ static void dem2di_extent_set(dem2d_world *world) {
    infinite with other shapes. */
 static double dem2di_softness_of(const dem2di_build *build, double *sums) {
     const dem2d_world *world = build->world;
-    int pairs = build->total[DEM2DI_DISCS] + build->total[DEM2DI_OTHERS];
-    double most = 0;
+    int pairs = build->total[DEM2DI_DISCS] + build->total[DEM2DI_OTHERS], n = world->body_count;
+    double most = 0, *light = sums + n, *slender = light + n; /* 2/m, 2/I */
     if (build->total[DEM2DI_OTHERS] > 0 || build->plan.terms != 0 || build->plan.turns)
         return HUGE_VAL;
-    for (int i = 0; i < world->body_count; i++) sums[i] = 0;
-    for (int i = 0; i < pairs + build->total[DEM2DI_WALL_CONTACTS]; i++) {
-        int partner[2];
-        partner[0] = build->keys[i].a;
-        partner[1] = i < pairs ? build->keys[i].b : partner[0];
-        double radius = dem2di_max(world->now[partner[0]].radius, world->now[partner[1]].radius);
-        for (int k = 0; k < (i < pairs ? 2 : 1); k++) {
-            const dem2di_body *body = &world->bodies[partner[k]];
-            sums[partner[k]] += 2 * (1 / dem2di_body_mass(world, body) +
-                                     radius * radius / dem2di_body_inertia(world, body));
-        }
+    for (int i = 0; i < n; i++) {
+        sums[i] = 0;
+        light[i] = 2 / dem2di_body_mass(world, &world->bodies[i]);
+        slender[i] = 2 / dem2di_body_inertia(world, &world->bodies[i]);
     }
-    for (int i = 0; i < world->body_count; i++) most = dem2di_max(most, sums[i]);
+    for (int i = 0; i < pairs + build->total[DEM2DI_WALL_CONTACTS]; i++) {
+        int a = build->keys[i].a, b = i < pairs ? build->keys[i].b : a;
+        double radius = dem2di_max(world->now[a].radius, world->now[b].radius);
+        sums[a] += light[a] + radius * radius * slender[a];
+        if (i < pairs) sums[b] += light[b] + radius * radius * slender[b];
+    }
+    for (int i = 0; i < n; i++) most = dem2di_max(most, sums[i]);
     return most;
 }
 
