@@ -532,6 +532,82 @@ static void test_fast_custom(void **state) {
     }
 }
 
+/* --- segments -----------------------------------------------------------------------------------
+ */
+
+static double segment_distance(dem2d_vec a, dem2d_vec b, dem2d_vec x) {
+    const double ux = b.x - a.x, uy = b.y - a.y;
+    const double t = ((x.x - a.x) * ux + (x.y - a.y) * uy) / (ux * ux + uy * uy);
+    const double place = t < 0 ? 0 : t > 1 ? 1 : t;
+    return hypot(x.x - a.x - place * ux, x.y - a.y - place * uy);
+}
+
+/* Each particle against each segment where the list was built. Pairs that are within both skins are
+   listed once; returns how many. */
+static int check_segments_listed(const dem2d_world *world, const dem2d_vec (*ends)[2], int count) {
+    const dem2di_list *list = &world->list;
+    int near = 0, between = 0;
+    for (int i = 0; i < world->body_count; i++)
+        for (int j = 0; j < count; j++) {
+            const double reach = world->now[i].radius + 1 / sqrt(world->inverse_skin_squared[i]) +
+                                 world->walls[j].skin;
+            const double distance = segment_distance(ends[j][0], ends[j][1], world->now[i].x);
+            int listed = 0;
+            if (fabs(distance - reach) < 1e-6 * reach) { /* either will do */
+                between++;
+                continue;
+            }
+            for (int k = list->first[i]; k < list->first[i + 1]; k++)
+                listed += list->adjacent[k] >= list->pairs &&
+                          list->keys[list->adjacent[k]].b == world->walls[j].first;
+            assert_int_equal(listed, distance < reach);
+            near += distance < reach;
+        }
+    assert_in_range(list->count - list->pairs, near, near + between);
+    return near;
+}
+
+/* 300 particles with sizes from 1 to 1/ratio in a square, and one that is far away from them; 60
+   segments: short ones, long ones, along the axes and far beyond the square. */
+static void check_segments(double side, double ratio, double away, int least) {
+    enum { GRAINS = 300, SEGMENTS = 60 };
+    dem2d_world_desc desc = quiet_desc();
+    const scene s = open_scene(&desc, 1e5, 0.3);
+    dem2d_vec ends[SEGMENTS][2];
+    uint64_t random = 11;
+    for (int i = 0; i < GRAINS; i++)
+        add(&s, i % 3, pow(ratio, -random_between(&random, 0, 1)),
+            i == 7 ? away : random_between(&random, 0, side), random_between(&random, 0, side), 0);
+    for (int j = 0; j < SEGMENTS; j++) {
+        dem2d_wall_desc wall = {0};
+        dem2d_wall_id id;
+        const double length = side * pow(10, random_between(&random, -3, j % 7 == 0 ? 4 : 0));
+        const double angle = random_between(&random, 0, 2 * DEM2DI_PI);
+        wall.segment = true, wall.material = s.material;
+        wall.point.x = random_between(&random, -side / 8, 9 * side / 8);
+        wall.point.y = random_between(&random, -side / 8, 9 * side / 8);
+        wall.end = wall.point;
+        if (j % 3 != 1) wall.end.x += length * cos(angle);
+        if (j % 3 != 2) wall.end.y += length * sin(angle);
+        assert_ok(dem2d_world_add_wall(s.world, &wall, &id));
+        ends[j][0] = wall.point, ends[j][1] = wall.end;
+    }
+    dem2di_plan plan = dem2di_plan_make(s.world);
+    assert_ok(dem2di_build_list(s.world, &plan));
+    assert_true(check_segments_listed(s.world, (const dem2d_vec(*)[2])ends, SEGMENTS) >= least);
+    dem2d_world_destroy(s.world);
+}
+
+static void test_segments_listed(void **state) {
+    (void)state;
+    check_segments(30, 1, 10, 100);      /* all cells of the box */
+    check_segments(30, 30, 10, 50);      /* of five levels */
+    check_segments(30, 1, 1e7, 100);     /* a hash table */
+    check_segments(30, 30, -1e7, 50);    /* of five levels */
+    check_segments(3e3, 1, 10, 1);       /* of a sparse scene */
+    check_segments(30, 1000, 1e300, 20); /* where all cells of a row are one */
+}
+
 int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(test_clouds),      cmocka_unit_test(test_far_crawl),
@@ -541,7 +617,7 @@ int main(void) {
         cmocka_unit_test(test_rotations),   cmocka_unit_test(test_angles),
         cmocka_unit_test(test_deep_lever),  cmocka_unit_test(test_fast),
         cmocka_unit_test(test_falls_fast),  cmocka_unit_test(test_checks),
-        cmocka_unit_test(test_fast_custom),
+        cmocka_unit_test(test_fast_custom), cmocka_unit_test(test_segments_listed),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }
