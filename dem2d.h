@@ -14330,6 +14330,9 @@ static dem2di_surface dem2di_surface_at(const dem2di_wall_state *states, const d
     dem2di_surface surface;
     const dem2di_wall_state *state = &states[own->wall];
     dem2d_vec along = dem2di_vec(own->along.c, own->along.s);
+    surface.along = own->along;
+    surface.point = dem2di_add(state->point, own->start);
+    if (state->angle == 0) return surface;
     surface.point = dem2di_add(state->point, dem2di_turn(state->q, own->start));
     surface.along = dem2di_rot(dem2di_turn(state->q, along));
     return surface;
