@@ -17481,8 +17481,7 @@ static int dem2di_collide_plane(const dem2d_world *world, int a, int part, dem2d
 /* A particle at a face of segments: a pair, of which only what is near the particle counts, so that
    the search is as exact as for its neighbours. Of the ends that are cut off none is nearer than
    the particle's diameter to its foot, so that no face of a particle is longer than what is left
-   beside an end. Points are on the segment. Of a face the part at the foot of the centre has the
-   contact. */
+   beside an end. Points are on the segment. */
 static int dem2di_collide_segment(const dem2d_world *world, int a, int part,
                                   const dem2di_contact *last, dem2di_history *history,
                                   dem2di_contact *contact, dem2d_contact_point points[2],
@@ -17497,9 +17496,7 @@ static int dem2di_collide_segment(const dem2d_world *world, int a, int part,
     dem2d_vec start = dem2di_sub(surface.point, state->x);
     double foot = -dem2di_dot(start, along), gap;
     double nearest = dem2di_max(0, dem2di_min(extent, foot));
-    bool own = foot >= joint->from && foot < joint->to;
-    if (!own) contact->normal = dem2di_vec(0, 0); /* as if it had never been searched */
-    if (!own || !(dem2di_length(dem2di_along(start, nearest, along)) < state->radius)) return 0;
+    if (!(dem2di_length(dem2di_along(start, nearest, along)) < state->radius)) return 0;
     double from = dem2di_max(0, foot - reach), to = dem2di_min(extent, foot + reach);
     dem2di_pair pair;
     pair.a = dem2di_shape_of(world, body);
@@ -17582,6 +17579,25 @@ static void dem2di_wall_add(dem2d_world *world, int i, const dem2di_last *last,
     dem2di_geometry_put(&world->list, i, contact);
 }
 
+/* Is a particle over the part of a number, and not over another one of its face? Vertices are
+   searched once it is known that both of their faces overlap. */
+static bool dem2di_over_part(const dem2d_world *world, int a, int number) {
+    if (number >= DEM2DI_VERTEX) return false;
+    const dem2di_wall_joint *joint = &world->joints[number];
+    const dem2di_surface face = dem2di_surface_at(world->wall_now, &joint->face);
+    double foot =
+        dem2di_dot(dem2di_sub(world->now[a].x, face.point), dem2di_vec(face.along.c, face.along.s));
+    return foot >= joint->from && foot < joint->to;
+}
+
+/* Contact i is apart, as if it had never been searched. */
+static void dem2di_contact_idle(dem2d_world *world, int i) {
+    const dem2di_contacts *contacts = &world->list.contacts;
+    if (contacts->depth[i] < 0 && contacts->normal_x[i] == 0 && contacts->normal_y[i] == 0) return;
+    if (world->plan.joints) contacts->relief[i - world->list.discs] = 0;
+    dem2di_contact_apart(world, i, dem2di_vec(0, 0));
+}
+
 /* The same as for a pair, for a particle and a wall. Where segments are joined, the law comes after
    all of the geometry. */
 static void dem2di_update_wall_contact(dem2d_world *world, int i, dem2di_law_rows *rows,
@@ -17589,6 +17605,10 @@ static void dem2di_update_wall_contact(dem2d_world *world, int i, dem2di_law_row
     dem2di_list *list = &world->list;
     int a = list->keys[i].a, j = list->keys[i].b, found;
     bool segment = dem2di_is_segment(world, i);
+    if (j >= DEM2DI_VERTEX || (segment && world->plan.joints && !dem2di_over_part(world, a, j))) {
+        dem2di_contact_idle(world, i);
+        return;
+    }
     dem2di_history *history = &list->contacts.history[i - list->discs];
     dem2di_last last;
     dem2di_contact contact;
@@ -17597,9 +17617,7 @@ static void dem2di_update_wall_contact(dem2d_world *world, int i, dem2di_law_row
     contact.normal = last.contact.normal;
     dem2di_points_clear(world, i);
     if (world->plan.joints) list->contacts.relief[i - list->discs] = 0;
-    if (j >= DEM2DI_VERTEX)
-        found = dem2di_collide_vertex(world, a, j, &contact, points, count);
-    else if (segment)
+    if (segment)
         found =
             dem2di_collide_segment(world, a, j, &last.contact, history, &contact, points, count);
     else
@@ -17747,15 +17765,48 @@ static void dem2di_pools_join(dem2d_world *world, const dem2di_wall_rows *rows, 
     }
 }
 
+/* Is a contact with one of the faces of a vertex at its end there, and surely the same as that with
+   the vertex? Below the least radius of curvature a stationary overlap is the least of all. */
+static bool dem2di_row_ends(const dem2d_world *world, int row, int part, int away) {
+    const dem2di_contacts *contacts = &world->list.contacts;
+    const dem2di_body *body = &world->bodies[world->list.keys[row].a];
+    double radius = dem2di_shape_of(world, body)->rho_min * body->scale,
+           depth = contacts->depth[row];
+    return depth > 0 && depth < radius && dem2di_point_pair_of(world, contacts, row) == NULL &&
+           away * dem2di_normal_along(world, row, part) > DEM2DI_CORNER;
+}
+
+/* A contact with a vertex, found where both faces overlap. */
+static bool dem2di_find_vertex(dem2d_world *world, int vertex, dem2di_count *count) {
+    int a = world->list.keys[vertex].a, number = world->list.keys[vertex].b;
+    dem2d_contact_point points[2];
+    dem2di_contact contact;
+    memset(&contact, 0, sizeof contact);
+    if (!dem2di_collide_vertex(world, a, number, &contact, points, count)) return false;
+    dem2d_vec pivot = world->wall_now[dem2di_wall_of(world, vertex)].point;
+    dem2di_contact_place(world, vertex, 1, points, dem2di_sub(pivot, world->now[a].x), &contact);
+    dem2di_geometry_put(&world->list, vertex, &contact);
+    return true;
+}
+
 /* Of a vertex and both its faces: which count. */
-static void dem2di_resolve_vertex(dem2d_world *world, const dem2di_wall_rows *rows, int vertex) {
-    int row[2];
+static void dem2di_resolve_vertex(dem2d_world *world, const dem2di_wall_rows *rows, int vertex,
+                                  dem2di_count *count) {
+    int number = world->list.keys[vertex].b, end = dem2di_vertex_of(number), row[2], part[2];
+    const dem2di_wall_joint *joint = &world->joints[number % DEM2DI_VERTEX];
+    if (joint->partner[end] < 0) return; /* no more, in a damaged snapshot */
     dem2di_rows_of_vertex(world, rows, vertex, row);
-    if (row[0] < 0 || row[1] < 0 || dem2di_in_sharp_corner(world, vertex, row)) {
-        dem2di_leave_out(world, vertex);
-        return;
-    }
-    for (int k = 0; k < 2; k++) dem2di_pools_join(world, rows, vertex, row[k]);
+    part[0] = number % DEM2DI_VERTEX;
+    part[1] = joint->partner[end];
+    if (row[0] < 0 || row[1] < 0 || dem2di_in_sharp_corner(world, vertex, row)) return;
+    for (int k = 0; k < 2; k++)
+        if (dem2di_row_ends(world, row[k], part[k], joint->away[end][k])) {
+            dem2di_pools_join(world, rows, row[0], row[1]);
+            dem2di_leave_out(world, row[k]);
+            return;
+        }
+    if (!dem2di_find_vertex(world, vertex, count)) return;
+    dem2di_pools_join(world, rows, row[0], row[1]);
     for (int k = 0; k < 2; k++)
         if (dem2di_row_at_vertex(world, row[k], vertex)) {
             dem2di_leave_out(world, row[k]);
@@ -17862,16 +17913,20 @@ static void dem2di_joined_subtract(dem2d_world *world, int i, dem2di_contact *co
 }
 
 /* A particle's contacts with joined segments: which count. */
-static void dem2di_resolve_joined(dem2d_world *world, const dem2di_wall_rows *rows) {
+static void dem2di_resolve_joined(dem2d_world *world, const dem2di_wall_rows *rows,
+                                  dem2di_count *count) {
     const dem2di_list *list = &world->list;
-    for (int k = 0; k < rows->count; k++)
-        world->pools[rows->contact[k] - list->pairs] = rows->contact[k];
-    for (int k = 0; k < rows->count; k++)
-        if (dem2di_sign_of(world, rows->contact[k]) < 0 &&
-            list->contacts.depth[rows->contact[k]] > 0)
-            dem2di_resolve_vertex(world, rows, rows->contact[k]);
-    dem2di_pools_follow(world, rows);
+    int closed = 0;
     for (int k = 0; k < rows->count; k++) {
+        int i = rows->contact[k];
+        world->pools[i - list->pairs] = i;
+        closed += list->contacts.depth[i] > 0 && dem2di_is_segment(world, i);
+    }
+    for (int k = 0; k < rows->count && closed > 1; k++)
+        if (dem2di_sign_of(world, rows->contact[k]) < 0)
+            dem2di_resolve_vertex(world, rows, rows->contact[k], count);
+    if (closed > 0) dem2di_pools_follow(world, rows);
+    for (int k = 0; k < rows->count && closed > 1; k++) {
         int i = rows->contact[k], row[2];
         if (dem2di_sign_of(world, i) > 0 || !(list->contacts.depth[i] > 0)) continue;
         dem2di_rows_of_vertex(world, rows, i, row);
@@ -17884,11 +17939,11 @@ static void dem2di_update_joined(dem2d_world *world, int slot, dem2di_count *cou
     const dem2di_wall_rows own_rows = dem2di_wall_rows_of(world, slot);
     dem2di_law_rows rows;
     rows.count = 0;
-    dem2di_resolve_joined(world, &own_rows);
+    dem2di_resolve_joined(world, &own_rows, count);
     for (int k = 0; k < own_rows.count; k++) {
         dem2di_contact contact;
         int i = own_rows.contact[k];
-        if (!dem2di_is_segment(world, i)) continue;
+        if (world->list.contacts.depth[i] < 0 || !dem2di_is_segment(world, i)) continue;
         if (!dem2di_contact_get(world, &world->list.contacts, i, &contact)) {
             dem2di_contact_clear(world, i);
             dem2di_no_load(world, i);
