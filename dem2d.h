@@ -214,16 +214,19 @@ CONCEPTS
                 limited to friction times the normal force ([F] eq. 8-10). A rolling spring resists
                 relative rotation if the materials have rolling friction. Beside both springs there
                 may be dashpots; the limit is that of spring and dashpot together. A law of your own
-can replace all of these. Sliding     For all pairs, the tangential spring stretches by the sliding
-velocity of the last step times the time step. The sliding velocity is the mean of its values with
-the normal and arms at the beginning and at the end of the step, both with the velocities of that
-step. In the first step of a contact only the end is used. A time step or velocity that you change
-during a contact takes effect with the next move. Skipping    A pair with a known gap is not
-collided again until its particles have moved and turned by that gap together. Circle pairs skip
-this test: it costs more than the contact itself. List        The neighbour list (Verlet list) holds
-the pairs that are nearer than the sum of their skins. It is rebuilt when a particle has moved as
-far as its skin. Skins are tuned to the motion: thick skins list more pairs that are apart, thin
-ones cause more rebuilds. A fast particle gets a thicker skin. Edits keep the list, except: a
+                can replace all of these.
+    Sliding     For all pairs, the tangential spring stretches by the sliding velocity of the last
+                step times the time step. The sliding velocity is the mean of its values with the
+                normal and arms at the beginning and at the end of the step, both with the
+                velocities of that step. In the first step of a contact only the end is used. A time
+                step or velocity that you change during a contact takes effect with the next move.
+    Skipping    A pair with a known gap is not collided again until its particles have moved and
+                turned by that gap together. Circle pairs skip this test: it costs more than the
+                contact itself.
+    List        The neighbour list (Verlet list) holds the pairs that are nearer than the sum of
+                their skins. It is rebuilt when a particle has moved as far as its skin. Skins are
+                tuned to the motion: thick skins list more pairs that are apart, thin ones cause
+                more rebuilds. A fast particle gets a thicker skin. Edits keep the list, except: a
                 particle or a wall is added, removed or moved out of its skin; a particle becomes
                 fixed or free; friction, a dashpot or rolling friction is set where no materials had
                 it, or removed from the last ones.
@@ -330,12 +333,14 @@ HOW TO
                          walls. Its normal points to the grains it presses on; so does a
                          segment's, which grains may touch from both sides.
     stop and go on       dem2d_world_save, dem2d_world_load: the run continues to the same bits.
-What there is in a world: dem2d_world_particles, dem2d_world_walls, dem2d_world_shapes,
-dem2d_world_materials, and their descs: dem2d_world_get_desc, dem2d_world_get_wall_desc,
-dem2d_world_get_pair, dem2d_world_get_particle_desc, dem2d_world_get_material_desc. compare two runs
-dem2d_world_hash after as many steps. draw                 dem2d_world_write_svg, or
-dem2d_shape_outline for your own pictures. measure a sample     dem2d_world_stress with the sample's
-area (of one grain: dem2d_world_particle_stress), then dem2d_stress_principal for p and q;
+    list what is there   dem2d_world_particles, dem2d_world_walls, dem2d_world_shapes,
+                         dem2d_world_materials, and their descs: dem2d_world_get_desc,
+                         dem2d_world_get_wall_desc, dem2d_world_get_pair,
+                         dem2d_world_get_particle_desc, dem2d_world_get_material_desc.
+    compare two runs     dem2d_world_hash after as many steps.
+    draw                 dem2d_world_write_svg, or dem2d_shape_outline for your own pictures.
+    measure a sample     dem2d_world_stress with the sample's area (of one grain:
+                         dem2d_world_particle_stress), then dem2d_stress_principal for p and q;
                          dem2d_strain of its sides; dem2d_world_porosity of a box inside it;
                          dem2d_world_packing: coordination number, overlaps, rattlers.
     tell it is at rest   dem2d_world_equilibrium: unbalanced below 1e-3, a small kinetic_ratio.
@@ -440,10 +445,10 @@ THREADS
     to desc.parallel_for, if there is one, in blocks of some hundred contacts or particles: any
     thread system will do (examples/threads_posix.c, threads_openmp.c). A block writes only its own
     results, and sums are taken in the order of names and ids. So neither the number of threads nor
-the distribution of the blocks can change a bit. One thread does the short loops over all particles
-    when the list is rebuilt, the sums of the forces on walls, and the speeds of servo walls. All
-    threads call custom support functions and laws; only the thread that called the step allocates
-    and writes to the log.
+    the distribution of the blocks can change a bit. One thread does the short loops over all
+    particles when the list is rebuilt, the sums of the forces on walls, and the speeds of servo
+    walls. All threads call custom support functions and laws; only the thread that called the step
+    allocates and writes to the log.
 
 COSTS (instructions per circle and step of a settled bed with 2.0 contacts each, gcc -O2, by
 `make -C tests bench-cost`; a feature that the scene does not use costs nothing: which features are
@@ -11711,7 +11716,8 @@ static bool dem2di_state_finite(const dem2di_state *state) {
    Invariants between steps, which tests/inside.h checks:
      1. Ids and slots of particles lead to each other. Slots that are free have a shape of -1.
      2. A key is of two particles that live, the one of lower rank first, or of a particle that
-   lives and a part of a wall; or it is forgotten (a < 0), its contact is apart, the list is stale.
+        lives and a part of a wall; or it is forgotten (a < 0), its contact is apart, the list is
+        stale.
      3. A contact is closed where its depth is above 0. Otherwise it has no force, points or law
         state. Two circles that are both of the disc kind have their arms from the depth.
      4. adjacent has each contact of a listed pair once for each of its particles, first as B.
@@ -23220,7 +23226,7 @@ DEM2D_API dem2d_result dem2d_world_write_csv(const dem2d_world *world, const dem
 
    CHANGES
      0.7.0  Snapshots stay of version 4: those of 0.6.0 are read, unless they have dashpots, rolling
-            friction or a law: these are refused by the names of their arrays.
+            friction, a law or joined segments: these are refused by the names of their arrays.
             Dashpots beside the tangential spring and that against rolling:
             tangential_damping_ratio and rolling_damping_ratio of materials and pairs. In the safe
             time step each dashpot adds its lag to its own spring only.
@@ -23245,9 +23251,9 @@ DEM2D_API dem2d_result dem2d_world_write_csv(const dem2d_world *world, const dem
             Particles and walls may have a name of 64 bits, which orders pairs and sums in place of
             the id (name in their descs and infos).
             Walls turn about a pivot (angular_velocity, dem2d_world_drive_wall), run as belts
-            (surface_speed), and may be chains of segments (points, count, closed), which have
-   forces per part (dem2d_world_get_wall_part, dem2d_contact_info.part_b). Snapshots without parts
-            are read.
+            (surface_speed), and may be chains of segments (points, count, closed). Forces on their
+            parts: dem2d_world_get_wall_part, dem2d_contact_info.part_b. Snapshots without parts are
+            read.
             Polygons in contact at one point take a third less time, smooth grains a tenth.
             New: queries of space (dem2d_world_query_box, _query_point, _query_shape, _cast_ray,
             _cast_ray_all, _nearest), and dem2d_world_particle_contacts.
