@@ -12044,9 +12044,8 @@ typedef enum dem2di_group {
     DEM2DI_BLOCK_RESULTS,
     DEM2DI_TREE, /* particles and walls, where queries are asked; as many nodes are enough */
     DEM2DI_EVENTS,
-    DEM2DI_MOVES_APART, /* of bodies, where they have been relaxed */
-    DEM2DI_SCRATCH,     /* lines */
-    DEM2DI_SHAPE,       /* one row: a shape itself; its columns by its count, its parts, ... */
+    DEM2DI_SCRATCH, /* lines */
+    DEM2DI_SHAPE,   /* one row: a shape itself; its columns by its count, its parts, ... */
     DEM2DI_SHAPE_COUNT,
     DEM2DI_SHAPE_PARTS,
     DEM2DI_SHAPE_BLOCKS,
@@ -12630,7 +12629,7 @@ static const dem2di_column dem2di_columns[] = {
     DEM2DI_COLUMN("events", EVENTS, events, DEM2DI_FIRST, event_fields),
     DEM2DI_UNSAVED(ADJACENCY, list.adjacent, 0),
     DEM2DI_UNSAVED(BLOCK_RESULTS, block_results, 0),
-    DEM2DI_UNSAVED(MOVES_APART, apart, 0),
+    DEM2DI_UNSAVED(TREE, apart, 0),
     DEM2DI_UNSAVED(TREE, tree.boxes, 0),
     DEM2DI_UNSAVED(TREE, tree.items, 0),
     DEM2DI_UNSAVED(TREE, tree.found, 0),
@@ -20913,8 +20912,8 @@ DEM2D_API dem2d_result dem2d_world_relax(dem2d_world *world, double tolerance, i
     if (result == DEM2D_OK) result = dem2di_check_number(env, "sweeps", sweeps, DEM2DI_COUNT);
     if (result != DEM2D_OK) return result;
     memset(&done, 0, sizeof done);
-    if (!dem2di_group_reserve(world, DEM2DI_MOVES_APART, world->body_count))
-        return dem2di_out_of_memory(world, "moves");
+    result = dem2di_tree_make(world); /* room for the moves, too */
+    if (result != DEM2D_OK) return result;
     if (world->body_count > 0)
         memset(world->apart, 0, (size_t)world->body_count * sizeof *world->apart);
     result = dem2di_apart_sweep(world, tolerance, &done); /* later ones need no more memory */
