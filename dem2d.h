@@ -11723,8 +11723,8 @@ static bool dem2di_state_finite(const dem2di_state *state) {
      4. adjacent has each contact of a listed pair once for each of its particles, first as B.
      5. before is where the last force pass was, with the contacts that it found: queries, the
         writers and the hash read these and compute nothing anew.
-     6. The parts of walls are in the order of the walls' ranks, free slots have none; surfaces are
-        where the walls' states of now put them.
+     6. The parts of walls are in the order of the walls' ranks, free slots have none; surfaces
+        are where the walls' states of now put them, also of faces once they are joined.
      7. Loads, list.last, and all else in scratch are valid during a step only, but for the zeros of
         contacts that are apart.
    Results depend on positions, velocities, laws, and the history of each contact since it closed;
@@ -12132,6 +12132,7 @@ struct dem2d_world {
     dem2di_part *parts;
     dem2di_surface *surfaces;  /* of the parts now */
     dem2di_wall_joint *joints; /* of the parts, when the segments were last joined: */
+    dem2di_surface *face_surfaces; /* of the faces of these parts, once they are joined */
     bool joints_due;           /* they must be joined again before the next force pass */
     bool joined;               /* some are */
     int wall_count, part_count;
@@ -12601,6 +12602,7 @@ static const dem2di_column dem2di_columns[] = {
     DEM2DI_UNSAVED(WALLS, wall_next, 0),
     DEM2DI_COLUMN("wall_parts", PARTS, parts, DEM2DI_FIRST | DEM2DI_HASHED, part_fields),
     DEM2DI_UNSAVED(PARTS, surfaces, 0),
+    DEM2DI_UNSAVED(PARTS, face_surfaces, 0),
     DEM2DI_COLUMN("joints", PARTS, joints, 0, joint_fields),
     DEM2DI_COLUMN("pairs", KEYS, list.keys, DEM2DI_FIRST | DEM2DI_HASHED, key_fields),
     DEM2DI_CONTACT_COLUMN("normal_x", KEYS, normal_x, finite_field),
@@ -14331,9 +14333,8 @@ static void dem2di_parts_resize(dem2d_world *world, int slot, int count) {
 }
 
 /* Where a part, or a face, is when its wall is in one of its states. */
-static dem2di_surface dem2di_surface_at(const dem2di_wall_state *states, const dem2di_part *own) {
+static dem2di_surface dem2di_surface_at(const dem2di_wall_state *state, const dem2di_part *own) {
     dem2di_surface surface;
-    const dem2di_wall_state *state = &states[own->wall];
     dem2d_vec along = dem2di_vec(own->along.c, own->along.s);
     surface.along = own->along;
     surface.point = dem2di_add(state->point, own->start);
@@ -14345,7 +14346,8 @@ static dem2di_surface dem2di_surface_at(const dem2di_wall_state *states, const d
 
 static dem2di_surface dem2di_surface_of(const dem2d_world *world, const dem2di_wall_state *states,
                                         int part) {
-    return dem2di_surface_at(states, &world->parts[part]);
+    const dem2di_part *own = &world->parts[part];
+    return dem2di_surface_at(&states[own->wall], own);
 }
 
 /* The parts of a wall whose name is new to their places in the order of ranks, one by one; keys go
@@ -14434,11 +14436,19 @@ static void dem2di_radius_set(dem2d_world *world, int slot) {
     }
 }
 
+/* The face of a part, which is at rest relative to the part's wall. */
+static void dem2di_face_place(dem2d_world *world, int part) {
+    const dem2di_wall_state *state = &world->wall_now[world->parts[part].wall];
+    world->face_surfaces[part] = dem2di_surface_at(state, &world->joints[part].face);
+}
+
 static void dem2di_surfaces_set(dem2d_world *world, int wall) {
     int first = world->walls[wall].first;
     world->tree.made = false;
-    for (int k = first; k < first + world->walls[wall].count; k++)
+    for (int k = first; k < first + world->walls[wall].count; k++) {
         world->surfaces[k] = dem2di_surface_of(world, world->wall_now, k);
+        if (world->parts[k].extent > 0) dem2di_face_place(world, k);
+    }
 }
 
 /* Out of the wall, towards the grains. */
@@ -15281,6 +15291,7 @@ static dem2d_result dem2di_join(dem2d_world *world) {
             same = same && dem2di_partner_of(&before[k / 2], k % 2) ==
                                dem2di_partner_of(&world->joints[k / 2], k % 2);
         if (!same) dem2di_forget_vertices(world);
+        for (int k = 0; k < parts; k++) dem2di_face_place(world, k);
         if (joined != world->plan.joints) dem2di_edited(world);
         world->joined = joined;
         world->joints_due = false;
@@ -17496,12 +17507,11 @@ static int dem2di_collide_segment(const dem2d_world *world, int a, int part,
                                   const dem2di_contact *last, dem2di_history *history,
                                   dem2di_contact *contact, dem2d_contact_point points[2],
                                   dem2di_count *count) {
-    const dem2di_wall_joint *joint = &world->joints[part];
-    const dem2di_surface surface = dem2di_surface_at(world->wall_now, &joint->face);
+    const dem2di_surface surface = world->face_surfaces[part];
     const dem2di_body *body = &world->bodies[a];
     const dem2di_state *state = &world->now[a];
     const dem2d_rot none = {1, 0};
-    const double extent = joint->face.extent, reach = 3 * state->radius;
+    const double extent = world->joints[part].face.extent, reach = 3 * state->radius;
     dem2d_vec along = dem2di_vec(surface.along.c, surface.along.s);
     dem2d_vec start = dem2di_sub(surface.point, state->x);
     double foot = -dem2di_dot(start, along), gap;
@@ -17594,9 +17604,9 @@ static void dem2di_wall_add(dem2d_world *world, int i, const dem2di_last *last,
 static bool dem2di_over_part(const dem2d_world *world, int a, int number) {
     if (number >= DEM2DI_VERTEX) return false;
     const dem2di_wall_joint *joint = &world->joints[number];
-    const dem2di_surface face = dem2di_surface_at(world->wall_now, &joint->face);
-    double foot =
-        dem2di_dot(dem2di_sub(world->now[a].x, face.point), dem2di_vec(face.along.c, face.along.s));
+    const dem2di_surface *face = &world->face_surfaces[number];
+    dem2d_vec along = dem2di_vec(face->along.c, face->along.s);
+    double foot = dem2di_dot(dem2di_sub(world->now[a].x, face->point), along);
     return foot >= joint->from && foot < joint->to;
 }
 
@@ -17705,9 +17715,9 @@ static void dem2di_rows_of_vertex(const dem2d_world *world, const dem2di_wall_ro
 
 /* Component of the normal of a contact along the face of a part. */
 static double dem2di_normal_along(const dem2d_world *world, int contact, int part) {
-    dem2di_surface face = dem2di_surface_at(world->wall_now, &world->joints[part].face);
+    const dem2d_rot along = world->face_surfaces[part].along;
     const dem2di_contacts *contacts = &world->list.contacts;
-    return contacts->normal_x[contact] * face.along.c + contacts->normal_y[contact] * face.along.s;
+    return contacts->normal_x[contact] * along.c + contacts->normal_y[contact] * along.s;
 }
 
 /* Is a contact with a face at its end, and the same as that with the vertex there? Two searches
@@ -17730,8 +17740,7 @@ static bool dem2di_in_sharp_corner(const dem2d_world *world, int vertex, const i
     int end = dem2di_vertex_of(number);
     const dem2di_wall_joint *joint = &world->joints[part];
     int other = joint->partner[end], away[2] = {joint->away[end][0], joint->away[end][1]};
-    dem2d_rot a = dem2di_surface_at(world->wall_now, &joint->face).along;
-    dem2d_rot b = dem2di_surface_at(world->wall_now, &world->joints[other].face).along;
+    dem2d_rot a = world->face_surfaces[part].along, b = world->face_surfaces[other].along;
     double turn = a.c * b.c + a.s * b.s;
     if ((away[0] != 0 && away[1] != 0 ? -turn * away[0] * away[1] : fabs(turn)) >= DEM2DI_SHARP)
         return false;

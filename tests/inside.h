@@ -132,6 +132,10 @@ static bool inside_parts_hold(const dem2d_world *w) {
             if (w->parts[parts].wall != j) return inside_fail("a part of another wall", parts);
             if (memcmp(&is, &w->surfaces[parts], sizeof is) != 0)
                 return inside_fail("a part is elsewhere", parts);
+            const dem2di_surface face = dem2di_surface_at(&w->wall_now[j], &w->joints[parts].face);
+            if (!w->joints_due && w->parts[parts].extent > 0 &&
+                memcmp(&face, &w->face_surfaces[parts], sizeof face) != 0)
+                return inside_fail("a face is elsewhere", parts);
         }
     }
     return parts == w->part_count || inside_fail("parts without a wall", parts);
