@@ -12130,11 +12130,11 @@ struct dem2d_world {
     dem2di_wall *walls;
     dem2di_wall_state *wall_before, *wall_now, *wall_next;
     dem2di_part *parts;
-    dem2di_surface *surfaces;  /* of the parts now */
-    dem2di_wall_joint *joints; /* of the parts, when the segments were last joined: */
+    dem2di_surface *surfaces;      /* of the parts now */
+    dem2di_wall_joint *joints;     /* of the parts, when the segments were last joined: */
     dem2di_surface *face_surfaces; /* of the faces of these parts, once they are joined */
-    bool joints_due;           /* they must be joined again before the next force pass */
-    bool joined;               /* some are */
+    bool joints_due;               /* they must be joined again before the next force pass */
+    bool joined;                   /* some are */
     int wall_count, part_count;
 
     dem2di_list list;
@@ -17599,10 +17599,8 @@ static void dem2di_wall_add(dem2d_world *world, int i, const dem2di_last *last,
     dem2di_geometry_put(&world->list, i, contact);
 }
 
-/* Is a particle over the part of a number, and not over another one of its face? Vertices are
-   searched once it is known that both of their faces overlap. */
+/* Is a particle over the part of a number, and not over another one of its face? */
 static bool dem2di_over_part(const dem2d_world *world, int a, int number) {
-    if (number >= DEM2DI_VERTEX) return false;
     const dem2di_wall_joint *joint = &world->joints[number];
     const dem2di_surface *face = &world->face_surfaces[number];
     dem2d_vec along = dem2di_vec(face->along.c, face->along.s);
@@ -17619,12 +17617,12 @@ static void dem2di_contact_idle(dem2d_world *world, int i) {
 }
 
 /* The same as for a pair, for a particle and a wall. Where segments are joined, the law comes after
-   all of the geometry. */
+   all of the geometry, and vertices are searched where both of their faces overlap. */
 static void dem2di_update_wall_contact(dem2d_world *world, int i, dem2di_law_rows *rows,
                                        dem2di_count *count) {
     dem2di_list *list = &world->list;
     int a = list->keys[i].a, j = list->keys[i].b, found;
-    bool segment = dem2di_is_segment(world, i);
+    const bool segment = j < DEM2DI_VERTEX && world->parts[j].extent > 0;
     if (j >= DEM2DI_VERTEX || (segment && world->plan.joints && !dem2di_over_part(world, a, j))) {
         dem2di_contact_idle(world, i);
         return;
@@ -17670,10 +17668,11 @@ static void dem2di_update_wall_contact(dem2d_world *world, int i, dem2di_law_row
 #define DEM2DI_SHARP 0.7071
 #define DEM2DI_RISES 0.3827
 
-/* The contacts of one particle with parts and vertices of walls, in the order of their numbers. */
+/* The contacts of one particle with parts of walls and then with vertices, in the order of their
+   numbers. */
 typedef struct dem2di_wall_rows {
     const int *contact;
-    int count;
+    int parts, count;
 } dem2di_wall_rows;
 
 static dem2di_wall_rows dem2di_wall_rows_of(const dem2d_world *world, int slot) {
@@ -17682,21 +17681,33 @@ static dem2di_wall_rows dem2di_wall_rows_of(const dem2d_world *world, int slot) 
     int begin = list->first[slot + 1];
     while (begin > list->own[slot] && list->adjacent[begin - 1] >= list->pairs) begin--;
     rows.contact = list->adjacent + begin;
-    rows.count = list->first[slot + 1] - begin;
+    rows.count = rows.parts = list->first[slot + 1] - begin;
+    while (rows.parts > 0 && list->keys[rows.contact[rows.parts - 1]].b >= DEM2DI_VERTEX)
+        rows.parts--;
     return rows;
 }
 
-/* The lowest part of the face that a listed contact is with; -1 of a vertex or a half-plane. */
+/* The contacts with parts from the first one that overlaps to the last one. */
+static dem2di_wall_rows dem2di_closed_rows_of(const dem2d_world *world,
+                                              const dem2di_wall_rows *rows) {
+    const double *depth = world->list.contacts.depth;
+    dem2di_wall_rows closed = *rows;
+    while (closed.parts > 0 && depth[closed.contact[closed.parts - 1]] < 0) closed.parts--;
+    while (closed.parts > 0 && depth[closed.contact[0]] < 0) closed.contact++, closed.parts--;
+    closed.count = closed.parts;
+    return closed;
+}
+
+/* The lowest part of the face that a contact with a part is with; -1 of a half-plane. */
 static int dem2di_face_of(const dem2d_world *world, int contact) {
     int number = world->list.keys[contact].b;
-    if (number >= DEM2DI_VERTEX || !(world->parts[number].extent > 0)) return -1;
-    return world->joints[number].first;
+    return world->parts[number].extent > 0 ? world->joints[number].first : -1;
 }
 
 /* The contact with a face that overlaps, whether it counts or has been left out (depth 0); or -1.
  */
 static int dem2di_row_of_face(const dem2d_world *world, const dem2di_wall_rows *rows, int face) {
-    for (int k = 0; k < rows->count; k++)
+    for (int k = 0; k < rows->parts; k++)
         if (world->list.contacts.depth[rows->contact[k]] >= 0 &&
             dem2di_face_of(world, rows->contact[k]) == face)
             return rows->contact[k];
@@ -17778,7 +17789,7 @@ static void dem2di_pools_join(dem2d_world *world, const dem2di_wall_rows *rows, 
                               int other) {
     int pairs = world->list.pairs, from = world->pools[one - pairs],
         to = world->pools[other - pairs];
-    for (int k = 0; k < rows->count; k++) {
+    for (int k = 0; k < rows->parts; k++) {
         int *pool = &world->pools[rows->contact[k] - pairs];
         *pool = *pool == from ? to : *pool;
     }
@@ -17838,7 +17849,7 @@ static void dem2di_resolve_vertex(dem2d_world *world, const dem2di_wall_rows *ro
    contact with the same face. */
 static void dem2di_pools_follow(dem2d_world *world, const dem2di_wall_rows *rows) {
     const dem2di_list *list = &world->list;
-    for (int k = 0; k < rows->count; k++) {
+    for (int k = 0; k < rows->parts; k++) {
         int old = rows->contact[k], face = dem2di_face_of(world, old);
         if (!(list->last.depth[old] > 0) || list->contacts.depth[old] >= 0 || face < 0) continue;
         int now = dem2di_row_of_face(world, rows, face);
@@ -17857,9 +17868,9 @@ static void dem2di_last_shared(const dem2d_world *world, const dem2di_wall_rows 
     double shear = 0, own = 0, sum = 0;
     int before = 0, now = 0, source = i;
     *moment = 0;
-    for (int k = 0; k < own_rows->count; k++) {
+    for (int k = 0; k < own_rows->parts; k++) {
         int other = own_rows->contact[k];
-        if (world->pools[other - list->pairs] != pool || dem2di_sign_of(world, other) < 0) continue;
+        if (world->pools[other - list->pairs] != pool) continue;
         if (list->contacts.depth[other] > 0) {
             double left = 1 - list->contacts.relief[other - list->discs];
             double force = left * dem2di_whole_depth(world, other) *
@@ -17931,42 +17942,50 @@ static void dem2di_joined_subtract(dem2d_world *world, int i, dem2di_contact *co
     dem2di_force_put(world, i, contact, 0, count);
 }
 
-/* A particle's contacts with joined segments: which count. */
-static void dem2di_resolve_joined(dem2d_world *world, const dem2di_wall_rows *rows,
-                                  dem2di_count *count) {
+/* A particle's contacts with joined segments: which count. Vertices do where two of them overlap:
+   returns the number of rows that may have a force. */
+static int dem2di_resolve_joined(dem2d_world *world, const dem2di_wall_rows *rows,
+                                 dem2di_count *count) {
     const dem2di_list *list = &world->list;
     int closed = 0;
-    for (int k = 0; k < rows->count; k++) {
+    for (int k = 0; k < rows->parts; k++) {
         int i = rows->contact[k];
-        world->pools[i - list->pairs] = i;
         closed += list->contacts.depth[i] > 0 && dem2di_is_segment(world, i);
     }
-    for (int k = 0; k < rows->count && closed > 1; k++)
-        if (dem2di_sign_of(world, rows->contact[k]) < 0)
-            dem2di_resolve_vertex(world, rows, rows->contact[k], count);
-    if (closed > 0) dem2di_pools_follow(world, rows);
-    for (int k = 0; k < rows->count && closed > 1; k++) {
+    if (closed == 0) return 0;
+    for (int k = 0; k < rows->parts; k++)
+        world->pools[rows->contact[k] - list->pairs] = rows->contact[k];
+    if (closed == 1) {
+        dem2di_pools_follow(world, rows);
+        return rows->parts;
+    }
+    const dem2di_wall_rows closed_rows = dem2di_closed_rows_of(world, rows);
+    for (int k = rows->parts; k < rows->count; k++)
+        dem2di_resolve_vertex(world, &closed_rows, rows->contact[k], count);
+    dem2di_pools_follow(world, rows);
+    for (int k = rows->parts; k < rows->count; k++) {
         int i = rows->contact[k], row[2];
-        if (dem2di_sign_of(world, i) > 0 || !(list->contacts.depth[i] > 0)) continue;
-        dem2di_rows_of_vertex(world, rows, i, row);
+        if (!(list->contacts.depth[i] > 0)) continue;
+        dem2di_rows_of_vertex(world, &closed_rows, i, row);
         dem2di_relieve(world, i, row);
     }
+    return rows->count;
 }
 
 /* The same, and their forces. */
 static void dem2di_update_joined(dem2d_world *world, int slot, dem2di_count *count) {
     const dem2di_wall_rows own_rows = dem2di_wall_rows_of(world, slot);
+    const int acting = dem2di_resolve_joined(world, &own_rows, count);
     dem2di_law_rows rows;
     rows.count = 0;
-    dem2di_resolve_joined(world, &own_rows, count);
-    for (int k = 0; k < own_rows.count; k++) {
+    for (int k = 0; k < acting; k++) {
         dem2di_contact contact;
         int i = own_rows.contact[k];
         if (world->list.contacts.depth[i] < 0 || !dem2di_is_segment(world, i)) continue;
         if (!dem2di_contact_get(world, &world->list.contacts, i, &contact)) {
             dem2di_contact_clear(world, i);
             dem2di_no_load(world, i);
-        } else if (dem2di_sign_of(world, i) < 0) {
+        } else if (k >= own_rows.parts) {
             dem2di_joined_subtract(world, i, &contact, count);
         } else {
             dem2di_law_room(world, &rows, count);
