@@ -18463,8 +18463,10 @@ static void dem2di_wall_rotate(dem2di_wall_state *state, double by) {
     state->q = dem2d_rot_make(sum);
 }
 
-/* New wall velocities and points; true when one has left the reach of the list. Contacts with walls
-   are listed in the order of the parts, and so of the walls. */
+/* New wall velocities and points; true when one has left the reach of the list. Walls that stand
+   still have been compared with this when they were last set, but for turned half-planes, whose
+   change depends on the box of the particles. Contacts with walls are listed in the order of the
+   parts, and so of the walls. */
 static bool dem2di_control_pass(dem2d_world *world) {
     const dem2di_list *list = &world->list;
     bool stale = false;
@@ -18486,7 +18488,8 @@ static bool dem2di_control_pass(dem2d_world *world) {
         next->w = dem2di_wall_spin(&wall->desc);
         next->surface = wall->desc.surface_speed;
         if (next->w != 0) dem2di_wall_rotate(next, next->w * world->time_step);
-        stale = stale || !(dem2di_wall_change(world, world->wall_next, j) <= wall->skin);
+        if (wall->desc.mode != DEM2D_WALL_STILL || wall->reshaped)
+            stale = stale || !(dem2di_wall_change(world, world->wall_next, j) <= wall->skin);
     }
     return stale;
 }
@@ -19101,7 +19104,7 @@ static dem2d_result dem2di_check_states(const dem2d_world *world, const dem2di_c
                            "particle %d would get a state that is not finite",
                            world->bodies[slot].index);
     for (int j = 0; j < world->wall_count; j++)
-        if (world->walls[j].alive &&
+        if (world->walls[j].alive && (free_hand || world->walls[j].desc.mode != DEM2D_WALL_STILL) &&
             !(dem2di_vec_finite(world->wall_next[j].point) &&
               dem2di_finite(world->wall_next[j].drift) && fabs(world->wall_next[j].angle) <= 4 &&
               (!free_hand || dem2di_vec_finite(world->wall_next[j].force))))
