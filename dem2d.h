@@ -17563,8 +17563,7 @@ static int dem2di_collide_vertex(const dem2d_world *world, int a, int number,
     pair.size = state->radius + pair.distance;
     pair.calls = 0;
     dem2di_search search;
-    dem2di_contact_solve(&pair, world->solver, NULL, dem2di_centres(&pair), world->tolerance,
-                         world->max_iterations, true, &search);
+    dem2di_pair_search_anew(world, &pair, &search);
     count->calls += pair.calls;
     contact->normal.x = search.normal.x;
     contact->normal.y = search.normal.y;
