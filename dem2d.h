@@ -11814,6 +11814,11 @@ typedef struct dem2di_surface {
    of the vertex at its start or end. */
 #define DEM2DI_VERTEX (1 << 28)
 
+/* The part that a number is of. */
+static inline int dem2di_part_of(int number) {
+    return number & (DEM2DI_VERTEX - 1);
+}
+
 /* How a segment is joined to others (section joints): its face, of which it may be a part, and the
    faces that meet this one at its ends. */
 typedef struct dem2di_wall_joint {
@@ -13056,7 +13061,7 @@ static void dem2di_law_set(dem2d_world *world, int a, int b, const dem2d_pair_de
 
 /* The wall whose part a listed contact is with. */
 static inline int dem2di_wall_of(const dem2d_world *world, int contact) {
-    return world->parts[world->list.keys[contact].b % DEM2DI_VERTEX].wall;
+    return world->parts[dem2di_part_of(world->list.keys[contact].b)].wall;
 }
 
 /* How the two of a listed contact meet; B is a particle or a wall. */
@@ -14324,7 +14329,7 @@ static void dem2di_parts_resize(dem2d_world *world, int slot, int count) {
     if (more > 0) memset(world->joints + end, 0, (size_t)more * sizeof *world->joints);
     world->joints_due = true;
     for (int i = list->pairs; i < list->count; i++)
-        if (list->keys[i].b % DEM2DI_VERTEX >= end) list->keys[i].b += more;
+        if (dem2di_part_of(list->keys[i].b) >= end) list->keys[i].b += more;
     wall->count = count;
     world->part_count += more;
     world->tree.made = false;
@@ -14366,7 +14371,7 @@ static void dem2di_parts_rank(dem2d_world *world, int slot) {
     int by = wall->first - old, count = wall->count, low = by < 0 ? wall->first : old;
     int high = low + count + abs(by);
     for (int i = list->pairs; i < list->count && by != 0; i++) {
-        int *number = &list->keys[i].b, part = *number % DEM2DI_VERTEX;
+        int *number = &list->keys[i].b, part = dem2di_part_of(*number);
         if (part < low || part >= high) continue;
         *number += part >= old && part < old + count ? by : by < 0 ? count : -count;
     }
@@ -14672,7 +14677,7 @@ static void dem2di_forget_turned(dem2d_world *world, int slot, const dem2d_wall_
         double cosine = part.along.c * surface->along.c + part.along.s * surface->along.s;
         if (!all && cosine > 0) continue;
         for (int i = list->pairs; i < list->count; i++)
-            if (list->keys[i].b % DEM2DI_VERTEX == wall->first + k) dem2di_contact_forget(world, i);
+            if (dem2di_part_of(list->keys[i].b) == wall->first + k) dem2di_contact_forget(world, i);
         world->list_stale = true;
     }
 }
@@ -14798,7 +14803,7 @@ static dem2di_load dem2di_part_load(const dem2d_world *world, int part) {
     dem2di_load load = {{0, 0}, 0};
     for (int i = list->pairs; i < list->count; i++) {
         dem2di_contact contact;
-        if (list->keys[i].b % DEM2DI_VERTEX != part || list->keys[i].a < 0) continue;
+        if (dem2di_part_of(list->keys[i].b) != part || list->keys[i].a < 0) continue;
         if (!dem2di_contact_get(world, contacts, i, &contact)) continue;
         dem2d_vec force = dem2di_contact_force(&contact);
         dem2d_vec point = dem2di_add(world->before[list->keys[i].a].x, dem2di_arm_a(&contact));
@@ -15303,7 +15308,7 @@ static dem2d_result dem2di_join(dem2d_world *world) {
 
 /* Where the vertex of a number is. */
 static dem2d_vec dem2di_vertex_place(const dem2d_world *world, int number) {
-    int part = number % DEM2DI_VERTEX;
+    int part = dem2di_part_of(number);
     const dem2di_surface *surface = &world->surfaces[part];
     if (dem2di_vertex_of(number) == 0) return surface->point;
     return dem2di_surface_end(surface, world->parts[part].extent);
@@ -15823,7 +15828,7 @@ static inline bool dem2di_part_is_near(const dem2d_world *world, const dem2di_di
 /* The same for a vertex at an end of a part that is near. */
 static inline bool dem2di_vertex_is_near(const dem2d_world *world, const dem2di_disc *disc,
                                          int number) {
-    int part = number % DEM2DI_VERTEX, end = dem2di_vertex_of(number);
+    int part = dem2di_part_of(number), end = dem2di_vertex_of(number);
     if (dem2di_partner_of(&world->joints[part], end) < 0) return false;
     dem2d_vec from = dem2di_sub(disc->centre, dem2di_vertex_place(world, number));
     double reach = disc->reach + world->walls[world->parts[part].wall].skin;
@@ -15839,7 +15844,7 @@ static bool dem2di_meets_part(const dem2d_world *world, int slot, int part) {
 
 /* The same for a contact's number: a part, or a vertex of one. */
 static bool dem2di_number_is_near(const dem2d_world *world, const dem2di_disc *disc, int number) {
-    return dem2di_part_is_near(world, disc, number % DEM2DI_VERTEX) &&
+    return dem2di_part_is_near(world, disc, dem2di_part_of(number)) &&
            (number < DEM2DI_VERTEX || dem2di_vertex_is_near(world, disc, number));
 }
 
@@ -17578,7 +17583,7 @@ static int dem2di_collide_vertex(const dem2d_world *world, int a, int number,
 
 /* Is a listed contact with a segment of a wall, or a vertex? */
 static inline bool dem2di_is_segment(const dem2d_world *world, int contact) {
-    return world->parts[world->list.keys[contact].b % DEM2DI_VERTEX].extent > 0;
+    return world->parts[dem2di_part_of(world->list.keys[contact].b)].extent > 0;
 }
 
 /* The point of a contact with a wall further along the normal. */
@@ -17588,7 +17593,7 @@ static void dem2di_arms_deepen(dem2di_arms *arms, double by, bool turns) {
 }
 
 /* The rows of a contact with a wall whose geometry is known. */
-static void dem2di_wall_add(dem2d_world *world, int i, const dem2di_last *last,
+static DEM2DI_INLINE void dem2di_wall_add(dem2d_world *world, int i, const dem2di_last *last,
                             dem2di_contact *contact, dem2di_law_rows *rows) {
     bool two = dem2di_point_pair_of(world, &world->list.contacts, i) != NULL;
     if (world->faces == DEM2D_ONE_POINT) /* [P] fig. 4b: from the foot point to the middle */
@@ -17717,7 +17722,7 @@ static int dem2di_row_of_face(const dem2d_world *world, const dem2di_wall_rows *
 static void dem2di_rows_of_vertex(const dem2d_world *world, const dem2di_wall_rows *rows,
                                   int vertex, int row[2]) {
     int number = world->list.keys[vertex].b;
-    const dem2di_wall_joint *joint = &world->joints[number % DEM2DI_VERTEX];
+    const dem2di_wall_joint *joint = &world->joints[dem2di_part_of(number)];
     int other = joint->partner[dem2di_vertex_of(number)];
     row[0] = dem2di_row_of_face(world, rows, joint->first);
     row[1] = dem2di_row_of_face(world, rows, world->joints[other].first);
@@ -17746,7 +17751,7 @@ static bool dem2di_row_at_vertex(const dem2d_world *world, int row, int vertex) 
 
 /* Is the particle at the reflex side of a sharp vertex? */
 static bool dem2di_in_sharp_corner(const dem2d_world *world, int vertex, const int row[2]) {
-    int number = world->list.keys[vertex].b, part = number % DEM2DI_VERTEX;
+    int number = world->list.keys[vertex].b, part = dem2di_part_of(number);
     int end = dem2di_vertex_of(number);
     const dem2di_wall_joint *joint = &world->joints[part];
     int other = joint->partner[end], away[2] = {joint->away[end][0], joint->away[end][1]};
@@ -17822,10 +17827,10 @@ static bool dem2di_find_vertex(dem2d_world *world, int vertex, dem2di_count *cou
 static void dem2di_resolve_vertex(dem2d_world *world, const dem2di_wall_rows *rows, int vertex,
                                   dem2di_count *count) {
     int number = world->list.keys[vertex].b, end = dem2di_vertex_of(number), row[2], part[2];
-    const dem2di_wall_joint *joint = &world->joints[number % DEM2DI_VERTEX];
+    const dem2di_wall_joint *joint = &world->joints[dem2di_part_of(number)];
     if (joint->partner[end] < 0) return; /* no more, in a damaged snapshot */
     dem2di_rows_of_vertex(world, rows, vertex, row);
-    part[0] = number % DEM2DI_VERTEX;
+    part[0] = dem2di_part_of(number);
     part[1] = joint->partner[end];
     if (row[0] < 0 || row[1] < 0 || dem2di_in_sharp_corner(world, vertex, row)) return;
     for (int k = 0; k < 2; k++)
@@ -19382,7 +19387,7 @@ static dem2d_contact_info dem2di_contact_of(const dem2d_world *world,
     if (iterator->walls) {
         int wall = dem2di_wall_of(world, iterator->number);
         info.wall = dem2di_wall_id(world, wall);
-        info.part_b = key->b % DEM2DI_VERTEX - world->walls[wall].first;
+        info.part_b = dem2di_part_of(key->b) - world->walls[wall].first;
         info.feature = key->b / DEM2DI_VERTEX;
     } else {
         info.b = dem2di_particle_id(world, key->b);
@@ -22256,7 +22261,7 @@ static bool dem2di_key_sound(const dem2d_world *w, int contact) {
     if (key->a < 0) return w->list_stale && !(w->list.contacts.depth[contact] > 0);
     if (key->a >= w->body_count || w->bodies[key->a].shape_index < 0) return false;
     if (contact >= w->list.pairs) {
-        int end = dem2di_vertex_of(key->b), part = key->b % DEM2DI_VERTEX;
+        int end = dem2di_vertex_of(key->b), part = dem2di_part_of(key->b);
         return part < w->part_count && end < 2 && (end < 0 || w->parts[part].extent > 0);
     }
     if (key->b >= w->body_count || w->bodies[key->b].shape_index < 0) return false;
