@@ -17594,7 +17594,7 @@ static void dem2di_arms_deepen(dem2di_arms *arms, double by, bool turns) {
 
 /* The rows of a contact with a wall whose geometry is known. */
 static DEM2DI_INLINE void dem2di_wall_add(dem2d_world *world, int i, const dem2di_last *last,
-                            dem2di_contact *contact, dem2di_law_rows *rows) {
+                                          dem2di_contact *contact, dem2di_law_rows *rows) {
     bool two = dem2di_point_pair_of(world, &world->list.contacts, i) != NULL;
     if (world->faces == DEM2D_ONE_POINT) /* [P] fig. 4b: from the foot point to the middle */
         dem2di_arms_deepen(&contact->arms, contact->depth / 2,
@@ -17627,7 +17627,8 @@ static void dem2di_update_wall_contact(dem2d_world *world, int i, dem2di_law_row
     dem2di_list *list = &world->list;
     int a = list->keys[i].a, j = list->keys[i].b, found;
     const bool segment = j < DEM2DI_VERTEX && world->parts[j].extent > 0;
-    if (j >= DEM2DI_VERTEX || (segment && world->plan.joints && !dem2di_over_part(world, a, j))) {
+    const bool joined = segment && world->plan.joints;
+    if (j >= DEM2DI_VERTEX || (joined && !dem2di_over_part(world, a, j))) {
         dem2di_contact_idle(world, i);
         return;
     }
@@ -17635,7 +17636,10 @@ static void dem2di_update_wall_contact(dem2d_world *world, int i, dem2di_law_row
     dem2di_last last;
     dem2di_contact contact;
     dem2d_contact_point points[2];
-    dem2di_last_get(world, &list->contacts, i, &last);
+    if (joined) /* the search needs no more */
+        (void)dem2di_contact_get(world, &list->contacts, i, &last.contact);
+    else
+        dem2di_last_get(world, &list->contacts, i, &last);
     contact.normal = last.contact.normal;
     dem2di_points_clear(world, i);
     if (world->plan.joints) list->contacts.relief[i - list->discs] = 0;
@@ -17650,7 +17654,7 @@ static void dem2di_update_wall_contact(dem2d_world *world, int i, dem2di_law_row
     }
     dem2d_vec pivot = world->wall_now[dem2di_wall_of(world, i)].point;
     dem2di_contact_place(world, i, found, points, dem2di_sub(pivot, world->now[a].x), &contact);
-    if (segment && world->plan.joints)
+    if (joined)
         dem2di_geometry_put(list, i, &contact);
     else
         dem2di_wall_add(world, i, &last, &contact, rows);
