@@ -194,12 +194,12 @@ CONCEPTS
                 the ends of the common part. Each has its own depth and the full stiffness kn; the
                 second has less where the common part is short. Their forces are the gradient of an
                 energy and grow from zero, so that energy is conserved and piles come to rest.
-    Wall        A half-plane: its normal points into the grains. Or a segment, which has two sides.
-                Or a chain of segments. Segments that meet and do not move against each other are
-                joined: in line they are one face, and the energy of a particle depends on their
-                union, not on how it is cut. A wall stands still, moves at a velocity and turns
-                about a pivot, or is servo-controlled to a stress. Its parts (segments of a chain)
-                are numbered; contacts name them.
+    Wall        A half-plane: its normal points into the grains. Or a segment, or a chain of
+                segments, with two sides or one. Segments that meet and do not move against each
+                other are joined: in line they are one face, and the energy of a particle depends on
+                their union, not on how it is cut. A wall stands still, moves at a velocity and
+                turns about a pivot, or is servo-controlled to a stress. Its parts (segments of a
+                chain) are numbered; contacts name them.
     Name        Of the two of a pair, A is the one with the lower id, and sums over contacts and
                 particles go by ids, walls last. dem2d_particle_desc.name and dem2d_wall_desc.name
                 (64 bits, 0: none) replace this order: first by name, then by id. With the same
@@ -1444,6 +1444,16 @@ typedef enum dem2d_wall_mode {
 /// segment. At a vertex of two faces, E(both) = E(one) + E(other) - E(their common point): see
 /// dem2d_contact_info.sign.
 ///
+/// A segment or chain that is one_sided pushes to the left of its direction only: into a closed
+/// chain whose points go counter-clockwise. From the left it acts as one of two sides. A grain that
+/// came from there, and is pressed so deep that the shorter way out is to the right, is pushed back
+/// to the left: its overlap is what it has to move to get there. This ends where no part of it is
+/// within the face: of a circle when its centre is more than the radius behind it, with an overlap
+/// of the diameter. So the energy of a disc is conserved, and that of other grains beside one face;
+/// not where they are pushed back over a vertex. A grain that comes from the right, or around a
+/// free end, has no contact until it has passed; nor has a grain that is put where the shorter way
+/// out is to the right. Queries of space see both sides.
+///
 /// A MOVING wall turns about its pivot, which moves with it: a drum is a closed chain with an
 /// angular_velocity. Its parts are placed by the angle, so that its shape stays the same to
 /// rounding however long it turns. A step may turn it by less than half a turn.
@@ -1485,6 +1495,7 @@ typedef struct dem2d_wall_desc {
     const dem2d_vec *points; ///< m, of a chain of segments, copied; `point` to `end` are ignored
     int count;               ///< of points, 2 to 268435456; 0 without
     bool closed;             ///< chain: one segment more from the last point to the first
+    bool one_sided;          ///< segment or chain: pushes to the left of its direction only
     uint64_t name;           ///< orders contacts and sums: see Name in the manual; 0: none
     dem2d_groups groups;     ///< whom it meets; all zero: everyone
     uint64_t user_data;      ///< the caller's: kept and saved
@@ -11819,6 +11830,11 @@ static inline int dem2di_part_of(int number) {
     return number & (DEM2DI_VERTEX - 1);
 }
 
+/* Depths of contacts with one-sided walls that are apart because the particle passes from the
+   right, or because the contact with another face pushes it back. Others that are apart have -1. */
+#define DEM2DI_PASSING (-2)
+#define DEM2DI_YIELDS (-3)
+
 /* How a segment is joined to others (section joints): its face, of which it may be a part, and the
    faces that meet this one at its ends. */
 typedef struct dem2di_wall_joint {
@@ -11954,7 +11970,7 @@ typedef struct dem2di_plan {
     bool one_law;  /* all particles are of one material: */
     int material;
     bool held;                 /* some particles are not free */
-    bool joints;               /* two segments are joined */
+    bool joints;               /* two segments are joined, or a wall has one side */
     int terms;                 /* DEM2DI_DASHPOT ...: of the law, beside springs and friction */
     int terms_now, terms_made; /* those that the laws have now, and had in the last force pass */
     bool faces;         /* contacts may have two points: by the rule, and some particle has faces */
@@ -12139,7 +12155,8 @@ struct dem2d_world {
     dem2di_wall_joint *joints;     /* of the parts, when the segments were last joined: */
     dem2di_surface *face_surfaces; /* of the faces of these parts, once they are joined */
     bool joints_due;               /* they must be joined again before the next force pass */
-    bool joined;                   /* some are */
+    bool joined;                   /* some are, or have one side: */
+    bool one_sided;                /* a wall with parts has */
     int wall_count, part_count;
 
     dem2di_list list;
@@ -12225,6 +12242,7 @@ static const dem2di_field dem2di_wall_fields[] = {
     DEM2DI_ROW(dem2d_wall_desc, points, DEM2DI_OPTIONAL, "- NULL; of a chain, copied"),
     DEM2DI_ROW(dem2d_wall_desc, count, DEM2DI_WHOLE_OR_0(2, 1 << 28), "- 0; of points"),
     DEM2DI_ROW(dem2d_wall_desc, closed, DEM2DI_SWITCH, "- false; chain"),
+    DEM2DI_ROW(dem2d_wall_desc, one_sided, DEM2DI_SWITCH, "- false; segment or chain"),
     DEM2DI_ROW(dem2d_wall_desc, name, DEM2DI_WORD, "- 0"),
     DEM2DI_ROW(dem2d_wall_desc, groups.category, DEM2DI_TAG, "- 0"),
     DEM2DI_ROW(dem2d_wall_desc, groups.mask, DEM2DI_TAG, "- 0"),
@@ -12274,6 +12292,7 @@ static const dem2di_field dem2di_progress_fields[] = {
     DEM2DI_SAVED("check_due", dem2d_world, check_due, DEM2DI_SWITCH),
     DEM2DI_SAVED("joints_due", dem2d_world, joints_due, DEM2DI_SWITCH),
     DEM2DI_SAVED("joined", dem2d_world, joined, DEM2DI_SWITCH),
+    DEM2DI_SAVED("one_sided", dem2d_world, one_sided, DEM2DI_SWITCH),
     DEM2DI_SAVED("plan_due", dem2d_world, plan_due, DEM2DI_WHOLE(0, 2)),
     DEM2DI_SAVED("skin_fixed", dem2d_world, skin_fixed, DEM2DI_SWITCH),
     DEM2DI_SAVED("scattered", dem2d_world, scattered, DEM2DI_SWITCH),
@@ -14279,6 +14298,8 @@ static dem2d_result dem2di_check_wall(const dem2d_world *world, const dem2d_wall
     }
     if (desc->segment) result = dem2di_check_segment(world, desc);
     if (result != DEM2D_OK) return result;
+    if (desc->one_sided && !desc->segment)
+        return dem2di_fail(env, DEM2D_OUT_OF_RANGE, -1, "one_sided: a half-plane has one side");
     if (!desc->segment && !dem2di_unit(desc->normal, &unit))
         return dem2di_fail(env, DEM2D_OUT_OF_RANGE, -1, "normal is 0");
     return dem2di_check_spans(world, desc);
@@ -14696,7 +14717,8 @@ DEM2D_API dem2d_result dem2d_world_set_wall(dem2d_world *world, dem2d_wall_id id
     const dem2di_wall old = *wall;
     const dem2d_wall_desc settled = dem2di_wall_settled(desc, wall->desc.normal);
     double extent = world->parts[wall->first].extent;
-    bool other_kind = old.desc.segment != settled.segment || old.count != parts;
+    bool other_kind = old.desc.segment != settled.segment || old.count != parts ||
+                      old.desc.one_sided != settled.one_sided;
     if (old.desc.name != desc->name) world->list_stale = true; /* contacts go by the wall's rank */
     const dem2di_groups met = dem2di_wall_groups(&old);
     dem2di_forget_turned(world, slot, &settled, other_kind);
@@ -14920,6 +14942,10 @@ DEM2D_API dem2d_result dem2d_world_get_wall(const dem2d_world *world, dem2d_wall
    half-planes do: a box in a corner has the contacts of both. There a disc would have to overlap
    by 1 - cos(22.5 degrees), 8 % of its radius, to reach X while both feet are on the faces.
 
+   One side. Segments of a one-sided wall collide as all do. Then it is decided for each particle
+   whether it came from the left, by its contacts in the last force pass (resolve). Both segments of
+   a face have the same sides.
+
    A chain's parts are always joined. Of other walls those are that stand still, or move at the same
    velocity and do not turn. What follows is found when walls have changed, from their places then.
  */
@@ -15056,12 +15082,13 @@ static void dem2di_ends_inside(const dem2d_world *world, dem2di_joining *joining
     }
 }
 
-/* May the segments of two walls be of one face? It has one material, and the same particles meet
-   it. */
+/* May the segments of two walls be of one face? It has one material, the same sides, and the same
+   particles meet it. */
 static bool dem2di_one_face(const dem2di_wall *a, const dem2di_wall *b) {
     const dem2di_groups one = dem2di_wall_groups(a), other = dem2di_wall_groups(b);
     return a->desc.material.index == b->desc.material.index && one.category == other.category &&
-           one.mask == other.mask && one.sensor == other.sensor;
+           one.mask == other.mask && one.sensor == other.sensor &&
+           a->desc.one_sided == b->desc.one_sided;
 }
 
 /* Of the ends that meet one, the one whose segment goes on in line, if both have none yet. */
@@ -15073,6 +15100,7 @@ static void dem2di_end_continue(const dem2d_world *world, dem2di_joining *joinin
         const dem2d_vec other = dem2di_end_away(world, &ends[k]);
         const dem2di_wall *second = &world->walls[world->parts[ends[k].part].wall];
         if (ends[k].straight >= 0 || ends[k].part == ends[i].part) continue;
+        if (wall->desc.one_sided && ends[k].which == ends[i].which) continue;
         if (dem2di_one_face(wall, second) && dem2di_dot(away, other) < 0 &&
             fabs(dem2di_cross(away, other)) <= DEM2DI_JOINT) {
             ends[i].straight = k;
@@ -15242,9 +15270,12 @@ static int dem2di_partner_of(const dem2di_wall_joint *joint, int end) {
     return joint->face.extent > 0 ? joint->partner[end] : -1;
 }
 
-/* Faces and vertices of all walls. Returns whether some are joined. */
+/* Faces and vertices of all walls. Returns whether some are joined or have one side. */
 static bool dem2di_joints_find(dem2d_world *world, dem2di_joining *joining) {
     bool joined = false;
+    world->one_sided = false;
+    for (int k = 0; k < world->part_count; k++)
+        if (world->walls[world->parts[k].wall].desc.one_sided) joined = world->one_sided = true;
     dem2di_ends_list(world, joining);
     dem2di_ends_meet(world, joining);
     dem2di_ends_inside(world, joining);
@@ -17474,14 +17505,14 @@ static void dem2di_update_pair(dem2d_world *world, int i, dem2di_law_rows *rows,
     dem2di_geometry_put(list, i, &contact);
 }
 
-/* A particle at a half-plane: one support call, none for a circle. Returns the number of points. */
-static int dem2di_collide_plane(const dem2d_world *world, int a, int part, dem2di_contact *contact,
-                                dem2d_contact_point points[2], dem2di_count *count) {
+/* A particle at a half-plane through a point, with a unit normal u into it: one support call, none
+   for a circle. Returns the number of points. */
+static int dem2di_collide_plane(const dem2d_world *world, int a, dem2d_vec point, dem2d_vec u,
+                                dem2di_contact *contact, dem2d_contact_point points[2],
+                                dem2di_count *count) {
     const dem2di_body *body = &world->bodies[a];
     const dem2d_shape *shape = dem2di_shape_of(world, body);
     const dem2di_state *state = &world->now[a];
-    dem2d_vec point = world->surfaces[part].point;
-    dem2d_vec u = dem2di_negate(dem2di_surface_normal(&world->surfaces[part]));
     dem2d_vec support = dem2di_scale(u, state->radius);
     contact->normal.x = u.x;
     contact->normal.y = u.y;
@@ -17647,7 +17678,9 @@ static void dem2di_update_wall_contact(dem2d_world *world, int i, dem2di_law_row
         found =
             dem2di_collide_segment(world, a, j, &last.contact, history, &contact, points, count);
     else
-        found = dem2di_collide_plane(world, a, j, &contact, points, count);
+        found = dem2di_collide_plane(world, a, world->surfaces[j].point,
+                                     dem2di_negate(dem2di_surface_normal(&world->surfaces[j])),
+                                     &contact, points, count);
     if (found == 0) {
         dem2di_contact_apart(world, i, contact.normal);
         return;
@@ -17827,6 +17860,14 @@ static bool dem2di_find_vertex(dem2d_world *world, int vertex, dem2di_count *cou
     return true;
 }
 
+/* Are the normals of two contacts more than a right angle apart? */
+static bool dem2di_opposed(const dem2d_world *world, int i, int other) {
+    const dem2di_contacts *contacts = &world->list.contacts;
+    return contacts->normal_x[i] * contacts->normal_x[other] +
+               contacts->normal_y[i] * contacts->normal_y[other] <
+           0;
+}
+
 /* Of a vertex and both its faces: which count. */
 static void dem2di_resolve_vertex(dem2d_world *world, const dem2di_wall_rows *rows, int vertex,
                                   dem2di_count *count) {
@@ -17851,6 +17892,8 @@ static void dem2di_resolve_vertex(dem2d_world *world, const dem2di_wall_rows *ro
             dem2di_leave_out(world, vertex);
             return;
         }
+    for (int k = 0; k < 2 && world->one_sided; k++) /* pushed back from behind it */
+        if (dem2di_opposed(world, row[k], vertex)) dem2di_leave_out(world, vertex);
 }
 
 /* Springs of contacts whose face is now in contact elsewhere, or not at all, are in the pool of the
@@ -17950,12 +17993,183 @@ static void dem2di_joined_subtract(dem2d_world *world, int i, dem2di_contact *co
     dem2di_force_put(world, i, contact, 0, count);
 }
 
+/* --- one side --------------------------------------------------------------------------------
+   A contact with a one-sided face, as found with two sides, pushes the particle to the left or to
+   the right. To the left it counts, unless the particle is on its way from the right. To the right
+   it is replaced by that with the half-plane behind the face, if the particle came from the left:
+   its contact with this face was closed in the last force pass, or its centre was at the left.
+   Behind a reflex vertex, where no face is beside the particle, the contact with one face is taken,
+   and discs are pushed towards the vertex: their energy is that of the signed distance. Otherwise
+   the particle is on its way from the right: the contact is apart, and the depth says so until they
+   no longer overlap or another contact with this wall is closed. */
+
+static bool dem2di_is_one_sided(const dem2d_world *world, int contact) {
+    return world->walls[dem2di_wall_of(world, contact)].desc.one_sided;
+}
+
+static bool dem2di_was_held(const dem2d_world *world, int contact) {
+    const double depth = world->list.last.depth[contact];
+    return depth > 0 || depth == DEM2DI_YIELDS;
+}
+
+/* Was some contact with a face closed in the last force pass? */
+static bool dem2di_face_was_closed(const dem2d_world *world, const dem2di_wall_rows *rows,
+                                   int face) {
+    for (int k = 0; k < rows->parts; k++)
+        if (dem2di_was_held(world, rows->contact[k]) &&
+            dem2di_face_of(world, rows->contact[k]) == face)
+            return true;
+    return false;
+}
+
+/* Had a particle contacts with a wall in the last force pass (1), was it passing (-1), or none? */
+static int dem2di_wall_was(const dem2d_world *world, const dem2di_wall_rows *rows, int wall) {
+    int was = 0;
+    for (int k = 0; k < rows->parts; k++) {
+        if (dem2di_wall_of(world, rows->contact[k]) != wall) continue;
+        if (dem2di_was_held(world, rows->contact[k])) return 1;
+        if (world->list.last.depth[rows->contact[k]] == DEM2DI_PASSING) was = -1;
+    }
+    return was;
+}
+
+/* Was the centre of a particle at the left of a part in the last force pass? */
+static bool dem2di_was_left(const dem2d_world *world, int a, int part) {
+    const dem2di_surface surface = dem2di_surface_of(world, world->wall_before, part);
+    dem2d_vec from = dem2di_sub(world->before[a].x, surface.point);
+    return dem2di_dot(from, dem2di_surface_normal(&surface)) > 0;
+}
+
+/* How a contact with a one-sided face lies. */
+typedef struct dem2di_sidedness {
+    bool right;  /* pushes to the right, at a vertex seen from both faces together */
+    int end;     /* of the face at which it is, or -1 */
+    int partner; /* reflex vertex: the part of the other face, else -1 */
+} dem2di_sidedness;
+
+/* A part of the other face at the vertex at an end of the face of a contact; or -1. */
+static int dem2di_part_beyond(const dem2d_world *world, const dem2di_wall_rows *rows, int i,
+                              int end) {
+    const int face = dem2di_face_of(world, i);
+    for (int k = rows->parts; k < rows->count; k++) {
+        const int number = world->list.keys[rows->contact[k]].b, at = dem2di_vertex_of(number);
+        const int part = dem2di_part_of(number);
+        const dem2di_wall_joint *joint = &world->joints[part];
+        const int other = joint->partner[at];
+        if (other < 0) continue; /* in a damaged snapshot */
+        if (joint->first == face && joint->away[at][0] == 1 - 2 * end) return other;
+        if (world->joints[other].first == face && joint->away[at][1] == 1 - 2 * end) return part;
+    }
+    return -1;
+}
+
+/* The end of a face at which a contact is; -1: it is along the face. */
+static int dem2di_end_touched(const dem2d_world *world, int i) {
+    const int a = world->list.keys[i].a, part = world->list.keys[i].b;
+    const dem2di_surface surface = world->face_surfaces[part];
+    const double along = -dem2di_normal_along(world, i, part);
+    dem2di_contact contact;
+    if (fabs(along) <= DEM2DI_CORNER) return -1;
+    (void)dem2di_contact_get(world, &world->list.contacts, i, &contact);
+    dem2d_vec from = dem2di_sub(dem2di_add(world->now[a].x, dem2di_arm_a(&contact)), surface.point);
+    double place = dem2di_dot(from, dem2di_vec(surface.along.c, surface.along.s));
+    double near = DEM2DI_JOINT * world->now[a].radius;
+    if (along < 0) return place < near ? 0 : -1;
+    return place > world->joints[part].face.extent - near ? 1 : -1;
+}
+
+static dem2di_sidedness dem2di_side_of(const dem2d_world *world, const dem2di_wall_rows *rows,
+                                       int i) {
+    const dem2di_contacts *contacts = &world->list.contacts;
+    const int part = world->list.keys[i].b;
+    const dem2di_surface *own = &world->surfaces[part];
+    dem2d_vec left = dem2di_surface_normal(own);
+    dem2di_sidedness side;
+    side.end = dem2di_end_touched(world, i);
+    side.partner = side.end >= 0 ? dem2di_part_beyond(world, rows, i, side.end) : -1;
+    if (side.partner >= 0) {
+        const dem2di_surface *other = &world->surfaces[side.partner];
+        double turn = own->along.c * other->along.s - own->along.s * other->along.c;
+        left = dem2di_add(left, dem2di_surface_normal(other));
+        if ((side.end == 1 ? turn : -turn) <= 0) side.partner = -1;
+    }
+    side.right = contacts->normal_x[i] * left.x + contacts->normal_y[i] * left.y > 0;
+    return side;
+}
+
+/* The contact of the half-plane behind a face in place of one that pushes to the right. A disc at a
+   vertex is pushed towards it: the half-plane's normal is that of the contact turned around. */
+static void dem2di_push_back(dem2d_world *world, int i, dem2di_count *count) {
+    const int a = world->list.keys[i].a;
+    dem2d_contact_point points[2];
+    dem2di_contact found, contact;
+    memset(&contact, 0, sizeof contact);
+    (void)dem2di_contact_get(world, &world->list.contacts, i, &found);
+    dem2d_vec point = dem2di_add(world->now[a].x, dem2di_arm_a(&found));
+    dem2d_vec u = dem2di_negate(dem2di_surface_normal(&world->surfaces[world->list.keys[i].b]));
+    if (dem2di_is_circle(world, a)) u = dem2di_negate(found.normal);
+    dem2di_points_clear(world, i);
+    int number = dem2di_collide_plane(world, a, point, u, &contact, points, count);
+    if (number == 0) { /* thinner than rounding */
+        dem2di_contact_apart(world, i, contact.normal);
+        return;
+    }
+    dem2d_vec pivot = world->wall_now[dem2di_wall_of(world, i)].point;
+    dem2di_contact_place(world, i, number, points, dem2di_sub(pivot, world->now[a].x), &contact);
+    dem2di_geometry_put(&world->list, i, &contact);
+}
+
+/* Does a contact that pushes to the right, behind a reflex vertex, leave this to that with the
+   other face: one that is at its side, or of two at the vertex the first? */
+static bool dem2di_side_yields(const dem2d_world *world, const dem2di_wall_rows *rows,
+                               const dem2di_sidedness *side) {
+    const int other = dem2di_row_of_face(world, rows, world->joints[side->partner].first);
+    if (other < 0 || !(world->list.contacts.depth[other] > 0)) return false;
+    return side->end == 0 || dem2di_end_touched(world, other) < 0;
+}
+
+/* A particle's contacts with one-sided walls: which count. Those that push back are marked by their
+   relief first, so that each sees the others as they were found. */
+static void dem2di_resolve_sides(dem2d_world *world, const dem2di_wall_rows *rows,
+                                 dem2di_count *count) {
+    const dem2di_list *list = &world->list;
+    for (int k = 0; k < rows->parts; k++) {
+        const int i = rows->contact[k], a = list->keys[i].a, part = list->keys[i].b;
+        if (!(list->contacts.depth[i] > 0) || !dem2di_is_one_sided(world, i)) continue;
+        const dem2di_sidedness side = dem2di_side_of(world, rows, i);
+        const int was = dem2di_wall_was(world, rows, dem2di_wall_of(world, i));
+        const bool vertex = side.partner >= 0;
+        const dem2d_vec normal = dem2di_vec(list->contacts.normal_x[i], list->contacts.normal_y[i]);
+        if (!side.right && was >= 0) continue;
+        if (side.right && was >= 0 && (side.end < 0 || vertex) &&
+            (dem2di_face_was_closed(world, rows, world->joints[part].first) ||
+             (vertex && dem2di_face_was_closed(world, rows, world->joints[side.partner].first)) ||
+             dem2di_was_left(world, a, part))) {
+            list->contacts.relief[i - list->discs] = -1;
+            if (!vertex || !dem2di_side_yields(world, rows, &side)) continue;
+            dem2di_contact_apart(world, i, normal);
+            list->contacts.depth[i] = DEM2DI_YIELDS;
+            continue;
+        }
+        dem2di_contact_apart(world, i, normal);
+        if (was <= 0) list->contacts.depth[i] = DEM2DI_PASSING;
+    }
+    for (int k = 0; k < rows->parts; k++) {
+        double *relief = &list->contacts.relief[rows->contact[k] - list->discs];
+        if (!(*relief < 0)) continue;
+        *relief = 0;
+        if (list->contacts.depth[rows->contact[k]] > 0)
+            dem2di_push_back(world, rows->contact[k], count);
+    }
+}
+
 /* A particle's contacts with joined segments: which count. Vertices do where two of them overlap:
    returns the number of rows that may have a force. */
 static int dem2di_resolve_joined(dem2d_world *world, const dem2di_wall_rows *rows,
                                  dem2di_count *count) {
     const dem2di_list *list = &world->list;
     int closed = 0;
+    if (world->one_sided) dem2di_resolve_sides(world, rows, count);
     for (int k = 0; k < rows->parts; k++) {
         int i = rows->contact[k];
         closed += list->contacts.depth[i] > 0 && dem2di_is_segment(world, i);
@@ -21670,6 +21884,18 @@ static void dem2di_hash_column(void *context, const void *object, const dem2di_c
     dem2di_hash_fields(hashing);
 }
 
+/* Contacts with one-sided walls that are apart as a particle passes, or as they yield: in the order
+   of parts, then of ranks. */
+static void dem2di_hash_passing(dem2di_hashing *hashing) {
+    const dem2d_world *w = hashing->world;
+    const dem2di_list *list = &w->list;
+    for (int i = list->pairs; i < list->count && w->one_sided; i++) {
+        if (!(list->contacts.depth[i] < -1) || list->keys[i].a < 0) continue;
+        hashing->hash = dem2di_hash_word(hashing->hash, (uint64_t)list->keys[i].b + 1);
+        hashing->hash = dem2di_hash_word(hashing->hash, (uint64_t)w->bodies[list->keys[i].a].index);
+    }
+}
+
 DEM2D_API uint64_t dem2d_world_hash(const dem2d_world *world) {
     if (world == NULL) return 0;
     dem2di_hashing hashing;
@@ -21677,6 +21903,7 @@ DEM2D_API uint64_t dem2d_world_hash(const dem2d_world *world) {
     hashing.world = world;
     hashing.hash = DEM2DI_HASH_START;
     dem2di_for_columns(world, dem2di_hash_column, &hashing);
+    dem2di_hash_passing(&hashing);
     uint64_t hash = dem2di_hash_word(hashing.hash, 0); /* low bits come from high ones too */
     return hash != 0 ? hash : 1;
 }
@@ -23289,9 +23516,9 @@ DEM2D_API dem2d_result dem2d_world_write_csv(const dem2d_world *world, const dem
             Particles and walls may have a name of 64 bits, which orders pairs and sums in place of
             the id (name in their descs and infos).
             Walls turn about a pivot (angular_velocity, dem2d_world_drive_wall), run as belts
-            (surface_speed), and may be chains of segments (points, count, closed). Forces on their
-            parts: dem2d_world_get_wall_part, dem2d_contact_info.part_b. Snapshots without parts are
-            read.
+            (surface_speed), and may be chains of segments (points, count, closed), with one side
+            (one_sided). Forces on their parts: dem2d_world_get_wall_part,
+            dem2d_contact_info.part_b. Snapshots without parts are read.
             Polygons in contact at one point take a third less time, smooth grains a tenth.
             New: queries of space (dem2d_world_query_box, _query_point, _query_shape, _cast_ray,
             _cast_ray_all, _nearest), and dem2d_world_particle_contacts.

@@ -1,5 +1,5 @@
 /* Walls that turn, belts and chains: closed forms in the turning frame, whole turns, forces on
-   parts, the ledger, lists, snapshots, and what is refused. */
+   parts, the ledger, lists, snapshots, and what is refused; walls with one side. */
 #include "dem2d.h"
 #include "testing.h"
 #include "world_scene.h"
@@ -385,13 +385,242 @@ static void test_set_again(void **state) {
         }
 }
 
+/* --- one side ---------------------------------------------------------------------------------- */
+
+enum { SIDED_DISC, SIDED_BOX, SIDED_SERIES, SIDED_KINDS };
+
+static dem2d_shape *make_sided(int kind) {
+    const double a[4] = {0.1, 0, 0, 0.004}, b[4] = {0};
+    if (kind == SIDED_SERIES) return make_series(a, b, 3);
+    return kind == SIDED_DISC ? make_disc(0.05) : make_box(0.1, 0.1);
+}
+
+/* A floor with kinks of both kinds and two segments in line; its left is above. */
+static const dem2d_vec floor_points[6] = {{-2, 0.5}, {-0.6, 0},  {-0.3, 0},
+                                          {0, 0},    {0.5, 0.1}, {2, 0}};
+
+static dem2d_wall_desc floor_chain(const scene *s, bool one_sided) {
+    dem2d_wall_desc desc = chain_desc(s, floor_points, 6, false);
+    desc.one_sided = one_sided;
+    return desc;
+}
+
+/* From the left all is as with two sides, bit by bit. */
+static void test_front_is_the_same(void **state) {
+    (void)state;
+    for (int kind = 0; kind < SIDED_KINDS; kind++) {
+        dem2d_particle_info last[2][3];
+        for (int one = 0; one < 2; one++) {
+            int contacts = 0;
+            scene s = make_scene(0.3, 1e-5, vec(0, -9.81), true);
+            const dem2d_wall_desc desc = floor_chain(&s, one);
+            dem2d_particle_id ids[3];
+            add_wall(&s, &desc);
+            for (int i = 0; i < 3; i++)
+                ids[i] = add_shape(&s, make_sided(kind), DEM2D_FREE, vec(0.5 * i - 0.7, 0.25),
+                                   0.3 * i, vec(0.6, -1), 0);
+            for (int i = 0; i < 4000; i++) {
+                step(&s, 10);
+                contacts += contacts_of(&s, NULL, 0);
+            }
+            assert_true(contacts > 50);
+            for (int i = 0; i < 3; i++) last[one][i] = grain_of(&s, ids[i]);
+            close_scene(&s);
+        }
+        for (int i = 0; i < 3; i++) {
+            assert_same_bits(last[0][i].pose.position.x, last[1][i].pose.position.x);
+            assert_same_bits(last[0][i].pose.position.y, last[1][i].pose.position.y);
+            assert_same_bits(last[0][i].velocity.x, last[1][i].velocity.x);
+            assert_same_bits(last[0][i].angular_velocity, last[1][i].angular_velocity);
+        }
+    }
+}
+
+typedef struct shot {
+    double deepest;  /* of the centre behind the target, along the way */
+    double energy;   /* greatest change of the energy, over that of the shot */
+    double closed;   /* part of the steps with a contact */
+    dem2d_vec v, at; /* at the end, over the speed */
+} shot;
+
+/* A grain flies along a unit vector through a target at a wall, from twice its size before it, as
+   fast as a spring stops over a depth on a straight face: m v^2 = kn d^2. */
+static shot shoot(const dem2d_wall_desc *wall, int kind, dem2d_vec target, dem2d_vec way,
+                  double depth) {
+    scene s = make_scene(0, 1e-6, vec(0, 0), true);
+    dem2d_wall_desc desc = *wall;
+    dem2d_ledger ledger;
+    shot out = {-1, 0, 0, {0, 0}, {0, 0}};
+    desc.material = s.material;
+    add_wall(&s, &desc);
+    const dem2d_vec from = vec(target.x - 0.15 * way.x, target.y - 0.15 * way.y);
+    const dem2d_particle_id id =
+        add_shape(&s, make_sided(kind), DEM2D_FREE, from, 0.1, vec(0, 0), 0);
+    const double speed = depth * sqrt(KN / grain_of(&s, id).mass);
+    const int steps = (int)(0.5 / speed * 1e6);
+    set_velocity(&s, id, DEM2D_FREE, vec(speed * way.x, speed * way.y), 0);
+    for (int i = 0; i < steps; i++) {
+        step(&s, 1);
+        const dem2d_vec x = grain_of(&s, id).pose.position;
+        out.deepest = fmax(out.deepest, (x.x - target.x) * way.x + (x.y - target.y) * way.y);
+        ledger = ledger_of(&s);
+        out.energy = fmax(out.energy, fabs(ledger.closure));
+        out.closed += (double)(contacts_of(&s, NULL, 0) > 0) / steps;
+    }
+    const dem2d_particle_info info = grain_of(&s, id);
+    out.energy /= 0.5 * info.mass * speed * speed;
+    out.v = vec(info.velocity.x / speed, info.velocity.y / speed), out.at = info.pose.position;
+    close_scene(&s);
+    return out;
+}
+
+/* Pressed in until the centre is far behind the face, and pushed back to the left; over faces and
+   vertices of a chain, and on a lone segment. The energy stays where the grain is a disc or beside
+   one face. */
+static void test_deep(void **state) {
+    (void)state;
+    static const double at[5] = {-0.45, -0.3, -0.15, -0.02, 0.03};
+    dem2d_wall_desc floor = {0}, line = {0};
+    floor.points = floor_points, floor.count = 6, floor.one_sided = true;
+    line.segment = line.one_sided = true, line.point = vec(-1, 0), line.end = vec(1, 0);
+    for (int kind = 0; kind < SIDED_KINDS; kind++)
+        for (int i = 0; i < 6; i++)
+            for (int k = -1; k <= 1; k++) {
+                const dem2d_vec way = vec(sin(0.4 * k), -cos(0.4 * k));
+                const double x = i < 5 ? at[i] : 0;
+                const dem2d_vec target = vec(x, x > 0 ? 0.2 * x : 0);
+                const shot out = shoot(i < 5 ? &floor : &line, kind, target, way, 0.085);
+                assert_true(out.deepest > 0.02 && out.deepest < 0.06);
+                assert_true(out.v.y > 0 && out.at.y > 0.2 * fmax(0, out.at.x));
+                if (kind == SIDED_DISC || i < 3 || i == 5) assert_true(out.energy < 1e-6);
+                if (kind == SIDED_DISC && (i < 3 || i == 5)) {
+                    assert_within(out.v.x, way.x, 1e-5);
+                    assert_within(out.v.y, -way.y, 1e-5);
+                }
+            }
+}
+
+/* Deeper than its diameter: it is gone, as documented. */
+static void test_too_deep(void **state) {
+    (void)state;
+    dem2d_wall_desc line = {0};
+    line.segment = line.one_sided = true, line.point = vec(-1, 0), line.end = vec(1, 0);
+    const shot held = shoot(&line, SIDED_DISC, vec(0, 0), vec(0, -1), 0.099);
+    const shot gone = shoot(&line, SIDED_DISC, vec(0, 0), vec(0, -1), 0.101);
+    assert_true(held.v.y > 0.99 && held.deepest > 0.048);
+    assert_true(gone.v.y < 0 && gone.at.y < -0.05);
+}
+
+/* From the right a grain flies on as if there were no wall, also over vertices and past free ends,
+   whose sides push what has corners. */
+static void test_from_behind(void **state) {
+    (void)state;
+    static const double at[7] = {-2, -0.6, -0.3, -0.1, 0, 0.5, 2};
+    dem2d_wall_desc floor = {0};
+    floor.points = floor_points, floor.count = 6, floor.one_sided = true;
+    for (int kind = 0; kind < SIDED_KINDS; kind++)
+        for (int i = 0; i < 7; i++)
+            for (int k = -2; k <= 2; k++) {
+                const dem2d_vec way = vec(sin(0.5 * k), cos(0.5 * k));
+                const double y = i == 0 ? 0.5 : i == 5 ? 0.1 : 0;
+                if (kind != SIDED_DISC && (i == 0 || i == 6)) continue;
+                const shot out = shoot(&floor, kind, vec(at[i], y), way, 0.05);
+                assert_true(out.closed == 0);
+                assert_within(out.v.x, way.x, 1e-12);
+            }
+}
+
+/* A box of one-sided walls holds grains at rest and one that two sides would lose; all goes on the
+   same from a snapshot, and in any order of the neighbour list. */
+static void test_box_of_one_side(void **state) {
+    (void)state;
+    const dem2d_vec corners[4] = {{0, 0}, {1, 0}, {1, 1}, {0, 1}};
+    for (int way = 0; way < 3; way++) {
+        uint64_t hash = 0;
+        for (int run = 0; run < 2; run++) {
+            dem2d_material_desc material = stone_desc(KN / 2, 0.3);
+            dem2d_world_desc world = {0};
+            material.damping_ratio = 0.2;
+            world.time_step = 1e-5, world.gravity = vec(0, -9.81), world.skin = run ? 0.3 : 0;
+            scene s = open_scene(&world, &material);
+            dem2d_wall_desc box = chain_desc(&s, corners, 4, true);
+            dem2d_particle_id ids[50];
+            box.one_sided = true;
+            add_wall(&s, &box);
+            for (int i = 0; i < 50; i++) {
+                dem2d_particle_desc grain =
+                    grain_desc(&s, give_shape(&s, make_sided(i % SIDED_KINDS)), 0.6,
+                               vec(0.1 + 0.088 * (i % 10), 0.1 + 0.09 * (i / 10)));
+                grain.angle = i;
+                if (i == 44) grain.velocity = vec(50 * cos(0.8 * way), 50 * sin(0.8 * way));
+                ids[i] = add_grain(&s, &grain);
+            }
+            for (int k = 0; k < 3; k++) {
+                step(&s, 2000);
+                if (run == 0) continue;
+                scene_bytes saved = scene_save(s.world);
+                const scene old = s;
+                s = scene_load(&old, &saved);
+                close_scene(&old);
+                free(saved.bytes);
+            }
+            for (int i = 0; i < 50; i++) {
+                const dem2d_vec x = grain_of(&s, ids[i]).pose.position;
+                assert_true(x.x > 0 && x.x < 1 && x.y > 0 && x.y < 1);
+            }
+            if (run == 1) assert_true(dem2d_world_hash(s.world) == hash);
+            hash = dem2d_world_hash(s.world);
+            close_scene(&s);
+        }
+    }
+}
+
+/* Refused for half-planes; kept in the desc; sides may be changed: contacts end then. */
+static void test_sides_set(void **state) {
+    (void)state;
+    test_env env;
+    test_env_init(&env);
+    dem2d_world_desc world = {0};
+    world.time_step = 1e-5, world.env = &env.env;
+    const dem2d_material_desc material = stone_desc(KN, 0);
+    scene s = open_scene(&world, &material);
+    dem2d_wall_desc desc = plane_desc(&s, vec(0, 0), vec(0, 1));
+    dem2d_wall_id id;
+    desc.one_sided = true;
+    assert_result(dem2d_world_add_wall(s.world, &desc, &id), DEM2D_OUT_OF_RANGE);
+    assert_logged(&env, DEM2D_OUT_OF_RANGE, -1, "one_sided");
+    desc.segment = true, desc.end = vec(1, 0), desc.one_sided = false;
+    id = add_wall(&s, &desc);
+    add_shape(&s, make_disc(0.05), DEM2D_FREE, vec(0.5, -0.04), 0, vec(0, 0), 0);
+    step(&s, 1);
+    assert_int_equal(contacts_of(&s, NULL, 0), 1);
+    const uint64_t before = dem2d_world_hash(s.world);
+    desc.one_sided = true;
+    assert_ok(dem2d_world_set_wall(s.world, id, &desc));
+    assert_true(dem2d_world_hash(s.world) != before);
+    step(&s, 10);
+    assert_int_equal(contacts_of(&s, NULL, 0), 0);
+    desc.one_sided = false;
+    assert_ok(dem2d_world_get_wall_desc(s.world, id, &desc));
+    assert_true(desc.one_sided);
+    desc.one_sided = false;
+    assert_ok(dem2d_world_set_wall(s.world, id, &desc));
+    step(&s, 1);
+    assert_int_equal(contacts_of(&s, NULL, 0), 1);
+    close_scene(&s);
+    assert_clean(&env);
+}
+
 int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(test_turning_frame), cmocka_unit_test(test_coriolis),
         cmocka_unit_test(test_whole_turns),   cmocka_unit_test(test_belt),
         cmocka_unit_test(test_drum),          cmocka_unit_test(test_drive),
         cmocka_unit_test(test_blade),         cmocka_unit_test(test_refusals),
-        cmocka_unit_test(test_set_again),
+        cmocka_unit_test(test_set_again),     cmocka_unit_test(test_front_is_the_same),
+        cmocka_unit_test(test_deep),          cmocka_unit_test(test_too_deep),
+        cmocka_unit_test(test_from_behind),   cmocka_unit_test(test_box_of_one_side),
+        cmocka_unit_test(test_sides_set),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }
