@@ -23490,56 +23490,52 @@ DEM2D_API dem2d_result dem2d_world_write_csv(const dem2d_world *world, const dem
    >>licence  Changes and licence
 
    CHANGES
-     0.7.0  Snapshots stay of version 4: those of 0.6.0 are read, unless they have dashpots, rolling
-            friction, a law or joined segments: these are refused by the names of their arrays.
-            Dashpots beside the tangential spring and that against rolling:
-            tangential_damping_ratio and rolling_damping_ratio of materials and pairs. In the safe
-            time step each dashpot adds its lag to its own spring only.
-            A caller's law gets contact points in arrays (dem2d_law_batch), also of contacts of two
-            points, each contact once in a step, and may call dem2d_law_builtin. It replaces
-            dem2d_law_input and dem2d_law_output. For servo walls and the bounds of the time step
-            the law sets stiffness and dashpot where they are not those of the materials.
-            Circles with dashpots and rolling friction are nearly as fast as those without. A step
-            that would give circles a state that is not finite is refused.
-            A tangential spring of one contact point is shared out to two by the forces of their
-            normal springs, without dashpots.
-            Events: contacts that closed and opened, with impulse and greatest force
-            (dem2d_world_desc.event_capacity, dem2d_world_events).
-            Arrays: dem2d_world_read_particles, dem2d_world_write_particles,
-            dem2d_world_read_contacts.
-            External loads: dem2d_world_set_load, or dem2d_world_desc.loads once a step; their work
-            is dem2d_ledger.loads and a column of histories.
-            Several processes: dem2d_world_desc.gather may change the sums of the contact forces in
-            each step, commit may refuse a step.
-            Units, ranges and defaults of options are said once, in the comments of the descs.
-            Fits of ellipses and polygons take 40 % fewer instructions.
-            Particles and walls may have a name of 64 bits, which orders pairs and sums in place of
-            the id (name in their descs and infos).
-            Walls turn about a pivot (angular_velocity, dem2d_world_drive_wall), run as belts
+     0.7.0  Runs differ from those of 0.6.0 with segments that are joined, with dashpots at two
+            contact points, and with a law of the caller. Snapshots stay of version 4: those of
+            0.6.0 are read, unless they have dashpots, rolling friction, a law or joined segments:
+            these are refused. Pairs have another order in snapshots.
+            Laws: dashpots beside the tangential spring and the spring against rolling
+            (tangential_damping_ratio, rolling_damping_ratio of materials and pairs). In the safe
+            time step each dashpot adds its lag to its own spring only. When one contact point
+            becomes two, its tangential spring is shared out by the forces of the normal springs,
+            without dashpots. A caller's law gets contact points in arrays (dem2d_law_batch), also
+            of contacts of two points, each contact once in a step, and may call dem2d_law_builtin.
+            This replaces dem2d_law_input and dem2d_law_output. For servo walls and the bounds of
+            the time step the law sets stiffness and dashpot where they are not those of the
+            materials. A step that would give circles a state that is not finite is refused.
+            Walls: they turn about a pivot (angular_velocity, dem2d_world_drive_wall), run as belts
             (surface_speed), and may be chains of segments (points, count, closed), with one side
             (one_sided). Forces on their parts: dem2d_world_get_wall_part,
-            dem2d_contact_info.part_b. Snapshots without parts are read.
-            Polygons in contact at one point take a third less time, smooth grains a tenth.
-            New: queries of space (dem2d_world_query_box, _query_point, _query_shape, _cast_ray,
-            _cast_ray_all, _nearest), and dem2d_world_particle_contacts.
-            New: dem2d_pairs_contact, many contact queries at once, with a memory that the caller
-            keeps.
-            Particles and walls may have groups that decide who meets whom, may be sensors, and
-            have user_data (groups and user_data in their descs and infos, dem2d_world_set_groups,
-            dem2d_world_set_user_data, dem2d_world_particle_overlaps, dem2d_world_wall_overlaps).
-            Segments that meet are joined by faces and vertices of their union, and no grain can
-            tell how a face is cut: a box keeps its speed and energy on a chain, springs are handed
-            on, energies are continuous at kinks of any size. Contacts may have the sign -1
-            (dem2d_contact_info.feature, sign). Segments that move against each other are no longer
-            joined while their ends happen to meet. Segments have the force along a face that slides
-            off their end, so that energy is conserved there.
+            dem2d_contact_info.part_b.
+            Joined segments: no grain can tell how a face is cut. A box keeps its speed and energy
+            on a chain, springs are handed on, energies are continuous at kinks of any size.
+            Contacts may have the sign -1 (dem2d_contact_info.feature, sign). Segments that move
+            against each other are no longer joined while their ends happen to meet. A face that
+            slides off the end of a segment feels the force along it, so that energy is conserved.
+            Loads: dem2d_world_set_load, or dem2d_world_desc.loads once a step; their work is
+            dem2d_ledger.loads and a column of histories.
+            Arrays: dem2d_world_read_particles, dem2d_world_write_particles,
+            dem2d_world_read_contacts. dem2d_pairs_contact answers many contact queries at once,
+            with a memory that the caller keeps.
+            Space: dem2d_world_query_box, _query_point, _query_shape, _cast_ray, _cast_ray_all,
+            _nearest; dem2d_world_particle_contacts.
+            Events: contacts that closed and opened, with impulse and greatest force
+            (dem2d_world_desc.event_capacity, dem2d_world_events).
+            Groups decide who meets whom, sensors only detect, user_data is kept and saved
+            (dem2d_world_set_groups, _set_user_data, _particle_overlaps, _wall_overlaps).
+            Names of 64 bits order pairs and sums in place of the ids (name of particles and walls).
+            Several processes: dem2d_world_desc.gather may change the sums of the contact forces in
+            each step, commit may refuse a step.
             What there is: dem2d_world_walls, _shapes, _materials; as descs: dem2d_world_get_desc,
             _get_wall_desc, _get_particle_desc, _get_material_desc, _get_pair. New edits of a
             particle: dem2d_world_set_material, dem2d_world_set_shape.
+            New scenes: dem2d_world_choose_time_step, from masses and stiffnesses alone;
             dem2d_world_overlap_at and dem2d_world_relax, so that new particles do not explode.
-            dem2d_world_choose_time_step, from masses and stiffnesses alone.
-            Neighbour lists take less than half the time, with a thousand segments a tenth of it.
-            Their order in snapshots is another one; results are the same.
+            Speed: circles with dashpots and rolling friction take less than half the time, polygons
+            in contact at one point two thirds, smooth grains nine tenths, neighbour lists less than
+            half, and a tenth with a thousand segments. Fits of ellipses and polygons take 40 %
+            fewer instructions.
+            Manual: units, ranges and defaults of options are in the comments of the descs.
      0.6.0  Runs differ from those of 0.5.0 with friction between circles, dashpots, polybeziers,
             two contact points with friction, and servo walls. Snapshots (version 4) name their
             arrays and fields, so that later headers read them; earlier snapshots are refused. The
