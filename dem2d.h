@@ -15777,7 +15777,7 @@ static bool dem2di_disc_make(const dem2di_build *build, int slot, dem2di_disc *d
     disc->slot = slot;
     disc->fixed = body->motion == DEM2D_FIXED;
     disc->circle = dem2di_shape_of(world, body)->type == DEM2D_CIRCLE && dem2di_has_discs(world);
-    return disc->fixed || before->radius != now->radius ||
+    return (disc->fixed && world->plan_due > 0) || before->radius != now->radius ||
            !(dem2di_dot(moved, moved) < skin * skin / 4);
 }
 
@@ -15987,7 +15987,8 @@ static void dem2di_search_segment(const dem2di_build *build, int part, dem2di_fi
 }
 
 /* Contacts of the last force pass whose partners are out of reach by now stay listed for the
-   queries and the ledger. Particles only get there when some have strayed or are fixed. */
+   queries and the ledger. Particles only get there when some have strayed or have been fixed since
+   (then the features in use are due). */
 static void dem2di_find_lost(const dem2di_build *build, dem2di_finds *finds) {
     const dem2d_world *world = build->world;
     const dem2di_list *list = &world->list;

@@ -381,7 +381,7 @@ static void add_polygon(bench *b) {
 /* Two that touch each other and, behind it, the lid; out of reach of all others. */
 static void add_fixed_pair(bench *b) {
     for (int i = 0; i < 2; i++) {
-        const dem2d_vec at = {0.5, b->height - 0.5 + 10 + 0.04 * i};
+        const dem2d_vec at = {0.5, b->height - 0.5 + 1 + 0.04 * i};
         dem2d_particle_desc d = disc_desc(b, at, 0.025);
         dem2d_particle_id id;
         d.motion = DEM2D_FIXED;
