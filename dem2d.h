@@ -1,4 +1,4 @@
-/* dem2d.h - two-dimensional discrete element method for smooth and irregular grains, version 0.7.0
+/* dem2d.h - two-dimensional discrete element method for smooth and irregular grains, version 0.8.0
 
    One C99 header, no dependency but the C standard library. MIT licence (end of file).
 
@@ -516,7 +516,7 @@ DETERMINISM
    ============================================================================================ */
 
 #define DEM2D_VERSION_MAJOR 0
-#define DEM2D_VERSION_MINOR 7
+#define DEM2D_VERSION_MINOR 8
 #define DEM2D_VERSION_PATCH 0
 #define DEM2D_VERSION \
     (DEM2D_VERSION_MAJOR * 10000 + DEM2D_VERSION_MINOR * 100 + DEM2D_VERSION_PATCH)
@@ -23491,6 +23491,7 @@ DEM2D_API dem2d_result dem2d_world_write_csv(const dem2d_world *world, const dem
    >>licence  Changes and licence
 
    CHANGES
+     0.8.0  Runs of scenes that 0.7.0 has are the same to the bit, and so are snapshots.
      0.7.0  Runs differ from those of 0.6.0 with segments that are joined, with dashpots at two
             contact points, and with a law of the caller. Snapshots stay of version 4: those of
             0.6.0 are read, unless they have dashpots, rolling friction, a law or joined segments:
