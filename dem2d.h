@@ -21,6 +21,7 @@ CONTENTS (search for the anchor, ">>" and the word)
                     contact of two shapes                                   >>api-contact
                     world                                                   >>api-world
                     measures                                                >>api-measures
+                    coarse-grained fields                                   >>api-grids
                     queries of space                                        >>api-queries
                     particles and contacts in bulk                          >>api-bulk
                     state hash, snapshots                                   >>api-snapshot
@@ -53,6 +54,7 @@ CONTENTS (search for the anchor, ">>" and the word)
                     the ledger of energies                                  >>ledger
                     contacts, sums, motion; the stable time step            >>step
                     energy, stress, fabric, packing, distance from rest     >>measures
+                    coarse-grained fields on grids                          >>grids
                     overlaps, rays, the nearest                             >>queries
                     particles and contacts from and into arrays             >>bulk
                     bytes to a callback or a file                           >>output
@@ -343,6 +345,12 @@ HOW TO
                          dem2d_world_particle_stress), then dem2d_stress_principal for p and q;
                          dem2d_strain of its sides; dem2d_world_porosity of a box inside it;
                          dem2d_world_packing: coordination number, overlaps, rattlers.
+    average over a part  dem2d_world_average_box, dem2d_world_average_circle: density, velocity,
+                         contact and kinetic stress, fabric of what is there.
+    see where it flows,  dem2d_grid_create, dem2d_grid_add at as many times as you like,
+      and what it bears  dem2d_grid_read: the same in the cells of a grid, smoothed, as means over
+                         these times; dem2d_grid_reset, dem2d_grid_destroy. For a profile take one
+                         row or column of cells.
     tell it is at rest   dem2d_world_equilibrium: unbalanced below 1e-3, a small kinetic_ratio.
     load it slowly       dem2d_world_inertial_number below 1e-3.
     explain its strength dem2d_world_fabric: anisotropies of contacts and forces, and the q/p that
@@ -1895,7 +1903,8 @@ DEM2D_API dem2d_result dem2d_world_energy(const dem2d_world *world, dem2d_energy
 /// The energy balance of a world with desc.ledger. Errors: OUT_OF_RANGE for a world without it.
 DEM2D_API dem2d_result dem2d_world_ledger(const dem2d_world *world, dem2d_ledger *ledger);
 /// Love-Weber stress: (1/area) times the sum of f l over the contacts, walls included; area > 0,
-/// m2. Errors: NOT_FINITE, OUT_OF_RANGE (area).
+/// m2. This is the stress of the contacts; that of the motion is dem2d_average.kinetic. Errors:
+/// NOT_FINITE, OUT_OF_RANGE (area).
 DEM2D_API dem2d_result dem2d_world_stress(const dem2d_world *world, double area,
                                           dem2d_stress *stress);
 /// Stress in a particle: (1/its area) times the sum of arm and force over its contacts, walls
@@ -1931,6 +1940,92 @@ DEM2D_API dem2d_result dem2d_world_equilibrium(const dem2d_world *world,
 /// Quasi-static below 1e-3; 0 without particles. Errors: NOT_FINITE, OUT_OF_RANGE.
 DEM2D_API dem2d_result dem2d_world_inertial_number(const dem2d_world *world, double strain_rate,
                                                    double pressure, double *number);
+
+/* ============================================================================================
+   >>api-grids  Coarse-grained fields: averages over the cells of a grid, a box or a circle
+   ============================================================================================ */
+
+/// A grid of nx by ny equal cells, and how particles are smoothed.
+typedef struct dem2d_grid_desc {
+    int nx;          ///< number of cells along x, 1 to 2^15
+    int ny;          ///< number of cells along y, 1 to 2^15
+    dem2d_box box;   ///< m, the cells divide it; upper above lower
+    double width_x;  ///< m, >= 0, half-width of the smoothing function along x; 0: sharp
+    double width_y;  ///< m, >= 0, likewise along y
+    double angle;    ///< rad, -2^30 to 2^30: box and cells are turned by it about the origin
+    bool periodic_x; ///< what leaves the box at one side comes back at the other; width_x is at
+                     ///< most 16 sides of the box
+    bool periodic_y; ///< likewise along y
+    uint32_t mask;   ///< groups of the particles that count, a bit for each; 0: all
+} dem2d_grid_desc;
+
+/// Sums over a region or time, smoothed. Opaque.
+typedef struct dem2d_grid dem2d_grid;
+
+/// Averages over a cell of a grid, a box or a circle. Vectors and tensors are in the axes of the
+/// grid. Without anything to average they are 0.
+typedef struct dem2d_average {
+    dem2d_vec centre;      ///< m, of the cell, in the plane
+    double number;         ///< 1/m2, of particles
+    double density;        ///< kg/m2, mass of particles per area
+    double solid_fraction; ///< area of particles per area
+    dem2d_vec momentum;    ///< kg/(m s), per area
+    dem2d_vec velocity;    ///< m/s, momentum / density
+    dem2d_stress contact;  ///< Pa, stress of the contacts
+    dem2d_stress kinetic;  ///< Pa, stress of the fluctuations about velocity
+    dem2d_vec boundary;    ///< N/m2, force per area of what is no particle that counts
+    double contacts;       ///< 1/m2, between particles that count
+    double fabric_xx;      ///< mean of n n over these contacts, with n the unit normals
+    double fabric_xy;      ///< likewise
+    double fabric_yy;      ///< likewise
+} dem2d_average;
+
+/// Create an empty grid; *grid is the caller's, to be released by dem2d_grid_destroy. It belongs to
+/// no world and is in no snapshot. env may be NULL. Errors: NULL_ARGUMENT, OUT_OF_RANGE,
+/// NOT_FINITE, OUT_OF_MEMORY.
+DEM2D_API dem2d_result dem2d_grid_create(const dem2d_env *env, const dem2d_grid_desc *desc,
+                                         dem2d_grid **grid);
+/// Release a grid; NULL is allowed.
+DEM2D_API void dem2d_grid_destroy(dem2d_grid *grid);
+/// Add the state of a world at its last force pass, with a weight > 0: 1, or the time that the
+/// state stands for. Averages are over all that was added, by weight. Serial; allocates nothing.
+///
+/// Each particle that counts is spread about its centre by the function g(x) g(y), with g(x) =
+/// 15/16 (1 - (x/width)^2)^2 / width for |x| < width. Its integral is 1, its standard deviation
+/// width/sqrt(7). With width 0 the particle is in the cell of its centre. Its area is spread in the
+/// same way: solid_fraction needs a width or a cell above the size of a particle (else
+/// dem2d_world_porosity). The stress of a contact is spread along the line from centre to centre
+/// (Goldhirsch 2010, Granular Matter 12, 239-252). A cell gets the mean of all this over its area,
+/// exactly. So the sum over all cells times their area is the total: number and mass of the
+/// particles, momentum, the sum of which dem2d_world_stress is the mean. What reaches beyond the
+/// box is missing: a margin of the width around the particles holds all.
+///
+/// Particles count if they are free and in a group of the mask; sensors do not. All others that
+/// push, and walls, are the boundary: the line of such a contact ends at the contact point, and
+/// there the force on the particle is added to `boundary` (Weinhart and others 2012, Granular
+/// Matter 14, 289-294). With V the velocity, p the momentum and g gravity, the smoothed fields obey
+///     dp/dt + div(density V V + kinetic + contact) = density g + boundary
+/// exactly, where the x component of div s is ds.xx/dx + ds.yx/dy. Damping and external loads are
+/// forces that no field has. The kinetic stress is that of the velocities less the mean velocity of
+/// all that was added to the cell; its trace over twice the density is the granular temperature.
+///
+/// Errors: NULL_ARGUMENT, NOT_FINITE, OUT_OF_RANGE (weight; a particle longer than a period).
+DEM2D_API dem2d_result dem2d_grid_add(dem2d_grid *grid, const dem2d_world *world, double weight);
+/// Averages of all cells, row by row, the lowest row first, x fastest: the first `capacity` of them
+/// go into cells (may be NULL if capacity is 0); count gets nx ny. A profile across a line is a
+/// grid of one row or column, with width 0 along the line. Errors: OUT_OF_RANGE (capacity below 0).
+DEM2D_API dem2d_result dem2d_grid_read(const dem2d_grid *grid, dem2d_average *cells, int capacity,
+                                       int *count);
+/// Forget what was added. Errors: NULL_ARGUMENT.
+DEM2D_API dem2d_result dem2d_grid_reset(dem2d_grid *grid);
+/// Averages over a box, sharp: of the particles whose centres are in it, and of contacts by the
+/// part of the line between the centres that is in it. Errors: NOT_FINITE, OUT_OF_RANGE (upper not
+/// above lower).
+DEM2D_API dem2d_result dem2d_world_average_box(const dem2d_world *world, const dem2d_box *box,
+                                               dem2d_average *average);
+/// The same over a circle with a radius > 0 (m). Errors: NOT_FINITE, OUT_OF_RANGE (radius).
+DEM2D_API dem2d_result dem2d_world_average_circle(const dem2d_world *world, dem2d_vec centre,
+                                                  double radius, dem2d_average *average);
 
 /* ============================================================================================
    >>api-queries  What is where: overlaps, rays, the nearest; contacts of one particle
@@ -19869,20 +19964,25 @@ static double dem2di_area_inside(const dem2d_world *world, int slot, const dem2d
     return area * dem2di_part_inside(shape, &pose, &part);
 }
 
-static dem2d_result dem2di_check_region(const dem2d_env *env, const dem2d_box *region) {
-    dem2d_result result = dem2di_check_vec(env, "region.lower", region->lower);
-    if (result == DEM2D_OK) result = dem2di_check_vec(env, "region.upper", region->upper);
+static dem2d_result dem2di_check_region(const dem2d_env *env, const char *name,
+                                        const dem2d_box *region) {
+    char lower[32], upper[32];
+    (void)snprintf(lower, sizeof lower, "%s.lower", name);
+    (void)snprintf(upper, sizeof upper, "%s.upper", name);
+    dem2d_result result = dem2di_check_vec(env, lower, region->lower);
+    if (result == DEM2D_OK) result = dem2di_check_vec(env, upper, region->upper);
     if (result != DEM2D_OK) return result;
     double width = region->upper.x - region->lower.x, height = region->upper.y - region->lower.y;
     if (width > 0 && height > 0 && width * height > 0 && dem2di_finite(width * height))
         return DEM2D_OK;
-    return dem2di_fail(env, DEM2D_OUT_OF_RANGE, -1, "region of %g by %g", width, height);
+    return dem2di_fail(env, DEM2D_OUT_OF_RANGE, -1, "%s.upper: %g by %g from lower", name, width,
+                       height);
 }
 
 DEM2D_API dem2d_result dem2d_world_porosity(const dem2d_world *world, const dem2d_box *region,
                                             double *porosity) {
     if (world == NULL || region == NULL || porosity == NULL) return DEM2D_NULL_ARGUMENT;
-    dem2d_result result = dem2di_check_region(&world->env, region);
+    dem2d_result result = dem2di_check_region(&world->env, "region", region);
     if (result != DEM2D_OK) return result;
     double solid = 0;
     for (int place = 0, slot; (slot = dem2di_next_grain(world, &place)) >= 0;)
@@ -20153,6 +20253,544 @@ DEM2D_API dem2d_result dem2d_world_inertial_number(const dem2d_world *world, dou
     }
     *number = 0;
     if (count > 0) *number = fabs(strain_rate) * (diameters / count) * sqrt(mass / area / pressure);
+    return DEM2D_OK;
+}
+
+/* ============================================================================================
+   >>grids  Coarse-grained fields: averages over the cells of a grid, a box or a circle
+   uses: config, math, memory, fields, broad, law, world, objects, measures
+
+   A grid holds sums for each cell. What is added at a point or along a line is shared out among the
+   cells of a window, the cells that its smoothing function reaches:
+     coordinates   of the plane -> of the grid: the corner of the box is 0, a cell has the sides 1
+     shares        a point -> its parts in the columns and in the rows of the window: differences of
+                   the integral of the smoothing function, whose sum is 1
+     weights       products of these shares; for a line their mean along it
+     sums          weights times mass, momentum, force and branch, ... -> cells
+     averages      sums over total weight and area
+   The mean along a line is exact: between the places where the line passes the edge of a cell, less
+   or plus the width, each share is a polynomial of degree 5 of the place on the line, the product
+   of two has degree 10, and Gauss's rule of 6 points integrates degree 11. An average over a box is
+   a grid of one cell with width 0; a circle is one cell whose weights are 0, 1, or the part of the
+   line inside.
+   ============================================================================================ */
+
+/* Sums over what was added, times its weight. */
+typedef struct dem2di_coarse_cell {
+    double number, mass, area;
+    dem2d_vec velocity;    /* mean, by mass */
+    dem2di_tensor scatter; /* sum of mass times the square of velocity less its mean */
+    dem2d_stress contact;
+    dem2d_vec boundary;
+    double contacts;
+    dem2di_tensor fabric;
+} dem2di_coarse_cell;
+
+/* Columns or rows of a window: the first, which may be off a periodic grid, and their number. If
+   a periodic window is longer than the grid, what is beyond `count` comes round to the first. */
+typedef struct dem2di_window {
+    int first, span, count;
+} dem2di_window;
+
+struct dem2d_grid {
+    dem2d_env env;
+    dem2d_grid_desc desc;
+    dem2d_rot axes;
+    dem2d_vec side;           /* m, of a cell */
+    double reach[2];          /* width in cells */
+    double radius;            /* m, of a circle about the middle of the box; 0 of a grid */
+    double weight;            /* sum of the weights */
+    dem2di_window windows[2]; /* columns and rows */
+    double *shares[2];        /* of these */
+    double *weights;          /* of the cells of the window, row by row */
+    dem2di_coarse_cell *cells;
+};
+
+static const dem2di_field dem2di_grid_fields[] = {
+    DEM2DI_ROW(dem2d_grid_desc, nx, DEM2DI_WHOLE(1, 32768), "- none"),
+    DEM2DI_ROW(dem2d_grid_desc, ny, DEM2DI_WHOLE(1, 32768), "- none"),
+    DEM2DI_ROW(dem2d_grid_desc, box.lower, DEM2DI_VECTOR, "m none"),
+    DEM2DI_ROW(dem2d_grid_desc, box.upper, DEM2DI_VECTOR, "m none; above lower"),
+    DEM2DI_ROW(dem2d_grid_desc, width_x, DEM2DI_FROM_0, "m 0"),
+    DEM2DI_ROW(dem2d_grid_desc, width_y, DEM2DI_FROM_0, "m 0"),
+    DEM2DI_ROW(dem2d_grid_desc, angle, DEM2DI_NUMBER(-1073741824.0, 1073741824.0, 0), "rad 0"),
+    DEM2DI_ROW(dem2d_grid_desc, periodic_x, DEM2DI_SWITCH, "- false"),
+    DEM2DI_ROW(dem2d_grid_desc, periodic_y, DEM2DI_SWITCH, "- false"),
+    DEM2DI_ROW(dem2d_grid_desc, mask, DEM2DI_TAG, "- 0"),
+};
+
+/* --- weights ------------------------------------------------------------------------------------
+ */
+
+/* Integral up to t of 15/16 (1 - (t/reach)^2)^2 / reach from -reach to reach: from 0 to 1. */
+static double dem2di_smooth_step(double t, double reach) {
+    if (t <= -reach) return 0;
+    if (t >= reach) return 1;
+    double u = t / reach, v = u * u;
+    return 0.5 + u * (0.9375 + v * (-0.625 + v * 0.1875));
+}
+
+static int dem2di_coarse_count(const dem2d_grid *grid, int axis) {
+    return axis == 0 ? grid->desc.nx : grid->desc.ny;
+}
+
+static bool dem2di_coarse_periodic(const dem2d_grid *grid, int axis) {
+    return axis == 0 ? grid->desc.periodic_x : grid->desc.periodic_y;
+}
+
+/* From the plane to the grid: axes and unit of length are those of the cells. */
+static void dem2di_coarse_place(const dem2d_grid *grid, dem2d_vec point, double at[2]) {
+    dem2d_vec p = dem2di_sub(dem2di_turn_back(grid->axes, point), grid->desc.box.lower);
+    at[0] = p.x / grid->side.x;
+    at[1] = p.y / grid->side.y;
+    for (int k = 0; k < 2; k++) {
+        double period = dem2di_coarse_count(grid, k);
+        if (dem2di_coarse_periodic(grid, k)) at[k] -= period * floor(at[k] / period);
+    }
+}
+
+/* The window of a line, with weights 0; false if it is off the grid. */
+static bool dem2di_coarse_open(dem2d_grid *grid, const double at[2], const double along[2]) {
+    for (int k = 0; k < 2; k++) {
+        dem2di_window *window = &grid->windows[k];
+        int count = dem2di_coarse_count(grid, k);
+        double first = floor(at[k] + dem2di_min(along[k], 0) - grid->reach[k]);
+        double last = floor(at[k] + dem2di_max(along[k], 0) + grid->reach[k]);
+        if (!dem2di_coarse_periodic(grid, k)) {
+            first = dem2di_max(first, 0);
+            last = dem2di_min(last, count - 1);
+        }
+        if (!(first <= last)) return false;
+        window->first = (int)first;
+        window->span = (int)(last - first) + 1;
+        window->count = window->span < count ? window->span : count;
+    }
+    int count = grid->windows[0].count * grid->windows[1].count;
+    memset(grid->weights, 0, (size_t)count * sizeof *grid->weights);
+    return true;
+}
+
+/* Add the weights of a point times a factor. */
+static void dem2di_coarse_blend(dem2d_grid *grid, const double at[2], double factor) {
+    for (int k = 0; k < 2; k++) {
+        const dem2di_window *window = &grid->windows[k];
+        double *shares = grid->shares[k];
+        double left = window->first - at[k], below = dem2di_smooth_step(left, grid->reach[k]);
+        memset(shares, 0, (size_t)window->count * sizeof *shares);
+        for (int i = 0; i < window->span; i++) {
+            double up_to = dem2di_smooth_step(left + (i + 1), grid->reach[k]);
+            shares[i % window->count] += up_to - below;
+            below = up_to;
+        }
+    }
+    int columns = grid->windows[0].count, rows = grid->windows[1].count;
+    for (int j = 0; j < rows; j++) {
+        double *row = grid->weights + j * columns, share = factor * grid->shares[1][j];
+        for (int i = 0; i < columns; i++) row[i] += share * grid->shares[0][i];
+    }
+}
+
+/* The places on a line where a coordinate is a whole number: the next is number over rate. */
+typedef struct dem2di_crossings {
+    double start, rate, number, last;
+} dem2di_crossings;
+
+static dem2di_crossings dem2di_crossings_start(double start, double rate, double least,
+                                               double most) {
+    dem2di_crossings c;
+    bool up = rate > 0;
+    c.start = start;
+    c.rate = rate;
+    c.number = up ? dem2di_max(floor(start) + 1, least) : dem2di_min(ceil(start) - 1, most);
+    c.last = up ? most : least;
+    return c;
+}
+
+/* Where on the line the next is, at most 1. */
+static double dem2di_crossings_next(const dem2di_crossings *c) {
+    if (c->rate == 0 || (c->rate > 0 ? c->number > c->last : c->number < c->last)) return 1;
+    return dem2di_min((c->number - c->start) / c->rate, 1);
+}
+
+/* Add the mean weights of the part of a line between two places on it, times the part's length. */
+static void dem2di_coarse_gauss(dem2d_grid *grid, const double at[2], const double along[2],
+                                double from, double to) {
+    /* Nodes and weights of Gauss's rule of six points, those above 0: zeros of the Legendre
+       polynomial P6, and 2/((1 - x^2) P6'(x)^2). */
+    static const double node[3] = {0.2386191860831969, 0.6612093864662645, 0.9324695142031521};
+    static const double part[3] = {0.4679139345726910, 0.3607615730481386, 0.1713244923791704};
+    double middle = (from + to) / 2, half = (to - from) / 2;
+    for (int i = 0; i < 6; i++) {
+        double s = middle + half * (i % 2 == 0 ? node[i / 2] : -node[i / 2]);
+        const double p[2] = {at[0] + s * along[0], at[1] + s * along[1]};
+        dem2di_coarse_blend(grid, p, half * part[i / 2]);
+    }
+}
+
+/* The part of a line from p along b inside the circle: between both places where |p + s b - c| is
+   the radius. */
+static double dem2di_circle_part(const dem2d_grid *grid, dem2d_vec p, dem2d_vec b) {
+    const dem2d_box *box = &grid->desc.box;
+    dem2d_vec c = dem2di_scale(dem2di_add(box->lower, box->upper), 0.5), d = dem2di_sub(p, c);
+    double r = grid->radius, bb = dem2di_dot(b, b), middle = -dem2di_dot(d, b);
+    double lever = dem2di_cross(d, b), square = bb * r * r - lever * lever;
+    if (!(bb > 0)) return dem2di_dot(d, d) < r * r ? 1 : 0;
+    if (!(square > 0)) return 0;
+    double half = sqrt(square) / bb;
+    double from = dem2di_max(middle / bb - half, 0), to = dem2di_min(middle / bb + half, 1);
+    return dem2di_max(to - from, 0);
+}
+
+/* The weights of a line from a point along b, of length 0 for a point; false if it is off the grid.
+ */
+static bool dem2di_coarse_weigh(dem2d_grid *grid, dem2d_vec point, dem2d_vec b) {
+    double at[2], along[2];
+    dem2d_vec turned = dem2di_turn_back(grid->axes, b);
+    along[0] = turned.x / grid->side.x;
+    along[1] = turned.y / grid->side.y;
+    dem2di_coarse_place(grid, point, at);
+    if (grid->radius > 0) {
+        const dem2di_window one = {0, 1, 1};
+        grid->windows[0] = grid->windows[1] = one;
+        grid->weights[0] = dem2di_circle_part(grid, point, b);
+        return grid->weights[0] > 0;
+    }
+    if (!dem2di_coarse_open(grid, at, along)) return false;
+    if (along[0] == 0 && along[1] == 0) {
+        dem2di_coarse_blend(grid, at, 1);
+        return true;
+    }
+    dem2di_crossings edges[4]; /* of columns, of rows; less the width, plus the width */
+    for (int k = 0; k < 4; k++) {
+        int axis = k / 2;
+        bool periodic = dem2di_coarse_periodic(grid, axis);
+        double reach = k % 2 == 0 ? -grid->reach[axis] : grid->reach[axis];
+        edges[k] = dem2di_crossings_start(at[axis] + reach, along[axis], periodic ? -DBL_MAX : 0,
+                                          periodic ? DBL_MAX : dem2di_coarse_count(grid, axis));
+    }
+    for (double from = 0, to; from < 1; from = to) {
+        to = 1;
+        for (int k = 0; k < 4; k++) to = dem2di_min(to, dem2di_crossings_next(&edges[k]));
+        if (to > from) dem2di_coarse_gauss(grid, at, along, from, to);
+        for (int k = 0; k < 4 && to < 1; k++)
+            if (dem2di_crossings_next(&edges[k]) <= to)
+                edges[k].number += along[k / 2] > 0 ? 1 : -1;
+    }
+    return true;
+}
+
+/* --- sums ---------------------------------------------------------------------------------------
+ */
+
+/* The cell of a weight of the window. */
+static dem2di_coarse_cell *dem2di_coarse_cell_at(dem2d_grid *grid, int column, int row) {
+    int x = (grid->windows[0].first + column) % grid->desc.nx;
+    int y = (grid->windows[1].first + row) % grid->desc.ny;
+    if (x < 0) x += grid->desc.nx;
+    if (y < 0) y += grid->desc.ny;
+    return &grid->cells[(size_t)y * (size_t)grid->desc.nx + (size_t)x];
+}
+
+/* What is added to the cells of a window. */
+typedef struct dem2di_addend {
+    double number, mass, area;
+    dem2d_vec velocity;
+    double contacts;
+    dem2d_vec branch, force, normal, boundary;
+} dem2di_addend;
+
+/* A running mean and the squares about it (West 1979, Communications of the ACM 22, 532-535). */
+static void dem2di_cell_add_motion(dem2di_coarse_cell *cell, double mass, dem2d_vec velocity) {
+    dem2d_vec change = dem2di_sub(velocity, cell->velocity);
+    double before = cell->mass;
+    cell->mass += mass;
+    if (!(cell->mass > 0)) return;
+    cell->velocity = dem2di_along(cell->velocity, mass / cell->mass, change);
+    dem2di_tensor_add(&cell->scatter, mass * (before / cell->mass), change, change);
+}
+
+static void dem2di_cell_add(dem2di_coarse_cell *cell, const dem2di_addend *a, double w) {
+    if (a->number > 0) {
+        cell->number += w * a->number;
+        cell->area += w * a->area;
+        dem2di_cell_add_motion(cell, w * a->mass, a->velocity);
+        return;
+    }
+    dem2di_stress_add(&cell->contact, a->branch, dem2di_scale(a->force, w));
+    cell->boundary = dem2di_along(cell->boundary, w, a->boundary);
+    cell->contacts += w * a->contacts;
+    dem2di_tensor_add(&cell->fabric, w * a->contacts, a->normal, a->normal);
+}
+
+static void dem2di_coarse_add(dem2d_grid *grid, const dem2di_addend *a, double weight) {
+    int columns = grid->windows[0].count, rows = grid->windows[1].count;
+    for (int j = 0; j < rows; j++)
+        for (int i = 0; i < columns; i++) {
+            double w = weight * grid->weights[j * columns + i];
+            if (w > 0) dem2di_cell_add(dem2di_coarse_cell_at(grid, i, j), a, w);
+        }
+}
+
+/* Does a particle count? */
+static bool dem2di_coarse_counts(const dem2d_grid *grid, const dem2d_world *world, int slot) {
+    const dem2di_groups groups = dem2di_groups_at(world, slot);
+    return world->bodies[slot].motion == DEM2D_FREE && !groups.sensor &&
+           dem2di_in_groups(grid->desc.mask, groups.category);
+}
+
+static void dem2di_coarse_add_particles(dem2d_grid *grid, const dem2d_world *world, double weight) {
+    dem2di_addend add;
+    memset(&add, 0, sizeof add);
+    add.number = 1;
+    for (int place = 0, slot; (slot = dem2di_next_particle(world, &place)) >= 0;) {
+        const dem2di_body *body = &world->bodies[slot];
+        if (!dem2di_coarse_counts(grid, world, slot) ||
+            !dem2di_coarse_weigh(grid, world->before[slot].x, dem2di_vec(0, 0)))
+            continue;
+        add.mass = dem2di_body_mass(world, body);
+        add.area = dem2di_body_area(world, body);
+        add.velocity = dem2di_turn_back(grid->axes, dem2di_velocities_mean(world, slot).v);
+        dem2di_coarse_add(grid, &add, weight);
+    }
+}
+
+/* A line along which a force is passed on: from a particle's centre to the other's, or to the
+   contact point, where the boundary pushes the particle back. */
+static void dem2di_coarse_add_line(dem2d_grid *grid, dem2d_vec start, dem2d_vec branch,
+                                   dem2d_vec force, const dem2d_vec *normal, double weight) {
+    dem2di_addend add;
+    memset(&add, 0, sizeof add);
+    dem2d_vec turned = dem2di_turn_back(grid->axes, force);
+    if (dem2di_coarse_weigh(grid, start, branch)) {
+        add.branch = dem2di_turn_back(grid->axes, branch);
+        add.force = turned;
+        if (normal != NULL) {
+            add.contacts = 1;
+            add.normal = dem2di_turn_back(grid->axes, *normal);
+        }
+        dem2di_coarse_add(grid, &add, weight);
+    }
+    if (normal != NULL) return;
+    memset(&add, 0, sizeof add);
+    add.boundary = dem2di_negate(turned);
+    if (dem2di_coarse_weigh(grid, dem2di_add(start, branch), dem2di_vec(0, 0)))
+        dem2di_coarse_add(grid, &add, weight);
+}
+
+static void dem2di_coarse_add_contacts(dem2d_grid *grid, const dem2d_world *world, double weight) {
+    dem2di_contact_iterator iterator = dem2di_contacts_start(false);
+    while (dem2di_next_contact(world, &iterator)) {
+        const dem2di_key *key = &world->list.keys[iterator.number];
+        const dem2di_contact *contact = &iterator.contact;
+        dem2d_vec force = dem2di_contact_force(contact), start = world->before[key->a].x;
+        bool a = dem2di_coarse_counts(grid, world, key->a);
+        bool b = !iterator.walls && dem2di_coarse_counts(grid, world, key->b);
+        if (a && b)
+            dem2di_coarse_add_line(grid, start, iterator.branch, force, &contact->normal, weight);
+        else if (a)
+            dem2di_coarse_add_line(grid, start, dem2di_arm_a(contact), force, NULL, weight);
+        else if (b)
+            dem2di_coarse_add_line(grid, dem2di_add(start, iterator.branch), dem2di_arm_b(contact),
+                                   dem2di_negate(force), NULL, weight);
+    }
+}
+
+static void dem2di_coarse_add_world(dem2d_grid *grid, const dem2d_world *world, double weight) {
+    dem2di_coarse_add_particles(grid, world, weight);
+    dem2di_coarse_add_contacts(grid, world, weight);
+    grid->weight += weight;
+}
+
+/* --- averages -----------------------------------------------------------------------------------
+ */
+
+static dem2d_average dem2di_coarse_average(const dem2d_grid *grid, int i) {
+    const dem2di_coarse_cell *cell = &grid->cells[i];
+    const dem2d_vec lower = grid->desc.box.lower;
+    dem2d_average average;
+    memset(&average, 0, sizeof average);
+    dem2d_vec centre = dem2di_vec(lower.x + (i % grid->desc.nx + 0.5) * grid->side.x,
+                                  lower.y + (i / grid->desc.nx + 0.5) * grid->side.y);
+    average.centre = dem2di_turn(grid->axes, centre);
+    if (!(grid->weight > 0)) return average;
+    double area = grid->side.x * grid->side.y;
+    if (grid->radius > 0) area = DEM2DI_PI * grid->radius * grid->radius;
+    area *= grid->weight;
+    average.number = cell->number / area;
+    average.density = cell->mass / area;
+    average.solid_fraction = cell->area / area;
+    average.velocity = cell->velocity;
+    average.momentum = dem2di_scale(cell->velocity, average.density);
+    average.contact = dem2di_stress_over(&cell->contact, area);
+    average.kinetic.xx = cell->scatter.xx / area;
+    average.kinetic.xy = average.kinetic.yx = cell->scatter.xy / area;
+    average.kinetic.yy = cell->scatter.yy / area;
+    average.boundary = dem2di_scale(cell->boundary, 1 / area);
+    average.contacts = cell->contacts / area;
+    if (!(cell->contacts > 0)) return average;
+    average.fabric_xx = cell->fabric.xx / cell->contacts;
+    average.fabric_xy = cell->fabric.xy / cell->contacts;
+    average.fabric_yy = cell->fabric.yy / cell->contacts;
+    return average;
+}
+
+/* Sides, reach and axes of a grid from its desc. */
+static void dem2di_coarse_measure(dem2d_grid *grid, const dem2d_grid_desc *desc) {
+    grid->desc = *desc;
+    grid->axes = dem2d_rot_make(desc->angle);
+    grid->side.x = (desc->box.upper.x - desc->box.lower.x) / desc->nx;
+    grid->side.y = (desc->box.upper.y - desc->box.lower.y) / desc->ny;
+    grid->reach[0] = desc->width_x / grid->side.x;
+    grid->reach[1] = desc->width_y / grid->side.y;
+}
+
+/* A smoothing function reaches over at most so many periods of a grid: beyond one the fields are
+   nearly uniform, and a window stays short. */
+#define DEM2DI_PERIODS 16
+
+static dem2d_result dem2di_check_grid(const dem2d_env *env, const dem2d_grid_desc *desc) {
+    dem2d_result result = dem2di_check_fields(env, DEM2DI_ALL(dem2di_grid_fields), desc);
+    if (result == DEM2D_OK) result = dem2di_check_region(env, "box", &desc->box);
+    if (result != DEM2D_OK) return result;
+    for (int k = 0; k < 2; k++) {
+        const dem2d_box *box = &desc->box;
+        double period = k == 0 ? box->upper.x - box->lower.x : box->upper.y - box->lower.y;
+        double width = k == 0 ? desc->width_x : desc->width_y;
+        if (!(period / (k == 0 ? desc->nx : desc->ny) > 0))
+            return dem2di_fail(env, DEM2D_OUT_OF_RANGE, -1, "box: its cells are too small");
+        if ((k == 0 ? desc->periodic_x : desc->periodic_y) && width > DEM2DI_PERIODS * period)
+            return dem2di_fail(env, DEM2D_OUT_OF_RANGE, -1,
+                               "width_%c = %g is above %d times the period %g", 'x' + k, width,
+                               DEM2DI_PERIODS, period);
+    }
+    return DEM2D_OK;
+}
+
+static size_t dem2di_coarse_cells(const dem2d_grid_desc *desc) {
+    return (size_t)desc->nx * (size_t)desc->ny;
+}
+
+DEM2D_API void dem2d_grid_destroy(dem2d_grid *grid) {
+    if (grid == NULL) return;
+    const dem2d_env env = grid->env;
+    size_t count = dem2di_coarse_cells(&grid->desc);
+    dem2di_release(&env, grid->shares[0], (size_t)grid->desc.nx, sizeof **grid->shares);
+    dem2di_release(&env, grid->shares[1], (size_t)grid->desc.ny, sizeof **grid->shares);
+    dem2di_release(&env, grid->weights, count, sizeof *grid->weights);
+    dem2di_release(&env, grid->cells, count, sizeof *grid->cells);
+    dem2di_release(&env, grid, 1, sizeof *grid);
+}
+
+DEM2D_API dem2d_result dem2d_grid_reset(dem2d_grid *grid) {
+    if (grid == NULL) return DEM2D_NULL_ARGUMENT;
+    memset(grid->cells, 0, dem2di_coarse_cells(&grid->desc) * sizeof *grid->cells);
+    grid->weight = 0;
+    return DEM2D_OK;
+}
+
+DEM2D_API dem2d_result dem2d_grid_create(const dem2d_env *env, const dem2d_grid_desc *desc,
+                                         dem2d_grid **grid) {
+    if (desc == NULL) return dem2di_fail_null(env, "desc");
+    if (grid == NULL) return dem2di_fail_null(env, "grid");
+    dem2d_result result = dem2di_check_grid(env, desc);
+    if (result != DEM2D_OK) return result;
+    size_t count = dem2di_coarse_cells(desc);
+    dem2d_grid *made = (dem2d_grid *)dem2di_allocate(env, 1, sizeof *made);
+    if (made == NULL) return dem2di_fail_memory(env, 1, "grid");
+    memset(made, 0, sizeof *made);
+    if (env != NULL) made->env = *env;
+    dem2di_coarse_measure(made, desc);
+    made->shares[0] = (double *)dem2di_allocate(env, (size_t)desc->nx, sizeof **made->shares);
+    made->shares[1] = (double *)dem2di_allocate(env, (size_t)desc->ny, sizeof **made->shares);
+    made->weights = (double *)dem2di_allocate(env, count, sizeof *made->weights);
+    made->cells = (dem2di_coarse_cell *)dem2di_allocate(env, count, sizeof *made->cells);
+    if (made->shares[0] == NULL || made->shares[1] == NULL || made->weights == NULL ||
+        made->cells == NULL) {
+        dem2d_grid_destroy(made);
+        return dem2di_fail_memory(env, (int)count, "cells of a grid");
+    }
+    (void)dem2d_grid_reset(made);
+    *grid = made;
+    return DEM2D_OK;
+}
+
+/* No particle is longer than a period: contacts would come round the grid. */
+static dem2d_result dem2di_check_periods(const dem2d_grid *grid, const dem2d_world *world) {
+    double period = HUGE_VAL;
+    if (grid->desc.periodic_x) period = grid->side.x * grid->desc.nx;
+    if (grid->desc.periodic_y) period = dem2di_min(period, grid->side.y * grid->desc.ny);
+    for (int place = 0, slot; (slot = dem2di_next_particle(world, &place)) >= 0;)
+        if (2 * world->now[slot].radius > period)
+            return dem2di_fail(&grid->env, DEM2D_OUT_OF_RANGE, world->bodies[slot].index,
+                               "particle %d of diameter %g: the period of the grid is %g",
+                               world->bodies[slot].index, 2 * world->now[slot].radius, period);
+    return DEM2D_OK;
+}
+
+DEM2D_API dem2d_result dem2d_grid_add(dem2d_grid *grid, const dem2d_world *world, double weight) {
+    if (grid == NULL) return DEM2D_NULL_ARGUMENT;
+    if (world == NULL) return dem2di_fail_null(&grid->env, "world");
+    dem2d_result result = dem2di_check_number(&grid->env, "weight", weight, DEM2DI_POSITIVE);
+    if (result == DEM2D_OK) result = dem2di_check_periods(grid, world);
+    if (result == DEM2D_OK) dem2di_coarse_add_world(grid, world, weight);
+    return result;
+}
+
+DEM2D_API dem2d_result dem2d_grid_read(const dem2d_grid *grid, dem2d_average *cells, int capacity,
+                                       int *count) {
+    if (grid == NULL) return DEM2D_NULL_ARGUMENT;
+    if (count == NULL) return dem2di_fail_null(&grid->env, "count");
+    if (cells == NULL && capacity > 0) return dem2di_fail_null(&grid->env, "cells");
+    dem2d_result result = dem2di_check_number(&grid->env, "capacity", capacity, DEM2DI_COUNT);
+    if (result != DEM2D_OK) return result;
+    *count = (int)dem2di_coarse_cells(&grid->desc);
+    for (int i = 0; i < *count && i < capacity; i++) cells[i] = dem2di_coarse_average(grid, i);
+    return DEM2D_OK;
+}
+
+/* Average of a world over a grid of one cell; the box has been checked. */
+static dem2d_average dem2di_average_one(const dem2d_world *world, const dem2d_box *box,
+                                        double radius) {
+    double share[2], weight;
+    dem2di_coarse_cell cell;
+    dem2d_grid grid;
+    dem2d_grid_desc desc;
+    memset(&cell, 0, sizeof cell);
+    memset(&grid, 0, sizeof grid);
+    memset(&desc, 0, sizeof desc);
+    desc.nx = desc.ny = 1;
+    desc.box = *box;
+    dem2di_coarse_measure(&grid, &desc);
+    grid.radius = radius;
+    grid.shares[0] = &share[0];
+    grid.shares[1] = &share[1];
+    grid.weights = &weight;
+    grid.cells = &cell;
+    dem2di_coarse_add_world(&grid, world, 1);
+    return dem2di_coarse_average(&grid, 0);
+}
+
+DEM2D_API dem2d_result dem2d_world_average_box(const dem2d_world *world, const dem2d_box *box,
+                                               dem2d_average *average) {
+    if (world == NULL || box == NULL || average == NULL) return DEM2D_NULL_ARGUMENT;
+    dem2d_result result = dem2di_check_region(&world->env, "box", box);
+    if (result == DEM2D_OK) *average = dem2di_average_one(world, box, 0);
+    return result;
+}
+
+DEM2D_API dem2d_result dem2d_world_average_circle(const dem2d_world *world, dem2d_vec centre,
+                                                  double radius, dem2d_average *average) {
+    if (world == NULL || average == NULL) return DEM2D_NULL_ARGUMENT;
+    dem2d_result result = dem2di_check_vec(&world->env, "centre", centre);
+    if (result == DEM2D_OK)
+        result = dem2di_check_number(&world->env, "radius", radius, DEM2DI_POSITIVE);
+    if (result != DEM2D_OK) return result;
+    if (!(radius * radius >= DBL_MIN && dem2di_finite(4 * radius * radius)))
+        return dem2di_fail(&world->env, DEM2D_OUT_OF_RANGE, -1, "radius = %g: no area", radius);
+    dem2d_box box;
+    box.lower = dem2di_sub(centre, dem2di_vec(radius, radius));
+    box.upper = dem2di_add(centre, dem2di_vec(radius, radius));
+    *average = dem2di_average_one(world, &box, radius);
     return DEM2D_OK;
 }
 

@@ -75,6 +75,7 @@ enum {
     CSV,
     SEGMENT, /* dem2d_wall_desc once more */
     QUERY,
+    GRID,
     DESCS
 };
 
@@ -97,6 +98,7 @@ typedef struct fixture {
     dem2d_world *world;
     dem2d_shape *ellipse, *polygon;
     dem2d_outline_set *set;
+    dem2d_grid *grid;
     dem2d_shape_id shape, spare_shape, stale_shapes[STALE];
     dem2d_material_id materials[2], stale_materials[STALE];
     dem2d_particle_id particle, stale_particles[STALE];
@@ -249,7 +251,14 @@ static void fixture_stale(fixture *f) {
     fixture_strangers(f, 4);
 }
 
-/* A box of grains of three shapes with the full law, a ledger and two segments, after `steps`
+static dem2d_grid_desc good_grid(void) {
+    dem2d_grid_desc d = {0};
+    d.nx = 3, d.ny = 2, d.box.lower = vec(0.05, 0.02), d.box.upper = vec(0.4, 0.3);
+    d.width_x = 0.1, d.width_y = 0.05;
+    return d;
+}
+
+/* A box of grains of three shapes with the full law, a ledger, two segments and a grid, after `steps`
    steps. Two of them hold the same to the bit. */
 static void fixture_make(fixture *f, int steps) {
     memset(f, 0, sizeof *f);
@@ -269,6 +278,9 @@ static void fixture_make(fixture *f, int steps) {
     fixture_particles(f);
     fixture_stale(f);
     assert_ok(dem2d_world_step(f->world, steps, NULL));
+    const dem2d_grid_desc grid = good_grid();
+    assert_ok(dem2d_grid_create(&f->env.env, &grid, &f->grid));
+    assert_ok(dem2d_grid_add(f->grid, f->world, 1));
     test_log_clear(&f->env);
 }
 
@@ -277,6 +289,7 @@ static fingerprint fixture_print(const fixture *f) {
 }
 
 static void fixture_end(fixture *f) {
+    dem2d_grid_destroy(f->grid);
     dem2d_world_destroy(f->world);
     dem2d_shape_destroy(f->ellipse);
     dem2d_shape_destroy(f->polygon);
@@ -298,6 +311,7 @@ enum { NAMED = 2 }; /* columns of a history, files of a series */
 typedef struct args {
     const dem2d_env *env;
     dem2d_world *world;
+    dem2d_grid *grid;
     const dem2d_shape *shape, *other;
     const dem2d_outline_set *set;
     const void *desc;
@@ -341,6 +355,7 @@ typedef struct args {
         dem2d_csv_desc csv;
         dem2d_stress stress;
         dem2d_query_desc query;
+        dem2d_grid_desc grid;
         dem2d_particle_arrays particles;
         dem2d_contact_arrays contacts;
     } d;
@@ -362,7 +377,8 @@ static void args_fill(args *a) {
 
 static void args_make(args *a, fixture *f) {
     memset(a, 0, sizeof *a);
-    a->env = &f->env.env, a->world = f->world, a->shape = f->ellipse, a->other = f->polygon;
+    a->env = &f->env.env, a->world = f->world, a->grid = f->grid, a->shape = f->ellipse,
+    a->other = f->polygon;
     a->set = f->set, a->desc = &a->d, a->points = a->p, a->others = a->q;
     a->a = a->series_a, a->b = a->series_b;
     a->out = &a->outputs[0], a->second = &a->outputs[1], a->third = &a->outputs[2];
@@ -496,6 +512,10 @@ static void with_contacts(args *a, fixture *f) {
     a->d.contacts.points = (dem2d_vec *)a->out;
     a->d.contacts.depths = (double *)a->second;
 }
+static void with_grid(args *a, fixture *f) {
+    (void)f;
+    a->d.grid = good_grid();
+}
 static void with_save(args *a, fixture *f) {
     (void)f;
     a->d.save.write = fingerprint_hash, a->d.save.user = &a->hash;
@@ -572,6 +592,9 @@ static void free_shape(args *v) {
 static void free_set(args *v) {
     dem2d_outline_set_destroy(*(dem2d_outline_set **)v->out);
 }
+static void free_grid(args *v) {
+    dem2d_grid_destroy(*(dem2d_grid **)v->out);
+}
 static void free_world(args *v) {
     dem2d_world_destroy(*(dem2d_world **)v->out);
 }
@@ -587,6 +610,7 @@ static void free_world(args *v) {
 #define OUT ARG(out, "out", POINTER)
 #define SECOND ARG(second, "second output", POINTER)
 #define IN_WORLD ARG(world, "world", POINTER)
+#define IN_GRID ARG(grid, "grid", POINTER)
 #define ENV ARG(env, "env", OPTIONAL)
 #define THE_DESC ARG(desc, "desc", POINTER)
 #define THREE_POINTS                                                                      \
@@ -911,7 +935,19 @@ typedef struct function {
       LOGS, IN_WORLD, ARG(x, "fraction", PORTION), OUT)                                           \
     F(world_particle_contacts,                                                                    \
       dem2d_world_particle_contacts(v->world, v->particle, v->out, v->count, v->second),          \
-      LOGS, IN_WORLD, ARG(particle, "particle", PARTICLE_ID), OUT, CAPACITY, SECOND)
+      LOGS, IN_WORLD, ARG(particle, "particle", PARTICLE_ID), OUT, CAPACITY, SECOND)              \
+    F(grid_create, dem2d_grid_create(v->env, v->desc, v->out),                                    \
+      MAKES(GRID, with_grid, free_grid), ENV, THE_DESC, OUT)                                      \
+    F(grid_add, dem2d_grid_add(v->grid, v->world, v->x),                                          \
+      LOGS, IN_GRID, IN_WORLD, ARG(x, "weight", POSITIVE))                                        \
+    F(grid_read, dem2d_grid_read(v->grid, v->out, v->count, v->second),                           \
+      LOGS, IN_GRID, OUT, CAPACITY, SECOND)                                                       \
+    F(grid_reset, dem2d_grid_reset(v->grid), LOGS, IN_GRID)                                       \
+    F(world_average_box, dem2d_world_average_box(v->world, v->region, v->out),                    \
+      LOGS, IN_WORLD, ARG(region, "box", POINTER), ARG(box.lower, "box", VECTOR),                 \
+      ARG(box.upper, "box", UPPER), OUT)                                                          \
+    F(world_average_circle, dem2d_world_average_circle(v->world, v->vector, v->x, v->out),        \
+      LOGS, IN_WORLD, ARG(vector, "centre", VECTOR), ARG(x, "radius", POSITIVE), OUT)
 /* clang-format on */
 
 #define FUNCTION_CALL(name, expression, ...)   \

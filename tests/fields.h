@@ -86,6 +86,7 @@ bool fields_get(int number, field_row *row) {
         {"dem2d_particle_desc", DEM2DI_ALL(dem2di_particle_fields)},
         {"dem2d_wall_desc", DEM2DI_ALL(dem2di_wall_fields)},
         {"dem2d_query_desc", DEM2DI_ALL(query_fields)},
+        {"dem2d_grid_desc", DEM2DI_ALL(dem2di_grid_fields)},
         {"dem2d_save_desc", DEM2DI_ALL(save_fields)},
         {"dem2d_load_desc", DEM2DI_ALL(load_fields)},
         {"dem2d_svg_desc", DEM2DI_ALL(dem2di_svg_fields)},

@@ -14,7 +14,7 @@
 static const char *const desc_names[DESCS] = {
     "custom",   "reduction", "image",    "fit",  "virtual", "contact", "world",
     "material", "pair",      "particle", "wall", "save",    "load",    "svg",
-    "vtp",      "pvd",       "csv",      "wall", "query"};
+    "vtp",      "pvd",       "csv",      "wall", "query",   "grid"};
 
 #define FIELD(type, field, ...) \
     { .name = #field, .offset = offsetof(dem2d_##type, field), .kind = __VA_ARGS__ }
@@ -55,6 +55,7 @@ static const struct special {
     {LOAD, FIELD(load_desc, law, POINTER)},
     {LOAD, FIELD(load_desc, law_tag, INTEGER, .result = DEM2D_NULL_ARGUMENT, .low = LAW_TAG,
                  .high = LAW_TAG)},
+    {GRID, FIELD(grid_desc, box.upper, UPPER)},
     {SVG, FIELD(svg_desc, write, POINTER)},
     {VTP, FIELD(vtp_desc, write, POINTER)},
     {PVD, FIELD(pvd_desc, times, POINTER)},
@@ -536,6 +537,7 @@ static void test_all_functions(void **state) {
                                          "world_shape",
                                          "strain",
                                          "world_hash",
+                                         "grid_destroy",
                                          "law_builtin"};
     char line[256];
     int found = 0, missing = 0;
@@ -586,6 +588,7 @@ static void test_others(void **state) {
     dem2d_world_destroy(NULL);
     dem2d_shape_destroy(NULL);
     dem2d_outline_set_destroy(NULL);
+    dem2d_grid_destroy(NULL);
     assert_int_equal(dem2d_outline_set_count(NULL), 0);
     for (int i = 0; i < COUNT_OF(results); i++)
         assert_string_equal(dem2d_result_text((dem2d_result)results[i]), "unknown result");
