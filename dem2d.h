@@ -357,6 +357,8 @@ HOW TO
                          they predict; dem2d_world_histogram for polar diagrams.
     look in ParaView     dem2d_world_write_vtp, a file for each part and time; dem2d_pvd_write
                          makes a series of them. Colour grains by any of their arrays.
+    plot fields          dem2d_grid_write_csv for tables and plots, dem2d_grid_write_vti for
+                         ParaView.
     keep a history       dem2d_world_write_csv after every so many steps, with append from the
                          second row on.
     keep it private      define DEM2D_STATIC beside DEM2D_IMPLEMENTATION: all functions are static,
@@ -1962,8 +1964,8 @@ typedef struct dem2d_grid_desc {
 /// Sums over a region or time, smoothed. Opaque.
 typedef struct dem2d_grid dem2d_grid;
 
-/// Averages over a cell of a grid, a box or a circle. Vectors and tensors are in the axes of the
-/// grid. Without anything to average they are 0.
+/// Averages over a cell of a grid, a box or a circle. Vectors and tensors are along x and y, also
+/// those of a grid that is turned. Without anything to average they are 0.
 typedef struct dem2d_average {
     dem2d_vec centre;      ///< m, of the cell, in the plane
     double number;         ///< 1/m2, of particles
@@ -2215,7 +2217,7 @@ typedef bool dem2d_read_fn(void *user, char *bytes, size_t count);
 /// Finds the custom shape of a tag, or NULL. Only its support and user are used.
 typedef const dem2d_custom_desc *dem2d_custom_fn(void *user, int tag);
 
-/// Where a snapshot goes.
+/// Where a snapshot goes, or the fields of a grid.
 typedef struct dem2d_save_desc {
     dem2d_write_fn *write; ///< where the bytes go, or NULL when a path is given
     void *user;            ///< passed to write
@@ -2331,6 +2333,16 @@ DEM2D_API dem2d_result dem2d_world_write_svg(const dem2d_world *world, const dem
 /// NULL: all zero.
 DEM2D_API dem2d_result dem2d_world_write_vtp(const dem2d_world *world, const dem2d_vtp_desc *desc,
                                              const char *path);
+/// Write the averages of a grid: a header line, then a row for each cell in the order of
+/// dem2d_grid_read. The columns are the fields of dem2d_average, with _x, _y, _xx, _xy, _yx, _yy
+/// behind the names of vectors and tensors.
+DEM2D_API dem2d_result dem2d_grid_write_csv(const dem2d_grid *grid, const dem2d_save_desc *desc,
+                                            const char *path);
+/// Write the averages of a grid for VTK and ParaView, as image data (.vti): cell data with the
+/// names of dem2d_average, tensors as 3 x 3. dem2d_pvd_write makes a series of such files. A grid
+/// that is turned has the attribute Direction, which VTK reads from version 9 on.
+DEM2D_API dem2d_result dem2d_grid_write_vti(const dem2d_grid *grid, const dem2d_save_desc *desc,
+                                            const char *path);
 /// Write a collection of files that make a series in time. env (may be NULL) gets the messages.
 DEM2D_API dem2d_result dem2d_pvd_write(const dem2d_env *env, const dem2d_pvd_desc *desc,
                                        const char *path);
@@ -20549,7 +20561,7 @@ static void dem2di_coarse_add_particles(dem2d_grid *grid, const dem2d_world *wor
             continue;
         add.mass = dem2di_body_mass(world, body);
         add.area = dem2di_body_area(world, body);
-        add.velocity = dem2di_turn_back(grid->axes, dem2di_velocities_mean(world, slot).v);
+        add.velocity = dem2di_velocities_mean(world, slot).v;
         dem2di_coarse_add(grid, &add, weight);
     }
 }
@@ -20560,19 +20572,16 @@ static void dem2di_coarse_add_line(dem2d_grid *grid, dem2d_vec start, dem2d_vec 
                                    dem2d_vec force, const dem2d_vec *normal, double weight) {
     dem2di_addend add;
     memset(&add, 0, sizeof add);
-    dem2d_vec turned = dem2di_turn_back(grid->axes, force);
-    if (dem2di_coarse_weigh(grid, start, branch)) {
-        add.branch = dem2di_turn_back(grid->axes, branch);
-        add.force = turned;
-        if (normal != NULL) {
-            add.contacts = 1;
-            add.normal = dem2di_turn_back(grid->axes, *normal);
-        }
-        dem2di_coarse_add(grid, &add, weight);
+    add.branch = branch;
+    add.force = force;
+    if (normal != NULL) {
+        add.contacts = 1;
+        add.normal = *normal;
     }
+    if (dem2di_coarse_weigh(grid, start, branch)) dem2di_coarse_add(grid, &add, weight);
     if (normal != NULL) return;
     memset(&add, 0, sizeof add);
-    add.boundary = dem2di_negate(turned);
+    add.boundary = dem2di_negate(force);
     if (dem2di_coarse_weigh(grid, dem2di_add(start, branch), dem2di_vec(0, 0)))
         dem2di_coarse_add(grid, &add, weight);
 }
@@ -23327,7 +23336,7 @@ DEM2D_API dem2d_result dem2d_world_load(const dem2d_load_desc *desc, const char 
 /* ============================================================================================
    >>writers  Pictures, files for ParaView, histories
    uses: config, math, memory, fields, mass, shapes, broad, law, world, objects, walls, measures,
-   output
+   grids, output
    ============================================================================================ */
 
 /* Write text without formatting, of any length. */
@@ -23805,12 +23814,17 @@ static void dem2di_item_numbers(const dem2d_world *world, const dem2di_item *ite
         dem2di_wall_numbers(world, item->slot, numbers);
 }
 
-/* Write the doubles of one item or point. Subnormal numbers become 0: some readers reject them. */
-static void dem2di_vtp_doubles(dem2di_writer *writer, const double *numbers, int count) {
+/* Write doubles in a line. Subnormal numbers become 0: some readers reject them. */
+static void dem2di_put_doubles(dem2di_writer *writer, const double *numbers, int count) {
     for (int k = 0; k < count; k++) {
         if (k > 0) dem2di_put(writer, " ");
         dem2di_put_number(writer, fabs(numbers[k]) >= DBL_MIN ? numbers[k] : 0);
     }
+}
+
+/* The doubles of one item or point. */
+static void dem2di_vtp_doubles(dem2di_writer *writer, const double *numbers, int count) {
+    dem2di_put_doubles(writer, numbers, count);
     dem2di_put(writer, "\n");
 }
 
@@ -23930,6 +23944,151 @@ DEM2D_API dem2d_result dem2d_world_write_vtp(const dem2d_world *world, const dem
     if (result != DEM2D_OK) return result;
     dem2di_vtp(world, desc, &writer);
     return dem2di_writer_close(env, path, &writer);
+}
+
+/* --- fields of grids ----------------------------------------------------------------------------
+ */
+
+/* A field of an average: its doubles by the kind. */
+typedef struct dem2di_grid_column {
+    const char *name;
+    size_t offset;
+    char kind; /* s: scalar, v: vector, t: tensor xx xy yx yy, m: symmetric tensor xx xy yy */
+} dem2di_grid_column;
+
+#define DEM2DI_GRID_COLUMN(field, kind) \
+    { #field, offsetof(dem2d_average, field), kind }
+
+/* In the order of the struct; the centre, which is no data of a .vti file, comes first. */
+static const dem2di_grid_column dem2di_grid_columns[] = {
+    DEM2DI_GRID_COLUMN(centre, 'v'),
+    DEM2DI_GRID_COLUMN(number, 's'),
+    DEM2DI_GRID_COLUMN(density, 's'),
+    DEM2DI_GRID_COLUMN(solid_fraction, 's'),
+    DEM2DI_GRID_COLUMN(momentum, 'v'),
+    DEM2DI_GRID_COLUMN(velocity, 'v'),
+    DEM2DI_GRID_COLUMN(contact, 't'),
+    DEM2DI_GRID_COLUMN(kinetic, 't'),
+    DEM2DI_GRID_COLUMN(boundary, 'v'),
+    DEM2DI_GRID_COLUMN(contacts, 's'),
+    {"fabric", offsetof(dem2d_average, fabric_xx), 'm'},
+};
+#define DEM2DI_GRID_COLUMNS (int)(sizeof dem2di_grid_columns / sizeof *dem2di_grid_columns)
+
+static int dem2di_grid_doubles(const dem2di_grid_column *column) {
+    char kind = column->kind;
+    return kind == 's' ? 1 : kind == 'v' ? 2 : kind == 'm' ? 3 : 4;
+}
+
+/* What follows the name of a column in a table. */
+static const char *dem2di_grid_suffix(const dem2di_grid_column *column, int i) {
+    static const char *const vector[2] = {"_x", "_y"};
+    static const char *const tensor[4] = {"_xx", "_xy", "_yx", "_yy"};
+    if (column->kind == 's') return "";
+    if (column->kind == 'v') return vector[i];
+    return tensor[column->kind == 'm' && i == 2 ? 3 : i];
+}
+
+static void dem2di_grid_numbers(const dem2d_average *average, const dem2di_grid_column *column,
+                                double numbers[4]) {
+    memcpy(numbers, (const char *)average + column->offset,
+           (size_t)dem2di_grid_doubles(column) * sizeof *numbers);
+}
+
+static void dem2di_grid_csv(const dem2d_grid *grid, dem2di_writer *writer) {
+    int count = (int)dem2di_coarse_cells(&grid->desc);
+    for (int row = -1; row < count && writer->good; row++) { /* -1: the header line */
+        dem2d_average average = dem2di_coarse_average(grid, row < 0 ? 0 : row);
+        for (int k = 0; k < DEM2DI_GRID_COLUMNS; k++) {
+            const dem2di_grid_column *column = &dem2di_grid_columns[k];
+            double numbers[4];
+            dem2di_grid_numbers(&average, column, numbers);
+            for (int i = 0; i < dem2di_grid_doubles(column); i++) {
+                if (k + i > 0) dem2di_put(writer, ",");
+                if (row >= 0) {
+                    dem2di_put_number(writer, numbers[i]);
+                    continue;
+                }
+                dem2di_put(writer, column->name);
+                dem2di_put(writer, dem2di_grid_suffix(column, i));
+            }
+        }
+        dem2di_put(writer, "\n");
+    }
+}
+
+/* The numbers of a column as VTK wants them: vectors of 3, tensors of 9. Returns how many. */
+static int dem2di_grid_vtk(const dem2d_average *average, const dem2di_grid_column *column,
+                           double numbers[9]) {
+    double own[4];
+    bool symmetric = column->kind == 'm';
+    dem2di_grid_numbers(average, column, own);
+    memset(numbers, 0, 9 * sizeof *numbers);
+    numbers[0] = own[0];
+    if (column->kind == 's') return 1;
+    numbers[1] = own[1];
+    if (column->kind == 'v') return 3;
+    numbers[3] = own[symmetric ? 1 : 2];
+    numbers[4] = own[symmetric ? 2 : 3];
+    return 9;
+}
+
+static void dem2di_grid_vti(const dem2d_grid *grid, dem2di_writer *writer) {
+    const dem2d_rot q = grid->axes;
+    dem2d_vec origin = dem2di_turn(q, grid->desc.box.lower);
+    int nx = grid->desc.nx, ny = grid->desc.ny, count = nx * ny;
+    const double place[3] = {origin.x, origin.y, 0}, space[3] = {grid->side.x, grid->side.y, 1};
+    const double turned[9] = {q.c, -q.s, 0, q.s, q.c, 0, 0, 0, 1};
+    dem2di_put(writer, "<?xml version=\"1.0\"?>\n<VTKFile type=\"ImageData\" version=\"1.0\" "
+                       "byte_order=\"LittleEndian\">\n");
+    dem2di_print(writer, "<ImageData WholeExtent=\"0 %d 0 %d 0 0\" Origin=\"", nx, ny);
+    dem2di_put_doubles(writer, place, 3);
+    dem2di_put(writer, "\" Spacing=\"");
+    dem2di_put_doubles(writer, space, 3);
+    if (q.s != 0 || q.c != 1) {
+        dem2di_put(writer, "\" Direction=\"");
+        dem2di_put_doubles(writer, turned, 9);
+    }
+    dem2di_print(writer, "\">\n<Piece Extent=\"0 %d 0 %d 0 0\">\n<CellData>\n", nx, ny);
+    for (int k = 1; k < DEM2DI_GRID_COLUMNS && writer->good; k++) {
+        const dem2di_grid_column *column = &dem2di_grid_columns[k];
+        char kind = column->kind;
+        dem2di_vtp_tag(writer, "Float64", column->name, kind == 's' ? 1 : kind == 'v' ? 3 : 9);
+        for (int i = 0; i < count; i++) {
+            dem2d_average average = dem2di_coarse_average(grid, i);
+            double numbers[9];
+            dem2di_vtp_doubles(writer, numbers, dem2di_grid_vtk(&average, column, numbers));
+        }
+        dem2di_put(writer, "</DataArray>\n");
+    }
+    dem2di_put(writer, "</CellData>\n</Piece>\n</ImageData>\n</VTKFile>\n");
+}
+
+/* A function that writes a grid. */
+typedef void dem2di_grid_fn(const dem2d_grid *grid, dem2di_writer *writer);
+
+static dem2d_result dem2di_grid_write(const dem2d_grid *grid, const dem2d_save_desc *desc,
+                                      const char *path, dem2di_grid_fn *put) {
+    dem2di_writer writer;
+    dem2d_save_desc plain;
+    if (grid == NULL) return DEM2D_NULL_ARGUMENT;
+    memset(&plain, 0, sizeof plain);
+    if (desc == NULL) desc = &plain;
+    dem2d_result result =
+        dem2di_writer_open(&grid->env, desc->write, desc->user, path, false, &writer);
+    if (result != DEM2D_OK) return result;
+    put(grid, &writer);
+    return dem2di_writer_close(&grid->env, path, &writer);
+}
+
+DEM2D_API dem2d_result dem2d_grid_write_csv(const dem2d_grid *grid, const dem2d_save_desc *desc,
+                                            const char *path) {
+    return dem2di_grid_write(grid, desc, path, dem2di_grid_csv);
+}
+
+DEM2D_API dem2d_result dem2d_grid_write_vti(const dem2d_grid *grid, const dem2d_save_desc *desc,
+                                            const char *path) {
+    return dem2di_grid_write(grid, desc, path, dem2di_grid_vti);
 }
 
 /* Write text as the value of an attribute. */

@@ -947,7 +947,11 @@ typedef struct function {
       LOGS, IN_WORLD, ARG(region, "box", POINTER), ARG(box.lower, "box", VECTOR),                 \
       ARG(box.upper, "box", UPPER), OUT)                                                          \
     F(world_average_circle, dem2d_world_average_circle(v->world, v->vector, v->x, v->out),        \
-      LOGS, IN_WORLD, ARG(vector, "centre", VECTOR), ARG(x, "radius", POSITIVE), OUT)
+      LOGS, IN_WORLD, ARG(vector, "centre", VECTOR), ARG(x, "radius", POSITIVE), OUT)             \
+    F(grid_write_csv, dem2d_grid_write_csv(v->grid, v->desc, NULL),                               \
+      DESCRIBED(SAVE, with_save), IN_GRID, ARG(desc, "path and write", POINTER))                  \
+    F(grid_write_vti, dem2d_grid_write_vti(v->grid, v->desc, NULL),                               \
+      DESCRIBED(SAVE, with_save), IN_GRID, ARG(desc, "path and write", POINTER))
 /* clang-format on */
 
 #define FUNCTION_CALL(name, expression, ...)   \

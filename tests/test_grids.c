@@ -296,8 +296,8 @@ static dem2d_average total_of(int count, double area) {
     return t;
 }
 
-/* What the other queries of the world say. The axes of the grid are turned by `angle`. */
-static void check_totals(const scene *s, const dem2d_average *t, double angle) {
+/* What the other queries of the world say. */
+static void check_totals(const scene *s, const dem2d_average *t) {
     static dem2d_contact_info list[CONTACTS];
     dem2d_stress whole;
     long double mass = 0, area = 0, px = 0, py = 0;
@@ -315,24 +315,20 @@ static void check_totals(const scene *s, const dem2d_average *t, double angle) {
         const dem2d_wall_info wall = wall_of(s, ids[i]);
         push.x -= wall.force.x, push.y -= wall.force.y;
     }
-    const long double c = cosl(angle), n = sinl(angle);
     const long double size = fabs(whole.xx) + fabs(whole.yy), force = fabs(push.y);
     const long double speed = fabsl(px) + fabsl(py);
     assert_near(t->number, grain_count, 1e-12L);
     assert_near(t->density, mass, 1e-12L);
     assert_near(t->solid_fraction, area, 1e-12L);
-    assert_within(t->momentum.x, c * px + n * py, 1e-12L * speed);
-    assert_within(t->momentum.y, c * py - n * px, 1e-12L * speed);
-    assert_within(t->boundary.x, c * push.x + n * push.y, 1e-12L * force);
-    assert_within(t->boundary.y, c * push.y - n * push.x, 1e-12L * force);
+    assert_within(t->momentum.x, px, 1e-12L * speed);
+    assert_within(t->momentum.y, py, 1e-12L * speed);
+    assert_within(t->boundary.x, push.x, 1e-12L * force);
+    assert_within(t->boundary.y, push.y, 1e-12L * force);
     assert_near(t->contacts, pairs, 1e-12L);
-    const long double xx = c * c * whole.xx + c * n * (whole.xy + whole.yx) + n * n * whole.yy;
-    const long double xy = c * c * whole.xy - n * n * whole.yx + c * n * (whole.yy - whole.xx);
-    const long double yx = c * c * whole.yx - n * n * whole.xy + c * n * (whole.yy - whole.xx);
-    assert_within(t->contact.xx, xx, 1e-12L * size);
-    assert_within(t->contact.xy, xy, 1e-12L * size);
-    assert_within(t->contact.yx, yx, 1e-12L * size);
-    assert_within(t->contact.yy, whole.xx + whole.yy - xx, 1e-12L * size);
+    assert_within(t->contact.xx, whole.xx, 1e-12L * size);
+    assert_within(t->contact.xy, whole.xy, 1e-12L * size);
+    assert_within(t->contact.yx, whole.yx, 1e-12L * size);
+    assert_within(t->contact.yy, whole.yy, 1e-12L * size);
 }
 
 static void test_totals(void **state) {
@@ -356,7 +352,7 @@ static void test_totals(void **state) {
                 const double area = (desc.box.upper.x - desc.box.lower.x) *
                                     (desc.box.upper.y - desc.box.lower.y) / count;
                 const dem2d_average total = total_of(count, area);
-                check_totals(&s, &total, desc.angle);
+                check_totals(&s, &total);
             }
     close_scene(&s);
 }
@@ -374,7 +370,7 @@ static void test_periodic(void **state) {
         desc.width_x = wide ? 0.6 : 0.1, desc.width_y = wide ? 0.5 : 0.07;
         const int count = fields_of(&s, &desc, cells);
         const dem2d_average total = total_of(count, 0.6 * 0.5 / count);
-        check_totals(&s, &total, 0);
+        check_totals(&s, &total);
         desc.box.lower.x -= 0.09, desc.box.upper.x -= 0.09; /* by three cells */
         desc.box.lower.y += 1, desc.box.upper.y += 1;       /* by two periods */
         assert_int_equal(fields_of(&s, &desc, others), count);
@@ -384,6 +380,46 @@ static void test_periodic(void **state) {
             assert_within(others[i].contact.yy, cells[k].contact.yy,
                           1e-9L * fabs(total.contact.yy) / 0.3);
         }
+    }
+    close_scene(&s);
+}
+
+/* A grid that is turned by a right angle has the cells of one that is not, and those of a part of a
+   turn are where they say they are. */
+static void test_turned(void **state) {
+    (void)state;
+    const scene s = make_heap(false, false, 0, 3000);
+    dem2d_grid_desc desc = {0};
+    desc.nx = 20, desc.ny = 30, desc.width_x = 0.2, desc.width_y = 0.1;
+    desc.box.lower = vec(0.1, 0.05), desc.box.upper = vec(0.9, 0.8);
+    const int count = fields_of(&s, &desc, cells);
+    dem2d_grid_desc turned = desc; /* x is along y, y against x */
+    turned.angle = (double)TEST_PI / 2, turned.nx = 30, turned.ny = 20;
+    turned.width_x = 0.1, turned.width_y = 0.2;
+    turned.box.lower = vec(0.05, -0.9), turned.box.upper = vec(0.8, -0.1);
+    assert_int_equal(fields_of(&s, &turned, others), count);
+    for (int i = 0; i < count; i++) {
+        const dem2d_average *c = &cells[i], *o = &others[(19 - i % 20) * 30 + i / 20];
+        const double stress = fabs(c->contact.xx) + fabs(c->contact.yy);
+        assert_within(o->centre.x, c->centre.x, 1e-14L);
+        assert_within(o->centre.y, c->centre.y, 1e-14L);
+        assert_near(o->density, c->density, 1e-9L);
+        assert_near(o->velocity.x, c->velocity.x, 1e-9L);
+        assert_within(o->contact.xy, c->contact.xy, 1e-9L * stress);
+        assert_within(o->contact.yy, c->contact.yy, 1e-9L * stress);
+    }
+    desc.angle = 0.7, desc.width_x = desc.width_y = 0; /* sharp: the cell of each centre */
+    find_grains(&s, 0);
+    assert_int_equal(fields_of(&s, &desc, cells), count);
+    for (int i = 0; i < count; i++) {
+        int inside = 0;
+        for (int k = 0; k < grain_count; k++) {
+            const double x = grains[k].x.x - cells[i].centre.x;
+            const double y = grains[k].x.y - cells[i].centre.y;
+            inside += fabs(x * cos(0.7) + y * sin(0.7)) < 0.02 &&
+                      fabs(y * cos(0.7) - x * sin(0.7)) < 0.0125;
+        }
+        assert_within(cells[i].number * 0.04 * 0.025, inside, 1e-12L);
     }
     close_scene(&s);
 }
@@ -660,6 +696,75 @@ static void test_bits(void **state) {
     close_scene(&a), close_scene(&b);
 }
 
+/* --- files ----------------------------------------------------------------------------------- */
+
+/* Both files hold the bits of dem2d_grid_read. */
+static void test_files(void **state) {
+    (void)state;
+    const scene s = make_heap(false, false, 0, 2000);
+    dem2d_grid_desc desc = wide_desc(0.1);
+    desc.nx = 4, desc.ny = 3, desc.angle = 0.4;
+    dem2d_grid *grid = new_grid(&desc);
+    add(grid, &s, 1);
+    const int count = read_grid(grid, cells);
+    scene_bytes file;
+    dem2d_save_desc to = {0};
+    memset(&file, 0, sizeof file);
+    to.write = scene_write, to.user = &file;
+    assert_ok(dem2d_grid_write_csv(grid, &to, NULL));
+    assert_true(scene_write(&file, "", 1));
+    const char *at = file.bytes;
+    const char header[] =
+        "centre_x,centre_y,number,density,solid_fraction,momentum_x,momentum_y,velocity_x,"
+        "velocity_y,contact_xx,contact_xy,contact_yx,contact_yy,kinetic_xx,kinetic_xy,kinetic_yx,"
+        "kinetic_yy,boundary_x,boundary_y,contacts,fabric_xx,fabric_xy,fabric_yy\n";
+    assert_memory_equal(at, header, sizeof header - 1);
+    at += sizeof header - 1;
+    for (int i = 0; i < count; i++)
+        for (size_t k = 0; k < sizeof *cells / sizeof(double); k++) {
+            double value;
+            char *end;
+            memcpy(&value, (char *)&cells[i] + k * sizeof value, sizeof value);
+            assert_same_bits(strtod(at, &end), value);
+            assert_true(*end == (k + 1 < sizeof *cells / sizeof(double) ? ',' : '\n'));
+            at = end + 1;
+        }
+    assert_true(*at == 0);
+    file.size = 0;
+    assert_ok(dem2d_grid_write_vti(grid, &to, NULL));
+    assert_true(scene_write(&file, "", 1));
+    assert_true(strstr(file.bytes, "WholeExtent=\"0 4 0 3 0 0\"") != NULL);
+    at = strstr(file.bytes, "Name=\"contact\" NumberOfComponents=\"9\"");
+    assert_non_null(at);
+    at = strchr(at, '\n');
+    for (int i = 0; i < count; i++)
+        for (int k = 0; k < 9; k++) {
+            const double t[9] = {cells[i].contact.xx,
+                                 cells[i].contact.xy,
+                                 0,
+                                 cells[i].contact.yx,
+                                 cells[i].contact.yy,
+                                 0,
+                                 0,
+                                 0,
+                                 0};
+            char *end;
+            assert_same_bits(strtod(at, &end), t[k]);
+            at = end;
+        }
+    assert_true(strncmp(at, "\n</DataArray>", 13) == 0);
+    const size_t whole = file.size - 1;
+    for (file.limit = 1; file.limit < whole; file.limit += 97) { /* a full disc */
+        file.size = 0;
+        assert_result(dem2d_grid_write_vti(grid, &to, NULL), DEM2D_IO);
+    }
+    assert_result(dem2d_grid_write_csv(grid, &to, "x.csv"), DEM2D_OUT_OF_RANGE);
+    assert_result(dem2d_grid_write_csv(grid, NULL, "build/no such/x.csv"), DEM2D_IO);
+    free(file.bytes);
+    dem2d_grid_destroy(grid);
+    close_scene(&s);
+}
+
 /* --- what is refused ------------------------------------------------------------------------- */
 
 static void test_refused(void **state) {
@@ -698,6 +803,7 @@ int main(void) {
         cmocka_unit_test(test_flow_balance), cmocka_unit_test(test_groups),
         cmocka_unit_test(test_time_mean),    cmocka_unit_test(test_regions),
         cmocka_unit_test(test_whole),        cmocka_unit_test(test_bits),
+        cmocka_unit_test(test_turned),       cmocka_unit_test(test_files),
         cmocka_unit_test(test_refused),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
