@@ -47,6 +47,7 @@ CONTENTS (search for the anchor, ">>" and the word)
                     spring, friction, critical time step                    >>law
                     leapfrog motion                                         >>motion
                     what a world holds: structs, fields, columns            >>world
+                    the periodic cell: images of particles, wraps           >>cell
                     shapes, materials, particles, by their ids              >>objects
                     walls, their parts and places                           >>walls
                     faces and vertices of walls whose segments are joined   >>joints
@@ -202,6 +203,11 @@ CONCEPTS
                 their union, not on how it is cut. A wall stands still, moves at a velocity and
                 turns about a pivot, or is servo-controlled to a stress. Its parts (segments of a
                 chain) are numbered; contacts name them.
+    Cell        A world may be periodic along x, along a second vector, or along both: see
+                dem2d_cell. A particle near the border has contacts with images of those on the
+                other side; dem2d_contact_info.shift tells with which. A particle that leaves the
+                cell comes back on the other side, so that its position jumps by a cell vector, and
+                with it dem2d_energy.potential if gravity has a part along that vector.
     Name        Of the two of a pair, A is the one with the lower id, and sums over contacts and
                 particles go by ids, walls last. dem2d_particle_desc.name and dem2d_wall_desc.name
                 (64 bits, 0: none) replace this order: first by name, then by id. With the same
@@ -291,6 +297,8 @@ HOW TO
     push grains          dem2d_world_set_load: a force and a torque until you set others. What
                          changes from step to step (drag, magnets, motors) is set by
                          dem2d_world_desc.loads. The work is in the ledger.
+    leave out the walls  dem2d_world_desc.cell makes the world periodic. dem2d_world_stress with the
+                         area of the cell is then the stress of a sample without any border.
     share a scene        Each world holds its own grains, and copies (ghosts) of the others' grains
       out to processes   within reach, with the same names. dem2d_world_desc.gather gives each ghost
                          the force that its owner has found: the worlds then move like one, to the
@@ -1352,6 +1360,19 @@ typedef dem2d_result dem2d_commit_fn(void *user, dem2d_result result);
 /// the bounds of the time step do not know: k dt^2/m must be below 4.
 typedef void dem2d_loads_fn(void *user, dem2d_world *world);
 
+/// A periodic cell: what leaves it on one side comes back on the other. All zero: no cell. If only
+/// one vector is not zero, the world is periodic along it, and walls can bound the other direction:
+/// half-planes that are parallel to this vector and do not turn. Other walls are refused, and all
+/// walls where both directions are periodic (OUT_OF_RANGE). The cell may be small: a particle can
+/// touch several images of another one, and images of itself. Centroids are kept in the cell:
+/// positions that you give are moved by whole cell vectors. dem2d_world_relax and the queries of
+/// space (boxes, points, shapes, rays, the nearest) return OUT_OF_RANGE in a cell.
+typedef struct dem2d_cell {
+    dem2d_vec a;      ///< m, along x: a.x >= 0, a.y = 0; zero: not periodic along x
+    dem2d_vec b;      ///< m, b.y > 0; zero: not periodic along b
+    dem2d_vec origin; ///< m, the corner: the cell is origin + s a + t b, 0 <= s, t < 1
+} dem2d_cell;
+
 /// A world. Only time_step has no default.
 typedef struct dem2d_world_desc {
     double time_step;          ///< s, > 0
@@ -1380,6 +1401,7 @@ typedef struct dem2d_world_desc {
     dem2d_loads_fn *loads;           ///< sets external loads in each step; NULL: none
     void *loads_user;                ///< passed to loads
     int event_capacity;              ///< of events that are kept, 0 to 2^30; 0: none
+    dem2d_cell cell;                 ///< m, periodic; all zero: none
 } dem2d_world_desc;
 
 /// How a particle moves. Two particles that are not free have no contact with each other, nor with
@@ -1562,7 +1584,7 @@ typedef struct dem2d_contact_info {
     double moment;           ///< N, on B, against rolling
     int part_a;              ///< part of A in contact: 0, since every particle has one part
     int part_b;              ///< part of B: of a wall by its number, of a particle 0
-    int shift[2]; ///< cells from A to the image of B: {0, 0}, since no direction is periodic
+    int shift[2]; ///< in a periodic cell: A touches the image of B at shift[0] a + shift[1] b
     /// 0: with a particle, a half-plane, or a face of segments, listed with the segment at the foot
     /// of A's centre. 1 or 2: with the vertex at the start or end of a segment where A overlaps two
     /// faces; its force is taken from theirs, which count the vertex twice.
@@ -2011,7 +2033,10 @@ DEM2D_API void dem2d_grid_destroy(dem2d_grid *grid);
 /// forces that no field has. The kinetic stress is that of the velocities less the mean velocity of
 /// all that was added to the cell; its trace over twice the density is the granular temperature.
 ///
-/// Errors: NULL_ARGUMENT, NOT_FINITE, OUT_OF_RANGE (weight; a particle longer than a period).
+/// In a periodic cell the grid has to be periodic with the same periods, b.x of the cell 0.
+///
+/// Errors: NULL_ARGUMENT, NOT_FINITE, OUT_OF_RANGE (weight; a particle longer than a period; the
+/// periods of the world's cell are others).
 DEM2D_API dem2d_result dem2d_grid_add(dem2d_grid *grid, const dem2d_world *world, double weight);
 /// Averages of all cells, row by row, the lowest row first, x fastest: the first `capacity` of them
 /// go into cells (may be NULL if capacity is 0); count gets nx ny. A profile across a line is a
@@ -2022,10 +2047,11 @@ DEM2D_API dem2d_result dem2d_grid_read(const dem2d_grid *grid, dem2d_average *ce
 DEM2D_API dem2d_result dem2d_grid_reset(dem2d_grid *grid);
 /// Averages over a box, sharp: of the particles whose centres are in it, and of contacts by the
 /// part of the line between the centres that is in it. Errors: NOT_FINITE, OUT_OF_RANGE (upper not
-/// above lower).
+/// above lower; a world with a cell).
 DEM2D_API dem2d_result dem2d_world_average_box(const dem2d_world *world, const dem2d_box *box,
                                                dem2d_average *average);
-/// The same over a circle with a radius > 0 (m). Errors: NOT_FINITE, OUT_OF_RANGE (radius).
+/// The same over a circle with a radius > 0 (m). Errors: NOT_FINITE, OUT_OF_RANGE (radius; a world
+/// with a cell).
 DEM2D_API dem2d_result dem2d_world_average_circle(const dem2d_world *world, dem2d_vec centre,
                                                   double radius, dem2d_average *average);
 
@@ -8514,7 +8540,7 @@ typedef struct dem2di_search {
     bool alone; /* two polygons have no second contact point: see dem2di_corner_alone */
 } dem2di_search;
 
-/* From centre a to centre b: the only place that a periodic cell would change. */
+/* From centre a to centre b. In a periodic cell b is the position of an image. */
 static dem2d_vec dem2di_centre_line(dem2d_vec a, dem2d_vec b) {
     return dem2di_sub(b, a);
 }
@@ -11831,6 +11857,10 @@ static bool dem2di_state_finite(const dem2di_state *state) {
      observe    last and next contacts, states -> ledger: only reads the others' results
      commit     the next states become those of now
 
+   In a periodic cell B of a pair may be an image: a slot behind those of the particles whose row in
+   each column of particles is a copy of the owner's, moved by whole cell vectors (section cell). No
+   pass but the building of the list and the sums over particles has to know of it.
+
    Invariants between steps, which tests/inside.h checks:
      1. Ids and slots of particles lead to each other. Slots that are free have a shape of -1.
      2. A key is of two particles that live, the one of lower rank first, or of a particle that
@@ -12135,6 +12165,13 @@ typedef struct dem2di_ledger {
 
 #define DEM2DI_MATERIALS_MAX 256 /* as declared: so many squared are the pairs of laws */
 
+/* A slot from dem2d_world.image_first on: a particle seen elsewhere in the lattice of cells. */
+typedef struct dem2di_image {
+    int owner;    /* slot of the particle; -1 when that has been removed */
+    int shift[2]; /* it is at as many cell vectors a and b from the owner */
+    int row;      /* while the list is made: its place among those that some pair needs, or -1 */
+} dem2di_image;
+
 /* Columns of one length. Those before the keys grow one by one; the others are renewed with the
    list, and in large scenes are most of the memory. */
 typedef enum dem2di_group {
@@ -12151,7 +12188,8 @@ typedef enum dem2di_group {
     DEM2DI_GROUPED,       /* of bodies, where grouped */
     DEM2DI_DISPLACEMENTS, /* of bodies, where plan.turns */
     DEM2DI_MADE,          /* of bodies, where some are redirected */
-    DEM2DI_EXCHANGED,     /* of ids, where the caller may change the sums */
+    DEM2DI_IMAGES,
+    DEM2DI_EXCHANGED, /* of ids, where the caller may change the sums */
     DEM2DI_WALLS_EXCHANGED,
     DEM2DI_STARTS, /* of the contacts of bodies, and the end of the last */
     DEM2DI_WALLS,
@@ -12265,6 +12303,12 @@ struct dem2d_world {
     bool joined;                   /* some are, or have one side: */
     bool one_sided;                /* a wall with parts has */
     int wall_count, part_count;
+
+    dem2d_cell cell;
+    bool periodic;                      /* there is a cell: one of its vectors is not zero */
+    bool wrap_due;                      /* no memory was left to move particles into the cell */
+    int image_first, image_count;       /* slots of images: from the first on, so many */
+    dem2di_image *images, *images_next; /* those, and what the search for the next list finds */
 
     dem2di_list list;
     dem2di_touch *touches;                 /* of contacts */
@@ -12380,6 +12424,9 @@ static const dem2di_field dem2di_setting_fields[] = {
     DEM2DI_SAVED("check_time_step", dem2d_world, check_time_step, DEM2DI_SWITCH),
     DEM2DI_SAVED("steps", dem2d_world, steps, DEM2DI_COUNTER),
     DEM2DI_SAVED("timed_at", dem2d_world, timed_at, DEM2DI_COUNTER),
+    DEM2DI_SAVED("cell_a", dem2d_world, cell.a, DEM2DI_VECTOR),
+    DEM2DI_SAVED("cell_b", dem2d_world, cell.b, DEM2DI_VECTOR),
+    DEM2DI_SAVED("cell_origin", dem2d_world, cell.origin, DEM2DI_VECTOR),
     DEM2DI_SAVED("timed", dem2d_world, timed, DEM2DI_ANY_NUMBER)}; /* a sum, which may overflow */
 
 /* What of the list outlives it, counters, lengths. */
@@ -12427,6 +12474,9 @@ static const dem2di_field dem2di_progress_fields[] = {
     DEM2DI_SAVED("ids", dem2d_world, id_count, DEM2DI_WHOLE(0, 1 << 30)),
     DEM2DI_SAVED("free_id", dem2d_world, free_id, DEM2DI_WHOLE(-1, 1 << 30)),
     DEM2DI_SAVED("particles", dem2d_world, body_count, DEM2DI_WHOLE(0, 1 << 30)),
+    DEM2DI_SAVED("wrap_due", dem2d_world, wrap_due, DEM2DI_SWITCH),
+    DEM2DI_SAVED("image_first", dem2d_world, image_first, DEM2DI_COUNT),
+    DEM2DI_SAVED("images", dem2d_world, image_count, DEM2DI_WHOLE(0, 1 << 30)),
     DEM2DI_SAVED("walls", dem2d_world, wall_count, DEM2DI_WHOLE(0, 1 << 30)),
     DEM2DI_SAVED("wall_parts", dem2d_world, part_count, DEM2DI_WHOLE(0, 1 << 30)),
     DEM2DI_SAVED("disc_pairs", dem2d_world, list.discs, DEM2DI_WHOLE(0, 1 << 30)),
@@ -12515,6 +12565,10 @@ static const dem2di_field dem2di_state_fields[] = {
 static const dem2di_field dem2di_velocity_fields[] = {
     DEM2DI_SAVED("velocity", dem2di_velocities, v, DEM2DI_VECTOR),
     DEM2DI_SAVED("angular_velocity", dem2di_velocities, w, DEM2DI_FINITE)};
+
+static const dem2di_field dem2di_image_fields[] = {
+    DEM2DI_SAVED("owner", dem2di_image, owner, DEM2DI_WHOLE(-1, 1 << 30)),
+    DEM2DI_SAVED("shift", dem2di_image, shift, DEM2DI_TAG)};
 
 static const dem2di_field dem2di_wall_id_fields[] = {
     DEM2DI_SAVED("alive", dem2di_wall, alive, DEM2DI_SWITCH),
@@ -12719,6 +12773,8 @@ static const dem2di_column dem2di_columns[] = {
     DEM2DI_UNSAVED(DISPLACEMENTS, next_displacement, 0),
     DEM2DI_UNSAVED(DISPLACEMENTS, lever, DEM2DI_MOVES),
     DEM2DI_COLUMN("last_velocities", MADE, made, DEM2DI_MOVES | DEM2DI_HASHED, velocity_fields),
+    DEM2DI_COLUMN("images", IMAGES, images, DEM2DI_FIRST, image_fields),
+    DEM2DI_UNSAVED(IMAGES, images_next, 0),
     DEM2DI_UNSAVED(SUMS, sums, DEM2DI_MOVES),
     DEM2DI_UNSAVED(EXCHANGED, exchange.force, 0),
     DEM2DI_UNSAVED(EXCHANGED, exchange.torque, 0),
@@ -12880,18 +12936,24 @@ static void dem2di_row_clear(dem2d_world *world, dem2di_group first, dem2di_grou
     }
 }
 
-/* Room for particles, in all columns of particles that are in use. */
+/* Slots of particles and of images, where there are some. */
+static int dem2di_slots(const dem2d_world *world) {
+    return world->image_count > 0 ? world->image_first + world->image_count : world->body_count;
+}
+
+/* Room for particles and the images that are there, in all columns of particles in use. */
 static bool dem2di_reserve_bodies(dem2d_world *world, int count) {
-    return dem2di_group_reserve(world, DEM2DI_BODIES, count) &&
+    const int slots = dem2di_slots(world) > count ? dem2di_slots(world) : count;
+    return dem2di_group_reserve(world, DEM2DI_BODIES, slots) &&
            dem2di_group_reserve(world, DEM2DI_STARTS, count + 1) &&
            dem2di_group_reserve(world, DEM2DI_IDS, count) &&
            (!world->named || (dem2di_group_reserve(world, DEM2DI_RANKS, count) &&
                               dem2di_group_reserve(world, DEM2DI_NAMES, count))) &&
            (!world->loaded || dem2di_group_reserve(world, DEM2DI_LOADS, count)) &&
            (!world->keeps_sums || dem2di_group_reserve(world, DEM2DI_SUMS, count)) &&
-           (!world->grouped || dem2di_group_reserve(world, DEM2DI_GROUPED, count)) &&
-           (!world->plan.turns || dem2di_group_reserve(world, DEM2DI_DISPLACEMENTS, count)) &&
-           (!world->redirected || dem2di_group_reserve(world, DEM2DI_MADE, count));
+           (!world->grouped || dem2di_group_reserve(world, DEM2DI_GROUPED, slots)) &&
+           (!world->plan.turns || dem2di_group_reserve(world, DEM2DI_DISPLACEMENTS, slots)) &&
+           (!world->redirected || dem2di_group_reserve(world, DEM2DI_MADE, slots));
 }
 
 /* Does the scene need the columns of a group of contacts? */
@@ -12970,8 +13032,300 @@ static dem2d_result dem2di_out_of_memory(const dem2d_world *world, const char *w
 }
 
 /* ============================================================================================
+   >>cell  The periodic cell: images of particles, wraps
+   uses: config, math, memory, broad, motion, world
+   ============================================================================================ */
+
+/* Particles are kept in the cell: after each step a centroid that has left it is moved back by
+   whole cell vectors, whatever is listed. What is beyond the border are images: of each particle
+   that some listed pair sees there, an image has a slot of its own behind those of the particles,
+   from image_first on. Its row in each column of particles is a copy of its owner's; only the
+   position differs, by its shift. So a pair (A, image of B) is like any other: A is a particle, the
+   one of lower rank, and the shift of the image tells the pairs of two partners from each other. A
+   pair of a particle with an image of itself has a shift s a + t b with t > 0, or t = 0 and s > 0.
+
+   The search for the list finds the images that are needed (section list). When a particle is moved
+   into the cell, its own images get the opposite shift, and so do the partners that its pairs see:
+   keys change, pairs and their histories stay. An image with the shift 0 is as good as its owner.
+   Pairs of the same two are ordered by t, then s: neither a wrap nor another choice of the cell
+   vector b changes this order, so that sums keep their bits. */
+
+/* The particle that a slot shows. */
+static inline int dem2di_owner(const dem2d_world *world, int slot) {
+    return world->image_count == 0 || slot < world->image_first
+               ? slot
+               : world->images[slot - world->image_first].owner;
+}
+
+/* From a particle to its image. */
+static inline dem2d_vec dem2di_cell_shift(const dem2d_world *world, int along_a, int along_b) {
+    const dem2d_cell *cell = &world->cell;
+    return dem2di_vec(along_a * cell->a.x + along_b * cell->b.x, along_b * cell->b.y);
+}
+
+/* No position is more cells away: whole numbers stay exact in doubles, and their sums in ints. */
+#define DEM2DI_CELLS_MOST 1073741824.0
+
+/* Points by fractions s, t of the cell vectors; 0 along one that is zero. */
+typedef struct dem2di_fractions {
+    dem2d_vec origin;
+    double per_x, per_y, slope; /* t = per_y y, s = per_x x - slope t */
+} dem2di_fractions;
+
+static dem2di_fractions dem2di_fractions_make(const dem2d_cell *cell) {
+    dem2di_fractions f;
+    f.origin = cell->origin;
+    f.per_x = cell->a.x > 0 ? 1 / cell->a.x : 0;
+    f.per_y = cell->b.y > 0 ? 1 / cell->b.y : 0;
+    f.slope = f.per_x * cell->b.x;
+    return f;
+}
+
+/* Whole cells from the cell to the one that a point is in; false when it is in the cell. */
+static inline bool dem2di_cells_out(const dem2di_fractions *f, dem2d_vec x, int out[2]) {
+    double t = (x.y - f->origin.y) * f->per_y, s = (x.x - f->origin.x) * f->per_x - t * f->slope;
+    if (s >= 0 && s < 1 && t >= 0 && t < 1) return false;
+    out[0] = (int)dem2di_max(-DEM2DI_CELLS_MOST, dem2di_min(DEM2DI_CELLS_MOST, floor(s)));
+    out[1] = (int)dem2di_max(-DEM2DI_CELLS_MOST, dem2di_min(DEM2DI_CELLS_MOST, floor(t)));
+    return true;
+}
+
+/* A position in the cell. */
+static dem2d_vec dem2di_wrapped(const dem2d_world *world, dem2d_vec x) {
+    const dem2di_fractions f = dem2di_fractions_make(&world->cell);
+    int out[2];
+    if (!world->periodic || !dem2di_cells_out(&f, x, out)) return x;
+    return dem2di_sub(x, dem2di_cell_shift(world, out[0], out[1]));
+}
+
+static dem2d_result dem2di_check_cell(const dem2d_env *env, const dem2d_cell *cell) {
+    const bool along = cell->a.y == 0 && cell->a.x >= 0;
+    const bool up = cell->b.y > 0 || (cell->b.x == 0 && cell->b.y == 0);
+    if (!along)
+        return dem2di_fail(env, DEM2D_OUT_OF_RANGE, -1, "cell.a = (%g, %g) is not along x",
+                           cell->a.x, cell->a.y);
+    if (!up)
+        return dem2di_fail(env, DEM2D_OUT_OF_RANGE, -1, "cell.b = (%g, %g): y is not above 0",
+                           cell->b.x, cell->b.y);
+    if (dem2di_finite(1 / (cell->a.x > 0 ? cell->a.x : 1)) &&
+        dem2di_finite(1 / (cell->b.y > 0 ? cell->b.y : 1)))
+        return DEM2D_OK;
+    return dem2di_fail(env, DEM2D_OUT_OF_RANGE, -1, "cell of %g by %g", cell->a.x, cell->b.y);
+}
+
+static void dem2di_cell_set(dem2d_world *world, const dem2d_cell *cell) {
+    world->cell = *cell;
+    world->periodic = cell->a.x > 0 || cell->b.y > 0;
+}
+
+/* A position that is given, of a particle or of an object like it. */
+static dem2d_result dem2di_check_place(const dem2d_world *world, dem2d_vec x) {
+    const dem2di_fractions f = dem2di_fractions_make(&world->cell);
+    int out[2];
+    if (!world->periodic || !dem2di_cells_out(&f, x, out) ||
+        (abs(out[0]) < DEM2DI_CELLS_MOST && abs(out[1]) < DEM2DI_CELLS_MOST))
+        return DEM2D_OK;
+    return dem2di_fail(&world->env, DEM2D_OUT_OF_RANGE, -1,
+                       "position (%g, %g) is 2^30 cells or more away", x.x, x.y);
+}
+
+/* --- images of a point in a box ----------------------------------------------------------------
+ */
+
+/* An iterator over the shifts that put a point into a box; without a cell the only one is 0. */
+typedef struct dem2di_shifts {
+    const dem2d_world *world;
+    dem2d_box box;
+    dem2d_vec x;
+    int along_a, along_b; /* the shift */
+    int last_a, last_b;
+} dem2di_shifts;
+
+/* Numbers n with low <= x + n size <= high, a few more for rounding errors of the box. */
+static void dem2di_shift_range(double x, double size, double low, double high, int *first,
+                               int *last) {
+    *first = *last = 0;
+    if (!(size > 0)) return;
+    const double from = floor((low - x) / size), to = ceil((high - x) / size);
+    *first = (int)dem2di_max(-DEM2DI_CELLS_MOST, dem2di_min(DEM2DI_CELLS_MOST, from));
+    *last = (int)dem2di_max(-DEM2DI_CELLS_MOST, dem2di_min(DEM2DI_CELLS_MOST, to));
+}
+
+static void dem2di_shifts_row(dem2di_shifts *at) {
+    const dem2d_cell *cell = &at->world->cell;
+    const double x = at->x.x + at->along_b * cell->b.x;
+    dem2di_shift_range(x, cell->a.x, at->box.lower.x, at->box.upper.x, &at->along_a, &at->last_a);
+}
+
+static dem2di_shifts dem2di_shifts_start(const dem2d_world *world, dem2d_vec x,
+                                         const dem2d_box *box) {
+    dem2di_shifts at;
+    at.world = world;
+    at.box = *box;
+    at.x = x;
+    dem2di_shift_range(x.y, world->cell.b.y, box->lower.y, box->upper.y, &at.along_b, &at.last_b);
+    dem2di_shifts_row(&at);
+    at.along_a--;
+    return at;
+}
+
+static bool dem2di_shifts_next(dem2di_shifts *at) {
+    if (at->along_a++ < at->last_a) return true;
+    while (at->along_b < at->last_b) {
+        at->along_b++;
+        dem2di_shifts_row(at);
+        if (at->along_a <= at->last_a) return true;
+    }
+    return false;
+}
+
+/* --- rows of images ----------------------------------------------------------------------------
+ */
+
+/* An image after its owner has moved: what changes in a step. */
+static inline void dem2di_image_move(dem2d_world *world, int k) {
+    const dem2di_image *image = &world->images[k];
+    const int slot = world->image_first + k;
+    if (image->owner < 0) return;
+    dem2di_state *now = &world->now[slot];
+    *now = world->now[image->owner];
+    now->x = dem2di_add(now->x, dem2di_cell_shift(world, image->shift[0], image->shift[1]));
+    if (world->plan.turns) world->displacement[slot] = world->displacement[image->owner];
+}
+
+/* The row of an image in all columns of particles. */
+static void dem2di_image_make(dem2d_world *world, int k) {
+    const int owner = world->images[k].owner, slot = world->image_first + k;
+    if (owner < 0) return;
+    for (int c = 0; c < DEM2DI_COLUMNS; c++) {
+        const dem2di_column *column = &dem2di_columns[c];
+        if (column->group < DEM2DI_BODIES || column->group > DEM2DI_MADE ||
+            (column->treatment & DEM2DI_SHARES) || slot >= world->capacity[column->group])
+            continue;
+        char *array = (char *)dem2di_column_get(world, column);
+        memcpy(array + (size_t)slot * column->size, array + (size_t)owner * column->size,
+               column->size);
+    }
+    dem2di_image_move(world, k);
+}
+
+static void dem2di_images_make(dem2d_world *world) {
+    for (int k = 0; k < world->image_count; k++) dem2di_image_make(world, k);
+}
+
+/* The images of a particle after an edit of it. */
+static void dem2di_images_follow(dem2d_world *world, int slot) {
+    for (int k = 0; k < world->image_count; k++)
+        if (world->images[k].owner == slot) dem2di_image_make(world, k);
+}
+
+/* Room for so many more images. */
+static bool dem2di_images_reserve(dem2d_world *world, int more) {
+    const int count = world->image_count;
+    if (more > (1 << 30) - count - world->image_first ||
+        !dem2di_group_reserve(world, DEM2DI_IMAGES, count + more))
+        return false;
+    if (count == 0) world->image_first = world->body_count;
+    return dem2di_reserve_bodies(world, world->image_first + count + more);
+}
+
+/* The slots of images go up when one more particle would take the first of them. */
+static bool dem2di_images_make_way(dem2d_world *world) {
+    const int first = world->image_first, more = 64 + world->body_count / 4;
+    if (world->image_count == 0 || world->body_count < first) return true;
+    if (!dem2di_images_reserve(world, more)) return false;
+    world->image_first += more;
+    for (int i = 0; i < world->list.pairs; i++)
+        if (world->list.keys[i].a >= 0 && world->list.keys[i].b >= first)
+            world->list.keys[i].b += more;
+    dem2di_images_make(world);
+    return true;
+}
+
+/* The slot of an image of a particle, for which there is room. */
+static int dem2di_image_slot(dem2d_world *world, int owner, int along_a, int along_b) {
+    int k = 0;
+    if (along_a == 0 && along_b == 0) return owner;
+    for (; k < world->image_count; k++) {
+        const dem2di_image *image = &world->images[k];
+        if (image->owner == owner && image->shift[0] == along_a && image->shift[1] == along_b)
+            return world->image_first + k;
+    }
+    dem2di_image *made = &world->images[world->image_count++];
+    made->owner = owner;
+    made->shift[0] = along_a;
+    made->shift[1] = along_b;
+    dem2di_image_make(world, k);
+    return world->image_first + k;
+}
+
+/* --- wraps -------------------------------------------------------------------------------------
+ */
+
+/* The shift of the B of a pair. */
+static void dem2di_shift_of(const dem2d_world *world, int slot, int shift[2]) {
+    shift[0] = shift[1] = 0;
+    if (world->image_count == 0 || slot < world->image_first) return;
+    shift[0] = world->images[slot - world->image_first].shift[0];
+    shift[1] = world->images[slot - world->image_first].shift[1];
+}
+
+/* A particle goes back by as many cells as it is out of the cell; there is room for the images that
+   its pairs see from there. */
+static void dem2di_wrap(dem2d_world *world, int slot, const int out[2]) {
+    const dem2di_list *list = &world->list;
+    for (int k = 0; k < world->image_count; k++) {
+        if (world->images[k].owner != slot) continue;
+        world->images[k].shift[0] += out[0];
+        world->images[k].shift[1] += out[1];
+    }
+    dem2d_vec way = dem2di_cell_shift(world, out[0], out[1]);
+    world->now[slot].x = dem2di_sub(world->now[slot].x, way);
+    for (int k = list->first[slot]; k < list->first[slot + 1]; k++) {
+        const int i = list->adjacent[k];
+        dem2di_key *key = &list->keys[i];
+        int shift[2];
+        if (i >= list->pairs || key->a < 0) continue;
+        if (k < list->own[slot]) {
+            if (key->b == slot) key->b = dem2di_image_slot(world, slot, out[0], out[1]);
+            continue;
+        }
+        dem2di_shift_of(world, key->b, shift);
+        key->b = dem2di_image_slot(world, dem2di_owner(world, key->b), shift[0] - out[0],
+                                   shift[1] - out[1]);
+    }
+}
+
+/* Particles that have left the cell go back into it; false when there is no memory: nothing has
+   changed then. */
+static bool dem2di_wrap_all(dem2d_world *world) {
+    const dem2di_list *list = &world->list;
+    const dem2di_fractions f = dem2di_fractions_make(&world->cell);
+    int64_t more = 0;
+    int out[2];
+    for (int i = 0; i < world->body_count; i++) {
+        if (!dem2di_cells_out(&f, world->now[i].x, out) || world->bodies[i].shape_index < 0)
+            continue;
+        more += list->first[i + 1] - list->first[i] + 1;
+    }
+    if (more > 1 << 29 || (more > 0 && !dem2di_images_reserve(world, (int)more))) return false;
+    for (int i = 0; i < world->body_count && more > 0; i++)
+        if (dem2di_cells_out(&f, world->now[i].x, out) && world->bodies[i].shape_index >= 0)
+            dem2di_wrap(world, i, out);
+    return true;
+}
+
+/* The positions after a step, in the cell, and those of the images. What finds no memory is tried
+   again before the next step. */
+static void dem2di_cell_commit(dem2d_world *world) {
+    if (!world->periodic) return;
+    world->wrap_due = !dem2di_wrap_all(world);
+    for (int k = 0; k < world->image_count; k++) dem2di_image_move(world, k);
+}
+
+/* ============================================================================================
    >>objects  Objects with ids: shapes, materials, particles, and what queries read of them
-   uses: config, math, memory, fields, shapes, gjk, broad, law, motion, world
+   uses: config, math, memory, fields, shapes, gjk, broad, law, motion, world, cell
    ============================================================================================ */
 
 DEM2D_API void dem2d_world_destroy(dem2d_world *world) {
@@ -13010,12 +13364,16 @@ static const dem2di_field dem2di_world_fields[] = {
     DEM2DI_ROW(dem2d_world_desc, loads, DEM2DI_OPTIONAL, "- NULL"),
     DEM2DI_ROW(dem2d_world_desc, loads_user, DEM2DI_OPTIONAL, "- NULL"),
     DEM2DI_ROW(dem2d_world_desc, event_capacity, DEM2DI_WHOLE(0, 1 << 30), "- none"),
+    DEM2DI_ROW(dem2d_world_desc, cell.a, DEM2DI_VECTOR, "m 0; along x"),
+    DEM2DI_ROW(dem2d_world_desc, cell.b, DEM2DI_VECTOR, "m 0; y > 0, or both 0"),
+    DEM2DI_ROW(dem2d_world_desc, cell.origin, DEM2DI_VECTOR, "m 0"),
 };
 
 DEM2D_API dem2d_result dem2d_world_create(const dem2d_world_desc *desc, dem2d_world **world) {
     if (desc == NULL) return DEM2D_NULL_ARGUMENT;
     if (world == NULL) return dem2di_fail_null(desc->env, "world");
     dem2d_result result = dem2di_check_fields(desc->env, DEM2DI_ALL(dem2di_world_fields), desc);
+    if (result == DEM2D_OK) result = dem2di_check_cell(desc->env, &desc->cell);
     if (result != DEM2D_OK) return result;
     dem2d_world *made = (dem2d_world *)dem2di_allocate(desc->env, 1, sizeof *made);
     if (made == NULL) return dem2di_fail(desc->env, DEM2D_OUT_OF_MEMORY, -1, "no memory for world");
@@ -13054,6 +13412,7 @@ DEM2D_API dem2d_result dem2d_world_create(const dem2d_world_desc *desc, dem2d_wo
     made->solver = desc->solver;
     made->faces = desc->faces;
     made->check_time_step = !desc->skip_time_step_check;
+    dem2di_cell_set(made, &desc->cell);
     if (!dem2di_reserve_bodies(made, desc->particle_capacity) ||
         !dem2di_list_reserve(made, &made->plan, desc->pair_capacity, desc->pair_capacity)) {
         result = dem2di_out_of_memory(made, "the capacities asked for");
@@ -13404,7 +13763,7 @@ static bool dem2di_groups_begin(dem2d_world *world, const dem2di_groups *groups)
     bool any = groups->category != 0 || groups->mask != 0 || groups->sensor || groups->user_data;
     if (world->grouped || !any) return true;
     if (!dem2di_group_reserve(world, DEM2DI_GROUPED, world->capacity[DEM2DI_BODIES])) return false;
-    memset(world->groups, 0, (size_t)world->body_count * sizeof *world->groups);
+    memset(world->groups, 0, (size_t)dem2di_slots(world) * sizeof *world->groups);
     return world->grouped = true;
 }
 
@@ -13424,8 +13783,10 @@ DEM2D_API dem2d_result dem2d_world_add_particle(dem2d_world *world, const dem2d_
     int slot = world->body_count;
     if (slot == 1 << 30)
         return dem2di_fail(&world->env, DEM2D_OUT_OF_RANGE, -1, "more than %d particles", slot);
+    result = dem2di_check_place(world, desc->position);
+    if (result != DEM2D_OK) return result;
     const dem2di_groups groups = dem2di_groups_of(&desc->groups, desc->user_data);
-    if (!dem2di_reserve_bodies(world, slot + 1) ||
+    if (!dem2di_images_make_way(world) || !dem2di_reserve_bodies(world, slot + 1) ||
         (desc->name != 0 && !dem2di_names_begin(world)) || !dem2di_groups_begin(world, &groups))
         return dem2di_out_of_memory(world, "a particle");
     dem2di_row_clear(world, DEM2DI_BODIES, DEM2DI_MADE, slot);
@@ -13439,7 +13800,7 @@ DEM2D_API dem2d_result dem2d_world_add_particle(dem2d_world *world, const dem2d_
     world->inverse[slot] = dem2di_inverse_of(world, &body);
     world->templates[desc->shape.index].users++;
     dem2di_state state;
-    state.x = desc->position;
+    state.x = dem2di_wrapped(world, desc->position);
     state.q = dem2di_orientation(world, desc->angle);
     state.v = desc->velocity;
     state.w = desc->angular_velocity;
@@ -13552,6 +13913,8 @@ DEM2D_API dem2d_result dem2d_world_remove_particle(dem2d_world *world, dem2d_par
     world->holes++;
     world->tree.made = false;
     dem2di_forget(world, slot);
+    for (int k = 0; k < world->image_count; k++)
+        if (world->images[k].owner == slot) world->images[k].owner = -1;
     dem2di_edited(world);
     dem2di_id_release(world, (int)id.index);
     return DEM2D_OK;
@@ -13900,10 +14263,12 @@ static void dem2di_moved(dem2d_world *world, int slot, dem2d_vec way) {
 
 /* To a position and an orientation, as states hold it. */
 static void dem2di_put_at(dem2d_world *world, int slot, dem2d_vec position, dem2d_rot q) {
+    position = dem2di_wrapped(world, position);
     dem2d_vec way = dem2di_sub(position, world->now[slot].x);
     world->now[slot].x = position;
     world->now[slot].q = q;
     world->before[slot] = world->now[slot];
+    dem2di_images_follow(world, slot);
     dem2di_moved(world, slot, way);
 }
 
@@ -13916,6 +14281,7 @@ DEM2D_API dem2d_result dem2d_world_move_particle(dem2d_world *world, dem2d_parti
     moved.position = position;
     moved.angle = angle;
     dem2d_result result = dem2di_check_motion(&world->env, &moved);
+    if (result == DEM2D_OK) result = dem2di_check_place(world, position);
     if (result != DEM2D_OK) return result;
     dem2di_put_at(world, slot, position, dem2di_orientation(world, angle));
     return DEM2D_OK;
@@ -13960,6 +14326,7 @@ DEM2D_API dem2d_result dem2d_world_set_groups(dem2d_world *world, dem2d_particle
     if (!dem2di_groups_begin(world, &now)) return dem2di_out_of_memory(world, "groups");
     if (!world->grouped) return DEM2D_OK;
     world->groups[slot] = now;
+    dem2di_images_follow(world, slot);
     if (!dem2di_meets_others(world, &old, &now, false)) return DEM2D_OK;
     for (int k = list->first[slot]; k < list->first[slot + 1]; k++)
         dem2di_contact_regroup(world, list->adjacent[k]);
@@ -13984,9 +14351,9 @@ static bool dem2di_redirect(dem2d_world *world, int slot, dem2d_vec v, double w)
     const dem2di_state *now = &world->now[slot];
     bool same = v.x == now->v.x && v.y == now->v.y && w == now->w;
     if (same || world->bodies[slot].redirected) return true;
-    if (!dem2di_group_reserve(world, DEM2DI_MADE, world->body_count)) return false;
+    if (!dem2di_group_reserve(world, DEM2DI_MADE, dem2di_slots(world))) return false;
     if (!world->redirected) /* of the others 0 */
-        memset(world->made, 0, (size_t)world->body_count * sizeof *world->made);
+        memset(world->made, 0, (size_t)dem2di_slots(world) * sizeof *world->made);
     world->made[slot] = dem2di_velocities_of(&world->now[slot]);
     world->bodies[slot].redirected = world->redirected = true;
     return true;
@@ -14018,6 +14385,7 @@ static void dem2di_set_motion(dem2d_world *world, int slot, dem2d_motion motion)
     body->motion = (uint8_t)motion;
     world->inverse[slot] = dem2di_inverse_of(world, body);
     world->check_due = world->ledger.edited = true;
+    dem2di_images_follow(world, slot);
     dem2di_edited(world);
 }
 
@@ -14026,6 +14394,7 @@ static bool dem2di_drive(dem2d_world *world, int slot, dem2d_vec velocity, doubl
     if (!dem2di_redirect(world, slot, velocity, spin)) return false;
     world->now[slot].v = velocity;
     world->now[slot].w = spin;
+    dem2di_images_follow(world, slot);
     if (world->bodies[slot].redirected) world->ledger.edited = true;
     if (dem2di_outruns(world, slot)) world->check_due = true;
     if (dem2di_speeds_matter(world, slot)) dem2di_edited(world);
@@ -14147,6 +14516,7 @@ DEM2D_API dem2d_result dem2d_world_set_material(dem2d_world *world, dem2d_partic
     if (result != DEM2D_OK || changed.material == world->bodies[slot].material) return result;
     world->bodies[slot] = changed;
     world->inverse[slot] = dem2di_inverse_of(world, &changed);
+    dem2di_images_follow(world, slot);
     world->check_due = world->ledger.edited = true;
     dem2di_edited(world);
     return DEM2D_OK;
@@ -14172,6 +14542,7 @@ DEM2D_API dem2d_result dem2d_world_set_shape(dem2d_world *world, dem2d_particle_
     world->inverse[slot] = dem2di_inverse_of(world, &changed);
     double radius = dem2di_shape_of(world, &changed)->circumscribed * scale;
     world->now[slot].radius = world->before[slot].radius = radius;
+    dem2di_images_follow(world, slot);
     dem2di_forget(world, slot);
     world->tree.made = false;
     world->check_due = true;
@@ -14203,6 +14574,7 @@ DEM2D_API dem2d_result dem2d_world_get_desc(const dem2d_world *world, dem2d_worl
     desc->exchange_user = world->exchange_user;
     desc->loads = world->set_loads;
     desc->loads_user = world->loads_user;
+    desc->cell = world->cell;
     return DEM2D_OK;
 }
 
@@ -14386,6 +14758,26 @@ static dem2d_result dem2di_check_segment(const dem2d_world *world, const dem2d_w
     return dem2di_fail(env, DEM2D_OUT_OF_RANGE, -1, "end: segment of length %g", length);
 }
 
+/* In a cell a wall is a half-plane along the periodic direction, and stays so. */
+static dem2d_result dem2di_check_wall_in_cell(const dem2d_world *world,
+                                              const dem2d_wall_desc *desc) {
+    const dem2d_cell *cell = &world->cell;
+    const dem2d_env *env = &world->env;
+    dem2d_vec normal, along = cell->a.x > 0 ? dem2di_vec(1, 0) : cell->b;
+    if (!world->periodic) return DEM2D_OK;
+    if (cell->a.x > 0 && cell->b.y > 0)
+        return dem2di_fail(env, DEM2D_OUT_OF_RANGE, -1, "a wall in a cell periodic along a and b");
+    if (desc->points != NULL || desc->segment || desc->angular_velocity != 0)
+        return dem2di_fail(env, DEM2D_OUT_OF_RANGE, -1,
+                           "a wall in a cell has an end or turns: only half-planes are possible");
+    if (!dem2di_unit(desc->normal, &normal)) return DEM2D_OK; /* an error of all half-planes */
+    (void)dem2di_unit(along, &along);
+    if (fabs(dem2di_dot(normal, along)) <= 4 * DBL_EPSILON) return DEM2D_OK; /* two roundings */
+    return dem2di_fail(env, DEM2D_OUT_OF_RANGE, -1,
+                       "normal (%g, %g) of a wall that is not along the periodic direction",
+                       desc->normal.x, desc->normal.y);
+}
+
 static dem2d_result dem2di_check_wall(const dem2d_world *world, const dem2d_wall_desc *desc) {
     const dem2d_env *env = &world->env;
     dem2d_vec unit;
@@ -14399,6 +14791,8 @@ static dem2d_result dem2di_check_wall(const dem2d_world *world, const dem2d_wall
         return dem2di_fail(env, DEM2D_OUT_OF_RANGE, -1, "angular_velocity = %g of a servo wall",
                            desc->angular_velocity);
     if (desc->points == NULL && desc->count != 0) return dem2di_fail_null(env, "points");
+    result = dem2di_check_wall_in_cell(world, desc);
+    if (result != DEM2D_OK) return result;
     if (desc->points != NULL) {
         result = dem2di_check_chain(world, desc);
         return result == DEM2D_OK ? dem2di_check_spans(world, desc) : result;
@@ -14867,6 +15261,10 @@ DEM2D_API dem2d_result dem2d_world_drive_wall(dem2d_world *world, dem2d_wall_id 
     if (result != DEM2D_OK) return result;
     if (wall->desc.mode == DEM2D_WALL_SERVO)
         return dem2di_fail(env, DEM2D_OUT_OF_RANGE, slot, "mode: a servo wall finds its velocity");
+    dem2d_wall_desc driven = wall->desc;
+    driven.angular_velocity = angular_velocity;
+    result = dem2di_check_wall_in_cell(world, &driven);
+    if (result != DEM2D_OK) return result;
     const dem2di_wall old = *wall;
     for (int j = 0; j < world->wall_count; j++) /* it may have rested beside them */
         if (j != slot && world->walls[j].alive && world->walls[j].desc.segment)
@@ -15454,7 +15852,7 @@ static dem2d_vec dem2di_vertex_place(const dem2d_world *world, int number) {
 
 /* ============================================================================================
    >>list  The list of contacts: particles in the order of space, partners, what they remember
-   uses: config, math, broad, law, motion, world, objects, walls, joints
+   uses: config, math, broad, law, motion, world, cell, objects, walls, joints
    ============================================================================================ */
 
 /* Parallel work is cut into blocks of so many items: enough to pay for a call of the callback's,
@@ -15504,11 +15902,11 @@ static int dem2di_force_blocks(int discs, int count) {
     return dem2di_blocks(discs, DEM2DI_BLOCK) + dem2di_blocks(count - discs, DEM2DI_BLOCK_OTHERS);
 }
 
-/* Blocks of the search for the list: of particles, of parts of walls, and one for contacts that
-   have come apart. */
+/* Blocks of the search for the list: of particles, of parts of walls, one for contacts that have
+   come apart, and one for the images in a cell. */
 static int dem2di_search_blocks(const dem2d_world *world) {
     return dem2di_blocks(world->body_count, DEM2DI_BLOCK) +
-           dem2di_blocks(world->part_count, DEM2DI_BLOCK_OTHERS) + 1;
+           dem2di_blocks(world->part_count, DEM2DI_BLOCK_OTHERS) + 1 + world->periodic;
 }
 
 /* Room for what the blocks find. */
@@ -15600,6 +15998,40 @@ static int dem2di_adjacency_sort_few(const dem2d_world *world, int slot, int *ru
     return as_b;
 }
 
+/* Is contact i of a pair before contact k of the same two, by the shifts of their images? */
+static bool dem2di_shift_precedes(const dem2d_world *world, int i, int k) {
+    int one[2], other[2];
+    dem2di_shift_of(world, world->list.keys[i].b, one);
+    dem2di_shift_of(world, world->list.keys[k].b, other);
+    return one[1] != other[1] ? one[1] < other[1] : one[0] < other[0];
+}
+
+/* Contacts of a particle, sorted by ranks, in a cell: those with images of one partner by shifts,
+   those with itself as B and then as A. Returns of how many it is B; so far without itself. */
+static int dem2di_adjacency_images(const dem2d_world *world, int slot, int *run, int count,
+                                   int as_b) {
+    const dem2di_key *keys = world->list.keys;
+    int own = 0;
+    for (int i = 1; i < count; i++) {
+        const int contact = run[i];
+        int k = i;
+        if (contact >= world->list.pairs) break; /* walls are behind */
+        for (; k > 0 &&
+               dem2di_adjacency_rank(world, slot, run[k - 1]) ==
+                   dem2di_adjacency_rank(world, slot, contact) &&
+               dem2di_shift_precedes(world, contact, run[k - 1]);
+             k--)
+            run[k] = run[k - 1];
+        run[k] = contact;
+    }
+    for (int i = as_b; i < count && run[i] < world->list.pairs; i++)
+        own += keys[run[i]].a == slot && dem2di_owner(world, keys[run[i]].b) == slot;
+    own /= 2; /* each is there twice, one entry behind the other */
+    for (int i = 0; i < own; i++) run[as_b + i] = run[as_b + 2 * i];
+    for (int i = 0; i < own; i++) run[as_b + own + i] = run[as_b + i];
+    return as_b + own;
+}
+
 /* Each particle's contacts in order; many by Shell's sort (Ciura's gaps): a particle that is a
    hundred times larger than its neighbours has hundreds. */
 static void dem2di_adjacency_sort_task(void *context, int begin, int end) {
@@ -15610,12 +16042,9 @@ static void dem2di_adjacency_sort_task(void *context, int begin, int end) {
     for (int slot = begin * DEM2DI_BLOCK; slot < last; slot++) {
         int *run = list->adjacent + list->first[slot];
         int count = list->first[slot + 1] - list->first[slot], as_b = 0;
-        if (count <= DEM2DI_FEW_CONTACTS) {
-            as_b = dem2di_adjacency_sort_few(world, slot, run, count);
-            list->own[slot] = list->first[slot] + as_b;
-            continue;
-        }
-        for (int g = 0; g < 7; g++) {
+        bool few = count <= DEM2DI_FEW_CONTACTS;
+        if (few) as_b = dem2di_adjacency_sort_few(world, slot, run, count);
+        for (int g = 0; g < 7 && !few; g++) {
             for (int i = gaps[g]; i < count; i++) {
                 int contact = run[i], k = i;
                 uint32_t rank = dem2di_adjacency_rank(world, slot, contact);
@@ -15625,7 +16054,8 @@ static void dem2di_adjacency_sort_task(void *context, int begin, int end) {
                 run[k] = contact;
             }
         }
-        while (as_b < count && list->keys[run[as_b]].a != slot) as_b++;
+        while (!few && as_b < count && list->keys[run[as_b]].a != slot) as_b++;
+        if (world->image_count > 0) as_b = dem2di_adjacency_images(world, slot, run, count, as_b);
         list->own[slot] = list->first[slot] + as_b;
     }
 }
@@ -15640,13 +16070,13 @@ static void dem2di_adjacency_fill_task(void *context, int begin, int end) {
     for (int i = 0; i < list->count; i++) {
         if (list->keys[i].a < 0) continue;
         last[list->keys[i].a]++;
-        if (i < list->pairs) last[list->keys[i].b]++;
+        if (i < list->pairs) last[dem2di_owner(world, list->keys[i].b)]++;
     }
     (void)dem2di_starts(last, slots);
     for (int i = 0; i < list->count; i++) {
         if (list->keys[i].a < 0) continue;
         list->adjacent[last[list->keys[i].a]++] = i;
-        if (i < list->pairs) list->adjacent[last[list->keys[i].b]++] = i;
+        if (i < list->pairs) list->adjacent[last[dem2di_owner(world, list->keys[i].b)]++] = i;
     }
 }
 
@@ -15707,8 +16137,10 @@ static void dem2di_arrange_task(void *context, int begin, int end) {
         dem2di_key *key = &w->list.keys[i];
         if (key->a < 0) continue;
         key->a = to[key->a];
-        if (i < w->list.pairs) key->b = to[key->b];
+        if (i < w->list.pairs && dem2di_owner(w, key->b) == key->b) key->b = to[key->b];
     }
+    for (int k = 0; k < w->image_count; k++)
+        if (w->images[k].owner >= 0) w->images[k].owner = to[w->images[k].owner];
     w->body_count = count;
     w->holes = 0;
     w->tree.made = false;
@@ -15801,7 +16233,16 @@ typedef struct dem2di_build {
     char *column;                        /* room for a column of contacts, where the grid was */
     bool bounded, back; /* as in the world; whether the next step may look back on contacts */
     double softness;
+    int image_base;          /* an image that was found has this plus its number for a slot, */
+    int images, lost_images; /* so many are in world->images_next: near ones, then those of contacts
+                                whose partners are out of reach */
 } dem2di_build;
+
+/* The particle that a slot in the keys of the next list shows. */
+static inline int dem2di_build_owner(const dem2di_build *build, int slot) {
+    return slot < build->image_base ? slot
+                                    : build->world->images_next[slot - build->image_base].owner;
+}
 
 /* Are two circles taken by the closed form? GJK and EPA take every pair. */
 static bool dem2di_has_discs(const dem2d_world *world) {
@@ -16093,6 +16534,173 @@ static void dem2di_search_segment(const dem2di_build *build, int part, dem2di_fi
     }
 }
 
+/* --- images that particles may meet -------------------------------------------------------------
+   Found before the blocks search: the images of each particle that come within reach of the box of
+   all centres. A block then looks for the particles near each of them. */
+
+static bool dem2di_build_image(dem2di_build *build, int owner, int along_a, int along_b) {
+    dem2d_world *world = build->world;
+    const int k = build->images + build->lost_images;
+    if (k == 1 << 28 || !dem2di_group_reserve(world, DEM2DI_IMAGES, k + 1)) return false;
+    world->images_next[k].owner = owner;
+    world->images_next[k].shift[0] = along_a;
+    world->images_next[k].shift[1] = along_b;
+    world->images_next[k].row = -1;
+    return true;
+}
+
+/* The disc of an image, with that for its slot. */
+static dem2di_disc dem2di_image_disc(const dem2di_build *build, const dem2di_image *image,
+                                     int slot) {
+    dem2di_disc disc = build->grid.discs[image->owner];
+    dem2d_vec way = dem2di_cell_shift(build->world, image->shift[0], image->shift[1]);
+    disc.centre = dem2di_add(disc.centre, way);
+    disc.slot = slot;
+    return disc;
+}
+
+/* Is the B of a listed pair out of reach? */
+static bool dem2di_listed_far(const dem2di_build *build, const dem2di_key *key) {
+    dem2di_image image;
+    image.owner = dem2di_owner(build->world, key->b);
+    dem2di_shift_of(build->world, key->b, image.shift);
+    const dem2di_disc disc = dem2di_image_disc(build, &image, key->b);
+    return !dem2di_discs_near(&build->grid.discs[key->a], &disc);
+}
+
+/* Is B of a listed pair an image with a shift? One with the shift 0 is as good as its owner. */
+static bool dem2di_is_shifted(const dem2d_world *world, int slot) {
+    int shift[2];
+    dem2di_shift_of(world, slot, shift);
+    return shift[0] != 0 || shift[1] != 0;
+}
+
+/* Images of closed contacts that are out of reach; false when there is no memory. */
+static bool dem2di_build_lost_images(dem2di_build *build) {
+    const dem2d_world *world = build->world;
+    const dem2di_list *list = &world->list;
+    for (int i = 0; i < list->pairs && build->strayed; i++) {
+        const dem2di_key *key = &list->keys[i];
+        int shift[2];
+        if (!(list->contacts.depth[i] > 0) || !dem2di_is_shifted(world, key->b)) continue;
+        if (!dem2di_listed_far(build, key)) continue;
+        dem2di_shift_of(world, key->b, shift);
+        if (!dem2di_build_image(build, dem2di_owner(world, key->b), shift[0], shift[1]))
+            return false;
+        build->lost_images++;
+    }
+    return true;
+}
+
+/* All images that the list may need, and room for them. Numbers of cells are rounded: the box is a
+   little larger. */
+static bool dem2di_build_images(dem2di_build *build) {
+    dem2d_world *world = build->world;
+    const dem2di_grid *grid = &build->grid;
+    build->image_base = world->body_count;
+    for (int i = 0; i < world->body_count && world->periodic; i++) {
+        const double far = dem2di_size_of(grid->box.lower) + dem2di_size_of(grid->box.upper);
+        const double reach = grid->discs[i].reach + grid->size / 2 + DEM2DI_ROUNDOFF * far;
+        dem2d_box box = grid->box;
+        box.lower = dem2di_sub(box.lower, dem2di_vec(reach, reach));
+        box.upper = dem2di_add(box.upper, dem2di_vec(reach, reach));
+        dem2di_shifts at = dem2di_shifts_start(world, grid->discs[i].centre, &box);
+        while (dem2di_shifts_next(&at)) {
+            if (at.along_a == 0 && at.along_b == 0) continue;
+            if (!dem2di_build_image(build, i, at.along_a, at.along_b)) return false;
+            build->images++;
+        }
+    }
+    if (!dem2di_build_lost_images(build)) return false;
+    const int slots = world->body_count + build->images + build->lost_images;
+    return !world->periodic ||
+           (dem2di_reserve_bodies(world, slots) &&
+            (!build->plan.turns || dem2di_group_reserve(world, DEM2DI_DISPLACEMENTS, slots)));
+}
+
+/* May a particle be the A of a pair with an image? */
+static bool dem2di_meets_image(const dem2d_world *world, int slot, const dem2di_image *image) {
+    const int b = image->shift[1], a = image->shift[0];
+    if (slot == image->owner) return b > 0 || (b == 0 && a > 0);
+    return world->bodies[slot].rank < world->bodies[image->owner].rank;
+}
+
+/* Particles near image k among the discs from begin to end in sorted that are in cells of a row. */
+static void dem2di_image_range(const dem2di_build *build, int k, const dem2di_disc *own, int begin,
+                               int end, int level, const dem2di_cell row[2], dem2di_finds *finds) {
+    const dem2d_world *world = build->world;
+    const dem2di_grid *grid = &build->grid;
+    const dem2di_image *image = &world->images_next[k];
+    for (int i = begin; i < end; i++) {
+        const dem2di_disc *other = &grid->sorted[i];
+        if (other->level != level || !dem2di_discs_near(other, own)) continue;
+        dem2di_cell at = dem2di_cell_at(grid, other->centre, dem2di_cell_size(grid, level));
+        if (at.x < row[0].x || at.x > row[1].x || at.y < row[0].y || at.y > row[1].y) continue;
+        if (!dem2di_meets_image(world, other->slot, image)) continue;
+        if (finds->groups != NULL &&
+            !dem2di_meet(&finds->groups[image->owner], &finds->groups[other->slot]))
+            continue;
+        dem2di_find(finds, other->slot, own->circle && other->circle ? own->slot : ~own->slot);
+    }
+}
+
+/* Particles near image k, row by row of the cells around it. The reach of discs is below half a
+   cell, the rest of 0.51 is for the rounding of cell numbers. Where there are more cells than
+   particles, it is compared with all of them. */
+static void dem2di_image_partners(const dem2di_build *build, int k, dem2di_finds *finds) {
+    const dem2di_grid *grid = &build->grid;
+    const dem2di_disc own =
+        dem2di_image_disc(build, &build->world->images_next[k], build->image_base + k);
+    const dem2d_vec side = dem2di_sub(grid->box.upper, grid->box.lower);
+    const dem2d_vec from = dem2di_sub(own.centre, grid->box.lower);
+    for (int level = 0; level < DEM2DI_LEVELS; level++) {
+        const double size = dem2di_cell_size(grid, level), r = own.reach + 0.51 * size;
+        dem2di_cell cells[2];
+        if (!(grid->levels >> level & 1) || from.x < -r || from.y < -r || from.x > side.x + r ||
+            from.y > side.y + r)
+            continue;
+        cells[0].x = dem2di_cell_of(dem2di_max(0, from.x - r), size);
+        cells[0].y = dem2di_cell_of(dem2di_max(0, from.y - r), size);
+        cells[1].x = dem2di_cell_of(dem2di_min(side.x, from.x + r), size);
+        cells[1].y = dem2di_cell_of(dem2di_min(side.y, from.y + r), size);
+        if (cells[1].x - cells[0].x >= grid->count - (cells[1].y - cells[0].y)) {
+            dem2di_image_range(build, k, &own, 0, grid->count, level, cells, finds);
+            continue;
+        }
+        for (int64_t y = cells[0].y; y <= cells[1].y; y++) {
+            int64_t x = cells[0].x;
+            while (x <= cells[1].x) {
+                int begin, end;
+                dem2di_cell run[2] = {{x, y}, {0, y}};
+                x = dem2di_grid_run(grid, x, cells[1].x, y, level, &begin, &end);
+                run[1].x = x - 1;
+                dem2di_image_range(build, k, &own, begin, end, level, run, finds);
+            }
+        }
+    }
+}
+
+/* Images of the same owners as in the list that are needed, in their order; the keys of the next
+   list get their slots. */
+static void dem2di_build_images_keep(dem2di_build *build, int pairs) {
+    dem2d_world *world = build->world;
+    dem2di_image *images = world->images_next;
+    const int base = build->image_base, found = build->images + build->lost_images;
+    int used = 0;
+    for (int i = 0; i < pairs; i++)
+        if (build->keys[i].b >= base) images[build->keys[i].b - base].row = 0;
+    for (int k = 0; k < found; k++)
+        if (images[k].row == 0) images[k].row = used++;
+    for (int i = 0; i < pairs; i++)
+        if (build->keys[i].b >= base) build->keys[i].b = base + images[build->keys[i].b - base].row;
+    for (int k = 0; k < found; k++)
+        if (images[k].row >= 0) images[images[k].row] = images[k];
+    world->images_next = world->images;
+    world->images = images;
+    world->image_first = base;
+    world->image_count = used;
+}
+
 /* Contacts of the last force pass whose partners are out of reach by now stay listed for the
    queries and the ledger. Particles only get there when some have strayed or have been fixed since
    (then the features in use are due). */
@@ -16100,13 +16708,17 @@ static void dem2di_find_lost(const dem2di_build *build, dem2di_finds *finds) {
     const dem2d_world *world = build->world;
     const dem2di_list *list = &world->list;
     const dem2di_disc *discs = build->grid.discs;
+    int image = build->image_base + build->images;
     for (int i = build->strayed ? 0 : list->pairs; i < list->count; i++) {
         int a = list->keys[i].a, b = list->keys[i].b;
         if (!(list->contacts.depth[i] > 0)) continue;
-        if (i >= list->pairs && !dem2di_number_is_near(world, &discs[a], b))
-            dem2di_find(finds, ~a, b);
-        else if (i < list->pairs && !dem2di_discs_near(&discs[a], &discs[b]))
-            dem2di_find(finds, a, discs[a].circle && discs[b].circle ? b : ~b);
+        if (i >= list->pairs) {
+            if (!dem2di_number_is_near(world, &discs[a], b)) dem2di_find(finds, ~a, b);
+        } else if (dem2di_listed_far(build, &list->keys[i])) {
+            const int owner = dem2di_owner(world, b);
+            b = dem2di_is_shifted(world, b) ? image++ : owner;
+            dem2di_find(finds, a, discs[a].circle && discs[owner].circle ? b : ~b);
+        }
     }
 }
 
@@ -16114,6 +16726,7 @@ static void dem2di_search_task(void *context, int begin, int end) {
     const dem2di_build *build = (const dem2di_build *)context;
     const dem2d_world *world = build->world;
     int bodies = dem2di_blocks(world->body_count, DEM2DI_BLOCK);
+    int blocks = dem2di_search_blocks(world);
     for (int block = begin; block < end; block++) {
         dem2di_block_result *result = &world->block_results[block];
         int first = (block - bodies) * DEM2DI_BLOCK_OTHERS;
@@ -16121,6 +16734,8 @@ static void dem2di_search_task(void *context, int begin, int end) {
                               dem2di_groups_used(world)};
         if (block < bodies)
             dem2di_search_particles(build, block, &finds);
+        else if (block == blocks - 1 && world->periodic)
+            for (int k = 0; k < build->images; k++) dem2di_image_partners(build, k, &finds);
         else if (first >= world->part_count)
             dem2di_find_lost(build, &finds);
         else
@@ -16132,6 +16747,26 @@ static void dem2di_search_task(void *context, int begin, int end) {
         result->starts[DEM2DI_OTHERS] = finds.others;
         result->starts[DEM2DI_WALL_CONTACTS] = finds.walls;
     }
+}
+
+/* The contact that a particle had in the old list, as A, with an image of another; or -1. */
+static int dem2di_listed_image(const dem2di_build *build, const dem2di_key *key) {
+    const dem2d_world *world = build->world;
+    const dem2di_list *list = &world->list;
+    const int owner = dem2di_build_owner(build, key->b);
+    int shift[2] = {0, 0};
+    if (key->b >= build->image_base)
+        memcpy(shift, world->images_next[key->b - build->image_base].shift, sizeof shift);
+    for (int k = list->own[key->a]; k < list->first[key->a + 1]; k++) {
+        const int contact = list->adjacent[k];
+        const dem2di_key *old = &list->keys[contact];
+        int listed[2];
+        if (contact >= list->pairs || old->a != key->a || dem2di_owner(world, old->b) != owner)
+            continue;
+        dem2di_shift_of(world, old->b, listed);
+        if (listed[0] == shift[0] && listed[1] == shift[1]) return contact;
+    }
+    return -1;
 }
 
 /* The contact that two partners had in the old list, or -1. */
@@ -16208,7 +16843,8 @@ static void dem2di_carry_others(const dem2di_build *build, int discs, int pairs)
         const dem2di_key *key = &build->keys[i];
         if (world->plan.turns)
             contacts->history[i - discs].bound -=
-                world->displacement[key->a] + world->displacement[key->b];
+                world->displacement[key->a] +
+                world->displacement[dem2di_build_owner(build, key->b)];
     }
 }
 
@@ -16231,11 +16867,13 @@ static void dem2di_fill_task(void *context, int begin, int end) {
             }
             if (b < 0) b = ~b;
             int at = result->starts[kind]++;
-            bool turned = bodies[a].rank > bodies[b].rank;
+            int owner = dem2di_build_owner(build, b);
+            bool turned = bodies[a].rank > bodies[owner].rank;
             build->keys[at].a = turned ? b : a;
             build->keys[at].b = turned ? a : b;
-            build->old[at] = dem2di_listed(world, &build->keys[at], false);
-            spread += a < b ? b - a : a - b;
+            build->old[at] = world->periodic ? dem2di_listed_image(build, &build->keys[at])
+                                             : dem2di_listed(world, &build->keys[at], false);
+            spread += a < owner ? owner - a : a - owner;
         }
         result->spread = spread;
     }
@@ -16365,7 +17003,7 @@ static double dem2di_softness_of(const dem2di_build *build, double *sums) {
         slender[i] = 2 / dem2di_body_inertia(world, &world->bodies[i]);
     }
     for (int i = 0; i < pairs + build->total[DEM2DI_WALL_CONTACTS]; i++) {
-        int a = build->keys[i].a, b = i < pairs ? build->keys[i].b : a;
+        int a = build->keys[i].a, b = i < pairs ? dem2di_build_owner(build, build->keys[i].b) : a;
         double radius = dem2di_max(world->now[a].radius, world->now[b].radius);
         sums[a] += light[a] + radius * radius * slender[a];
         if (i < pairs) sums[b] += light[b] + radius * radius * slender[b];
@@ -16538,6 +17176,7 @@ static bool dem2di_build_search(dem2di_build *build) {
     if (!dem2di_build_cut(build)) return false;
     dem2di_run(world, DEM2D_PHASE_LIST, blocks, dem2di_place_task, build);
     dem2di_run(world, DEM2D_PHASE_LIST, 1, dem2di_grid_task, build);
+    if (!dem2di_build_images(build)) return false;
     while (full)
         if (!dem2di_search_pass(build, &full)) return false;
     if (!dem2di_build_cut(build)) return false;
@@ -16571,15 +17210,17 @@ static void dem2di_build_finish(dem2di_build *build) {
     list->discs = discs;
     list->pairs = pairs;
     list->count = count;
+    if (world->periodic) dem2di_build_images_keep(build, pairs);
     if (count > 0) memcpy(list->keys, build->keys, (size_t)count * sizeof *list->keys);
     if (world->plan.turns != build->plan.turns) dem2di_reorient(world, build->plan.turns);
     world->plan = build->plan;
-    world->immovable = dem2di_some_immovable(world);
-    dem2di_loads_clear(world);
-    dem2di_adjacency_make(world);
     if (world->plan.turns)
         dem2di_run(world, DEM2D_PHASE_LIST, dem2di_blocks(world->body_count, DEM2DI_BLOCK),
                    dem2di_displacement_task, world);
+    dem2di_images_make(world);
+    world->immovable = dem2di_some_immovable(world);
+    dem2di_loads_clear(world);
+    dem2di_adjacency_make(world);
     dem2di_extent_set(world);
     world->bounded = build->bounded;
     world->softness = build->softness;
@@ -16624,7 +17265,7 @@ static dem2d_result dem2di_build_list(dem2d_world *world, const dem2di_plan *pla
             world->walls[j].skin = dem2di_skin_of(world, largest, dem2di_wall_speed(world, j));
         build.plan = *plan;
         room = !build.plan.turns ||
-               dem2di_group_reserve(world, DEM2DI_DISPLACEMENTS, world->body_count);
+               dem2di_group_reserve(world, DEM2DI_DISPLACEMENTS, dem2di_slots(world));
     }
     if (!room || !dem2di_build_search(&build)) return dem2di_list_failed(world, skin, interval);
     dem2di_run(world, DEM2D_PHASE_LIST, dem2di_search_blocks(world), dem2di_fill_task, &build);
@@ -16840,7 +17481,7 @@ static double dem2di_ledger_turnover(const dem2di_ledger *ledger, const dem2di_l
 /* ============================================================================================
    >>step  Contacts, their sums, walls, motion; the stable time step
    uses: config, math, memory, fields, support, shapes, gjk, faces, contact, broad, law, motion,
-         world, objects, walls, joints, list, ledger
+         world, cell, objects, walls, joints, list, ledger
    ============================================================================================ */
 
 /* Contacts of circles are taken in batches: what they need is fetched, all are computed by a loop
@@ -19331,6 +19972,15 @@ static void dem2di_touch_sort_task(void *context, int begin, int end) {
         }
     }
     dem2di_sort(world->changes, world->changes_spare, count);
+    for (int i = 1; i < count && world->image_count > 0; i++) { /* images of one partner */
+        const dem2di_order change = world->changes[i];
+        int k = i;
+        for (; k > 0 && world->changes[k - 1].key == change.key &&
+               dem2di_shift_precedes(world, change.value, world->changes[k - 1].value);
+             k--)
+            world->changes[k] = world->changes[k - 1];
+        world->changes[k] = change;
+    }
     world->change_count = count;
 }
 
@@ -19406,8 +20056,8 @@ DEM2D_API dem2d_result dem2d_world_choose_time_step(const dem2d_world *world, do
 
 /* A step has been made, and nobody has been given other velocities since. */
 static void dem2di_made(dem2d_world *world) {
-    for (int i = 0; i < world->body_count && world->redirected; i++)
-        world->bodies[i].redirected = false;
+    const int slots = dem2di_slots(world);
+    for (int i = 0; i < slots && world->redirected; i++) world->bodies[i].redirected = false;
     world->redirected = false;
     world->made_step = world->time_step;
 }
@@ -19418,6 +20068,7 @@ static void dem2di_commit(dem2d_world *world) {
     for (int j = 0; j < world->wall_count; j++)
         if (world->walls[j].desc.mode != DEM2D_WALL_STILL) dem2di_surfaces_set(world, j);
     dem2di_made(world);
+    dem2di_cell_commit(world);
     world->steps++;
     world->sums_fresh = world->keeps_sums && world->gather == NULL;
     world->tree.made = false;
@@ -19452,6 +20103,8 @@ typedef struct dem2di_trial {
 /* The passes that may be refused, up to the last check. */
 static dem2d_result dem2di_step_try(dem2d_world *world, dem2di_trial *trial) {
     if (world->set_loads != NULL) world->set_loads(world->loads_user, world);
+    if (world->wrap_due) dem2di_cell_commit(world);
+    if (world->wrap_due) return dem2di_out_of_memory(world, "images in the cell");
     if (!dem2di_sums_reserve(world)) return dem2di_out_of_memory(world, "sums of forces");
     if (!dem2di_group_reserve(world, DEM2DI_EVENTS, world->event_capacity))
         return dem2di_out_of_memory(world, "events");
@@ -19544,7 +20197,7 @@ DEM2D_API dem2d_result dem2d_world_events(dem2d_world *world, dem2d_contact_even
 
 /* ============================================================================================
    >>measures  Lists of what is there, energy, stress, fabric, packing, distance from rest
-   uses: config, math, memory, fields, mass, shapes, broad, law, motion, world, objects
+   uses: config, math, memory, fields, mass, shapes, broad, law, motion, world, cell, objects
    ============================================================================================ */
 
 /* Slot of the next particle in the order of ranks, or -1; `place` starts at 0. */
@@ -19703,6 +20356,20 @@ DEM2D_API dem2d_result dem2d_world_materials(const dem2d_world *world, dem2d_mat
     return DEM2D_OK;
 }
 
+/* The shift of the B of a pair in the last force pass, from the branch vector that it had then: the
+   particles may have gone back into the cell since. */
+static void dem2di_shift_seen(const dem2d_world *world, const dem2di_key *key, dem2d_vec branch,
+                              int shift[2]) {
+    const dem2di_fractions f = dem2di_fractions_make(&world->cell);
+    if (!world->periodic) return;
+    const int owner = dem2di_owner(world, key->b);
+    dem2d_vec apart = dem2di_sub(world->before[owner].x, world->before[key->a].x);
+    dem2d_vec way = dem2di_sub(branch, apart);
+    double t = way.y * f.per_y, s = way.x * f.per_x - t * f.slope;
+    shift[0] = (int)floor(s + 0.5);
+    shift[1] = (int)floor(t + 0.5);
+}
+
 static dem2d_contact_info dem2di_contact_of(const dem2d_world *world,
                                             const dem2di_contact_iterator *iterator) {
     const dem2di_key *key = &world->list.keys[iterator->number];
@@ -19717,6 +20384,7 @@ static dem2d_contact_info dem2di_contact_of(const dem2d_world *world,
         info.feature = key->b / DEM2DI_VERTEX;
     } else {
         info.b = dem2di_particle_id(world, key->b);
+        dem2di_shift_seen(world, key, iterator->branch, info.shift);
     }
     info.sign = info.feature > 0 ? -1 : 1;
     info.normal = contact->normal;
@@ -19976,6 +20644,24 @@ static double dem2di_area_inside(const dem2d_world *world, int slot, const dem2d
     return area * dem2di_part_inside(shape, &pose, &part);
 }
 
+/* The same of a particle and of all its images in a cell. */
+static double dem2di_images_inside(const dem2d_world *world, int slot, const dem2d_box *region) {
+    const dem2di_state *state = &world->before[slot];
+    dem2d_vec reach = dem2di_vec(state->radius, state->radius);
+    dem2d_box box, seen;
+    double area = 0;
+    box.lower = dem2di_sub(region->lower, reach);
+    box.upper = dem2di_add(region->upper, reach);
+    dem2di_shifts at = dem2di_shifts_start(world, state->x, &box);
+    while (dem2di_shifts_next(&at)) {
+        dem2d_vec way = dem2di_cell_shift(world, at.along_a, at.along_b);
+        seen.lower = dem2di_sub(region->lower, way);
+        seen.upper = dem2di_sub(region->upper, way);
+        area += dem2di_area_inside(world, slot, &seen);
+    }
+    return area;
+}
+
 static dem2d_result dem2di_check_region(const dem2d_env *env, const char *name,
                                         const dem2d_box *region) {
     char lower[32], upper[32];
@@ -19998,7 +20684,7 @@ DEM2D_API dem2d_result dem2d_world_porosity(const dem2d_world *world, const dem2
     if (result != DEM2D_OK) return result;
     double solid = 0;
     for (int place = 0, slot; (slot = dem2di_next_grain(world, &place)) >= 0;)
-        solid += dem2di_area_inside(world, slot, region);
+        solid += dem2di_images_inside(world, slot, region);
     double width = region->upper.x - region->lower.x, height = region->upper.y - region->lower.y;
     *porosity = 1 - solid / (width * height);
     return DEM2D_OK;
@@ -20736,11 +21422,38 @@ static dem2d_result dem2di_check_periods(const dem2d_grid *grid, const dem2d_wor
     return DEM2D_OK;
 }
 
+/* Two periods are the same to rounding. */
+static bool dem2di_same_period(double one, double other) {
+    return fabs(one - other) <= DEM2DI_ROUNDOFF * other;
+}
+
+/* A world that is periodic needs a grid with the same periods. */
+static dem2d_result dem2di_check_grid_cell(const dem2d_grid *grid, const dem2d_world *world) {
+    const dem2d_cell *cell = &world->cell;
+    const dem2d_grid_desc *desc = &grid->desc;
+    const dem2d_vec side = dem2di_sub(desc->box.upper, desc->box.lower);
+    if (!world->periodic) return DEM2D_OK;
+    if (desc->angle == 0 && cell->b.x == 0 &&
+        (!(cell->a.x > 0) || (desc->periodic_x && dem2di_same_period(side.x, cell->a.x))) &&
+        (!(cell->b.y > 0) || (desc->periodic_y && dem2di_same_period(side.y, cell->b.y))))
+        return DEM2D_OK;
+    return dem2di_fail(&grid->env, DEM2D_OUT_OF_RANGE, -1,
+                       "box: the grid does not have the periods of the world's cell");
+}
+
+/* A box or circle has no images of what is beyond the border. */
+static dem2d_result dem2di_check_no_cell(const dem2d_world *world) {
+    if (!world->periodic) return DEM2D_OK;
+    return dem2di_fail(&world->env, DEM2D_OUT_OF_RANGE, -1,
+                       "cell: averages over a box or a circle do not work in a periodic cell");
+}
+
 DEM2D_API dem2d_result dem2d_grid_add(dem2d_grid *grid, const dem2d_world *world, double weight) {
     if (grid == NULL) return DEM2D_NULL_ARGUMENT;
     if (world == NULL) return dem2di_fail_null(&grid->env, "world");
     dem2d_result result = dem2di_check_number(&grid->env, "weight", weight, DEM2DI_POSITIVE);
     if (result == DEM2D_OK) result = dem2di_check_periods(grid, world);
+    if (result == DEM2D_OK) result = dem2di_check_grid_cell(grid, world);
     if (result == DEM2D_OK) dem2di_coarse_add_world(grid, world, weight);
     return result;
 }
@@ -20783,6 +21496,7 @@ DEM2D_API dem2d_result dem2d_world_average_box(const dem2d_world *world, const d
                                                dem2d_average *average) {
     if (world == NULL || box == NULL || average == NULL) return DEM2D_NULL_ARGUMENT;
     dem2d_result result = dem2di_check_region(&world->env, "box", box);
+    if (result == DEM2D_OK) result = dem2di_check_no_cell(world);
     if (result == DEM2D_OK) *average = dem2di_average_one(world, box, 0);
     return result;
 }
@@ -20793,6 +21507,7 @@ DEM2D_API dem2d_result dem2d_world_average_circle(const dem2d_world *world, dem2
     dem2d_result result = dem2di_check_vec(&world->env, "centre", centre);
     if (result == DEM2D_OK)
         result = dem2di_check_number(&world->env, "radius", radius, DEM2DI_POSITIVE);
+    if (result == DEM2D_OK) result = dem2di_check_no_cell(world);
     if (result != DEM2D_OK) return result;
     if (!(radius * radius >= DBL_MIN && dem2di_finite(4 * radius * radius)))
         return dem2di_fail(&world->env, DEM2D_OUT_OF_RANGE, -1, "radius = %g: no area", radius);
@@ -20927,6 +21642,9 @@ static int dem2di_leaf_begin(const dem2di_tree *tree, int k) {
 /* Room for what a query may find, and a tree. */
 static dem2d_result dem2di_tree_make(dem2d_world *world) {
     dem2di_tree *tree = &world->tree;
+    if (world->periodic)
+        return dem2di_fail(&world->env, DEM2D_OUT_OF_RANGE, -1,
+                           "cell: queries of space and relax do not work in a periodic cell");
     int levels = 0, items = world->body_count + world->part_count;
     while (DEM2DI_LEAF << levels < items) levels++;
     int leaves = 1 << levels, nodes = 2 * leaves - 1;
@@ -21852,6 +22570,8 @@ DEM2D_API dem2d_result dem2d_world_particle_contacts(const dem2d_world *world, d
     if (result != DEM2D_OK) return result;
     for (int k = list->first[slot]; k < list->first[slot + 1]; k++) {
         dem2di_contact_iterator at = dem2di_contacts_start(false);
+        if (k < list->own[slot] && list->keys[list->adjacent[k]].a == slot)
+            continue; /* with itself in a cell: once, as A */
         at.walls = list->adjacent[k] >= list->pairs;
         at.number = list->adjacent[k];
         if (!dem2di_contact_get(world, &list->contacts, at.number, &at.contact)) continue;
@@ -21865,7 +22585,7 @@ DEM2D_API dem2d_result dem2d_world_particle_contacts(const dem2d_world *world, d
 
 /* ============================================================================================
    >>bulk  Particles and contacts from and into arrays of a caller
-   uses: config, math, memory, fields, law, motion, world, objects, list, step, measures
+   uses: config, math, memory, fields, law, motion, world, cell, objects, list, step, measures
    ============================================================================================ */
 
 /* Particles are read array by array, each in the order of the slots, in which the columns are read
@@ -22070,7 +22790,8 @@ static dem2d_result dem2di_check_row(const dem2d_world *world, int row,
                                "%s[%d] = %g of a fixed particle is not 0", names[k], row,
                                values[k]);
     }
-    return dem2di_check_number(env, "angles", made->angle, DEM2DI_ANGLE);
+    dem2d_result result = dem2di_check_number(env, "angles", made->angle, DEM2DI_ANGLE);
+    return result == DEM2D_OK ? dem2di_check_place(world, made->position) : result;
 }
 
 static dem2d_result dem2di_check_writable(const dem2d_world *world,
@@ -22117,7 +22838,7 @@ DEM2D_API dem2d_result dem2d_world_write_particles(dem2d_world *world,
     bool moves = arrays->positions != NULL || arrays->angles != NULL;
     bool drives = arrays->velocities != NULL || arrays->angular_velocities != NULL;
     bool loads = arrays->loads != NULL || arrays->load_torques != NULL;
-    if ((drives && !dem2di_group_reserve(world, DEM2DI_MADE, world->body_count)) ||
+    if ((drives && !dem2di_group_reserve(world, DEM2DI_MADE, dem2di_slots(world))) ||
         (loads && !dem2di_loads_begin(world)))
         return dem2di_out_of_memory(world, "velocities and loads");
     for (int row = 0, index = 0; row < count; row++) {
@@ -22234,8 +22955,8 @@ static dem2d_result dem2di_writer_close(const dem2d_env *env, const char *path,
 
 /* ============================================================================================
    >>snapshot  State hash, snapshots: both follow the tables of columns and fields
-   uses: config, math, memory, fields, support, shapes, broad, law, motion, world, objects, walls,
-         joints, list, measures, output
+   uses: config, math, memory, fields, support, shapes, broad, law, motion, world, cell, objects,
+         walls, joints, list, measures, output
    ============================================================================================ */
 
 /* To save, load, check and hash another number, add a row to the table of fields of its struct; for
@@ -22368,6 +23089,7 @@ static int dem2di_rows(const void *object, const dem2di_column *column) {
     rows[DEM2DI_DISPLACEMENTS] = w->plan.turns ? w->body_count : 0;
     rows[DEM2DI_MADE] = w->redirected ? w->body_count : 0;
     rows[DEM2DI_EVENTS] = w->event_count;
+    rows[DEM2DI_IMAGES] = w->image_count;
     rows[DEM2DI_WALLS] = w->wall_count;
     rows[DEM2DI_PARTS] = w->part_count;
     for (int k = DEM2DI_KEYS; k < DEM2DI_ADJACENCY; k++)
@@ -23134,6 +23856,39 @@ static void dem2di_finish_walls(dem2di_loader *loader) {
     dem2di_finish_joints(loader);
 }
 
+/* May a slot be the B of a pair of a particle with itself? */
+static bool dem2di_is_own_image(const dem2d_world *w, int slot) {
+    int shift[2];
+    dem2di_shift_of(w, slot, shift);
+    return shift[1] > 0 || (shift[1] == 0 && shift[0] > 0);
+}
+
+/* The cell and the images in it. They come right behind the particles, whatever slots they had. */
+static void dem2di_finish_images(dem2di_loader *loader) {
+    dem2d_world *w = loader->world;
+    const int down = w->image_first - w->body_count;
+    dem2di_load_check(loader, dem2di_check_cell(loader->env, &w->cell));
+    if (!dem2di_load_good(loader)) return;
+    dem2di_cell_set(w, &w->cell);
+    dem2di_load_expect(loader, w->image_count == 0 || (w->periodic && down >= 0), "images");
+    if (!dem2di_load_good(loader) || w->image_count == 0) return;
+    for (int i = 0; i < w->list.pairs; i++)
+        if (w->list.keys[i].a >= 0 && w->list.keys[i].b >= w->image_first)
+            w->list.keys[i].b -= down;
+    w->image_first = w->body_count;
+    for (int k = 0; k < w->image_count && dem2di_load_good(loader); k++) {
+        const dem2di_image *image = &w->images[k];
+        const bool lives = image->owner < 0 || (image->owner < w->body_count &&
+                                                w->bodies[image->owner].shape_index >= 0);
+        dem2di_load_expect(loader,
+                           lives && abs(image->shift[0]) <= DEM2DI_CELLS_MOST &&
+                               abs(image->shift[1]) <= DEM2DI_CELLS_MOST,
+                           "an image");
+    }
+    dem2di_load_room(loader, dem2di_reserve_bodies(w, w->body_count));
+    if (dem2di_load_good(loader)) dem2di_images_make(w);
+}
+
 /* Is a key of two that exist, and listed with its kind? A forgotten key may be anything. */
 static bool dem2di_key_sound(const dem2d_world *w, int contact) {
     const dem2di_key *key = &w->list.keys[contact];
@@ -23143,11 +23898,14 @@ static bool dem2di_key_sound(const dem2d_world *w, int contact) {
         int end = dem2di_vertex_of(key->b), part = dem2di_part_of(key->b);
         return part < w->part_count && end < 2 && (end < 0 || w->parts[part].extent > 0);
     }
-    if (key->b >= w->body_count || w->bodies[key->b].shape_index < 0) return false;
-    const dem2di_body *a = &w->bodies[key->a], *b = &w->bodies[key->b];
+    if (key->b >= dem2di_slots(w)) return false;
+    const int owner = dem2di_owner(w, key->b);
+    if (owner < 0 || owner >= w->body_count || w->bodies[owner].shape_index < 0) return false;
+    if (owner == key->a && !dem2di_is_own_image(w, key->b)) return false;
+    const dem2di_body *a = &w->bodies[key->a], *b = &w->bodies[owner];
     bool round = dem2di_shape_of(w, a)->type == DEM2D_CIRCLE &&
                  dem2di_shape_of(w, b)->type == DEM2D_CIRCLE && dem2di_has_discs(w);
-    return a != b && round == (contact < w->list.discs) && (round || w->plan.turns);
+    return round == (contact < w->list.discs) && (round || w->plan.turns);
 }
 
 /* May the next step use the plan without examining the scene? */
@@ -23198,6 +23956,7 @@ static void dem2di_finish_world(dem2di_loader *loader) {
         dem2di_finish_body(loader, i);
     if (dem2di_load_good(loader)) dem2di_load_expect(loader, dem2di_ids_agree(w), "ids differ");
     if (dem2di_load_good(loader)) dem2di_finish_ranks(loader);
+    if (dem2di_load_good(loader)) dem2di_finish_images(loader);
     dem2di_finish_walls(loader);
     dem2di_finish_list(loader);
 }
@@ -23335,8 +24094,8 @@ DEM2D_API dem2d_result dem2d_world_load(const dem2d_load_desc *desc, const char 
 
 /* ============================================================================================
    >>writers  Pictures, files for ParaView, histories
-   uses: config, math, memory, fields, mass, shapes, broad, law, world, objects, walls, measures,
-   grids, output
+   uses: config, math, memory, fields, mass, shapes, broad, law, world, cell, objects, walls,
+         measures, grids, output
    ============================================================================================ */
 
 /* Write text without formatting, of any length. */
@@ -23595,7 +24354,7 @@ static void dem2di_draw_chains(const dem2d_world *world, const dem2di_view *view
         dem2d_vec start = world->before[key->a].x, end = dem2di_add(start, iterator.branch);
         double most = dem2di_smaller_radius(world, &iterator) * view->factor;
         if (dem2di_off_view(world, view, key->a) &&
-            (iterator.walls || dem2di_off_view(world, view, key->b)))
+            (iterator.walls || dem2di_off_view(world, view, dem2di_owner(world, key->b))))
             continue;
         dem2di_draw_line(dem2di_pixel(view, start), dem2di_pixel(view, end),
                          dem2di_min(iterator.contact.force * unit, most), writer);

@@ -71,6 +71,49 @@ static bool inside_ranks_hold(const dem2d_world *w) {
     return true;
 }
 
+/* A particle of higher rank, or an image of it; or an image of A that is up, or right. */
+static bool inside_is_b(const dem2d_world *w, const dem2di_key *key) {
+    const int owner = dem2di_owner(w, key->b);
+    if (key->b >= w->body_count && (key->b < w->image_first || key->b >= dem2di_slots(w)))
+        return false;
+    if (!inside_lives(w, owner)) return false;
+    if (owner != key->a) return w->bodies[key->a].rank < w->bodies[owner].rank;
+    if (key->b == owner) return false;
+    const int *shift = w->images[key->b - w->image_first].shift;
+    return shift[1] > 0 || (shift[1] == 0 && shift[0] > 0);
+}
+
+/* Images are copies of their owners but for the shift; particles are in the cell, to rounding. */
+static bool inside_images_hold(const dem2d_world *w) {
+    const dem2di_fractions f = dem2di_fractions_make(&w->cell);
+    int out[2];
+    for (int k = 0; k < w->image_count; k++) {
+        const int slot = w->image_first + k, owner = w->images[k].owner;
+        if (owner < 0) continue;
+        if (!inside_lives(w, owner)) return inside_fail("the owner of an image is gone", k);
+        dem2di_state is = w->now[owner];
+        is.x = dem2di_add(is.x, dem2di_cell_shift(w, w->images[k].shift[0], w->images[k].shift[1]));
+        if (memcmp(&is, &w->now[slot], sizeof is) != 0 ||
+            w->inverse[slot].mass != w->inverse[owner].mass ||
+            w->bodies[slot].index != w->bodies[owner].index ||
+            w->bodies[slot].rank != w->bodies[owner].rank ||
+            w->bodies[slot].material != w->bodies[owner].material ||
+            w->bodies[slot].redirected != w->bodies[owner].redirected)
+            return inside_fail("an image is not like its owner", k);
+        if (w->plan.turns &&
+            (w->displacement[slot] != w->displacement[owner] || w->lever[slot] != w->lever[owner]))
+            return inside_fail("an image has another displacement", k);
+    }
+    for (int i = 0; i < w->body_count && w->periodic && !w->wrap_due; i++) {
+        if (!inside_lives(w, i) || !dem2di_cells_out(&f, w->now[i].x, out)) continue;
+        const double t = (w->now[i].x.y - f.origin.y) * f.per_y;
+        const double s = (w->now[i].x.x - f.origin.x) * f.per_x - t * f.slope;
+        if (!(s > -1e-12 && s < 1 + 1e-12 && t > -1e-12 && t < 1 + 1e-12))
+            return inside_fail("a particle is out of the cell", i);
+    }
+    return true;
+}
+
 static bool inside_contact_holds(const dem2d_world *w, int i) {
     const dem2di_list *list = &w->list;
     const dem2di_key *key = &list->keys[i];
@@ -81,8 +124,7 @@ static bool inside_contact_holds(const dem2d_world *w, int i) {
     if (!inside_lives(w, key->a)) return inside_fail("A of a contact is gone", i);
     if (i >= list->pairs && !(key->b >= 0 && key->b % DEM2DI_VERTEX < w->part_count))
         return inside_fail("a wall of a contact is gone", i);
-    if (i < list->pairs &&
-        !(inside_lives(w, key->b) && w->bodies[key->a].rank < w->bodies[key->b].rank))
+    if (i < list->pairs && !inside_is_b(w, key))
         return inside_fail("B of a contact is gone, or has the lower rank", i);
     (void)dem2di_contact_get(w, &list->contacts, i, &contact);
     const dem2di_groups of_a = dem2di_groups_at(w, key->a);
@@ -111,7 +153,9 @@ static bool inside_adjacency_holds(const dem2d_world *w) {
             if (i < 0 || i >= list->count) return inside_fail("no such contact", i);
             if (list->keys[i].a < 0) continue;
             const bool as_b = k < list->own[slot];
-            if ((as_b ? list->keys[i].b : list->keys[i].a) != slot || (as_b && i >= list->pairs))
+            const int who =
+                as_b && i < list->pairs ? dem2di_owner(w, list->keys[i].b) : list->keys[i].a;
+            if (who != slot || (as_b && i >= list->pairs))
                 return inside_fail("a contact of another particle", slot);
             entries++;
         }
@@ -144,7 +188,7 @@ static bool inside_parts_hold(const dem2d_world *w) {
 bool inside_holds(const dem2d_world *world) {
     if (!inside_ids_hold(world) || !inside_ranks_hold(world) || !inside_adjacency_holds(world))
         return false;
-    if (!inside_parts_hold(world)) return false;
+    if (!inside_parts_hold(world) || !inside_images_hold(world)) return false;
     for (int i = 0; i < world->list.count; i++)
         if (!inside_contact_holds(world, i)) return false;
     return true;
