@@ -348,7 +348,8 @@ HOW TO
                          dem2d_world_get_wall_desc, dem2d_world_get_pair,
                          dem2d_world_get_particle_desc, dem2d_world_get_material_desc.
     compare two runs     dem2d_world_hash after as many steps.
-    draw                 dem2d_world_write_svg, or dem2d_shape_outline for your own pictures.
+    draw                 dem2d_world_write_svg, with colours by model, material, group, speed,
+                         pressure or numbers of yours; or dem2d_shape_outline for your own pictures.
     measure a sample     dem2d_world_stress with the sample's area (of one grain:
                          dem2d_world_particle_stress), then dem2d_stress_principal for p and q;
                          dem2d_strain of its sides; dem2d_world_porosity of a box inside it;
@@ -2294,13 +2295,30 @@ DEM2D_API dem2d_result dem2d_world_load(const dem2d_load_desc *desc, const char 
    >>api-writers  Pictures, files for ParaView, histories
    ============================================================================================ */
 
+/// What the colours of particles show in a picture.
+typedef enum dem2d_colour {
+    DEM2D_COLOUR_MODEL,    ///< the model of the shape; fixed particles grey, driven ones hatched
+    DEM2D_COLOUR_MATERIAL, ///< the material, with a key by index
+    DEM2D_COLOUR_GROUP,    ///< the lowest group of its category, with a key by bit; grey: none
+    DEM2D_COLOUR_SPEED,    ///< m/s, mean of the half steps; this and what follows with a colour bar
+    DEM2D_COLOUR_PRESSURE, ///< Pa, mean of the normal stresses of dem2d_world_particle_stress
+    DEM2D_COLOUR_VALUES,   ///< values of the caller's
+    DEM2D_COLOUR_COUNT
+} dem2d_colour;
+
 /// An SVG picture of a world.
 typedef struct dem2d_svg_desc {
-    double width;          ///< px, >= 0; 0 for 800; the height follows from the scene
-    int outline_points;    ///< per curved particle, >= 3; 0 for 64
-    bool force_chains;     ///< lines along branches, width by normal force
-    dem2d_box view;        ///< m, the part that is drawn, upper above lower; all zero for the whole
-                           ///< scene
+    double width;         ///< px, >= 0; 0 for 800; the height follows from the scene
+    int outline_points;   ///< per curved particle, >= 3; 0 for 64
+    bool force_chains;    ///< lines along branches, width by normal force
+    dem2d_box view;       ///< m, the part that is drawn, upper above lower; all zero for the whole
+                          ///< scene
+    dem2d_colour colour;  ///< what the colours of particles show
+    double low;           ///< value at the lower end of the colour bar; beyond it the same colour
+    double high;          ///< at the upper end, above low; both 0: the least and the greatest drawn
+    const double *values; ///< for VALUES, finite, in the order of dem2d_world_particles
+    int value_count;      ///< number of values: of the particles, 0 to 2^30; else 0
+    const char *label;    ///< beside the colour bar, in UTF-8, without control characters; or NULL
     dem2d_write_fn *write; ///< where the bytes go, or NULL when a path is given
     void *user;            ///< passed to write
 } dem2d_svg_desc;
@@ -2344,8 +2362,9 @@ typedef struct dem2d_csv_desc {
    Errors: NULL_ARGUMENT, OUT_OF_RANGE, NOT_FINITE, IO (the file can't be opened, written or closed,
    or write returns false). */
 
-/// Draw shapes (a colour per model; fixed particles grey, driven ones hatched), walls, force chains
-/// and, below, a scale bar. The whole scene is the box of particles and segments, with half-planes
+/// Draw shapes (with a colour per model, or as desc.colour says), walls, force chains and, below, a
+/// scale bar and the key of the colours. Allocates 8 bytes for each particle if there is a colour
+/// bar (OUT_OF_MEMORY). The whole scene is the box of particles and segments, with half-planes
 /// whose distance from it is at most a third of its size. The line of the mean normal force is as
 /// wide as a quarter of the mean radius, but at most 1/400 of the picture; no line is wider than
 /// the radius of the smaller particle. desc may be NULL: all zero.
@@ -24138,6 +24157,46 @@ static void dem2di_put_number(dem2di_writer *writer, double value) {
     dem2di_print(writer, "%.17g", value);
 }
 
+/* Write text as the value of an attribute. */
+static void dem2di_put_escaped(dem2di_writer *writer, const char *text) {
+    while (*text != '\0') {
+        size_t plain = strcspn(text, "&<>\"'");
+        dem2di_put_bytes(writer, text, plain);
+        text += plain;
+        if (*text == '\0') return;
+        dem2di_put(writer, *text == '&'   ? "&amp;"
+                           : *text == '<' ? "&lt;"
+                           : *text == '>' ? "&gt;"
+                           : *text == '"' ? "&quot;"
+                                          : "&apos;");
+        text++;
+    }
+}
+
+/* Check the caller's names and values: not NULL, values finite, names without unwanted bytes. */
+static dem2d_result dem2di_check_named(const dem2d_env *env, const char *const *names,
+                                       const char *what, const double *values, const char *of,
+                                       int count, const char *unwanted) {
+    if (count == 0) return DEM2D_OK;
+    if (names == NULL) return dem2di_fail_null(env, what);
+    if (values == NULL) return dem2di_fail_null(env, of);
+    for (int i = 0; i < count; i++) {
+        if (names[i] == NULL)
+            return dem2di_fail(env, DEM2D_NULL_ARGUMENT, i, "%s[%d] is NULL", what, i);
+        if (names[i][strcspn(names[i], unwanted)] != '\0')
+            return dem2di_fail(env, DEM2D_OUT_OF_RANGE, i, "%s[%d] = %s", what, i, names[i]);
+        if (!dem2di_finite(values[i]))
+            return dem2di_fail(env, DEM2D_NOT_FINITE, i, "%s[%d] = %g is not finite", of, i,
+                               values[i]);
+    }
+    return DEM2D_OK;
+}
+
+/* Control characters, which XML does not allow. */
+#define DEM2DI_CONTROL                                                 \
+    "\001\002\003\004\005\006\007\010\011\012\013\014\015\016\017\020" \
+    "\021\022\023\024\025\026\027\030\031\032\033\034\035\036\037"
+
 /* Number of points to draw a shape: the corners of a sharp polygon, else `points`, 0 for 64. */
 static int dem2di_drawn_points(const dem2d_shape *shape, int points) {
     if (shape->type == DEM2D_POLYGON && shape->rounding == 0) return shape->count;
@@ -24250,6 +24309,12 @@ static const dem2di_field dem2di_svg_fields[] = {
     DEM2DI_ROW(dem2d_svg_desc, force_chains, DEM2DI_SWITCH, "- false"),
     DEM2DI_ROW(dem2d_svg_desc, view.lower, DEM2DI_VECTOR, "m all"),
     DEM2DI_ROW(dem2d_svg_desc, view.upper, DEM2DI_VECTOR, "m all; above lower, or all zero"),
+    DEM2DI_ROW(dem2d_svg_desc, colour, DEM2DI_CHOICE(DEM2D_COLOUR_COUNT), "- MODEL"),
+    DEM2DI_ROW(dem2d_svg_desc, low, DEM2DI_FINITE, "- 0"),
+    DEM2DI_ROW(dem2d_svg_desc, high, DEM2DI_FINITE, "- 0; above low, or both 0"),
+    DEM2DI_ROW(dem2d_svg_desc, values, DEM2DI_OPTIONAL, "- NULL; of VALUES required"),
+    DEM2DI_ROW(dem2d_svg_desc, value_count, DEM2DI_WHOLE(0, 1 << 30), "- 0; of VALUES required"),
+    DEM2DI_ROW(dem2d_svg_desc, label, DEM2DI_OPTIONAL, "- NULL"),
     DEM2DI_ROW(dem2d_svg_desc, write, DEM2DI_OPTIONAL, "- none; or a path, not both"),
     DEM2DI_ROW(dem2d_svg_desc, user, DEM2DI_OPTIONAL, "- NULL"),
 };
@@ -24274,14 +24339,6 @@ static dem2di_view dem2di_view_make(const dem2d_world *world, const dem2d_svg_de
     return view;
 }
 
-/* Fill colour: by model, or by motion for particles that are not free. */
-static const char *dem2di_fill_of(const dem2di_body *body, const dem2d_shape *shape) {
-    static const char *const colour[] = {"#e8c468", "#8fb9d8", "#b9a3d6",
-                                         "#94c99b", "#e59a83", "#c9c9c9"};
-    if (body->motion == DEM2D_FIXED) return "#8c8c8c";
-    return body->motion == DEM2D_DRIVEN ? "url(#dem2d-driven)" : colour[shape->type];
-}
-
 /* Is the bounding circle of a particle outside the view? */
 static bool dem2di_off_view(const dem2d_world *world, const dem2di_view *view, int slot) {
     dem2d_vec c = world->before[slot].x;
@@ -24291,11 +24348,125 @@ static bool dem2di_off_view(const dem2d_world *world, const dem2di_view *view, i
            c.y + r < view->box.lower.y || c.y - r > view->box.upper.y;
 }
 
+/* What the colours of a picture show. */
+typedef struct dem2di_colours {
+    dem2d_colour by;
+    double *values; /* of slots, where there is a colour bar, with these at its ends */
+    double low, high;
+    bool seen[256]; /* materials or groups that are drawn */
+} dem2di_colours;
+
+/* Classes have these in turn. */
+static const char *const dem2di_class_colours[] = {"#e8c468", "#8fb9d8", "#b9a3d6", "#94c99b",
+                                                   "#e59a83", "#7fc4c0", "#d790b5", "#b0a27e"};
+#define DEM2DI_CLASSES (int)(sizeof dem2di_class_colours / sizeof *dem2di_class_colours)
+
+/* Material of a particle, or its lowest group; -1 if it is in none. */
+static int dem2di_class_of(const dem2d_world *world, dem2d_colour by, int slot) {
+    uint32_t category = dem2di_groups_at(world, slot).category;
+    int bit = 0;
+    if (by == DEM2D_COLOUR_MATERIAL) return world->bodies[slot].material;
+    if (category == 0) return -1;
+    while (!(category >> bit & 1)) bit++;
+    return bit;
+}
+
+static bool dem2di_colour_bar(dem2d_colour by) {
+    return by == DEM2D_COLOUR_SPEED || by == DEM2D_COLOUR_PRESSURE || by == DEM2D_COLOUR_VALUES;
+}
+
+/* The number that the colour bar shows, but for the caller's. */
+static double dem2di_shown(const dem2d_world *world, dem2d_colour by, int slot) {
+    if (by == DEM2D_COLOUR_SPEED) return dem2di_length(dem2di_velocities_mean(world, slot).v);
+    dem2d_stress stress = dem2di_particle_stress(world, slot);
+    return stress.xx / 2 + stress.yy / 2;
+}
+
+static void dem2di_colours_find(const dem2d_world *world, const dem2d_svg_desc *desc,
+                                const dem2di_view *view, dem2di_colours *colours) {
+    double least = HUGE_VAL, greatest = -HUGE_VAL;
+    int row = 0;
+    for (int index = 0; index < world->id_count; index++) {
+        int slot = world->ids[index].slot;
+        if (slot < 0) continue;
+        bool drawn = !dem2di_off_view(world, view, slot);
+        if (colours->values == NULL) {
+            int of = dem2di_class_of(world, colours->by, slot);
+            if (drawn && of >= 0) colours->seen[of] = true;
+            continue;
+        }
+        double value = colours->by == DEM2D_COLOUR_VALUES ? desc->values[row++]
+                                                          : dem2di_shown(world, colours->by, slot);
+        colours->values[slot] = value;
+        if (drawn) least = dem2di_min(least, value);
+        if (drawn) greatest = dem2di_max(greatest, value);
+    }
+    bool given = desc->low != 0 || desc->high != 0, none = least > greatest;
+    colours->low = given ? desc->low : none ? 0 : least;
+    colours->high = given ? desc->high : none ? 0 : greatest;
+}
+
+static dem2d_result dem2di_check_colours(const dem2d_world *world, const dem2d_svg_desc *desc) {
+    const dem2d_env *env = &world->env;
+    int count = desc->colour == DEM2D_COLOUR_VALUES ? world->body_count - world->holes : 0;
+    if (desc->value_count != count)
+        return dem2di_fail(env, DEM2D_OUT_OF_RANGE, -1, "value_count = %d is not %d",
+                           desc->value_count, count);
+    if (count > 0 && desc->values == NULL) return dem2di_fail_null(env, "values");
+    for (int i = 0; i < count; i++)
+        if (!dem2di_finite(desc->values[i]))
+            return dem2di_fail(env, DEM2D_NOT_FINITE, i, "values[%d] = %g is not finite", i,
+                               desc->values[i]);
+    if (!(desc->low < desc->high) && (desc->low != 0 || desc->high != 0))
+        return dem2di_fail(env, DEM2D_OUT_OF_RANGE, -1, "high = %g is not above low = %g",
+                           desc->high, desc->low);
+    if (desc->label != NULL && desc->label[strcspn(desc->label, DEM2DI_CONTROL)] != '\0')
+        return dem2di_fail(env, DEM2D_OUT_OF_RANGE, -1, "label has control characters");
+    return DEM2D_OK;
+}
+
+/* A colour from dark blue over green to yellow, ever lighter; t from 0 to 1. */
+static void dem2di_colour_text(double t, char text[8]) {
+    static const double stops[5][3] = {
+        {38, 30, 92}, {36, 96, 146}, {42, 157, 138}, {148, 203, 88}, {253, 231, 76}};
+    int rgb[3], stop = (int)dem2di_min(t * 4, 3);
+    double part = t * 4 - stop;
+    for (int i = 0; i < 3; i++)
+        rgb[i] = (int)(stops[stop][i] + part * (stops[stop + 1][i] - stops[stop][i]) + 0.5);
+    (void)snprintf(text, 8, "#%02x%02x%02x", (unsigned)rgb[0] & 255, (unsigned)rgb[1] & 255,
+                   (unsigned)rgb[2] & 255);
+}
+
+/* Place of a value between the ends of the colour bar, 0 to 1. */
+static double dem2di_colour_place(const dem2di_colours *colours, double value) {
+    double half = colours->high / 2 - colours->low / 2;
+    if (!(half > 0)) return 0;
+    return dem2di_max(0, dem2di_min(1, (value / 2 - colours->low / 2) / half));
+}
+
+/* Fill colour of a particle; text is room for it. */
+static const char *dem2di_fill_of(const dem2d_world *world, const dem2di_colours *colours, int slot,
+                                  char text[8]) {
+    static const char *const colour[] = {"#e8c468", "#8fb9d8", "#b9a3d6",
+                                         "#94c99b", "#e59a83", "#c9c9c9"};
+    const dem2di_body *body = &world->bodies[slot];
+    if (colours->values != NULL) {
+        dem2di_colour_text(dem2di_colour_place(colours, colours->values[slot]), text);
+        return text;
+    }
+    if (colours->by != DEM2D_COLOUR_MODEL) {
+        int of = dem2di_class_of(world, colours->by, slot);
+        return of < 0 ? "#c9c9c9" : dem2di_class_colours[of % DEM2DI_CLASSES];
+    }
+    if (body->motion == DEM2D_FIXED) return "#8c8c8c";
+    if (body->motion == DEM2D_DRIVEN) return "url(#dem2d-driven)";
+    return colour[dem2di_shape_of(world, body)->type];
+}
+
 /* Draw one particle: a circle, or a path through its outline points. */
 static void dem2di_draw_particle(const dem2d_world *world, const dem2di_view *view, int points,
-                                 int i, dem2di_writer *writer) {
+                                 int i, const char *fill, dem2di_writer *writer) {
     const dem2d_shape *shape = dem2di_shape_of(world, &world->bodies[i]);
-    const char *fill = dem2di_fill_of(&world->bodies[i], shape);
     dem2d_pose pose = dem2di_pose_of(world, world->before, i);
     if (shape->type == DEM2D_CIRCLE) {
         dem2d_vec c = dem2di_pixel(view, pose.position);
@@ -24388,34 +24559,102 @@ static void dem2di_draw_scale(const dem2di_view *view, dem2di_writer *writer) {
                  right.x + 2 * tick, y + view->strip / 8, view->strip / 2.5, metres);
 }
 
+/* Text in the strip below the scene, or a number if there is none; anchor: "start" or "end". */
+static void dem2di_draw_text(const dem2di_view *view, double x, double y, const char *anchor,
+                             const char *text, double number, dem2di_writer *writer) {
+    dem2di_print(writer,
+                 "<text x=\"%.2f\" y=\"%.2f\" text-anchor=\"%s\" font-family=\"sans-serif\" "
+                 "font-size=\"%.2f\" fill=\"#222\">",
+                 x, y, anchor, view->strip / 3.5);
+    if (text != NULL)
+        dem2di_put_escaped(writer, text);
+    else
+        dem2di_print(writer, "%.3g", number);
+    dem2di_put(writer, "</text>\n");
+}
+
+/* A rectangle of the key, as high as a third of the strip. */
+static void dem2di_draw_swatch(const dem2di_view *view, double x, double width, const char *fill,
+                               dem2di_writer *writer) {
+    dem2di_print(writer,
+                 "<rect x=\"%.2f\" y=\"%.2f\" width=\"%.2f\" height=\"%.2f\" "
+                 "fill=\"%s\"/>\n",
+                 x, view->height + view->strip / 2, width, view->strip / 3, fill);
+}
+
+/* The colour bar in the right half of the strip, in steps, with the numbers at its ends. */
+static void dem2di_draw_bar(const dem2di_view *view, const dem2di_colours *colours,
+                            const char *label, dem2di_writer *writer) {
+    enum { STEPS = 32 };
+    char text[8];
+    double left = 0.62 * view->width, width = 0.24 * view->width;
+    double base = view->height + 0.78 * view->strip, gap = view->width / 100;
+    const char *named = colours->by == DEM2D_COLOUR_SPEED      ? "speed, m/s"
+                        : colours->by == DEM2D_COLOUR_PRESSURE ? "pressure, Pa"
+                                                               : "";
+    for (int i = 0; i < STEPS; i++) { /* a little wider than a step: no seams */
+        dem2di_colour_text((double)i / (STEPS - 1), text);
+        dem2di_draw_swatch(view, left + width * i / STEPS,
+                           width / STEPS * (i + 1 < STEPS ? 1.2 : 1), text, writer);
+    }
+    dem2di_draw_text(view, left - gap, base, "end", NULL, colours->low, writer);
+    dem2di_draw_text(view, left + width + gap, base, "start", NULL, colours->high, writer);
+    dem2di_draw_text(view, left, view->height + 0.4 * view->strip, "start",
+                     label != NULL ? label : named, 0, writer);
+}
+
+/* The key of classes: the first eight that are drawn, with their numbers. */
+static void dem2di_draw_key(const dem2di_view *view, const dem2di_colours *colours,
+                            const char *label, dem2di_writer *writer) {
+    double x = 0.5 * view->width, side = view->strip / 3, step = 0.06 * view->width;
+    const char *named = colours->by == DEM2D_COLOUR_MATERIAL ? "material" : "group";
+    for (int i = 0, drawn = 0; i < 256 && drawn < 8; i++) {
+        if (!colours->seen[i]) continue;
+        dem2di_draw_swatch(view, x, side, dem2di_class_colours[i % DEM2DI_CLASSES], writer);
+        dem2di_draw_text(view, x + 1.2 * side, view->height + 0.78 * view->strip, "start", NULL, i,
+                         writer);
+        x += step;
+        drawn++;
+    }
+    dem2di_draw_text(view, 0.5 * view->width, view->height + 0.4 * view->strip, "start",
+                     label != NULL ? label : named, 0, writer);
+}
+
 static void dem2di_draw(const dem2d_world *world, const dem2d_svg_desc *desc,
+                        const dem2di_view *view, const dem2di_colours *colours,
                         dem2di_writer *writer) {
-    dem2di_view view = dem2di_view_make(world, desc);
-    double height = view.height + view.strip;
+    double height = view->height + view->strip;
     dem2di_print(writer,
                  "<svg xmlns=\"http://www.w3.org/2000/svg\" width=\"%.0f\" height=\"%.0f\" "
                  "viewBox=\"0 0 %.2f %.2f\">\n<rect width=\"100%%\" height=\"100%%\" "
                  "fill=\"white\"/>\n",
-                 view.width, height, view.width, height);
+                 view->width, height, view->width, height);
     dem2di_print(writer, /* hatching, a hundred lines across the picture */
                  "<defs><pattern id=\"dem2d-driven\" width=\"%.3f\" height=\"9\" "
                  "patternUnits=\"userSpaceOnUse\" patternTransform=\"rotate(45)\">"
                  "<rect width=\"100%%\" height=\"9\" fill=\"#dcdcdc\"/>"
                  "<rect width=\"%.3f\" height=\"9\" fill=\"#6c6c6c\"/></pattern></defs>\n",
-                 view.width / 100, view.width / 300);
+                 view->width / 100, view->width / 300);
     /* an inner picture clips all that is outside the view */
     dem2di_print(writer,
                  "<svg width=\"%.2f\" height=\"%.2f\">\n"
                  "<g stroke=\"#333\" stroke-width=\"%.3f\">\n",
-                 view.width, view.height, view.width / 1600);
+                 view->width, view->height, view->width / 1600);
     for (int place = 0, slot; (slot = dem2di_next_particle(world, &place)) >= 0 && writer->good;)
-        if (!dem2di_off_view(world, &view, slot))
-            dem2di_draw_particle(world, &view, desc->outline_points, slot, writer);
+        if (!dem2di_off_view(world, view, slot)) {
+            char text[8];
+            const char *fill = dem2di_fill_of(world, colours, slot, text);
+            dem2di_draw_particle(world, view, desc->outline_points, slot, fill, writer);
+        }
     dem2di_print(writer, "</g>\n");
-    dem2di_draw_walls(world, &view, writer);
-    if (desc->force_chains) dem2di_draw_chains(world, &view, writer);
+    dem2di_draw_walls(world, view, writer);
+    if (desc->force_chains) dem2di_draw_chains(world, view, writer);
     dem2di_print(writer, "</svg>\n");
-    dem2di_draw_scale(&view, writer);
+    dem2di_draw_scale(view, writer);
+    if (colours->values != NULL)
+        dem2di_draw_bar(view, colours, desc->label, writer);
+    else if (colours->by != DEM2D_COLOUR_MODEL)
+        dem2di_draw_key(view, colours, desc->label, writer);
     dem2di_print(writer, "</svg>\n");
 }
 
@@ -24427,13 +24666,27 @@ DEM2D_API dem2d_result dem2d_world_write_svg(const dem2d_world *world, const dem
     if (desc == NULL) desc = &plain;
     const dem2d_env *env = &world->env;
     dem2di_writer writer;
+    dem2di_colours colours;
+    size_t room = (size_t)world->body_count + 1;
     dem2d_result result = dem2di_check_fields(env, DEM2DI_ALL(dem2di_svg_fields), desc);
     if (result == DEM2D_OK) result = dem2di_check_view(env, &desc->view);
-    if (result == DEM2D_OK)
-        result = dem2di_writer_open(env, desc->write, desc->user, path, false, &writer);
+    if (result == DEM2D_OK) result = dem2di_check_colours(world, desc);
     if (result != DEM2D_OK) return result;
-    dem2di_draw(world, desc, &writer);
-    return dem2di_writer_close(env, path, &writer);
+    memset(&colours, 0, sizeof colours);
+    colours.by = desc->colour;
+    if (dem2di_colour_bar(desc->colour)) {
+        colours.values = (double *)dem2di_allocate(env, room, sizeof *colours.values);
+        if (colours.values == NULL) return dem2di_fail_memory(env, world->body_count, "colours");
+    }
+    const dem2di_view view = dem2di_view_make(world, desc);
+    if (desc->colour != DEM2D_COLOUR_MODEL) dem2di_colours_find(world, desc, &view, &colours);
+    result = dem2di_writer_open(env, desc->write, desc->user, path, false, &writer);
+    if (result == DEM2D_OK) {
+        dem2di_draw(world, desc, &view, &colours, &writer);
+        result = dem2di_writer_close(env, path, &writer);
+    }
+    dem2di_release(env, colours.values, room, sizeof *colours.values);
+    return result;
 }
 
 /* --- files for VTK ------------------------------------------------------------------------------
@@ -24849,46 +25102,6 @@ DEM2D_API dem2d_result dem2d_grid_write_vti(const dem2d_grid *grid, const dem2d_
                                             const char *path) {
     return dem2di_grid_write(grid, desc, path, dem2di_grid_vti);
 }
-
-/* Write text as the value of an attribute. */
-static void dem2di_put_escaped(dem2di_writer *writer, const char *text) {
-    while (*text != '\0') {
-        size_t plain = strcspn(text, "&<>\"'");
-        dem2di_put_bytes(writer, text, plain);
-        text += plain;
-        if (*text == '\0') return;
-        dem2di_put(writer, *text == '&'   ? "&amp;"
-                           : *text == '<' ? "&lt;"
-                           : *text == '>' ? "&gt;"
-                           : *text == '"' ? "&quot;"
-                                          : "&apos;");
-        text++;
-    }
-}
-
-/* Check the caller's names and values: not NULL, values finite, names without unwanted bytes. */
-static dem2d_result dem2di_check_named(const dem2d_env *env, const char *const *names,
-                                       const char *what, const double *values, const char *of,
-                                       int count, const char *unwanted) {
-    if (count == 0) return DEM2D_OK;
-    if (names == NULL) return dem2di_fail_null(env, what);
-    if (values == NULL) return dem2di_fail_null(env, of);
-    for (int i = 0; i < count; i++) {
-        if (names[i] == NULL)
-            return dem2di_fail(env, DEM2D_NULL_ARGUMENT, i, "%s[%d] is NULL", what, i);
-        if (names[i][strcspn(names[i], unwanted)] != '\0')
-            return dem2di_fail(env, DEM2D_OUT_OF_RANGE, i, "%s[%d] = %s", what, i, names[i]);
-        if (!dem2di_finite(values[i]))
-            return dem2di_fail(env, DEM2D_NOT_FINITE, i, "%s[%d] = %g is not finite", of, i,
-                               values[i]);
-    }
-    return DEM2D_OK;
-}
-
-/* Control characters, which XML does not allow. */
-#define DEM2DI_CONTROL                                                 \
-    "\001\002\003\004\005\006\007\010\011\012\013\014\015\016\017\020" \
-    "\021\022\023\024\025\026\027\030\031\032\033\034\035\036\037"
 
 static const dem2di_field dem2di_pvd_fields[] = {
     DEM2DI_ROW(dem2d_pvd_desc, count, DEM2DI_WHOLE(0, 1 << 30), "- 0"),

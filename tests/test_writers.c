@@ -694,6 +694,144 @@ static void test_motions_shown(void **state) {
     dem2d_world_destroy(s.base.world);
 }
 
+/* --- colours -------------------------------------------------------------------------------------
+ */
+
+/* The fill of the grain whose centre is the n-th from the left of a row that was made so. */
+static const char *fill_of(const char *text, int n) {
+    static char fill[8];
+    const char *at = text;
+    for (int i = 0; i <= n; i++) assert_true(next_element(&at, "<circle"));
+    at = strstr(at, "fill=\"");
+    assert_non_null(at);
+    memcpy(fill, at + 6, 7);
+    return fill;
+}
+
+/* How light a colour is, 0 to 255. */
+static double lightness(const char *fill) {
+    unsigned r, g, b;
+    assert_int_equal(sscanf(fill, "#%02x%02x%02x", &r, &g, &b), 3);
+    return 0.3 * r + 0.59 * g + 0.11 * b;
+}
+
+/* Speeds of 0 to 9 m/s: ever lighter, from one end of the bar to the other; a range that is given;
+   what is off the view does not count. */
+static void test_colour_bar(void **state) {
+    (void)state;
+    full_scene s;
+    dem2d_particle_id all[16];
+    dem2d_svg_desc desc = {0};
+    char low[8], high[8];
+    int count;
+    make_rows(&s, 10, 1);
+    assert_ok(dem2d_world_particles(s.base.world, all, 16, &count));
+    for (int i = 0; i < 10; i++) set_velocity(&s.base, all[i], DEM2D_FREE, vec(0, i), 0);
+    step(&s.base, 1), step(&s.base, 1);
+    desc.colour = DEM2D_COLOUR_SPEED;
+    const char *text = svg_text(s.base.world, desc);
+    assert_non_null(strstr(text, ">speed, m/s</text>"));
+    strcpy(low, fill_of(text, 0)), strcpy(high, fill_of(text, 9));
+    assert_string_equal(low, "#261e5c"), assert_string_equal(high, "#fde74c");
+    for (int i = 1; i < 10; i++) {
+        const double before = lightness(fill_of(text, i - 1));
+        assert_true(lightness(fill_of(text, i)) > before + 5);
+    }
+    desc.low = 4, desc.high = 5;
+    text = svg_text(s.base.world, desc);
+    assert_non_null(strstr(text, ">4</text>")), assert_non_null(strstr(text, ">5</text>"));
+    for (int i = 0; i < 10; i++)
+        if (i != 4 && i != 5) assert_string_equal(fill_of(text, i), i < 5 ? low : high);
+    desc.low = desc.high = 0;
+    desc.view.lower = vec(-1, 0), desc.view.upper = vec(5, 2); /* grains 0 to 3 */
+    text = svg_text(s.base.world, desc);
+    assert_string_equal(fill_of(text, 3), high);
+    desc.colour = DEM2D_COLOUR_PRESSURE, desc.label = "a < b";
+    text = svg_text(s.base.world, desc);
+    assert_non_null(strstr(text, ">a &lt; b</text>"));
+    dem2d_world_destroy(s.base.world);
+}
+
+/* Values go by dem2d_world_particles, also when grains have left and have names that order them
+   otherwise. */
+static void test_colour_values(void **state) {
+    (void)state;
+    full_scene s;
+    dem2d_particle_id all[16];
+    dem2d_particle_info info;
+    dem2d_svg_desc desc = {0};
+    double values[8];
+    int count;
+    make_rows(&s, 6, 1);
+    assert_ok(dem2d_world_particles(s.base.world, all, 16, &count));
+    assert_ok(dem2d_world_get_particle(s.base.world, all[0], &info));
+    assert_ok(dem2d_world_remove_particle(s.base.world, all[2]));
+    dem2d_particle_desc grain = {0};
+    dem2d_particle_id id;
+    grain.shape = info.shape, grain.material = s.base.material, grain.scale = 1, grain.name = 1;
+    grain.position = vec(30, 1); /* in the free id, drawn by its name */
+    assert_ok(dem2d_world_add_particle(s.base.world, &grain, &id));
+    assert_ok(dem2d_world_remove_particle(s.base.world, all[4]));
+    assert_ok(dem2d_world_particles(s.base.world, all, 16, &count));
+    assert_int_equal(count, 5);
+    for (int i = 0; i < count; i++) {
+        dem2d_particle_info at;
+        assert_ok(dem2d_world_get_particle(s.base.world, all[i], &at));
+        values[i] = at.pose.position.x;
+    }
+    desc.colour = DEM2D_COLOUR_VALUES, desc.values = values, desc.value_count = count;
+    const char *text = svg_text(s.base.world, desc), *at = text;
+    double light[8], x[8];
+    for (int i = 0; i < count; i++) {
+        assert_true(next_element(&at, "<circle"));
+        x[i] = attribute(at, "cx"), light[i] = lightness(strstr(at, "fill=\"") + 6);
+    }
+    for (int i = 0; i < count; i++)
+        for (int k = 0; k < count; k++)
+            if (x[i] < x[k]) assert_true(light[i] < light[k]);
+    desc.value_count = 4;
+    assert_result(dem2d_world_write_svg(s.base.world, &desc, "build/none.svg"), DEM2D_OUT_OF_RANGE);
+    desc.value_count = 5, values[3] = NAN;
+    assert_result(dem2d_world_write_svg(s.base.world, &desc, "build/none.svg"), DEM2D_NOT_FINITE);
+    desc.values = NULL;
+    assert_result(dem2d_world_write_svg(s.base.world, &desc, "build/none.svg"),
+                  DEM2D_NULL_ARGUMENT);
+    values[3] = 0, desc.values = values, desc.low = 2, desc.high = 2;
+    assert_result(dem2d_world_write_svg(s.base.world, &desc, "build/none.svg"), DEM2D_OUT_OF_RANGE);
+    desc.high = 3, desc.label = "a\nb";
+    assert_result(dem2d_world_write_svg(s.base.world, &desc, "build/none.svg"), DEM2D_OUT_OF_RANGE);
+    dem2d_world_destroy(s.base.world);
+}
+
+/* Materials and groups have a key of those that are drawn. */
+static void test_colour_classes(void **state) {
+    (void)state;
+    full_scene s;
+    dem2d_particle_id all[16];
+    dem2d_svg_desc desc = {0};
+    int count;
+    make_rows(&s, 4, 1);
+    assert_ok(dem2d_world_particles(s.base.world, all, 16, &count));
+    dem2d_groups groups = {0};
+    groups.category = 1u << 31;
+    assert_ok(dem2d_world_set_groups(s.base.world, all[1], groups));
+    groups.category = 12; /* bits 2 and 3 */
+    assert_ok(dem2d_world_set_groups(s.base.world, all[2], groups));
+    desc.colour = DEM2D_COLOUR_GROUP;
+    const char *text = svg_text(s.base.world, desc);
+    assert_non_null(strstr(text, ">group</text>"));
+    assert_non_null(strstr(text, ">2</text>")), assert_non_null(strstr(text, ">31</text>"));
+    assert_null(strstr(text, ">3</text>")), assert_null(strstr(text, ">0</text>"));
+    assert_string_equal(fill_of(text, 0), "#c9c9c9");
+    assert_string_equal(fill_of(text, 1), "#b0a27e");
+    assert_string_equal(fill_of(text, 2), "#b9a3d6");
+    desc.colour = DEM2D_COLOUR_MATERIAL;
+    text = svg_text(s.base.world, desc);
+    assert_non_null(strstr(text, ">material</text>"));
+    assert_non_null(strstr(text, ">0</text>"));
+    dem2d_world_destroy(s.base.world);
+}
+
 /* --- time ----------------------------------------------------------------------------------------
  */
 
@@ -1064,6 +1202,29 @@ static const char script[] =
     "        first += len(got)\n"
     "    assert first == counts[0]\n"
     "    return cells\n"
+    "def vti(path):\n"
+    "    from vtkmodules.vtkIOXML import vtkXMLImageDataReader\n"
+    "    root = tree.parse(path).getroot()\n"
+    "    image = root.find('ImageData')\n"
+    "    reader = vtkXMLImageDataReader()\n"
+    "    assert reader.CanReadFile(path)\n"
+    "    reader.AddObserver('ErrorEvent', fail)\n"
+    "    reader.SetFileName(path)\n"
+    "    reader.Update()\n"
+    "    out, data = reader.GetOutput(), reader.GetOutput().GetCellData()\n"
+    "    arrays = image.findall('Piece/CellData/DataArray')\n"
+    "    cells = out.GetNumberOfCells()\n"
+    "    assert cells == 12 and data.GetNumberOfArrays() == len(arrays) == 10\n"
+    "    for array in arrays:\n"
+    "        got, width = data.GetArray(array.get('Name')), int(array.get('NumberOfComponents'))\n"
+    "        assert got.GetNumberOfComponents() == width and got.GetNumberOfTuples() == cells\n"
+    "        assert [got.GetValue(i) for i in range(cells * width)] == numbers(array)\n"
+    "    expected = [float(t) for t in open(path + '.txt').read().split()]\n"
+    "    for i in range(cells):\n"
+    "        box = out.GetCell(i).GetBounds()\n"
+    "        for k in range(2):\n"
+    "            assert abs((box[2 * k] + box[2 * k + 1]) / 2 - expected[2 * i + k]) < 1e-12\n"
+    "    return cells\n"
     "def pvd(path):\n"
     "    root = tree.parse(path).getroot()\n"
     "    assert (root.tag, root.get('type')) == ('VTKFile', 'Collection')\n"
@@ -1073,7 +1234,7 @@ static const char script[] =
     "    for s in sets:\n"
     "        assert tree.parse(os.path.join(os.path.dirname(path), s.get('file')))\n"
     "for path in sys.argv[1:]:\n"
-    "    print(path, pvd(path) if path.endswith('.pvd') else vtp(path))\n";
+    "    print(path, {'.pvd': pvd, '.vtp': vtp, '.vti': vti}[path[-4:]](path))\n";
 
 /* A python3 that has a module, or NULL. */
 static const char *find_python(const char *module) {
@@ -1127,6 +1288,38 @@ static void test_vtk_reads(void **state) {
     for (char *path = strtok(files, " "); path != NULL; path = strtok(NULL, " ")) remove(path);
 }
 
+/* The fields of a grid, turned and not: cells where dem2d_grid_read says they are. */
+static void test_vti_reads(void **state) {
+    (void)state;
+    const char *python = find_python("vtkmodules.vtkIOXML");
+    if (python == NULL) skip();
+    full_scene s;
+    make_scene(&s, NULL);
+    fill_scene(&s, GRAINS);
+    step(&s.base, 900);
+    for (int turned = 0; turned < 2; turned++) {
+        dem2d_grid_desc desc = {0};
+        dem2d_average cells[12];
+        dem2d_grid *grid;
+        int count;
+        desc.nx = 4, desc.ny = 3, desc.box.upper = vec(1, 0.8), desc.width_x = 0.2;
+        desc.angle = turned ? 0.5 : 0;
+        assert_ok(dem2d_grid_create(NULL, &desc, &grid));
+        assert_ok(dem2d_grid_add(grid, s.base.world, 1));
+        assert_ok(dem2d_grid_read(grid, cells, 12, &count));
+        assert_ok(dem2d_grid_write_vti(grid, NULL, "build/test_writers.vti"));
+        FILE *file = fopen("build/test_writers.vti.txt", "w");
+        assert_non_null(file);
+        for (int i = 0; i < count; i++)
+            fprintf(file, "%.17g %.17g\n", cells[i].centre.x, cells[i].centre.y);
+        assert_int_equal(fclose(file), 0);
+        run_script(python, "build/test_writers.vti");
+        dem2d_grid_destroy(grid);
+    }
+    remove("build/test_writers.vti"), remove("build/test_writers.vti.txt");
+    dem2d_world_destroy(s.base.world);
+}
+
 /* A series whose names need escapes. */
 static void test_pvd_names(void **state) {
     (void)state;
@@ -1169,6 +1362,9 @@ int main(void) {
         cmocka_unit_test(test_view),
         cmocka_unit_test(test_walls_beside),
         cmocka_unit_test(test_motions_shown),
+        cmocka_unit_test(test_colour_bar),
+        cmocka_unit_test(test_colour_values),
+        cmocka_unit_test(test_colour_classes),
         cmocka_unit_test(test_time),
         cmocka_unit_test(test_csv_errors),
         cmocka_unit_test(test_pvd),
@@ -1178,6 +1374,7 @@ int main(void) {
         cmocka_unit_test(test_vtp_walls),
         cmocka_unit_test(test_vtp_tiny),
         cmocka_unit_test(test_vtk_reads),
+        cmocka_unit_test(test_vti_reads),
         cmocka_unit_test(test_pvd_names),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
