@@ -9,6 +9,29 @@ int inside_slot(const dem2d_world *world, int index);
 void inside_scatter(dem2d_world *world, bool scattered);
 /* Renew the list of pairs in the next step. */
 void inside_renew_list(dem2d_world *world);
+/* Has a particle moved as far as its skin; will the next step renew the list? */
+bool inside_list_used_up(const dem2d_world *world);
+bool inside_list_stale(const dem2d_world *world);
+/* Sort the particles in space, and list the pairs, now. */
+bool inside_arrange(dem2d_world *world);
+/* The material whose law alone the steps of a world with pairs of circles go by, or -1. */
+int inside_one_law(const dem2d_world *world);
+/* Make as if so many steps had been too slow, and so many contacts not finite. */
+void inside_count_failures(dem2d_world *world, int slow, int unsound);
+/* Of a world without inverse skins and global damping, and of whole, which has them: give them to
+   the first, and forget the count of the last kind of proof. False if it has them already. */
+bool inside_give_back(dem2d_world *whole, dem2d_world *part);
+/* The drift of a servo wall, and the position of the particle in a slot, by the last step. */
+double inside_wall_drift(const dem2d_world *world, int wall);
+dem2d_vec inside_position(const dem2d_world *world, int slot);
+/* Tables of columns and fields: names that are one of a kind and fit into a record, no more fields
+   than there are bits; a column is swapped with one of its kind. */
+bool inside_tables_hold(void);
+/* Is the column of this name one of settings; one of shapes? */
+bool inside_is_setting(const char *column);
+bool inside_is_of_shapes(const char *column);
+/* Bytes that a writer passes on at once. */
+size_t inside_chunk(void);
 /* Do the invariants at the head of the world's section hold? Prints the first that does not. */
 bool inside_holds(const dem2d_world *world);
 /* Write to a file that is open for reading only; the result of closing it. */
@@ -28,9 +51,95 @@ void inside_renew_list(dem2d_world *world) {
     world->list_stale = true;
 }
 
+bool inside_list_used_up(const dem2d_world *world) {
+    return world->list_used_up;
+}
+
+bool inside_list_stale(const dem2d_world *world) {
+    return world->list_stale;
+}
+
+bool inside_arrange(dem2d_world *world) {
+    world->scattered = world->list_stale = true;
+    return dem2di_arrange(world);
+}
+
+int inside_one_law(const dem2d_world *world) {
+    return world->plan.one_law && world->list.discs > 0 ? world->plan.material : -1;
+}
+
+void inside_count_failures(dem2d_world *world, int slow, int unsound) {
+    world->slow_time_step = slow, world->count.unsound = unsound;
+}
+
+bool inside_give_back(dem2d_world *whole, dem2d_world *part) {
+    bool good = part->global_damping == 0 && whole->global_damping != 0 && whole->skin > 0;
+    for (int i = 0; i < part->body_count; i++) {
+        good = good && part->inverse_skin_squared[i] == 0 && whole->inverse_skin_squared[i] != 0;
+        part->inverse_skin_squared[i] = whole->inverse_skin_squared[i];
+    }
+    part->global_damping = whole->global_damping;
+    whole->count.proofs[DEM2D_PROOF_COUNT - 1] = 0;
+    return good;
+}
+
+double inside_wall_drift(const dem2d_world *world, int wall) {
+    return world->wall_now[wall].drift;
+}
+
+dem2d_vec inside_position(const dem2d_world *world, int slot) {
+    return world->now[slot].x;
+}
+
 static bool inside_fail(const char *what, int at) {
     fprintf(stderr, "invariant: %s (%d)\n", what, at);
     return false;
+}
+
+static bool inside_fields_hold(const dem2di_column *c, int column) {
+    for (int f = 0; f < c->count; f++) {
+        if (strlen(c->fields[f].name) > 8 * DEM2DI_NAME_WORDS)
+            return inside_fail("a field's name is too long", column);
+        for (int k = 0; k < f; k++)
+            if (strcmp(c->fields[k].name, c->fields[f].name) == 0)
+                return inside_fail("two fields of one name", column);
+    }
+    return true;
+}
+
+bool inside_tables_hold(void) {
+    for (int i = 0; i < DEM2DI_COLUMNS; i++) {
+        const dem2di_column *c = &dem2di_columns[i], *next = c + 1;
+        if ((c->name != NULL) != (c->count > 0) || c->count > DEM2DI_FIELDS)
+            return inside_fail("number of fields", i);
+        if (c->name != NULL && strlen(c->name) > 8 * DEM2DI_NAME_WORDS)
+            return inside_fail("a column's name is too long", i);
+        for (int k = 0; k < i && c->name != NULL; k++)
+            if (dem2di_columns[k].name != NULL && strcmp(dem2di_columns[k].name, c->name) == 0)
+                return inside_fail("two columns of one name", i);
+        if (!inside_fields_hold(c, i)) return false;
+        if ((c->treatment & DEM2DI_SWAPS) && (next->group != c->group || next->size != c->size))
+            return inside_fail("a column is swapped with one of another kind", i);
+    }
+    return true;
+}
+
+static const dem2di_column *inside_column(const char *name) {
+    const dem2di_column *column = dem2di_columns;
+    while (column->name == NULL || strcmp(column->name, name) != 0) column++;
+    return column;
+}
+
+bool inside_is_setting(const char *column) {
+    return inside_column(column)->group == DEM2DI_WORLD;
+}
+
+bool inside_is_of_shapes(const char *column) {
+    return inside_column(column)->group >= DEM2DI_SHAPE;
+}
+
+size_t inside_chunk(void) {
+    return DEM2DI_CHUNK;
 }
 
 static bool inside_lives(const dem2d_world *w, int slot) {

@@ -1,5 +1,6 @@
 /* Queries of many pairs at once: the answers of the single query, whatever is in the memories; and
    the straight paths for what was in contact before: the bits of the search that they leave out. */
+#define DEM2D_STATIC /* only what is called is compiled, which is a quarter */
 #define DEM2D_IMPLEMENTATION
 #include "dem2d.h"
 #include "testing.h"

@@ -1,9 +1,9 @@
 /* The hash of a world's state, and snapshots: a world that was loaded goes on as if it had never
    stopped, and no damaged snapshot is taken for a good one. */
 #define _POSIX_C_SOURCE 200809L
-#define DEM2D_IMPLEMENTATION
 #include "dem2d.h"
 #include "testing.h"
+#include "inside.h"
 #include "snapshot_scenes.h"
 
 #include <sys/stat.h>
@@ -29,7 +29,7 @@ typedef struct record {
     uint64_t rows, fields, width;
 } record;
 
-enum { RECORD_HEAD = 40, FIELD_HEAD = 32 };
+enum { RECORD_HEAD = 40, FIELD_HEAD = 32, SNAPSHOT_VERSION = 4 };
 
 static record record_at(const scene_bytes *bytes, size_t at) {
     record r = {at, at + RECORD_HEAD, 0, 0, 0, 0};
@@ -93,20 +93,22 @@ static int ledger_numbers(const dem2d_world *world, double *to) {
 static int numbers_of(const dem2d_world *world, double *to, int room) {
     static dem2d_particle_id ids[200];
     static dem2d_contact_info contacts[1000];
-    int count, used = 0;
+    dem2d_wall_id wall_ids[20];
+    int count, walls, used = 0;
     dem2d_energy energy;
+    assert_ok(dem2d_world_walls(world, wall_ids, COUNT_OF(wall_ids), &walls));
+    assert_in_range(walls, 0, COUNT_OF(wall_ids));
     assert_ok(dem2d_world_energy(world, &energy));
     to[used++] = energy.translational, to[used++] = energy.rotational;
     to[used++] = energy.normal, to[used++] = energy.tangential, to[used++] = energy.potential;
     to[used++] = energy.rolling;
     used += ledger_numbers(world, to + used);
-    for (int j = 0; j < world->wall_count; j++) {
-        const dem2d_wall_id id = {(uint32_t)j, world->walls[j].generation};
+    for (int j = 0; j < walls; j++) {
         dem2d_wall_info w;
-        if (!world->walls[j].alive) continue;
-        assert_ok(dem2d_world_get_wall(world, id, &w));
-        const double got[] = {(double)j,    w.segment,  w.point.x, w.point.y, w.end.x,  w.end.y,
-                              w.velocity.x, w.normal.x, w.force.x, w.force.y, w.length, w.stress};
+        assert_ok(dem2d_world_get_wall(world, wall_ids[j], &w));
+        const double got[] = {wall_ids[j].index, w.segment, w.point.x,    w.point.y,
+                              w.end.x,           w.end.y,   w.velocity.x, w.normal.x,
+                              w.force.x,         w.force.y, w.length,     w.stress};
         memcpy(to + used, got, sizeof got);
         used += COUNT_OF(got);
     }
@@ -137,10 +139,9 @@ static int numbers_of(const dem2d_world *world, double *to, int room) {
         memcpy(to + used, got, sizeof got);
         used += COUNT_OF(got);
     }
-    for (int j = 0; j < world->wall_count; j++) {
-        const dem2d_wall_id id = {(uint32_t)j, world->walls[j].generation};
+    for (int j = 0; j < walls; j++) {
         dem2d_wall_info w;
-        if (dem2d_world_get_wall(world, id, &w) != DEM2D_OK) continue;
+        assert_ok(dem2d_world_get_wall(world, wall_ids[j], &w));
         const double got[] = {w.point.x,    w.point.y,    w.normal.x, w.normal.y,
                               w.velocity.x, w.velocity.y, w.force.x,  w.force.y,
                               w.length,     w.stress,     w.target,   (double)w.mode};
@@ -218,12 +219,12 @@ static void test_resume(void **state) {
             dem2d_stats stats;
             int steps = i < 8 ? 1 : 41;
             check_resume(s.world, i % 2 == 1, 5);
-            for (; steps > 0 || (i % 4 == 3 && !s.world->list_used_up); steps--) {
+            for (; steps > 0 || (i % 4 == 3 && !inside_list_used_up(s.world)); steps--) {
                 assert_true(steps > -5000);
                 assert_ok(dem2d_world_step(s.world, 1, NULL));
             }
             assert_ok(dem2d_world_stats(s.world, &stats));
-            worn += s.world->list_used_up, lasting += !s.world->list_stale;
+            worn += inside_list_used_up(s.world), lasting += !inside_list_stale(s.world);
             contacts += stats.contacts + stats.wall_contacts;
         }
         check_resume(s.world, false, 500);
@@ -556,10 +557,9 @@ static void test_one_material(void **state) {
     for (uint32_t i = 0; i < 40; i++)
         if (i % 3 != 2) assert_ok(dem2d_world_remove_particle(s.world, (dem2d_particle_id){i, 1}));
     assert_ok(dem2d_world_step(s.world, 1500, NULL));
-    while (s.world->list_stale) assert_ok(dem2d_world_step(s.world, 1, NULL));
-    assert_true(s.world->plan.one_law && s.world->plan.material == 1);
-    assert_true(s.world->list.discs > 0);
-    s.world->slow_time_step = 3, s.world->count.unsound = 2;
+    while (inside_list_stale(s.world)) assert_ok(dem2d_world_step(s.world, 1, NULL));
+    assert_int_equal(inside_one_law(s.world), 1);
+    inside_count_failures(s.world, 3, 2);
     check_resume(s.world, false, 300);
     dem2d_world_destroy(s.world);
 }
@@ -577,7 +577,7 @@ static void test_servo(void **state) {
     wall.stress = 3000, wall.max_speed = 4, wall.length = 0.25;
     assert_ok(dem2d_world_set_wall(s.world, s.walls[3], &wall));
     assert_ok(dem2d_world_step(s.world, 2000, NULL));
-    assert_true(s.world->wall_now[3].drift != 0 && s.world->wall_now[3].force.y > 0);
+    assert_true(inside_wall_drift(s.world, 3) != 0);
     check_resume(s.world, true, 200);
     dem2d_world_destroy(s.world);
 }
@@ -625,7 +625,7 @@ static void test_resume_joints(void **state) {
             }
             before = now;
             if (i % 7 == 0 || handed % 2 == 1) check_resume(s.world, i % 2, 1);
-            const double place = (s.world->now[0].x.x - 0.5) / 0.05;
+            const double place = (inside_position(s.world, 0).x - 0.5) / 0.05;
             if (fabs(place - round(place)) < 0.15) check_resume(s.world, i % 2, 2);
         }
         assert_true(handed >= 2 && sheared >= 1);
@@ -656,7 +656,7 @@ static void check_joint_moves(double start, double speed) {
         assert_ok(dem2d_world_add_particle(s[k].world, &grain, &id));
     }
     for (int i = 0; i < 200; i++) {
-        s[1].world->list_stale = true;
+        inside_renew_list(s[1].world);
         for (int k = 0; k < 2; k++) assert_ok(dem2d_world_step(s[k].world, 1, NULL));
         assert_int_equal(dem2d_world_hash(s[0].world), dem2d_world_hash(s[1].world));
         dem2d_stats stats;
@@ -754,8 +754,7 @@ static void test_hash_stays(void **state) {
         assert_ok(dem2d_world_step(t.world, 50, NULL));
         const uint64_t hash = dem2d_world_hash(s.world);
         assert_int_equal(dem2d_world_hash(t.world), hash);
-        s.world->scattered = s.world->list_stale = true; /* so that all are sorted, and listed */
-        assert_true(dem2di_arrange(s.world));
+        assert_true(inside_arrange(s.world));
         assert_int_equal(dem2d_world_hash(s.world), hash);
         scene_bytes bytes = scene_save(s.world);
         free(bytes.bytes);
@@ -1053,7 +1052,7 @@ static void test_layout(void **state) {
     uint64_t word;
     int records = 0;
     assert_memory_equal(bytes.bytes, mark, 8);
-    assert_int_equal(get_word(bytes.bytes + 8), DEM2DI_SNAPSHOT_VERSION);
+    assert_int_equal(get_word(bytes.bytes + 8), SNAPSHOT_VERSION);
     assert_int_equal(get_word(bytes.bytes + 16), bytes.size);
     assert_int_equal(get_word(bytes.bytes + end), checksum_of(&bytes));
     for (size_t at = 24; at < end; at = record_at(&bytes, at).end) records++;
@@ -1071,25 +1070,9 @@ static void test_layout(void **state) {
     free(bytes.bytes);
 }
 
-/* Tables of columns and fields: names that are one of a kind and fit into a record, no more fields
-   than there are bits; a column is swapped with one of its kind. */
 static void test_tables(void **state) {
     (void)state;
-    for (int i = 0; i < DEM2DI_COLUMNS; i++) {
-        const dem2di_column *c = &dem2di_columns[i], *next = c + 1;
-        assert_true((c->name != NULL) == (c->count > 0) && c->count <= DEM2DI_FIELDS);
-        assert_true(c->name == NULL || strlen(c->name) <= 8 * DEM2DI_NAME_WORDS);
-        for (int k = 0; k < i && c->name != NULL; k++)
-            assert_true(dem2di_columns[k].name == NULL ||
-                        strcmp(dem2di_columns[k].name, c->name) != 0);
-        for (int f = 0; f < c->count; f++) {
-            assert_true(strlen(c->fields[f].name) <= 8 * DEM2DI_NAME_WORDS);
-            for (int k = 0; k < f; k++)
-                assert_true(strcmp(c->fields[k].name, c->fields[f].name) != 0);
-        }
-        if (c->treatment & DEM2DI_SWAPS)
-            assert_true(next->group == c->group && next->size == c->size);
-    }
+    assert_true(inside_tables_hold());
 }
 
 /* --- other versions -----------------------------------------------------------------------------
@@ -1130,20 +1113,11 @@ static void test_earlier(void **state) {
     (void)state;
     scene_bytes bytes = small_snapshot(SCENE_FULL);
     dem2d_world *whole = load_with(&bytes, NULL, false);
-    const int calls = COUNT_OF(whole->count.proofs);
-    assert_true(whole->inverse_skin_squared[0] != 0 && whole->global_damping != 0 &&
-                whole->skin > 0);
-    whole->count.proofs[calls - 1] = 0;
     cut_column(&bytes, "inverse_skins_squared");
     cut_field(&bytes, "world", "global_damping", 0);
-    cut_field(&bytes, "progress", "proofs", (uint64_t)calls - 1);
+    cut_field(&bytes, "progress", "proofs", DEM2D_PROOF_COUNT - 1);
     dem2d_world *part = load_with(&bytes, NULL, false);
-    for (int i = 0; i < part->body_count; i++) {
-        assert_true(part->inverse_skin_squared[i] == 0);
-        part->inverse_skin_squared[i] = whole->inverse_skin_squared[i];
-    }
-    assert_true(part->global_damping == 0);
-    part->global_damping = whole->global_damping;
+    assert_true(inside_give_back(whole, part));
     assert_same_world(whole, part);
     assert_ok(dem2d_world_step(part, 50, NULL));
     dem2d_world_destroy(whole), dem2d_world_destroy(part);
@@ -1194,7 +1168,7 @@ static void test_later(void **state) {
     put_word(bytes.bytes + record_named(&bytes, "states").at + 24, (uint64_t)1 << 40);
     check_refused(&bytes, DEM2D_FORMAT, "rows");
     for (uint64_t version = 0; version < 6; version++) {
-        if (version == DEM2DI_SNAPSHOT_VERSION) continue;
+        if (version == SNAPSHOT_VERSION) continue;
         bytes = small_snapshot(SCENE_CIRCLES);
         put_word(bytes.bytes + 8, version);
         check_refused(&bytes, DEM2D_FORMAT_VERSION, "version");
@@ -1210,10 +1184,8 @@ static void test_order(void **state) {
     for (int last = 0; last < 2; last++)
         for (size_t at = 24; at < bytes.size - 8; at = record_at(&bytes, at).end) {
             const record r = record_at(&bytes, at);
-            const dem2di_column *column = dem2di_columns;
-            while (column->name == NULL || strcmp(column->name, bytes.bytes + at) != 0) column++;
-            const bool setting = column->group == DEM2DI_WORLD;
-            if (setting != (last == 1) || column->group >= DEM2DI_SHAPE) continue;
+            const bool setting = inside_is_setting(bytes.bytes + at);
+            if (setting != (last == 1) || inside_is_of_shapes(bytes.bytes + at)) continue;
             const size_t count = (setting ? r.end : r.rows_at) - at;
             memcpy(moved.bytes + to, bytes.bytes + at, count);
             if (!setting) put_word(moved.bytes + to + 24, 0);
@@ -1280,7 +1252,7 @@ static void check_writes_fail(int kind) {
     scene_make(&s, kind, 40, &desc);
     assert_ok(dem2d_world_step(s.world, 50, NULL));
     scene_bytes whole = scene_save(s.world), part = {0};
-    assert_true(whole.size > 2 * DEM2DI_CHUNK);
+    assert_true(whole.size > 2 * inside_chunk());
     const dem2d_save_desc save = {.write = scene_write, .user = &part};
     for (part.limit = 1; part.limit <= whole.size; part.limit++) {
         part.size = 0;
