@@ -9,9 +9,8 @@
 #define DEM2D_IMPLEMENTATION
 #include "dem2d.h"
 #define BENCH_NAME "bench_fit"
-#include "bench.h"
+#include "bench_outlines.h"
 
-#include <dirent.h>
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -19,7 +18,6 @@
 #include <sys/stat.h>
 #include <time.h>
 
-#define PATH_ROOM 4096
 #define MADE 12 /* outlines, when none are given */
 
 /* --- fits ----------------------------------------------------------------------------------- */
@@ -53,91 +51,8 @@ static const method methods[] = {
 
 /* --- outlines ------------------------------------------------------------------------------- */
 
-typedef struct grain {
-    char *name; /* of its file, without folder and ".csv" */
-    dem2d_vec *points;
-    int count;
-    bool core;
-} grain;
-
-typedef struct grains {
-    grain *list;
-    int count, room;
-    int skipped;          /* other .csv files */
-    char core[PATH_ROOM]; /* path of core12.txt, if any */
-} grains;
-
-static void *need(void *memory) {
-    if (memory) return memory;
-    bench_fail("out of memory");
-    return NULL;
-}
-
-/* Takes the points. */
-static void list_grain(grains *all, const char *name, size_t length, dem2d_vec *points, int count) {
-    if (all->count == all->room) {
-        all->room = 2 * all->room + 16;
-        all->list = need(realloc(all->list, (size_t)all->room * sizeof *all->list));
-    }
-    grain *g = &all->list[all->count++];
-    g->name = need(malloc(length + 1)), g->points = points, g->count = count, g->core = false;
-    memcpy(g->name, name, length), g->name[length] = 0;
-}
-
-/* Adds the outline in a file, or counts the file as another one. */
-static void read_grain(grains *all, const char *path, const char *name) {
-    char line[256];
-    int count = 0, room = 0;
-    dem2d_vec *points = NULL, p;
-    FILE *file = fopen(path, "r");
-    if (file && fgets(line, sizeof line, file) && strcspn(line, "\r\n") == 3 &&
-        strncmp(line, "x,y", 3) == 0) {
-        while (fgets(line, sizeof line, file) && sscanf(line, "%lf,%lf", &p.x, &p.y) == 2) {
-            if (count == room) {
-                room = 2 * room + 256;
-                points = need(realloc(points, (size_t)room * sizeof *points));
-            }
-            points[count++] = p;
-        }
-    }
-    if (file) fclose(file);
-    if (count >= 3) {
-        list_grain(all, name, strlen(name) - 4, points, count);
-        return;
-    }
-    free(points);
-    all->skipped++;
-}
-
-/* All outlines below a folder; false when it can't be opened. */
-static bool read_folder(grains *all, const char *folder) {
-    DIR *dir = opendir(folder);
-    if (!dir) return false;
-    for (struct dirent *entry; (entry = readdir(dir));) {
-        const char *name = entry->d_name;
-        const size_t length = strlen(name);
-        char path[PATH_ROOM];
-        struct stat info;
-        if (name[0] == '.') continue;
-        const int written = snprintf(path, sizeof path, "%s/%s", folder, name);
-        if (written < 0 || (size_t)written >= sizeof path || lstat(path, &info)) continue;
-        if (S_ISDIR(info.st_mode)) /* a link to one could lead in circles */
-            read_folder(all, path);
-        else if (strcmp(name, "core12.txt") == 0)
-            memcpy(all->core, path, (size_t)written + 1);
-        else if (length > 4 && strcmp(name + length - 4, ".csv") == 0)
-            read_grain(all, path, name);
-    }
-    closedir(dir);
-    return true;
-}
-
-static int by_name(const void *a, const void *b) {
-    return strcmp(((const grain *)a)->name, ((const grain *)b)->name);
-}
-
 /* How many of the grains are named in core12.txt. */
-static int mark_core(grains *all) {
+static int mark_core(outlines *all) {
     char name[256];
     int marked = 0;
     FILE *file = all->core[0] ? fopen(all->core, "r") : NULL;
@@ -155,7 +70,7 @@ static int mark_core(grains *all) {
 }
 
 /* Angular grains with worn corners and a rough face: about one polygon's distance, waves on it. */
-static void make_grains(grains *all) {
+static void make_grains(outlines *all) {
     for (int i = 0; i < MADE; i++) {
         const int count = 600, sides = 4 + i % 4;
         dem2d_vec *points = need(malloc((size_t)count * sizeof *points));
@@ -174,14 +89,14 @@ static void make_grains(grains *all) {
             points[j].x = 1.3 * r * cos(t), points[j].y = r * sin(t);
         }
         snprintf(name, sizeof name, "made_%02d", i);
-        list_grain(all, name, strlen(name), points, count);
+        list_outline(all, name, strlen(name), points, count);
     }
 }
 
 /* --- measuring ------------------------------------------------------------------------------ */
 
 /* One fit; its time, and its coverage. */
-static dem2d_result run_once(const grain *g, const method *m, int count, double *coverage,
+static dem2d_result run_once(const outline *g, const method *m, int count, double *coverage,
                              double *spent) {
     dem2d_fit_desc desc = m->desc;
     dem2d_fit_report report = {0};
@@ -209,10 +124,10 @@ static void add_figures(figures *f, double coverage, double seconds) {
 }
 
 /* A fit to every grain: figures of all, and of those in the core. */
-static void measure(const grains *all, const method *m, int count, figures of[2]) {
+static void measure(const outlines *all, const method *m, int count, figures of[2]) {
     of[0] = of[1] = (figures){0};
     for (int i = 0; i < all->count; i++) {
-        const grain *g = &all->list[i];
+        const outline *g = &all->list[i];
         double coverage = 0, t[3], spent = 0;
         int runs = 0;
         dem2d_result result = DEM2D_OK;
@@ -289,21 +204,20 @@ static void write_picture(int which, const char *title) {
 }
 
 /* The grains to fit, in the order of their names. */
-static void get_grains(grains *all, const char *folder) {
+static void get_grains(outlines *all, const char *folder) {
     if (!folder) {
         make_grains(all);
         printf("%d outlines made here (a folder of real ones can be given)\n", all->count);
         return;
     }
-    if (!read_folder(all, folder) || all->count == 0) bench_fail("no outline below %s", folder);
-    qsort(all->list, (size_t)all->count, sizeof *all->list, by_name);
+    read_outlines(all, folder);
     printf("%d outlines below %s\n", all->count, folder);
     if (all->skipped)
         printf("skipped: %d .csv files that are no outlines (first line not x,y)\n", all->skipped);
 }
 
 int main(int argc, char **argv) {
-    static grains all;
+    static outlines all;
     if (argc > 2 || (argc > 1 && argv[1][0] == '-')) {
         fprintf(stderr, "usage: bench_fit [DIR]\n");
         return 2;
@@ -325,8 +239,7 @@ int main(int argc, char **argv) {
     fclose(csv);
     printf("\nbuild/fit.csv: the same figures\n");
     write_picture(core ? 1 : 0, core ? "grains of core12.txt" : "all outlines");
-    for (int i = 0; i < all.count; i++) free(all.list[i].name), free(all.list[i].points);
-    free(all.list);
+    free_outlines(&all);
     if (failed) printf("%d fits FAILED\n", failed);
     return failed ? 1 : 0;
 }
