@@ -2,9 +2,10 @@
    steps.
 
    PARTS: the scenes discs, polygons (4 to 7 sides), ellipses (aspect 1 to 2.5), beziers (10 arcs),
-   fourier (order 8) and mixed (all five), each settled under gravity and in the biaxial test; and
-   time against error by dt, order (of Fourier series) and skin; and the time of a list of pairs by
-   sizes (ratio of radii). --most leaves out larger scenes.
+   fourier (order 8) and mixed (all five), each settled under gravity and in the biaxial test; laws:
+   settled discs beside LAMMPS with the same law (friction, dashpots, rolling friction); and time
+   against error by dt, order (of Fourier series) and skin; and the time of a list of pairs by sizes
+   (ratio of radii). --most leaves out larger scenes.
 
    Scenes. Circles of equal area have diameters uniform in 0.04 to 0.06 m; density 2700, kn = kt =
    1e7 N/m, friction 0.2, time step 1e-4 s, 32 templates a model, scaled.
@@ -32,9 +33,12 @@
    the "CPU use": without the list that each run starts with. The figures of dem2d have the lists
    that fall into their batches.
 
-   Writes world.csv, dt.csv, order.csv, skin.csv, sizes.csv and, where gnuplot is installed,
-   pictures of them to OUTDIR, build/bench_world by default. Exit status: 0, 1 if bits differed, 2
-   if something failed. Speed never fails. */
+   Part laws: equal stiffness, friction, dashpots and rolling friction, no local damping; both go
+   from the same positions and velocities, and are compared after 200 steps.
+
+   Writes world.csv, laws.csv, dt.csv, order.csv, skin.csv, sizes.csv and, where gnuplot is
+   installed, pictures of all but laws to OUTDIR, build/bench_world by default. Exit status: 0, 1 if
+   bits differed, 2 if something failed. Speed never fails. */
 #define _POSIX_C_SOURCE 200809L
 #define DEM2D_IMPLEMENTATION
 #include "dem2d.h"
@@ -61,13 +65,14 @@
 #define BATCHES 7
 #define SKINS 4 /* that LAMMPS may choose from */
 
-enum { PART_DT = SCENES, PART_ORDER, PART_SKIN, PART_SIZES, PARTS };
+enum { PART_LAWS = SCENES, PART_DT, PART_ORDER, PART_SKIN, PART_SIZES, PARTS };
 enum { SETTLED, BIAXIAL, TESTS };
 enum { LEFT, RIGHT, BOTTOM, TOP, WALLS };
 
 static const char *const model_names[MODELS] = {"circle", "ellipse", "polygon", "bezier", "fs"};
-static const char *const part_names[PARTS] = {"discs", "polygons", "ellipses", "beziers", "fourier",
-                                              "mixed", "dt",       "order",    "skin",    "sizes"};
+static const char *const part_names[PARTS] = {"discs",   "polygons", "ellipses", "beziers",
+                                              "fourier", "mixed",    "laws",     "dt",
+                                              "order",   "skin",     "sizes"};
 static const char *const test_names[TESTS] = {"settled", "biaxial"};
 
 /* On a core, of this thread. */
@@ -128,8 +133,16 @@ static bed copy_bed(const bed *b, int columns, int rows) {
 
 /* --- runs ------------------------------------------------------------------------------------- */
 
+/* Contacts beside springs and friction: damping ratio of the normal and the tangential dashpot,
+   rolling friction. */
+typedef struct law {
+    const char *name;
+    double dashpot, rolling;
+} law;
+
 typedef struct setup {
     int test;
+    const law *law; /* NULL: springs and friction alone */
     double damping, skin, time_step;
     dem2d_parallel_fn *parallel;
     void *user;
@@ -144,20 +157,24 @@ typedef struct run {
 } run;
 
 static setup plain_setup(int test, double damping) {
-    const setup s = {test, damping, 0, TIME_STEP, NULL, NULL};
+    const setup s = {test, NULL, damping, 0, TIME_STEP, NULL, NULL};
     return s;
 }
 
-static void add_materials(run *r, int test) {
+static void add_materials(run *r, const setup *s) {
     dem2d_material_desc stone = {0};
     dem2d_pair_desc smooth = {0};
     stone.density = DENSITY;
     stone.normal_stiffness = smooth.normal_stiffness = STIFFNESS;
     stone.tangential_stiffness = smooth.tangential_stiffness = STIFFNESS;
     stone.friction = FRICTION;
+    if (s->law) {
+        stone.damping_ratio = stone.tangential_damping_ratio = s->law->dashpot;
+        stone.rolling_friction = s->law->rolling;
+    }
     expect_ok(dem2d_world_add_material(r->world, &stone, &r->grain_material), "material");
     expect_ok(dem2d_world_add_material(r->world, &stone, &r->wall_material), "material");
-    if (test != BIAXIAL) return;
+    if (s->test != BIAXIAL) return;
     expect_ok(dem2d_world_set_pair(r->world, r->grain_material, r->wall_material, &smooth), "pair");
 }
 
@@ -237,7 +254,7 @@ static run open_run(const bed *b, const setup *s) {
     desc.particle_capacity = b->count;
     r.bed = b;
     expect_ok(dem2d_world_create(&desc, &r.world), "world");
-    add_materials(&r, s->test);
+    add_materials(&r, s);
     add_grains(&r);
     add_walls(&r, s->test);
     if (s->test == BIAXIAL) control_walls(&r);
@@ -542,6 +559,17 @@ static void write_discs(FILE *file, const bed *b) {
     }
 }
 
+/* The first step here goes from rest at a full step of speed, in LAMMPS at half of one more than at
+   the start: it begins with the other half. */
+static void write_velocities(FILE *file, const run *r) {
+    fprintf(file, "\nVelocities\n\n");
+    for (int i = 0; i < r->bed->count; i++) {
+        const dem2d_particle_info now = get_particle(r, i);
+        fprintf(file, "%d %.17g %.17g 0 0 0 %.17g\n", i + 1, now.velocity.x / 2, now.velocity.y / 2,
+                now.angular_velocity / 2);
+    }
+}
+
 /* Corners about the centroid, a tenth nearer to it; rounding gives back at most that. */
 static void write_body(FILE *file, const bed *b, int i) {
     const grain *g = &b->grains[i];
@@ -573,14 +601,39 @@ static void write_polygons(FILE *file, const bed *b) {
     for (int i = 0; i < b->count; i++) write_body(file, b, i);
 }
 
-/* Dashpots take about two thirds of what would be critical. */
-static void send_discs(FILE *to, const bed *b) {
-    static const char wall[] = "wall/gran hooke/history 1e7 1e7 2500 1250 0.2 1";
+/* Commands for a law. LAMMPS divides its dashpots by the reduced mass; those here are equal where
+   the discs of a pair have the mean area. A tangential dashpot here is of a mass that is a third of
+   the reduced one, because a disc has half of m r^2. NULL: dashpots in place of local damping, two
+   thirds of what would be critical. */
+static void lammps_law(const law *l, char *pair, char *wall, size_t room) {
+    const double mass = DENSITY * PI * 0.025 * 0.025, root = sqrt(STIFFNESS / mass);
+    const double zeta = l ? l->dashpot : 0;
+    const double of_pair = l ? 2 * zeta * root * sqrt(2) : 2500,
+                 of_wall = l ? 2 * zeta * root : 2500;
+    const double across = l ? 1 / sqrt(3) : 0.5;
+    static const char plain[] = "%s%.9g %.9g %.9g %.9g %g 1%s";
+    static const char rolls[] = "%shooke %.9g %.9g tangential linear_history %.9g %.9g %g rolling "
+                                "sds %.9g 0 %g damping mass_velocity";
+    if (l && l->rolling > 0) {
+        snprintf(pair, room, rolls, "pair_style granular\npair_coeff * * ", STIFFNESS, of_pair,
+                 STIFFNESS, across, FRICTION, STIFFNESS, l->rolling);
+        snprintf(wall, room, rolls, "wall/gran granular ", STIFFNESS, of_wall, STIFFNESS, across,
+                 FRICTION, STIFFNESS, l->rolling);
+    } else {
+        snprintf(pair, room, plain, "pair_style gran/hooke/history ", STIFFNESS, STIFFNESS, of_pair,
+                 across * of_pair, FRICTION, "\npair_coeff * *");
+        snprintf(wall, room, plain, "wall/gran hooke/history ", STIFFNESS, STIFFNESS, of_wall,
+                 across * of_wall, FRICTION, "");
+    }
+}
+
+static void send_discs(FILE *to, const bed *b, const law *l) {
+    char pair[256], wall[256];
+    lammps_law(l, pair, wall, sizeof pair);
     fprintf(to, "units si\ndimension 2\nboundary f f p\nnewton off\natom_style sphere\n");
     fprintf(to, "comm_modify vel yes\nread_data lammps.data\n");
     fprintf(to, "set group all density/disc %d\n", DENSITY);
-    fprintf(to, "pair_style gran/hooke/history 1e7 1e7 2500 1250 0.2 1\npair_coeff * *\n");
-    fprintf(to, "fix move all nve/sphere disc\n");
+    fprintf(to, "%s\nfix move all nve/sphere disc\n", pair);
     fprintf(to, "fix sides all %s xplane %.17g %.17g\n", wall, b->left, b->right);
     fprintf(to, "fix floor all %s yplane %.17g NULL\n", wall, b->bottom);
 }
@@ -638,11 +691,13 @@ static void be_lammps(int input) {
     _exit(127);
 }
 
-static peer start_lammps(const bed *b, int scene) {
+/* moving: the bed after its first step, whose velocities LAMMPS begins with; or NULL, at rest. */
+static peer start_lammps(const bed *b, int scene, const law *law, const run *moving) {
     peer l = {true, 0, NULL, 0};
     int ends[2];
     FILE *data = create("lammps.data");
     (scene == DISCS ? write_discs : write_polygons)(data, b);
+    if (moving) write_velocities(data, moving);
     fclose(data);
     if (pipe(ends) != 0) bench_fail("no pipe");
     fcntl(ends[1], F_SETFD, FD_CLOEXEC);
@@ -652,7 +707,10 @@ static peer start_lammps(const bed *b, int scene) {
     close(ends[0]);
     l.commands = fdopen(ends[1], "w");
     if (!l.commands) bench_fail("no pipe");
-    (scene == DISCS ? send_discs : send_polygons)(l.commands, b);
+    if (scene == DISCS)
+        send_discs(l.commands, b, law);
+    else
+        send_polygons(l.commands, b);
     fprintf(l.commands,
             "neigh_modify delay 0 every 1 check yes\ntimestep %g\n"
             "fix weight all gravity %g vector 0 -1 0\nfix flat all enforce2d\n"
@@ -740,7 +798,7 @@ static void open_bench(bench *b, const bed *start) {
     if ((row->scene != DISCS && row->scene != POLYGONS) || row->test != SETTLED || !have_lammps())
         return;
     if (row->scene == DISCS ? row->count > 100000 : row->count > 5000) return;
-    b->lammps = start_lammps(&b->adapted, row->scene);
+    b->lammps = start_lammps(&b->adapted, row->scene, NULL, NULL);
     run_lammps(&b->lammps, lammps_skins[1], opt.quick ? 200 : row->count > 20000 ? 500 : 1000);
 }
 
@@ -929,6 +987,151 @@ static void measure_scenes(void) {
                 if (has_size(scene, test, sizes[i])) measure(scene, test, sizes[i], csv);
     fclose(csv);
     print_phases();
+}
+
+/* --- LAMMPS with equal laws ------------------------------------------------------------------- */
+
+#define CHECKED 200 /* steps, some ten swings of a contact, after which both are compared */
+
+static const law laws[] = {{"friction", 0, 0}, {"dashpots", 0.3, 0}, {"rolling", 0.3, 0.1}};
+static const int law_sizes[] = {500, 10000, 100000};
+
+enum { LAWS = COUNT_OF(laws), LAW_SIZES = COUNT_OF(law_sizes) };
+
+/* path: root mean square of the differences of the grains' displacements over that of the
+   displacements; energy: kinetic energy in LAMMPS over that here. */
+typedef struct law_row {
+    timing time;
+    double path, energy;
+} law_row;
+
+static law_row law_rows[LAWS][LAW_SIZES];
+
+/* Positions after the checked steps, and velocities: mean of the half steps before and after. */
+static void take_checked_steps(run *r, dem2d_vec *places, dem2d_vec *speeds) {
+    take_steps(r, CHECKED - 1);
+    for (int half = 0; half < 2; half++) {
+        for (int i = 0; i < r->bed->count; i++) {
+            const dem2d_particle_info now = get_particle(r, i);
+            if (half == 0) places[i] = now.pose.position;
+            speeds[i].x += now.velocity.x / 2, speeds[i].y += now.velocity.y / 2;
+        }
+        if (half == 0) take_steps(r, 1);
+    }
+}
+
+/* Compares with what LAMMPS wrote after as many steps from the same start. */
+static void compare_paths(const bed *b, const dem2d_vec *places, const dem2d_vec *speeds,
+                          law_row *row) {
+    char line[256];
+    double off = 0, way = 0, here = 0, there = 0;
+    FILE *file = fopen("lammps.dump", "r");
+    for (int i = 0; file && i < 9; i++)
+        if (!fgets(line, sizeof line, file)) break;
+    for (int i = 0, id = 0; i < b->count; i++) {
+        dem2d_vec p, v;
+        if (!file || fscanf(file, "%d %lf %lf %lf %lf", &id, &p.x, &p.y, &v.x, &v.y) != 5 ||
+            id != i + 1)
+            bench_fail("lammps.dump: no line for disc %d", i + 1);
+        const double mass = b->grains[i].scale * b->grains[i].scale;
+        off += pow(p.x - places[i].x, 2) + pow(p.y - places[i].y, 2);
+        way += pow(places[i].x - b->grains[i].x, 2) + pow(places[i].y - b->grains[i].y, 2);
+        here += mass * (speeds[i].x * speeds[i].x + speeds[i].y * speeds[i].y);
+        there += mass * (v.x * v.x + v.y * v.y);
+    }
+    fclose(file);
+    row->path = sqrt(off / way), row->energy = there / here;
+}
+
+/* The adapted bed at rest: both go on from it, without local damping and friction history. */
+static bed adapt_bed(const bed *start, setup *s, timing *row) {
+    const int steps = adapting_steps(row->count);
+    run r = open_run(start, s);
+    row->steps = batch_steps(take_steps(&r, steps) / steps);
+    const bed adapted = save_bed(&r, SETTLED);
+    close_run(&r);
+    s->damping = 0;
+    return adapted;
+}
+
+/* Batches in turn, as of scenes. LAMMPS writes what is compared after its first run. */
+static void run_law(run *r, const law *l, law_row *row) {
+    timing *t = &row->time;
+    const int count = t->count;
+    peer lammps = {false, 0, NULL, 0};
+    dem2d_vec *places = get_memory((size_t)count, sizeof *places);
+    dem2d_vec *speeds = get_memory((size_t)count, sizeof *speeds);
+    double ns[BATCHES];
+    take_steps(r, 1);
+    if (have_lammps()) {
+        lammps = start_lammps(r->bed, DISCS, l, r);
+        run_lammps(&lammps, lammps_skins[1], CHECKED);
+    }
+    if (lammps.on)
+        fprintf(lammps.commands, "write_dump all custom lammps.dump id x y vx vy modify sort id "
+                                 "format float %%.17g\n");
+    take_checked_steps(r, places, speeds);
+    for (int i = 0; i < BATCHES; i++) {
+        ns[i] = 1e9 * take_steps(r, t->steps) / ((double)count * t->steps);
+        for (int k = 0; k < SKINS && lammps.on; k++)
+            run_lammps(&lammps, lammps_skins[k], lammps_steps(t));
+    }
+    const bool finished = lammps.on;
+    stop_lammps(&lammps);
+    t->one = summary(ns, BATCHES), t->lammps = no_figure;
+    if (finished) read_lammps(t), compare_paths(r->bed, places, speeds, row);
+    free(places);
+    free(speeds);
+}
+
+static void print_law(const law *l, const law_row *row, FILE *csv) {
+    const timing *t = &row->time;
+    char one[32], peer_range[32];
+    printf("%-8s %8d | %7.1f %-12s | %7.1f %-12s %4g mm %5.2f | %9.2g %9.6f\n", l->name, t->count,
+           t->one.median, range_text(&t->one, one, sizeof one), t->lammps.median,
+           range_text(&t->lammps, peer_range, sizeof peer_range), 1000 * t->lammps_skin,
+           t->lammps.median / t->one.median, row->path, row->energy);
+    fprintf(csv, "%s,%d,%d,%.6g,%.6g,%.6g,%.6g,%.6g,%.6g,%g,%.4g,%.6g\n", l->name, t->count,
+            t->steps, t->one.median, t->one.low, t->one.high, t->lammps.median, t->lammps.low,
+            t->lammps.high, t->lammps_skin, row->path, row->energy);
+    fflush(stdout);
+}
+
+static void measure_law(int which, int size, FILE *csv) {
+    law_row *row = &law_rows[which][size];
+    setup s = plain_setup(SETTLED, 0.7);
+    s.law = &laws[which];
+    row->time.scene = DISCS, row->time.test = SETTLED, row->time.count = law_sizes[size];
+    row->path = row->energy = NAN;
+    bed start = get_bed(DISCS, SETTLED, law_sizes[size]);
+    bed adapted = adapt_bed(&start, &s, &row->time);
+    run r = open_run(&adapted, &s);
+    run_law(&r, s.law, row);
+    print_law(s.law, row, csv);
+    close_run(&r);
+    free(start.grains);
+    free(adapted.grains);
+}
+
+static void measure_laws(void) {
+    FILE *csv = create("laws.csv");
+    printf(
+        "\nSettled discs without local damping, by law: the same in both programs. dashpots: "
+        "normal "
+        "and\ntangential, damping ratio 0.3 (LAMMPS: gran/hooke/history); rolling: these, and "
+        "rolling friction 0.1\n(granular, sds). After %d steps from the same start: path, the "
+        "difference of displacements; energy,\nkinetic, LAMMPS over dem2d. LAMMPS has other "
+        "dashpots for discs that are not of mean size.\n%-8s %8s | %7s %-12s | %7s %-12s %7s %5s "
+        "| %9s %9s\n",
+        CHECKED, "law", "N", "ns", "(min-max)", "LAMMPS", "(min-max)", "skin", "times", "path",
+        "energy");
+    fprintf(csv, "law,particles,batch_steps,ns,ns_min,ns_max,lammps_ns,lammps_min,lammps_max,"
+                 "lammps_skin_m,path,energy\n");
+    for (int which = 0; which < LAWS; which++)
+        for (int size = 0; size < LAW_SIZES; size++)
+            if (law_sizes[size] <= opt.most && !(opt.quick && law_sizes[size] > 10000))
+                measure_law(which, size, csv);
+    fclose(csv);
 }
 
 /* --- time against error: dt ------------------------------------------------------------------- */
@@ -1230,6 +1433,31 @@ static void aim_lammps(int scene, int count, double times) {
     aim(text, r ? r->lammps.median / r->one.median : NAN, times, false);
 }
 
+static void aim_law(int which, double times) {
+    char text[96];
+    for (int size = 0; size < LAW_SIZES; size++) {
+        const timing *t = &law_rows[which][size].time;
+        if (t->count == 0) continue;
+        snprintf(text, sizeof text, "%d discs, %s, LAMMPS / dem2d", t->count, laws[which].name);
+        aim(text, t->lammps.median / t->one.median, times, false);
+    }
+}
+
+/* Speeds; and how near both programs are to each other, at worst. */
+static void aim_laws(void) {
+    double path = NAN, energy = NAN;
+    for (int i = 0; i < LAWS * LAW_SIZES; i++) {
+        const law_row *r = &law_rows[i / LAW_SIZES][i % LAW_SIZES];
+        if (r->time.count == 0 || isnan(r->path)) continue;
+        if (!(r->path <= path)) path = r->path;
+        if (!(fabs(r->energy - 1) <= energy)) energy = fabs(r->energy - 1);
+    }
+    aim_law(1, 3.3);
+    aim_law(2, 5);
+    aim("LAMMPS with equal laws: difference of paths", path, 0.01, true);
+    aim("LAMMPS with equal laws: difference of kinetic energy", energy, 0.01, true);
+}
+
 /* The slowest size: settled alone, or both tests. */
 static void aim_ns(int scene, int tests, double ns) {
     char text[96];
@@ -1265,8 +1493,10 @@ static void aim_threads(void) {
 static int print_aims(void) {
     int differ = 0;
     for (int i = 0; i < row_count; i++) differ += !rows[i].same;
-    if (row_count == 0) return 0;
+    if (row_count == 0 && !opt.parts[PART_LAWS]) return 0;
     printf("\nAims\n");
+    if (opt.parts[PART_LAWS]) aim_laws();
+    if (row_count == 0) return 0;
     aim_lammps(DISCS, 500, 2.5);
     aim_lammps(DISCS, 10000, 2.5);
     aim_lammps(DISCS, 100000, 2.5);
@@ -1541,6 +1771,7 @@ int main(int argc, char **argv) {
     if (!have_lammps()) printf("skipped: LAMMPS: %s\n", opt.lammps ? "no lmp here" : "not wanted");
     for (int i = 0; i < SCENES; i++) scenes = scenes || opt.parts[i];
     if (scenes) measure_scenes();
+    if (opt.parts[PART_LAWS]) measure_laws();
     if (opt.parts[PART_DT]) measure_dt();
     if (opt.parts[PART_ORDER]) measure_orders();
     if (opt.parts[PART_SKIN]) measure_skins();
