@@ -24,6 +24,7 @@ CONTENTS (search for the anchor, ">>" and the word)
                     coarse-grained fields                                   >>api-grids
                     queries of space                                        >>api-queries
                     particles and contacts in bulk                          >>api-bulk
+                    gradings, filling, inlets and outlets                   >>api-generators
                     state hash, snapshots                                   >>api-snapshot
                     writers                                                 >>api-writers
     Implementation  compiler, constants, floating point                     >>config
@@ -58,6 +59,7 @@ CONTENTS (search for the anchor, ">>" and the word)
                     coarse-grained fields on grids                          >>grids
                     overlaps, rays, the nearest                             >>queries
                     particles and contacts from and into arrays             >>bulk
+                    gradings, filling, inlets and outlets                   >>generators
                     bytes to a callback or a file                           >>output
                     state hash, snapshots                                   >>snapshot
                     pictures, files for ParaView, histories                 >>writers
@@ -83,7 +85,8 @@ WHAT IT IS
 
 WHAT IT DOES NOT DO
     3D; concave grains (a later version joins convex parts); bonded or breaking grains; fluids;
-    heat. It has no threads, windows, random numbers, clocks or formats for grains of its own.
+    heat. It has no threads, windows, clocks or formats for grains of its own. Random numbers come
+    from seeds of yours.
 
 LIMITS
     * Doubles only. At most 2^30 particles, and as many listed contacts. Sizes and coordinates are
@@ -323,6 +326,14 @@ HOW TO
                          what overlaps; dem2d_world_cast_ray for the first hit of a ray,
                          dem2d_world_cast_ray_all for all; dem2d_world_nearest. Also before the
                          first step. dem2d_world_particle_contacts: contacts of one particle.
+    draw a sample        dem2d_world_draw: sizes by a grading curve, log-normal or Fuller's law,
+                         shapes and materials by shares. dem2d_world_grading: the curve of a world.
+    fill a region        dem2d_world_fill: a box or the inside of an outline, with grains of a
+                         grading or of yours, on a lattice or by random sequential addition.
+    put grains in over   dem2d_world_feed: a rate of mass or number in a region, with velocities.
+      time, take them    dem2d_world_remove_in: what is in a region goes. dem2d_world_flow: what has
+      out, count them    crossed a line in a step. Both add up number, mass and area.
+    use random numbers   dem2d_random_uniform, dem2d_random_normal: the same bits everywhere.
     put grains in        dem2d_world_overlap_at tells how deep a new particle would be in others;
                          dem2d_world_relax moves those that overlap apart, without speed.
     change a grain       dem2d_world_set_material, dem2d_world_set_shape (template and scale).
@@ -2234,6 +2245,195 @@ DEM2D_API dem2d_result dem2d_world_read_contacts(const dem2d_world *world,
                                                  int *count);
 
 /* ============================================================================================
+   >>api-generators  Gradings, filling, inlets and outlets; random numbers
+   ============================================================================================ */
+
+/// Random number, uniform in [0, 1), with the same bits from every compiler (splitmix64). The state
+/// is a number of yours that each call changes: the first value, the seed, may be any. NULL: 0.
+DEM2D_API double dem2d_random_uniform(uint64_t *state);
+/// Random number of the normal distribution with mean 0 and standard deviation 1, likewise, from
+/// two uniform ones (Box, Muller 1958). NULL: 0.
+DEM2D_API double dem2d_random_normal(uint64_t *state);
+
+/// What the fractions of a grading are fractions of.
+typedef enum dem2d_measure {
+    DEM2D_MEASURE_MASS,   ///< of the mass of all grains
+    DEM2D_MEASURE_AREA,   ///< of their area
+    DEM2D_MEASURE_NUMBER, ///< of their number
+    DEM2D_MEASURE_COUNT
+} dem2d_measure;
+
+/// How the curve of a grading is given.
+typedef enum dem2d_curve {
+    DEM2D_CURVE_POINTS,    ///< by points
+    DEM2D_CURVE_LOGNORMAL, ///< ln(size) has a normal distribution, cut off at two sizes
+    DEM2D_CURVE_FULLER,    ///< passing = (size/greatest)^exponent, cut off below the least size
+    DEM2D_CURVE_COUNT
+} dem2d_curve;
+
+/// A point of a grading curve: how much of the sample has this size or less. Between two points the
+/// curve is straight over the logarithm of the size. A jump (two points of one size) and a first
+/// point above 0 are grains of just this size: {0.01, 1} alone, or {0.01, 0.5}, {0.02, 0.5},
+/// {0.02, 1} for two sizes with half of the mass each.
+typedef struct dem2d_grade {
+    double size;    ///< m, 1e-60 to 1e60, not below the point before: see dem2d_grading_desc
+    double passing; ///< not below the point before; the last is the whole, 1 or 100 or any other
+} dem2d_grade;
+
+/// One kind of grains in a sample.
+typedef struct dem2d_grain_kind {
+    double share;              ///< of the sample, > 0; the sum of all may be any
+    dem2d_particle_desc grain; ///< template of its grains; its scale and position are not read
+} dem2d_grain_kind;
+
+/// Sizes and kinds of the grains of a sample. The size of a grain is the diameter of the circle of
+/// equal area ([P] equivalent size), of all kinds. Each size has the same shares of all kinds.
+typedef struct dem2d_grading_desc {
+    const dem2d_grade *points;     ///< of the curve, for POINTS
+    int point_count;               ///< of them, 0 to 256
+    const dem2d_grain_kind *kinds; ///< shapes and materials; required
+    int kind_count;                ///< of them, 1 to 256
+    dem2d_measure measure;         ///< of which the curve and the shares tell fractions
+    dem2d_curve curve;             ///< points, log-normal, or Fuller
+    double least;                  ///< m, >= 0, least size; of LOGNORMAL and FULLER 1e-60 to 1e60
+    double greatest;               ///< m, >= 0, greatest size; likewise, above the least
+    double median;                 ///< m, >= 0, of LOGNORMAL likewise: median by the measure
+    double deviation;              ///< 0 to 100: for LOGNORMAL > 0, standard deviation of ln(size)
+    double exponent;               ///< 0 to 100: for FULLER > 0; 0.5 is Fuller's parabola
+} dem2d_grading_desc;
+
+/// A sample to be drawn from a grading.
+typedef struct dem2d_draw_desc {
+    const dem2d_grading_desc *grading; ///< sizes and kinds; required
+    int count;                         ///< of grains, 0 to 2^30; 0: as many as the area needs
+    /// m2, of all grains together, >= 0; 0: follows from the count. If both are given, all sizes
+    /// are multiplied by one factor so that both hold.
+    double area;
+    uint64_t seed; ///< same seed, same order
+} dem2d_draw_desc;
+
+/// Draw grains of a grading, not by chance but by quotas: from the greatest size down, each class
+/// (from one point of the curve to the next; the laws have 48) gets the number of grains that
+/// brings its sum nearest to its fraction, and their sizes are shifted within the class to meet it.
+/// What is left goes to the next class. So the error of each class is below half of one of its
+/// grains, and mostly 0. Kinds take turns so that their shares hold at each size. Then the order is
+/// shuffled.
+/// The first `capacity` descs go into grains (may be NULL if capacity is 0), with the kind's desc
+/// and its scale; count gets their number. The world is that of the shapes and materials. Errors:
+/// OUT_OF_RANGE, NOT_FINITE, STALE_ID, OUT_OF_MEMORY.
+DEM2D_API dem2d_result dem2d_world_draw(const dem2d_world *world, const dem2d_draw_desc *desc,
+                                        dem2d_particle_desc *grains, int capacity, int *count);
+/// Grading curve of the particles of a world, without sensors: passing[i] gets the fraction, by the
+/// measure, of those whose size is at most sizes[i] (m), with 1e-9 of it for rounding; count >= 0
+/// of both. All 0 without particles. Errors: NOT_FINITE, OUT_OF_RANGE.
+DEM2D_API dem2d_result dem2d_world_grading(const dem2d_world *world, dem2d_measure measure,
+                                           const double *sizes, int count, double *passing);
+
+/// Part of the plane: a box, or the inside of an outline.
+typedef struct dem2d_region {
+    dem2d_box box;           ///< m, upper above lower; not read if there are points
+    const dem2d_vec *points; ///< m, of an outline that does not cross itself, either way; or NULL
+    int count;               ///< of points, >= 3
+} dem2d_region;
+
+/// How a region is filled.
+typedef enum dem2d_fill_method {
+    /// Each grain in its own cell of a square lattice, at a random place within it. The lattice is
+    /// as wide as the region allows. Up to a solid fraction of about 0.6 for grains of one size.
+    DEM2D_FILL_LATTICE,
+    /// Random sequential addition: each grain at a random place, tried until it overlaps nothing,
+    /// large grains first. Discs of one size reach a solid fraction of 0.547 at most.
+    DEM2D_FILL_RANDOM,
+    DEM2D_FILL_METHOD_COUNT
+} dem2d_fill_method;
+
+/// What is filled into a region.
+typedef struct dem2d_fill_desc {
+    const dem2d_grading_desc *grading; ///< what is drawn; or NULL when grains are given
+    const dem2d_particle_desc *grains; ///< grains to be placed; their positions are not read
+    int count; ///< of grains, 0 to 2^30; of a grading 0: follows from solid_fraction
+    /// 0 to 1, area of the grains over that of the region; of a grading only. If the count is given
+    /// as well, all sizes are multiplied by one factor so that both hold.
+    double solid_fraction;
+    dem2d_region region;      ///< m, all of each grain is inside
+    dem2d_fill_method method; ///< lattice or random
+    double gap;               ///< m, >= 0, least distance of all things, and from the border
+    int tries;                ///< for RANDOM, of all grains, per grain, 0 to 2^30; 0 for 1000
+    bool keep_angles;         ///< grains keep their angles; else each try has a random one
+    bool partial;             ///< where there is no room for all, place those that find it
+    uint64_t seed;            ///< same seed, same packing
+} dem2d_fill_desc;
+
+/// What dem2d_world_fill has done.
+typedef struct dem2d_filling {
+    int count;             ///< of grains placed
+    double area;           ///< m2, of them
+    double solid_fraction; ///< this area over that of the region
+    int64_t tries;         ///< of RANDOM: a try's time is the area of the region
+} dem2d_filling;
+
+/// Add grains to a world, in a region, without overlaps with each other, with particles and with
+/// walls that they meet: contacts are evaluated exactly. All grains are added, or none
+/// (NOT_REACHED, the log tells the number and the solid fraction that were reached), unless
+/// desc->partial. ids (may be NULL if capacity is 0) gets the first `capacity` ids, in the order of
+/// the grains given or drawn; generation 0 for a grain that found no room. Errors: also those of
+/// dem2d_world_add_particle, of dem2d_world_draw, and of dem2d_outline_measure.
+DEM2D_API dem2d_result dem2d_world_fill(dem2d_world *world, const dem2d_fill_desc *desc,
+                                        dem2d_particle_id *ids, int capacity,
+                                        dem2d_filling *filling);
+
+/// Grains that have left a region or passed a line: the functions below add to it.
+typedef struct dem2d_flow {
+    int64_t count; ///< of grains
+    double mass;   ///< kg/m
+    double area;   ///< m2
+} dem2d_flow;
+
+/// Remove the free particles whose centroids are in a region, and add them to flow (may be NULL).
+/// Errors: those of dem2d_outline_measure for the region's points, OUT_OF_RANGE (box).
+DEM2D_API dem2d_result dem2d_world_remove_in(dem2d_world *world, const dem2d_region *region,
+                                             dem2d_flow *flow);
+/// Add to flow the particles (no sensors) whose centroids have crossed the line from one point to
+/// another (m) in the last step: those that went to its left, less those that went to its right. To
+/// be called after each step, or at the start of each: in dem2d_world_desc.loads. What a caller has
+/// moved has not crossed. Errors: NOT_FINITE, OUT_OF_RANGE (the points are the same).
+DEM2D_API dem2d_result dem2d_world_flow(const dem2d_world *world, dem2d_vec from, dem2d_vec to,
+                                        dem2d_flow *flow);
+
+/// Grains that come into a world over time.
+typedef struct dem2d_inlet_desc {
+    const dem2d_grading_desc *grading; ///< sizes and kinds; required
+    dem2d_region region;               ///< m, where they are put in; all of each grain is inside
+    double mass_rate;                  ///< kg/m/s, >= 0; or:
+    double number_rate;                ///< 1/s, >= 0
+    dem2d_vec velocity;                ///< m/s, added to that of the kind
+    double spread;    ///< m/s, >= 0, standard deviation of each component of the velocity
+    double gap;       ///< m, >= 0, as in dem2d_fill_desc
+    int tries;        ///< for each grain in a call, 0 to 2^30; 0 for 100
+    bool keep_angles; ///< grains have the angle of their kind; else a random one
+} dem2d_inlet_desc;
+
+/// State of an inlet: yours to keep and to save. At first all zero, but for the seed.
+typedef struct dem2d_inlet {
+    uint64_t seed;   ///< same seed, same grains
+    uint64_t random; ///< how far its random numbers have gone
+    double due;      ///< kg/m, or a number: less than the next grain needs
+    double missed;   ///< kg/m, or a number: what was due and found no room
+    int64_t count;   ///< of grains put in
+    double mass;     ///< kg/m, of them
+    double area;     ///< m2, of them
+} dem2d_inlet;
+
+/// Put in what is due after so many seconds (>= 0) since the last call: after each step, or after a
+/// number of them. Each grain gets a random place in the region without overlap. The sizes and
+/// kinds of all grains together follow the grading more closely than by chance (a sequence of low
+/// discrepancy: M. Roberts' R2). A grain that finds no room ends the call and is the next again:
+/// what is due then counts as missed, and is not made up for. At most 2^20 grains in a call.
+/// Errors: those of dem2d_world_fill but NOT_REACHED; OUT_OF_RANGE (both rates above 0).
+DEM2D_API dem2d_result dem2d_world_feed(dem2d_world *world, const dem2d_inlet_desc *desc,
+                                        double seconds, dem2d_inlet *inlet);
+
+/* ============================================================================================
    >>api-snapshot  State hash, snapshots
    ============================================================================================ */
 
@@ -2654,12 +2854,15 @@ static dem2d_vec dem2di_direction(int i, int count) {
     return dem2di_vec(z.c, z.s);
 }
 
+/* ln 2 in two parts, the first of 32 bits: its product with a small integer is exact. */
+#define DEM2DI_LN2_HIGH 6.93147180369123816490e-01
+#define DEM2DI_LN2_LOW 1.90821492927058770002e-10
+
 /* ln(a/b) for a >= b > 0 = k ln 2 + 2 artanh z, z = (a - b)/(a + b). Exact halving and doubling
    bring b to between 0.7 a and 1.4 a, so that z^2 <= 1/34. Then a - b is exact, and the first
    omitted term, z^24/25, is 1e-38. */
 static double dem2di_log_ratio(double a, double b) {
-    /* ln 2 in two parts, the first of 32 bits: k times it is exact */
-    const double high = 6.93147180369123816490e-01, low = 1.90821492927058770002e-10;
+    const double high = DEM2DI_LN2_HIGH, low = DEM2DI_LN2_LOW;
     int k = 0;
     for (; b < a * 0.70710678118654752; k++)
         if (a > 1)
@@ -2670,6 +2873,25 @@ static double dem2di_log_ratio(double a, double b) {
     double z = (a - b) / (a + b), square = z * z, sum = 0;
     for (int n = 23; n > 1; n -= 2) sum = square * (sum + 1.0 / n);
     return k * high + (2 * z + (2 * z * sum + k * low));
+}
+
+/* e^x for x <= 709, = 2^k e^r with |r| <= ln 2 / 2, by the series of e^r: the first omitted term,
+   r^14/14!, is 4e-18. 0 where e^x is far below any number that is added to it. */
+static double dem2di_exp(double x) {
+    if (x < -600) return 0;
+    double k = floor(x / (DEM2DI_LN2_HIGH + DEM2DI_LN2_LOW) + 0.5), sum = 1;
+    double r = (x - k * DEM2DI_LN2_HIGH) - k * DEM2DI_LN2_LOW;
+    for (int n = 13; n > 0; n--) sum = 1 + r / n * sum;
+    return ldexp(sum, (int)k);
+}
+
+/* A random number in [0, 1) from a 64-bit counter: an odd step, and two multiplications with
+   shifts between (S. Vigna's splitmix64). */
+static double dem2di_random(uint64_t *state) {
+    uint64_t x = *state += 0x9E3779B97F4A7C15u;
+    x = (x ^ (x >> 30)) * 0xBF58476D1CE4E5B9u;
+    x = (x ^ (x >> 27)) * 0x94D049BB133111EBu;
+    return (double)((x ^ (x >> 31)) >> 11) / 9007199254740992.0; /* 2^53 */
 }
 
 DEM2D_API dem2d_pose dem2d_pose_make(double x, double y, double angle, double scale) {
@@ -7503,15 +7725,6 @@ static int dem2di_fit_curved(dem2di_section *section, double f[2]) {
 }
 
 /* ---- the paper's fit: particle swarm on the overlap of pixels ---- */
-
-/* A random number in [0, 1) from a 64-bit counter: an odd step, and two multiplications with
-   shifts between (S. Vigna's splitmix64). */
-static double dem2di_random(uint64_t *state) {
-    uint64_t x = *state += 0x9E3779B97F4A7C15u;
-    x = (x ^ (x >> 30)) * 0xBF58476D1CE4E5B9u;
-    x = (x ^ (x >> 27)) * 0x94D049BB133111EBu;
-    return (double)((x ^ (x >> 31)) >> 11) / 9007199254740992.0; /* 2^53 */
-}
 
 /* A picture of one section: pixels inside its outline, which the chord closes. */
 typedef struct dem2di_raster {
@@ -15066,17 +15279,22 @@ static void dem2di_wall_place(dem2d_world *world, int slot, const dem2d_wall_des
     world->joints_due = true;
 }
 
-/* The line that segments are made of, when the first comes. The log knows if there is no memory. */
-static bool dem2di_line_make(dem2d_world *world, const dem2d_wall_desc *desc) {
-    if ((!desc->segment && desc->points == NULL) || world->line != NULL) return true;
-    dem2d_shape *line = dem2di_shape_allocate(&world->env, DEM2D_POLYGON, 2, 2);
-    if (line == NULL) return false;
+/* A polygon of two corners as a line of length 1 along x, about its middle. */
+static void dem2di_line_set(dem2d_shape *line) {
     for (int k = 0; k < 2; k++) {
         line->corners[k] = dem2di_vec(k - 0.5, 0);
         line->tangents[k] = dem2di_vec(1 - 2 * k, 0);
     }
     line->flat = true;
     line->circumscribed = 0.5;
+}
+
+/* The line that segments are made of, when the first comes. The log knows if there is no memory. */
+static bool dem2di_line_make(dem2d_world *world, const dem2d_wall_desc *desc) {
+    if ((!desc->segment && desc->points == NULL) || world->line != NULL) return true;
+    dem2d_shape *line = dem2di_shape_allocate(&world->env, DEM2D_POLYGON, 2, 2);
+    if (line == NULL) return false;
+    dem2di_line_set(line);
     world->line = line;
     return true;
 }
@@ -22914,6 +23132,1189 @@ DEM2D_API dem2d_result dem2d_world_read_contacts(const dem2d_world *world,
     }
     *count = open;
     return DEM2D_OK;
+}
+
+/* ============================================================================================
+   >>generators  Gradings, filling, inlets and outlets
+   uses: config, math, memory, fields, shapes, outlines, contact, broad, world, objects, walls,
+         measures, queries
+   ============================================================================================ */
+
+/* HOW A PACKING IS MADE
+     grading    points or a law -> classes: sizes from .. to, share of the sample (dem2di_curve)
+     draw       classes, count or area -> number and sum of each class -> sizes, from the greatest
+                down -> kinds in turn -> shuffled descs (dem2di_sample_draw)
+     fill       descs, region -> places (dem2di_filler), which change nothing in the world; then all
+                that have found one are added, for which memory is reserved before
+   The random numbers of each are one stream, in an order that depends on nothing but the desc and
+   on what is in the way. */
+
+DEM2D_API double dem2d_random_uniform(uint64_t *state) {
+    return state != NULL ? dem2di_random(state) : 0;
+}
+
+DEM2D_API double dem2d_random_normal(uint64_t *state) {
+    if (state == NULL) return 0;
+    double u = 1 - dem2di_random(state), v = dem2di_random(state); /* u is not 0 */
+    return sqrt(2 * dem2di_log_ratio(1, u)) * dem2d_rot_make(2 * DEM2DI_PI * v).c;
+}
+
+/* --- gradings ----------------------------------------------------------------------------------
+ */
+
+#define DEM2DI_CLASSES 256    /* of a curve at most */
+#define DEM2DI_LAW_CLASSES 48 /* of a law: over three decades of size each spans 15 % */
+#define DEM2DI_SAMPLE_KINDS 256
+
+/* Sizes whose squares, also those of their ratios, are normal numbers. */
+#define DEM2DI_SIZE DEM2DI_NUMBER(1e-60, 1e60, 0)
+
+static const dem2di_field dem2di_grading_fields[] = {
+    DEM2DI_ROW(dem2d_grading_desc, points, DEM2DI_OPTIONAL, "- NULL; required for POINTS"),
+    DEM2DI_ROW(dem2d_grading_desc, point_count, DEM2DI_WHOLE(0, DEM2DI_CLASSES), "- 0"),
+    DEM2DI_ROW(dem2d_grading_desc, kinds, DEM2DI_REQUIRED, "- none"),
+    DEM2DI_ROW(dem2d_grading_desc, kind_count, DEM2DI_WHOLE(1, DEM2DI_SAMPLE_KINDS), "- none"),
+    DEM2DI_ROW(dem2d_grading_desc, measure, DEM2DI_CHOICE(DEM2D_MEASURE_COUNT), "- MASS"),
+    DEM2DI_ROW(dem2d_grading_desc, curve, DEM2DI_CHOICE(DEM2D_CURVE_COUNT), "- POINTS"),
+    DEM2DI_ROW(dem2d_grading_desc, least, DEM2DI_FROM_0, "m none; of the laws"),
+    DEM2DI_ROW(dem2d_grading_desc, greatest, DEM2DI_FROM_0, "m none; of the laws"),
+    DEM2DI_ROW(dem2d_grading_desc, median, DEM2DI_FROM_0, "m none; of LOGNORMAL"),
+    DEM2DI_ROW(dem2d_grading_desc, deviation, DEM2DI_NUMBER(0, 100, 0), "- none; of LOGNORMAL"),
+    DEM2DI_ROW(dem2d_grading_desc, exponent, DEM2DI_NUMBER(0, 100, 0), "- none; of FULLER"),
+};
+
+static const dem2di_field dem2di_draw_fields[] = {
+    DEM2DI_ROW(dem2d_draw_desc, grading, DEM2DI_REQUIRED, "- none"),
+    DEM2DI_ROW(dem2d_draw_desc, count, DEM2DI_WHOLE(0, 1 << 30), "- by the area"),
+    DEM2DI_ROW(dem2d_draw_desc, area, DEM2DI_FROM_0, "m2 by the count"),
+    DEM2DI_ROW(dem2d_draw_desc, seed, DEM2DI_WORD, "- 0"),
+};
+
+/* Within a class the curve is straight over ln(size): by mass or area the number of grains is
+   proportional to size^-2 d ln(size), by number to d ln(size). */
+typedef struct dem2di_class {
+    double from, to; /* m */
+    double share;    /* of the sample; the sum of all is 1 */
+    double square;   /* m2, mean square of the size of its grains */
+} dem2di_class;
+
+typedef struct dem2di_curve {
+    dem2di_class classes[DEM2DI_CLASSES];
+    int count;
+    bool by_number;
+} dem2di_curve;
+
+/* Mean square of the size over the grains of a class. */
+static double dem2di_class_square(const dem2di_class *c, bool by_number) {
+    double ratio = c->to / c->from, wide = (ratio - 1) * (ratio + 1);
+    if (!(ratio > 1)) return c->from * c->from;
+    double log2 = 2 * dem2di_log_ratio(c->to, c->from);
+    return c->from * c->from * (by_number ? wide / log2 : log2 * ratio * (ratio / wide));
+}
+
+/* The size that a fraction u of the grains of a class do not exceed. */
+static double dem2di_class_size(const dem2di_class *c, bool by_number, double u) {
+    double ratio = c->from / c->to;
+    if (!(ratio < 1)) return c->from;
+    if (by_number) return c->from * dem2di_exp(u * dem2di_log_ratio(c->to, c->from));
+    return dem2di_min(c->to, c->from / sqrt(1 - u * (1 - ratio * ratio)));
+}
+
+static void dem2di_class_add(dem2di_curve *curve, double from, double to, double share) {
+    if (!(share > 0)) return;
+    dem2di_class *made = &curve->classes[curve->count++];
+    made->from = from;
+    made->to = to;
+    made->share = share;
+}
+
+/* Classes between the points of a curve, from the least size up. */
+static dem2d_result dem2di_curve_points(const dem2d_env *env, const dem2d_grading_desc *desc,
+                                        dem2di_curve *curve) {
+    const dem2d_grade *points = desc->points;
+    if (points == NULL) return dem2di_fail_null(env, "points");
+    if (desc->point_count < 1)
+        return dem2di_fail(env, DEM2D_OUT_OF_RANGE, -1, "point_count = 0: 1 is needed");
+    for (int i = 0; i < desc->point_count; i++) {
+        double size = points[i].size, passing = points[i].passing;
+        if (!dem2di_finite(size) || !dem2di_finite(passing))
+            return dem2di_fail(env, DEM2D_NOT_FINITE, i, "points[%d] = (%g, %g) is not finite", i,
+                               size, passing);
+        if (!(size >= 1e-60 && size <= 1e60 && passing >= 0 && passing <= 1e60))
+            return dem2di_fail(env, DEM2D_OUT_OF_RANGE, i,
+                               "points[%d] = (%g, %g): size is not 1e-60 to 1e60, or passing not 0 "
+                               "to 1e60",
+                               i, size, passing);
+        if (i > 0 && (size < points[i - 1].size || passing < points[i - 1].passing))
+            return dem2di_fail(env, DEM2D_OUT_OF_RANGE, i,
+                               "points[%d] = (%g, %g) is below the point before", i, size, passing);
+    }
+    double all = points[desc->point_count - 1].passing;
+    if (!(all >= 1e-60))
+        return dem2di_fail(env, DEM2D_OUT_OF_RANGE, desc->point_count - 1,
+                           "points[%d].passing = %g is not above 1e-60", desc->point_count - 1,
+                           all);
+    dem2di_class_add(curve, points[0].size, points[0].size, points[0].passing / all);
+    for (int i = 1; i < desc->point_count; i++)
+        dem2di_class_add(curve, points[i - 1].size, points[i].size,
+                         (points[i].passing - points[i - 1].passing) / all);
+    return DEM2D_OK;
+}
+
+/* Density of a log-normal distribution over ln(size), but for a factor. */
+static double dem2di_lognormal(const dem2d_grading_desc *desc, double size) {
+    double above = size > desc->median ? dem2di_log_ratio(size, desc->median)
+                                       : dem2di_log_ratio(desc->median, size);
+    double z = above / desc->deviation;
+    return dem2di_exp(-z * z / 2);
+}
+
+/* Passing of Fuller's curve, of what passes the greatest size. */
+static double dem2di_fuller(const dem2d_grading_desc *desc, double size) {
+    return dem2di_exp(-desc->exponent * dem2di_log_ratio(desc->greatest, size));
+}
+
+/* Classes of a law, of equal width in ln(size). The log-normal's shares by Simpson's rule. */
+static dem2d_result dem2di_curve_law(const dem2d_env *env, const dem2d_grading_desc *desc,
+                                     dem2di_curve *curve) {
+    bool normal = desc->curve == DEM2D_CURVE_LOGNORMAL;
+    double sum = 0, least = desc->least;
+    dem2d_result result = dem2di_check_number(env, "least", least, DEM2DI_SIZE);
+    if (result == DEM2D_OK)
+        result = dem2di_check_number(env, "greatest", desc->greatest, least, 1e60, DEM2DI_ABOVE,
+                                     DEM2DI_DOUBLE);
+    if (result == DEM2D_OK && normal)
+        result = dem2di_check_number(env, "median", desc->median, DEM2DI_SIZE);
+    if (result == DEM2D_OK && normal)
+        result = dem2di_check_number(env, "deviation", desc->deviation, DEM2DI_POSITIVE);
+    if (result == DEM2D_OK && !normal)
+        result = dem2di_check_number(env, "exponent", desc->exponent, DEM2DI_POSITIVE);
+    if (result != DEM2D_OK) return result;
+    double half = dem2di_log_ratio(desc->greatest, least) / (2 * DEM2DI_LAW_CLASSES);
+    for (int i = 0; i < DEM2DI_LAW_CLASSES; i++) {
+        double from = least * dem2di_exp(2 * i * half), to = least * dem2di_exp((2 * i + 2) * half);
+        double middle = least * dem2di_exp((2 * i + 1) * half), share;
+        if (i + 1 == DEM2DI_LAW_CLASSES) to = desc->greatest;
+        share = normal ? (dem2di_lognormal(desc, from) + 4 * dem2di_lognormal(desc, middle) +
+                          dem2di_lognormal(desc, to)) /
+                             6
+                       : dem2di_fuller(desc, to) - dem2di_fuller(desc, from);
+        dem2di_class_add(curve, from, to, share);
+        sum += dem2di_max(0, share);
+    }
+    for (int i = 0; i < curve->count; i++) curve->classes[i].share /= sum;
+    if (curve->count > 0 && dem2di_finite(curve->classes[0].share)) return DEM2D_OK;
+    return dem2di_fail(env, DEM2D_OUT_OF_RANGE, -1,
+                       "least = %g, greatest = %g: the curve has nothing between them", least,
+                       desc->greatest);
+}
+
+/* The kinds of a grading, each with a scale of 1. */
+static dem2d_result dem2di_check_kinds(const dem2d_world *world, const dem2d_grading_desc *desc) {
+    for (int k = 0; k < desc->kind_count; k++) {
+        const dem2d_grain_kind *kind = &desc->kinds[k];
+        dem2d_particle_desc grain = kind->grain;
+        dem2d_result result = dem2di_check_number(&world->env, "kinds[].share", kind->share, 1e-60,
+                                                  1e60, 0, DEM2DI_DOUBLE);
+        grain.scale = 1;
+        grain.position = dem2di_vec(0, 0);
+        if (result == DEM2D_OK) result = dem2di_check_particle(world, &grain);
+        if (result != DEM2D_OK) return result;
+    }
+    return DEM2D_OK;
+}
+
+static dem2d_result dem2di_curve_make(const dem2d_world *world, const dem2d_grading_desc *desc,
+                                      dem2di_curve *curve) {
+    const dem2d_env *env = &world->env;
+    dem2d_result result = dem2di_check_fields(env, DEM2DI_ALL(dem2di_grading_fields), desc);
+    if (result == DEM2D_OK) result = dem2di_check_kinds(world, desc);
+    if (result != DEM2D_OK) return result;
+    curve->count = 0;
+    curve->by_number = desc->measure == DEM2D_MEASURE_NUMBER;
+    result = desc->curve == DEM2D_CURVE_POINTS ? dem2di_curve_points(env, desc, curve)
+                                               : dem2di_curve_law(env, desc, curve);
+    if (result != DEM2D_OK) return result;
+    for (int i = 0; i < curve->count; i++)
+        curve->classes[i].square = dem2di_class_square(&curve->classes[i], curve->by_number);
+    return DEM2D_OK;
+}
+
+/* Mean square of the size over all grains of a curve. */
+static double dem2di_curve_square(const dem2di_curve *curve) {
+    double sum = 0;
+    for (int i = 0; i < curve->count; i++) {
+        const dem2di_class *c = &curve->classes[i];
+        sum += curve->by_number ? c->share * c->square : c->share / c->square;
+    }
+    return curve->by_number ? sum : 1 / sum;
+}
+
+/* --- drawing a sample --------------------------------------------------------------------------
+ */
+
+/* How many grains a class has, and what their sum shall be: of squares of sizes, or their number.
+ */
+typedef struct dem2di_quota {
+    int number;
+    double sum;
+} dem2di_quota;
+
+/* Quotas for a total of all classes, from the greatest sizes down. The sum of n grains of a class
+   can be shifted by half of to^2 - from^2 both ways; what it misses goes to the next class. Returns
+   the number of grains. */
+static int64_t dem2di_quotas(const dem2di_curve *curve, double total, dem2di_quota *quotas) {
+    double carry = 0;
+    int64_t all = 0;
+    for (int i = curve->count - 1; i >= 0; i--) {
+        const dem2di_class *c = &curve->classes[i];
+        double each = curve->by_number ? 1 : c->square;
+        double half = curve->by_number ? 0 : (c->to * c->to - c->from * c->from) / 2;
+        double target = c->share * total + carry;
+        double number = dem2di_max(0, floor(target / each + 0.5));
+        double low = number > 0 ? dem2di_max(number * each - half, 0) : 0;
+        double high = number > 0 ? number * each + half : 0;
+        quotas[i].number = (int)dem2di_min(number, 1 << 30);
+        quotas[i].sum = dem2di_max(low, dem2di_min(high, target));
+        carry = target - quotas[i].sum;
+        all += quotas[i].number;
+    }
+    return all;
+}
+
+/* Quotas for a number of grains: the total by bisection. Where two classes gain a grain at the same
+   total, no total gives the number: the grains of least size make up for it. */
+static void dem2di_quotas_of(const dem2di_curve *curve, int count, dem2di_quota *quotas) {
+    double mean = curve->by_number ? 1 : dem2di_curve_square(curve);
+    double low = 0, high = 2 * mean * (count + curve->count);
+    int64_t all = 0;
+    for (int i = 0; i < 64; i++) {
+        double total = i == 0 ? mean * count : (low + high) / 2;
+        all = dem2di_quotas(curve, total, quotas);
+        if (all == count) return;
+        if (all < count)
+            low = total;
+        else
+            high = total;
+    }
+    for (int i = 0; i < curve->count && all != count; i++) {
+        int64_t more = count - all;
+        if (more < -quotas[i].number) more = -quotas[i].number;
+        quotas[i].number += (int)more;
+        quotas[i].sum += (double)more * (curve->by_number ? 1 : curve->classes[i].square);
+        all += more;
+    }
+}
+
+/* Sizes of a class, the greatest first: those of the fractions (k + t)/n of its grains, with the t
+   for which the sum of squares is the quota's. */
+static void dem2di_class_draw(const dem2di_class *c, const dem2di_quota *quota, bool by_number,
+                              double *sizes) {
+    const int n = quota->number;
+    double low = 0, high = 1, t = 0.5;
+    for (int step = 0; step < 40 && !by_number && c->to > c->from; step++) {
+        double sum = 0;
+        for (int k = 0; k < n; k++) {
+            double size = dem2di_class_size(c, false, (k + t) / n);
+            sum += size * size;
+        }
+        if (sum < quota->sum)
+            low = t;
+        else
+            high = t;
+        t = (low + high) / 2;
+    }
+    for (int k = 0; k < n; k++) sizes[n - 1 - k] = dem2di_class_size(c, by_number, (k + t) / n);
+}
+
+/* The kind that is farthest behind its share, once a grain of this weight is added. */
+static int dem2di_kind_due(const double *shares, const double *have, int count, double sum) {
+    int best = 0;
+    for (int k = 1; k < count; k++)
+        if (shares[k] * sum - have[k] > shares[best] * sum - have[best]) best = k;
+    return best;
+}
+
+/* Shares of the kinds, by area or by number: of equal size, what is less dense has less mass. */
+static void dem2di_kind_shares(const dem2d_world *world, const dem2d_grading_desc *desc,
+                               double *shares) {
+    double sum = 0;
+    for (int k = 0; k < desc->kind_count; k++) {
+        const dem2d_grain_kind *kind = &desc->kinds[k];
+        double density = world->materials[kind->grain.material.index].density;
+        shares[k] = desc->measure == DEM2D_MEASURE_MASS ? kind->share / density : kind->share;
+        sum += shares[k];
+    }
+    for (int k = 0; k < desc->kind_count; k++) shares[k] /= sum;
+}
+
+/* Radius of the circle of equal area of a template. */
+static double dem2di_template_radius(const dem2d_world *world, dem2d_shape_id id) {
+    const dem2d_shape *shape = world->templates[id.index].shape;
+    if (shape->type == DEM2D_CIRCLE) return shape->circumscribed;
+    return sqrt(shape->mass.area / DEM2DI_PI);
+}
+
+/* A grain of a kind and a size. */
+static dem2d_particle_desc dem2di_grain_of(const dem2d_world *world, const dem2d_grain_kind *kind,
+                                           double size) {
+    dem2d_particle_desc grain = kind->grain;
+    grain.scale = size / (2 * dem2di_template_radius(world, grain.shape));
+    return grain;
+}
+
+/* Which kind each size is of, and the factor of all sizes; then in a random order. */
+static void dem2di_draw_grains(const dem2d_world *world, const dem2d_draw_desc *desc,
+                               const double *sizes, int count, dem2d_particle_desc *grains) {
+    const dem2d_grading_desc *grading = desc->grading;
+    double shares[DEM2DI_SAMPLE_KINDS], have[DEM2DI_SAMPLE_KINDS] = {0}, squares = 0, sum = 0,
+                                        factor = 1;
+    uint64_t random = desc->seed;
+    dem2di_kind_shares(world, grading, shares);
+    for (int i = 0; i < count; i++) squares += sizes[i] * sizes[i];
+    if (desc->count > 0 && desc->area > 0) factor = sqrt(desc->area * (4 / DEM2DI_PI) / squares);
+    for (int i = 0; i < count; i++) {
+        double weight = grading->measure == DEM2D_MEASURE_NUMBER ? 1 : sizes[i] * sizes[i];
+        sum += weight;
+        int k = dem2di_kind_due(shares, have, grading->kind_count, sum);
+        have[k] += weight;
+        grains[i] = dem2di_grain_of(world, &grading->kinds[k], factor * sizes[i]);
+    }
+    for (int i = count - 1; i > 0; i--) { /* Fisher and Yates */
+        int k = (int)(dem2di_random(&random) * (i + 1));
+        dem2d_particle_desc grain = grains[i];
+        grains[i] = grains[k];
+        grains[k] = grain;
+    }
+}
+
+/* Draws a sample into new memory for *count grains. */
+static dem2d_result dem2di_sample_draw(const dem2d_world *world, const dem2d_draw_desc *desc,
+                                       dem2d_particle_desc **grains, int *count) {
+    const dem2d_env *env = &world->env;
+    dem2di_curve curve;
+    dem2di_quota quotas[DEM2DI_CLASSES];
+    dem2d_result result = dem2di_curve_make(world, desc->grading, &curve);
+    if (result != DEM2D_OK) return result;
+    double squares = desc->area * (4 / DEM2DI_PI), number = desc->count;
+    if (desc->count == 0) number = squares / dem2di_curve_square(&curve);
+    if (!(number >= 0.5 && number <= (1 << 30) && squares <= 1e120))
+        return dem2di_fail(env, DEM2D_OUT_OF_RANGE, -1, "count = %d, area = %g: %g grains",
+                           desc->count, desc->area, number);
+    int64_t all = desc->count;
+    if (desc->count > 0)
+        dem2di_quotas_of(&curve, desc->count, quotas);
+    else
+        all = dem2di_quotas(&curve, curve.by_number ? number : squares, quotas);
+    if (all < 1) { /* all quotas are below half a grain */
+        all = 1;
+        dem2di_quotas_of(&curve, 1, quotas);
+    }
+    double *sizes = (double *)dem2di_allocate(env, (size_t)all, sizeof *sizes);
+    *grains = (dem2d_particle_desc *)dem2di_allocate(env, (size_t)all, sizeof **grains);
+    if (sizes != NULL && *grains != NULL) {
+        int made = 0;
+        for (int i = curve.count - 1; i >= 0; made += quotas[i--].number)
+            dem2di_class_draw(&curve.classes[i], &quotas[i], curve.by_number, sizes + made);
+        dem2di_draw_grains(world, desc, sizes, (int)all, *grains);
+        *count = (int)all;
+    } else {
+        dem2di_release(env, *grains, (size_t)all, sizeof **grains);
+        result = dem2di_fail_memory(env, (int)all, "grains");
+    }
+    dem2di_release(env, sizes, (size_t)all, sizeof *sizes);
+    return result;
+}
+
+DEM2D_API dem2d_result dem2d_world_draw(const dem2d_world *world, const dem2d_draw_desc *desc,
+                                        dem2d_particle_desc *grains, int capacity, int *count) {
+    dem2d_particle_desc *made = NULL;
+    int all = 0;
+    if (world == NULL || desc == NULL || count == NULL) return DEM2D_NULL_ARGUMENT;
+    dem2d_result result = dem2di_check_fields(&world->env, DEM2DI_ALL(dem2di_draw_fields), desc);
+    if (result == DEM2D_OK) result = dem2di_check_room(world, "grains", grains, capacity);
+    if (result == DEM2D_OK) result = dem2di_sample_draw(world, desc, &made, &all);
+    if (result != DEM2D_OK) return result;
+    if (capacity > 0)
+        memcpy(grains, made, (size_t)(all < capacity ? all : capacity) * sizeof *grains);
+    *count = all;
+    dem2di_release(&world->env, made, (size_t)all, sizeof *made);
+    return DEM2D_OK;
+}
+
+/* What a particle counts by a measure. */
+static double dem2di_measure_of(const dem2d_world *world, dem2d_measure measure, int slot) {
+    const dem2di_body *body = &world->bodies[slot];
+    return measure == DEM2D_MEASURE_MASS   ? dem2di_body_mass(world, body)
+           : measure == DEM2D_MEASURE_AREA ? dem2di_body_area(world, body)
+                                           : 1;
+}
+
+DEM2D_API dem2d_result dem2d_world_grading(const dem2d_world *world, dem2d_measure measure,
+                                           const double *sizes, int count, double *passing) {
+    if (world == NULL || sizes == NULL || passing == NULL) return DEM2D_NULL_ARGUMENT;
+    const dem2d_env *env = &world->env;
+    dem2d_result result =
+        dem2di_check_number(env, "measure", (int)measure, DEM2DI_CHOICE(DEM2D_MEASURE_COUNT));
+    if (result == DEM2D_OK) result = dem2di_check_number(env, "count", count, DEM2DI_COUNT);
+    for (int i = 0; i < count && result == DEM2D_OK; i++)
+        result = dem2di_check_number(env, "sizes[]", sizes[i], DEM2DI_FINITE);
+    if (result != DEM2D_OK) return result;
+    double all = 0;
+    for (int i = 0; i < count; i++) passing[i] = 0;
+    for (int place = 0, slot; (slot = dem2di_next_grain(world, &place)) >= 0;) {
+        double size = 2 * dem2di_equivalent(world, slot) * (1 - 1e-9);
+        double weight = dem2di_measure_of(world, measure, slot);
+        for (int i = 0; i < count; i++) passing[i] += size <= sizes[i] ? weight : 0;
+        all += weight;
+    }
+    for (int i = 0; i < count && all > 0; i++) passing[i] /= all;
+    return DEM2D_OK;
+}
+
+/* --- regions -----------------------------------------------------------------------------------
+ */
+
+/* A region that has been checked: its bounding box and its area. */
+typedef struct dem2di_area {
+    const dem2d_vec *points; /* NULL: the box */
+    int count;
+    dem2d_box box;
+    double area;
+} dem2di_area;
+
+static dem2d_result dem2di_area_make(const dem2d_env *env, const dem2d_region *region,
+                                     dem2di_area *made) {
+    dem2d_vec size;
+    made->points = region->points;
+    made->count = region->count;
+    made->box = region->box;
+    if (region->points != NULL) {
+        dem2d_mass mass;
+        dem2d_result result =
+            dem2di_check_outline(env, "region.points", region->points, region->count, true, &mass);
+        if (result != DEM2D_OK) return result;
+        made->box = dem2di_box_of(region->points, region->count, &size);
+        made->area = mass.area;
+        return DEM2D_OK;
+    }
+    dem2d_result result = dem2di_check_vec(env, "region.box.lower", region->box.lower);
+    if (result == DEM2D_OK) result = dem2di_check_vec(env, "region.box.upper", region->box.upper);
+    if (result != DEM2D_OK) return result;
+    size = dem2di_sub(region->box.upper, region->box.lower);
+    made->area = size.x * size.y;
+    if (size.x > 0 && size.y > 0 && made->area > 0 && dem2di_finite(made->area)) return DEM2D_OK;
+    return dem2di_fail(env, DEM2D_OUT_OF_RANGE, -1,
+                       "region.box.upper = (%.10g, %.10g) is not above lower = (%.10g, %.10g)",
+                       region->box.upper.x, region->box.upper.y, region->box.lower.x,
+                       region->box.lower.y);
+}
+
+/* Is a point in a region? By the even-odd rule, half of the boundary included. */
+static bool dem2di_area_has(const dem2di_area *area, dem2d_vec p) {
+    const dem2d_box *box = &area->box;
+    bool inside = false;
+    if (!(p.x >= box->lower.x && p.x <= box->upper.x && p.y >= box->lower.y && p.y <= box->upper.y))
+        return false;
+    if (area->points == NULL) return true;
+    dem2d_vec a = area->points[area->count - 1];
+    for (int i = 0; i < area->count; i++) {
+        dem2d_vec b = area->points[i];
+        double across = dem2di_cross(dem2di_sub(b, a), dem2di_sub(p, a));
+        if ((a.y <= p.y) != (b.y <= p.y) && (b.y > a.y) == (across > 0)) inside = !inside;
+        a = b;
+    }
+    return inside;
+}
+
+/* --- places for grains -------------------------------------------------------------------------
+   Grains that have a place are in a hash table of square cells. From level to level the cells have
+   half the width, at least that of the bounding circles of their grains and the gap. A chain may
+   hold grains of other cells, too; to look at these does no harm. */
+
+typedef struct dem2di_filler {
+    dem2d_world *world;
+    const dem2d_particle_desc *grains;
+    int count;
+    dem2di_area area;
+    double gap;
+    bool turned; /* each try has an angle of its own */
+    uint64_t random;
+    int64_t tries;
+    dem2d_pose *poses; /* of the grains; of scale 0 without a place */
+    dem2di_order *order, *spare;
+    int *next;  /* in a chain, -1 at its end */
+    int *heads; /* table of them */
+    int table;
+    double cell;     /* of level 0 */
+    uint32_t levels; /* in use */
+} dem2di_filler;
+
+#define DEM2DI_FILLER_BYTES (sizeof(dem2d_pose) + 2 * sizeof(dem2di_order) + 3 * sizeof(int))
+
+static const dem2d_shape *dem2di_filler_shape(const dem2di_filler *filler, int i) {
+    return filler->world->templates[filler->grains[i].shape.index].shape;
+}
+
+/* Radius of the bounding circle. */
+static double dem2di_filler_radius(const dem2di_filler *filler, int i) {
+    return dem2di_filler_shape(filler, i)->circumscribed * filler->grains[i].scale;
+}
+
+/* Chain of a cell of a level. */
+static int *dem2di_filler_head(const dem2di_filler *filler, int level, dem2di_cell cell) {
+    uint64_t h = (uint64_t)cell.x * 0x9E3779B97F4A7C15u; /* 2^64 / golden ratio */
+    h = (h ^ (h >> 32) ^ (uint64_t)cell.y) * 0x9E3779B97F4A7C15u;
+    h = (h ^ (h >> 29) ^ (uint64_t)level) * 0x9E3779B97F4A7C15u;
+    return &filler->heads[(h >> 32) & (uint64_t)(filler->table - 1)];
+}
+
+static dem2di_cell dem2di_filler_cell(const dem2di_filler *filler, dem2d_vec point, double size) {
+    dem2d_vec from = dem2di_sub(point, filler->area.box.lower);
+    dem2di_cell cell;
+    cell.x = dem2di_cell_of(dem2di_max(0, from.x), size);
+    cell.y = dem2di_cell_of(dem2di_max(0, from.y), size);
+    return cell;
+}
+
+/* Is grain i nearer to grain k than the gap? */
+static bool dem2di_filler_near(const dem2di_filler *filler, int i, int k) {
+    const dem2d_shape *a = dem2di_filler_shape(filler, i), *b = dem2di_filler_shape(filler, k);
+    dem2d_vec d = dem2di_sub(filler->poses[i].position, filler->poses[k].position);
+    double reach = dem2di_filler_radius(filler, i) + dem2di_filler_radius(filler, k) + filler->gap;
+    dem2d_contact_desc desc;
+    dem2d_contact contact;
+    if (!(dem2di_dot(d, d) < reach * reach)) return false;
+    if (a->type == DEM2D_CIRCLE && b->type == DEM2D_CIRCLE) return true;
+    memset(&desc, 0, sizeof desc);
+    desc.skip_points = true;
+    return dem2d_pair_contact(a, filler->poses[i], b, filler->poses[k], &desc, &contact) !=
+               DEM2D_OK ||
+           contact.depth > -filler->gap;
+}
+
+/* Is grain i nearer than the gap to one that has a place? */
+static bool dem2di_filler_blocked(const dem2di_filler *filler, int i) {
+    dem2d_vec at = filler->poses[i].position;
+    double reach = dem2di_filler_radius(filler, i) + filler->gap, size = filler->cell;
+    for (int level = 0; level < DEM2DI_LEVELS; level++, size /= 2) {
+        if (!(filler->levels >> level & 1)) continue;
+        dem2d_vec wide = dem2di_vec(reach + size / 2, reach + size / 2);
+        dem2di_cell low = dem2di_filler_cell(filler, dem2di_sub(at, wide), size), cell;
+        dem2di_cell high = dem2di_filler_cell(filler, dem2di_add(at, wide), size);
+        for (cell.y = low.y; cell.y <= high.y; cell.y++)
+            for (cell.x = low.x; cell.x <= high.x; cell.x++)
+                for (int k = *dem2di_filler_head(filler, level, cell); k >= 0; k = filler->next[k])
+                    if (dem2di_filler_near(filler, i, k)) return true;
+    }
+    return false;
+}
+
+/* Put grain i into the table. */
+static void dem2di_filler_put(dem2di_filler *filler, int i) {
+    double size = filler->cell, width = 2 * dem2di_filler_radius(filler, i) + filler->gap;
+    int level = 0;
+    while (level + 1 < DEM2DI_LEVELS && width <= size / 2) level++, size /= 2;
+    int *head = dem2di_filler_head(filler, level,
+                                   dem2di_filler_cell(filler, filler->poses[i].position, size));
+    filler->next[i] = *head;
+    *head = i;
+    filler->levels |= (uint32_t)1 << level;
+}
+
+/* Is all of grain i, whose centre is inside, at least the gap inside the outline? Each side is a
+   segment. */
+static bool dem2di_filler_inside(const dem2di_filler *filler, int i) {
+    const dem2di_area *area = &filler->area;
+    const dem2d_pose *pose = &filler->poses[i];
+    double radius = dem2di_filler_radius(filler, i);
+    dem2d_vec corners[2], tangents[2];
+    dem2d_shape line;
+    dem2d_contact_desc desc;
+    dem2d_contact contact;
+    if (area->points == NULL) return true;
+    if (!dem2di_area_has(area, pose->position)) return false;
+    memset((void *)&line, 0, sizeof line);
+    memset(&desc, 0, sizeof desc);
+    desc.skip_points = true;
+    line.type = DEM2D_POLYGON;
+    line.count = line.parts = 2;
+    line.corners = corners;
+    line.tangents = tangents;
+    dem2di_line_set(&line);
+    dem2d_vec a = area->points[area->count - 1];
+    for (int k = 0; k < area->count; k++) {
+        dem2d_vec b = area->points[k], e = dem2di_sub(b, a), u;
+        dem2d_pose side;
+        side.position = dem2di_along(a, 0.5, e);
+        side.scale = dem2di_length(e);
+        a = b;
+        dem2d_vec d = dem2di_sub(pose->position, side.position);
+        double reach = radius + filler->gap + side.scale / 2;
+        if (!(dem2di_dot(d, d) < reach * reach) || !dem2di_unit(e, &u)) continue;
+        side.rotation = dem2di_rot(u);
+        if (dem2d_pair_contact(dem2di_filler_shape(filler, i), *pose, &line, side, &desc,
+                               &contact) != DEM2D_OK ||
+            contact.depth > -filler->gap)
+            return false;
+    }
+    return true;
+}
+
+/* Is grain i nearer than the gap to what is in the world? */
+static dem2d_result dem2di_filler_meets(const dem2di_filler *filler, int i, bool *meets) {
+    const dem2d_particle_desc *grain = &filler->grains[i];
+    dem2di_question question = dem2di_question_make(filler->world, DEM2DI_ASK_REGION, NULL);
+    double reach = dem2di_filler_radius(filler, i) + filler->gap;
+    dem2d_vec normal, wide = dem2di_vec(reach, reach);
+    *meets = false;
+    if (grain->groups.sensor) return DEM2D_OK;
+    question.pose = filler->poses[i];
+    question.groups = dem2di_groups_of(&grain->groups, grain->user_data);
+    question.box.lower = dem2di_sub(question.pose.position, wide);
+    question.box.upper = dem2di_add(question.pose.position, wide);
+    question.desc.skip_sensors = question.all = true;
+    dem2d_result result = dem2di_question_ask(&question);
+    if (result != DEM2D_OK) return result;
+    question.shape = dem2di_filler_shape(filler, i); /* from now on of the grain, not the box */
+    for (int k = 0; k < question.count && !*meets; k++) {
+        int item = filler->world->tree.found[k].value;
+        *meets = dem2di_overlap_with(&question, item, &normal) > -filler->gap;
+    }
+    return DEM2D_OK;
+}
+
+static double dem2di_between(double low, double high, double u) {
+    return low + (high - low) * u;
+}
+
+/* Give grain i an angle, and where its centre may be so that its box is inside `room`. */
+static bool dem2di_filler_turn(dem2di_filler *filler, int i, const dem2d_box *room,
+                               dem2d_box *centres) {
+    const dem2d_particle_desc *grain = &filler->grains[i];
+    double more = filler->turned ? 2 * DEM2DI_PI * dem2di_random(&filler->random) : 0;
+    dem2d_pose *pose = &filler->poses[i];
+    dem2d_box own;
+    *pose = dem2d_pose_make(0, 0, filler->turned ? more : grain->angle, grain->scale);
+    if (dem2d_shape_aabb(dem2di_filler_shape(filler, i), *pose, &own) != DEM2D_OK) return false;
+    dem2d_vec gap = dem2di_vec(filler->gap, filler->gap);
+    centres->lower = dem2di_add(dem2di_sub(room->lower, own.lower), gap);
+    centres->upper = dem2di_sub(dem2di_sub(room->upper, own.upper), gap);
+    double slack = DEM2DI_ROUNDOFF * (dem2di_size_of(room->lower) + dem2di_size_of(room->upper));
+    return centres->lower.x <= centres->upper.x + slack &&
+           centres->lower.y <= centres->upper.y + slack;
+}
+
+/* Try grain i at a random place with its box inside `room`. Without success its scale is 0. */
+static dem2d_result dem2di_filler_try(dem2di_filler *filler, int i, const dem2d_box *room,
+                                      bool crowded) {
+    dem2d_pose *pose = &filler->poses[i];
+    dem2d_box centres;
+    bool meets = !dem2di_filler_turn(filler, i, room, &centres);
+    double u = dem2di_random(&filler->random), v = dem2di_random(&filler->random);
+    dem2d_result result = DEM2D_OK;
+    pose->position.x = dem2di_between(centres.lower.x, centres.upper.x, u);
+    pose->position.y = dem2di_between(centres.lower.y, centres.upper.y, v);
+    filler->tries++;
+    meets =
+        meets || (crowded && dem2di_filler_blocked(filler, i)) || !dem2di_filler_inside(filler, i);
+    if (!meets) result = dem2di_filler_meets(filler, i, &meets);
+    if (meets || result != DEM2D_OK) pose->scale = 0;
+    return result;
+}
+
+/* Random sequential addition, by falling bounding radius: the bits of positive doubles are in their
+   order. */
+static dem2d_result dem2di_fill_random(dem2di_filler *filler, int tries) {
+    int64_t most = (int64_t)(tries > 0 ? tries : 1000) * filler->count;
+    dem2d_result result = DEM2D_OK;
+    for (int i = 0; i < filler->count; i++) {
+        double radius = dem2di_filler_radius(filler, i);
+        memcpy(&filler->order[i].key, &radius, sizeof radius);
+        filler->order[i].key = ~filler->order[i].key;
+        filler->order[i].value = i;
+    }
+    dem2di_sort(filler->order, filler->spare, filler->count);
+    filler->cell = 2 * dem2di_filler_radius(filler, filler->order[0].value) + filler->gap;
+    for (int k = 0; k < filler->count && result == DEM2D_OK;) {
+        int i = filler->order[k].value;
+        if (filler->tries == most) break;
+        result = dem2di_filler_try(filler, i, &filler->area.box, true);
+        if (!(filler->poses[i].scale > 0)) continue;
+        dem2di_filler_put(filler, i);
+        k++;
+    }
+    return result;
+}
+
+/* Tries of a grain in its cell: where outlines or particles are in the way, a few find room. */
+#define DEM2DI_LATTICE_TRIES 4
+
+/* A lattice of so many cells for each grain, in the region's area, shows that almost all of it is
+   blocked: no narrower one is tried. */
+#define DEM2DI_LATTICE_CELLS 100.0
+
+/* Grains in the cells of a lattice of columns by rows, row by row, within which they keep half of
+   the gap; returns in *placed how many have found a place. */
+static dem2d_result dem2di_fill_cells(dem2di_filler *filler, int64_t columns, int64_t rows,
+                                      int *placed) {
+    const dem2d_box *box = &filler->area.box;
+    double half = filler->gap / 2; /* cells overlap by the gap, which grains keep from each side */
+    dem2d_vec corner = dem2di_add(box->lower, dem2di_vec(half, half));
+    double x = (box->upper.x - box->lower.x - 2 * half) / (double)columns;
+    double y = (box->upper.y - box->lower.y - 2 * half) / (double)rows;
+    dem2d_result result = DEM2D_OK;
+    int i = 0;
+    for (int k = 0; k < filler->count; k++) filler->poses[k].scale = 0;
+    for (int64_t cell = 0; cell < columns * rows && i < filler->count; cell++) {
+        double column = (double)(cell % columns), row = (double)(cell / columns);
+        dem2d_box room;
+        room.lower = dem2di_vec(corner.x + x * column - half, corner.y + y * row - half);
+        room.upper =
+            dem2di_vec(corner.x + x * (column + 1) + half, corner.y + y * (row + 1) + half);
+        for (int k = 0; k < DEM2DI_LATTICE_TRIES && !(filler->poses[i].scale > 0); k++) {
+            result = dem2di_filler_try(filler, i, &room, false);
+            if (result != DEM2D_OK) return result;
+        }
+        if (filler->poses[i].scale > 0) i++;
+    }
+    *placed = i;
+    return DEM2D_OK;
+}
+
+/* A lattice as wide as the region allows: narrower by 3 % as long as not all grains find a place,
+   but not narrower than the largest grain and the gap. */
+static dem2d_result dem2di_fill_lattice(dem2di_filler *filler) {
+    const dem2d_box *box = &filler->area.box;
+    double least = 0, width = box->upper.x - box->lower.x, height = box->upper.y - box->lower.y;
+    dem2d_result result = DEM2D_OK;
+    for (int i = 0; i < filler->count; i++)
+        least = dem2di_max(least, 2 * dem2di_filler_radius(filler, i));
+    least += filler->gap;
+    double pitch = dem2di_max(least, sqrt(filler->area.area / filler->count));
+    double most = DEM2DI_LATTICE_CELLS * filler->count * (width * (height / filler->area.area));
+    for (int placed = 0; result == DEM2D_OK; pitch = dem2di_max(least, pitch * 0.97)) {
+        double columns = floor((width - filler->gap) / pitch * (1 + 4 * DBL_EPSILON));
+        double rows = floor((height - filler->gap) / pitch * (1 + 4 * DBL_EPSILON));
+        if (columns >= 1 && rows >= 1)
+            result = dem2di_fill_cells(filler, (int64_t)columns, (int64_t)rows, &placed);
+        if (placed == filler->count || !(pitch > least) || columns * rows > most) break;
+    }
+    return result;
+}
+
+static const dem2di_field dem2di_fill_fields[] = {
+    DEM2DI_ROW(dem2d_fill_desc, grading, DEM2DI_OPTIONAL, "- NULL; or grains, not both"),
+    DEM2DI_ROW(dem2d_fill_desc, grains, DEM2DI_OPTIONAL, "- NULL; or grading, not both"),
+    DEM2DI_ROW(dem2d_fill_desc, count, DEM2DI_WHOLE(0, 1 << 30), "- by the solid fraction"),
+    DEM2DI_ROW(dem2d_fill_desc, solid_fraction, DEM2DI_NUMBER(0, 1, 0), "- by the count"),
+    DEM2DI_ROW(dem2d_fill_desc, region.box.lower, DEM2DI_VECTOR, "m none; or points"),
+    DEM2DI_ROW(dem2d_fill_desc, region.box.upper, DEM2DI_VECTOR, "m none; or points"),
+    DEM2DI_ROW(dem2d_fill_desc, region.points, DEM2DI_OPTIONAL, "m NULL; the box"),
+    DEM2DI_ROW(dem2d_fill_desc, region.count, DEM2DI_TAG, "- 0; at least 3 points"),
+    DEM2DI_ROW(dem2d_fill_desc, method, DEM2DI_CHOICE(DEM2D_FILL_METHOD_COUNT), "- LATTICE"),
+    DEM2DI_ROW(dem2d_fill_desc, gap, DEM2DI_FROM_0, "m 0"),
+    DEM2DI_ROW(dem2d_fill_desc, tries, DEM2DI_WHOLE(0, 1 << 30), "- 1000"),
+    DEM2DI_ROW(dem2d_fill_desc, keep_angles, DEM2DI_SWITCH, "- false"),
+    DEM2DI_ROW(dem2d_fill_desc, partial, DEM2DI_SWITCH, "- false"),
+    DEM2DI_ROW(dem2d_fill_desc, seed, DEM2DI_WORD, "- 0"),
+};
+
+/* Grains of a caller: each can be added to the world, wherever its place will be. */
+static dem2d_result dem2di_check_grains(const dem2d_world *world, const dem2d_particle_desc *grains,
+                                        int count) {
+    for (int i = 0; i < count; i++) {
+        dem2d_particle_desc grain = grains[i];
+        dem2di_body body;
+        grain.position = dem2di_vec(0, 0);
+        dem2d_result result = dem2di_check_particle(world, &grain);
+        if (result != DEM2D_OK) return result;
+        memset(&body, 0, sizeof body);
+        body.scale = grain.scale;
+        body.shape_index = (int)grain.shape.index;
+        body.material = (uint16_t)grain.material.index;
+        result = dem2di_check_masses(world, &body);
+        if (result != DEM2D_OK) return result;
+    }
+    return DEM2D_OK;
+}
+
+/* Area of a grain. */
+static double dem2di_grain_area(const dem2d_world *world, const dem2d_particle_desc *grain) {
+    return world->templates[grain->shape.index].shape->mass.area * grain->scale * grain->scale;
+}
+
+/* Room for these particles, so that adding them can't fail. */
+static bool dem2di_reserve_grains(dem2d_world *world, const dem2d_particle_desc *grains,
+                                  int count) {
+    const int all = world->body_count + count;
+    if (!dem2di_reserve_bodies(world, all)) return false;
+    for (int i = 0; i < count; i++) {
+        const dem2di_groups groups = dem2di_groups_of(&grains[i].groups, grains[i].user_data);
+        if (grains[i].name != 0 && !dem2di_names_begin(world)) return false;
+        if (!dem2di_groups_begin(world, &groups)) return false;
+    }
+    return dem2di_reserve_bodies(world, all); /* of the columns that these begin, too */
+}
+
+static void dem2di_filler_close(dem2di_filler *filler) {
+    dem2di_release(&filler->world->env, filler->poses, (size_t)filler->count + 64,
+                   DEM2DI_FILLER_BYTES);
+}
+
+/* All memory that places and new particles need, for filler->count grains: the rest can't fail. */
+static dem2d_result dem2di_filler_open(dem2di_filler *filler) {
+    dem2d_world *world = filler->world;
+    size_t room = (size_t)filler->count + 64; /* table <= 2 room */
+    if (filler->count > (1 << 30) - world->body_count)
+        return dem2di_fail(&world->env, DEM2D_OUT_OF_RANGE, -1, "more than %d particles", 1 << 30);
+    char *next = (char *)dem2di_allocate(&world->env, room, DEM2DI_FILLER_BYTES);
+    if (next == NULL) return dem2di_fail_memory(&world->env, filler->count, "grains");
+    filler->poses = (dem2d_pose *)dem2di_next_array(&next, room, sizeof *filler->poses);
+    filler->order = (dem2di_order *)dem2di_next_array(&next, room, sizeof *filler->order);
+    filler->spare = (dem2di_order *)dem2di_next_array(&next, room, sizeof *filler->spare);
+    filler->next = (int *)dem2di_next_array(&next, room, sizeof *filler->next);
+    filler->heads = (int *)dem2di_next_array(&next, 2 * room, sizeof *filler->heads);
+    memset((void *)filler->poses, 0, room * sizeof *filler->poses);
+    for (filler->table = 64; filler->table < filler->count;) filler->table *= 2;
+    for (int i = 0; i < filler->table; i++) filler->heads[i] = -1;
+    dem2d_result result = dem2di_reserve_grains(world, filler->grains, filler->count)
+                              ? dem2di_tree_make(world) /* last: it stays when what follows fails */
+                              : dem2di_out_of_memory(world, "the particles");
+    if (result != DEM2D_OK) dem2di_filler_close(filler);
+    return result;
+}
+
+/* Add the grains that have a place. */
+static dem2d_result dem2di_filler_add(dem2di_filler *filler, dem2d_particle_id *ids, int capacity,
+                                      dem2d_filling *filling) {
+    dem2d_world *world = filler->world;
+    dem2d_result result = DEM2D_OK;
+    for (int i = 0; i < filler->count && result == DEM2D_OK; i++) {
+        dem2d_particle_desc grain = filler->grains[i];
+        dem2d_particle_id id = {0, 0};
+        if (filler->poses[i].scale > 0) {
+            grain.position = filler->poses[i].position;
+            if (filler->turned) grain.angle = dem2d_rot_angle(filler->poses[i].rotation);
+            result = dem2d_world_add_particle(world, &grain, &id);
+        }
+        if (i < capacity) ids[i] = id;
+    }
+    filling->tries = filler->tries;
+    return result;
+}
+
+/* Places for all grains, as the desc wants them; what they fill is counted. */
+static dem2d_result dem2di_filler_run(dem2di_filler *filler, const dem2d_fill_desc *desc,
+                                      dem2d_filling *filling) {
+    const dem2d_env *env = &filler->world->env;
+    dem2d_result result = desc->method == DEM2D_FILL_RANDOM
+                              ? dem2di_fill_random(filler, desc->tries)
+                              : dem2di_fill_lattice(filler);
+    if (result != DEM2D_OK) return result;
+    memset(filling, 0, sizeof *filling);
+    for (int i = 0; i < filler->count; i++) {
+        if (!(filler->poses[i].scale > 0)) continue;
+        filling->count++;
+        filling->area += dem2di_grain_area(filler->world, &filler->grains[i]);
+    }
+    filling->solid_fraction = filling->area / filler->area.area;
+    if (filling->count == filler->count || desc->partial) return DEM2D_OK;
+    return dem2di_fail(env, DEM2D_NOT_REACHED, filling->count,
+                       "%d of %d grains have found room: a solid fraction of %.4g", filling->count,
+                       filler->count, filling->solid_fraction);
+}
+
+/* Fill with grains that are good. */
+static dem2d_result dem2di_filler_fill(dem2di_filler *filler, const dem2d_fill_desc *desc,
+                                       dem2d_particle_id *ids, int capacity,
+                                       dem2d_filling *filling) {
+    dem2d_filling done;
+    filler->gap = desc->gap;
+    filler->turned = !desc->keep_angles;
+    filler->random = ~desc->seed; /* not the numbers that have shuffled a sample */
+    dem2d_result result = dem2di_filler_open(filler);
+    if (result != DEM2D_OK) return result;
+    result = dem2di_filler_run(filler, desc, &done);
+    if (result == DEM2D_OK) result = dem2di_filler_add(filler, ids, capacity, &done);
+    if (result == DEM2D_OK) *filling = done;
+    dem2di_filler_close(filler);
+    return result;
+}
+
+DEM2D_API dem2d_result dem2d_world_fill(dem2d_world *world, const dem2d_fill_desc *desc,
+                                        dem2d_particle_id *ids, int capacity,
+                                        dem2d_filling *filling) {
+    dem2di_filler filler;
+    if (world == NULL || desc == NULL || filling == NULL) return DEM2D_NULL_ARGUMENT;
+    const dem2d_env *env = &world->env;
+    memset((void *)&filler, 0, sizeof filler);
+    dem2d_result result = dem2di_check_fields(env, DEM2DI_ALL(dem2di_fill_fields), desc);
+    if (result == DEM2D_OK) result = dem2di_check_room(world, "ids", ids, capacity);
+    if (result == DEM2D_OK) result = dem2di_area_make(env, &desc->region, &filler.area);
+    if (result != DEM2D_OK) return result;
+    if ((desc->grading == NULL) == (desc->grains == NULL))
+        return dem2di_fail(env, DEM2D_NULL_ARGUMENT, -1, "grading or grains: one has to be NULL");
+    if (desc->grains != NULL && desc->solid_fraction > 0)
+        return dem2di_fail(env, DEM2D_OUT_OF_RANGE, -1, "solid_fraction = %g, but grains are given",
+                           desc->solid_fraction);
+    dem2d_draw_desc draw;
+    dem2d_particle_desc *drawn = NULL;
+    int count = desc->count;
+    memset(&draw, 0, sizeof draw);
+    draw.grading = desc->grading;
+    draw.count = desc->count;
+    draw.area = desc->solid_fraction * filler.area.area;
+    draw.seed = desc->seed;
+    if (desc->grading != NULL) result = dem2di_sample_draw(world, &draw, &drawn, &count);
+    if (result != DEM2D_OK) return result;
+    if (count == 0) {
+        memset(filling, 0, sizeof *filling);
+        return DEM2D_OK;
+    }
+    filler.world = world;
+    filler.grains = drawn != NULL ? drawn : desc->grains;
+    filler.count = count;
+    result = dem2di_check_grains(world, filler.grains, count);
+    if (result == DEM2D_OK) result = dem2di_filler_fill(&filler, desc, ids, capacity, filling);
+    dem2di_release(env, drawn, (size_t)count, sizeof *drawn);
+    return result;
+}
+
+/* --- outlets and inlets ------------------------------------------------------------------------
+ */
+
+static void dem2di_flow_add(const dem2d_world *world, int slot, int sign, dem2d_flow *flow) {
+    if (flow == NULL) return;
+    flow->count += sign;
+    flow->mass += sign * dem2di_body_mass(world, &world->bodies[slot]);
+    flow->area += sign * dem2di_body_area(world, &world->bodies[slot]);
+}
+
+DEM2D_API dem2d_result dem2d_world_remove_in(dem2d_world *world, const dem2d_region *region,
+                                             dem2d_flow *flow) {
+    dem2di_area area;
+    if (world == NULL) return DEM2D_NULL_ARGUMENT;
+    if (region == NULL) return dem2di_fail_null(&world->env, "region");
+    dem2d_result result = dem2di_area_make(&world->env, region, &area);
+    for (int place = 0, slot;
+         result == DEM2D_OK && (slot = dem2di_next_particle(world, &place)) >= 0;) {
+        if (world->bodies[slot].motion != DEM2D_FREE) continue;
+        if (!dem2di_area_has(&area, world->now[slot].x)) continue;
+        dem2di_flow_add(world, slot, 1, flow);
+        result = dem2d_world_remove_particle(world, dem2di_particle_id(world, slot));
+    }
+    return result;
+}
+
+/* Where a path crosses the line from `from` along e: 1 to its left, -1 to its right, 0 not. The
+   positions before a step are those after the step before, to the bit, so that none is missed. */
+static int dem2di_crossing(dem2d_vec from, dem2d_vec e, dem2d_vec before, dem2d_vec now) {
+    dem2d_vec a = dem2di_sub(before, from), b = dem2di_sub(now, from);
+    double left_before = dem2di_cross(e, a), left_now = dem2di_cross(e, b);
+    if ((left_before > 0) == (left_now > 0)) return 0;
+    double part = left_before / (left_before - left_now);
+    double along = dem2di_dot(dem2di_along(a, part, dem2di_sub(b, a)), e);
+    if (!(along >= 0 && along < dem2di_dot(e, e))) return 0;
+    return left_now > 0 ? 1 : -1;
+}
+
+DEM2D_API dem2d_result dem2d_world_flow(const dem2d_world *world, dem2d_vec from, dem2d_vec to,
+                                        dem2d_flow *flow) {
+    if (world == NULL || flow == NULL) return DEM2D_NULL_ARGUMENT;
+    dem2d_result result = dem2di_check_vec(&world->env, "from", from);
+    if (result == DEM2D_OK) result = dem2di_check_vec(&world->env, "to", to);
+    if (result != DEM2D_OK) return result;
+    dem2d_vec e = dem2di_sub(to, from);
+    if (!(dem2di_dot(e, e) > 0 && dem2di_finite(dem2di_dot(e, e))))
+        return dem2di_fail(&world->env, DEM2D_OUT_OF_RANGE, -1,
+                           "from (%g, %g) to (%g, %g) is no line", from.x, from.y, to.x, to.y);
+    for (int place = 0, slot; (slot = dem2di_next_grain(world, &place)) >= 0;) {
+        int sign = dem2di_crossing(from, e, world->before[slot].x, world->now[slot].x);
+        if (sign != 0) dem2di_flow_add(world, slot, sign, flow);
+    }
+    return DEM2D_OK;
+}
+
+#define DEM2DI_INLET_MOST 1048576 /* grains due in a call: 2^20 */
+
+static const dem2di_field dem2di_inlet_fields[] = {
+    DEM2DI_ROW(dem2d_inlet_desc, grading, DEM2DI_REQUIRED, "- none"),
+    DEM2DI_ROW(dem2d_inlet_desc, region.box.lower, DEM2DI_VECTOR, "m none; or points"),
+    DEM2DI_ROW(dem2d_inlet_desc, region.box.upper, DEM2DI_VECTOR, "m none; or points"),
+    DEM2DI_ROW(dem2d_inlet_desc, region.points, DEM2DI_OPTIONAL, "m NULL; the box"),
+    DEM2DI_ROW(dem2d_inlet_desc, region.count, DEM2DI_TAG, "- 0; at least 3 points"),
+    DEM2DI_ROW(dem2d_inlet_desc, mass_rate, DEM2DI_FROM_0, "kg/m/s 0; or number_rate"),
+    DEM2DI_ROW(dem2d_inlet_desc, number_rate, DEM2DI_FROM_0, "1/s 0; or mass_rate"),
+    DEM2DI_ROW(dem2d_inlet_desc, velocity, DEM2DI_VECTOR, "m/s 0"),
+    DEM2DI_ROW(dem2d_inlet_desc, spread, DEM2DI_FROM_0, "m/s 0"),
+    DEM2DI_ROW(dem2d_inlet_desc, gap, DEM2DI_FROM_0, "m 0"),
+    DEM2DI_ROW(dem2d_inlet_desc, tries, DEM2DI_WHOLE(0, 1 << 30), "- 100"),
+    DEM2DI_ROW(dem2d_inlet_desc, keep_angles, DEM2DI_SWITCH, "- false"),
+};
+
+/* Number n of a sequence in [0, 1) whose steps are 2^64 times an irrational number. */
+static double dem2di_spread_number(double start, int64_t n, uint64_t step) {
+    uint64_t word = (uint64_t)(n + 1) * step;
+    double u = start + (double)(word >> 11) / 9007199254740992.0; /* 2^53 */
+    return u < 1 ? u : u - 1;
+}
+
+/* The grain that an inlet puts in after n others: R2's steps are 1/g and 1/g^2 of a turn, with the
+   real root g of g^3 = g + 1. Its quantiles are by number. */
+static dem2d_particle_desc dem2di_inlet_grain(const dem2d_world *world,
+                                              const dem2d_grading_desc *desc,
+                                              const dem2di_curve *curve, const double *shares,
+                                              uint64_t seed, int64_t n) {
+    double mean = dem2di_curve_square(curve), start = dem2di_random(&seed);
+    double u = dem2di_spread_number(start, n, 0xC13FA9A902A6328Fu);
+    double v = dem2di_spread_number(dem2di_random(&seed), n, 0x91E10DA5C79E7B1Du), part = 0;
+    int at = 0, kind = 0;
+    for (; at < curve->count; at++) {
+        const dem2di_class *c = &curve->classes[at];
+        part = curve->by_number ? c->share : c->share * (mean / c->square);
+        if (u < part || at + 1 == curve->count) break;
+        u -= part;
+    }
+    while (kind + 1 < desc->kind_count && v >= shares[kind]) v -= shares[kind++];
+    double within = dem2di_max(0, dem2di_min(1, u / part));
+    double size = dem2di_class_size(&curve->classes[at], curve->by_number, within);
+    return dem2di_grain_of(world, &desc->kinds[kind], size);
+}
+
+/* Mass of a grain. */
+static double dem2di_grain_mass(const dem2d_world *world, const dem2d_particle_desc *grain) {
+    return world->materials[grain->material.index].density * dem2di_grain_area(world, grain);
+}
+
+/* An inlet at work. */
+typedef struct dem2di_feed {
+    const dem2d_inlet_desc *desc;
+    dem2di_curve curve;
+    double shares[DEM2DI_SAMPLE_KINDS];
+    dem2d_inlet inlet; /* as it will be */
+    dem2d_particle_desc *grains;
+    int count; /* of grains that are due */
+} dem2di_feed;
+
+/* The grains that are due; NULL counts them. What they need of `due` is left for the next ones. */
+static int dem2di_feed_due(const dem2d_world *world, dem2di_feed *feed, double due,
+                           dem2d_particle_desc *grains) {
+    const dem2d_inlet *inlet = &feed->inlet;
+    for (int n = 0;; n++) {
+        dem2d_particle_desc grain = dem2di_inlet_grain(world, feed->desc->grading, &feed->curve,
+                                                       feed->shares, inlet->seed, inlet->count + n);
+        double need = feed->desc->mass_rate > 0 ? dem2di_grain_mass(world, &grain) : 1;
+        if (!(need <= due * (1 + 1e-12)) || n == DEM2DI_INLET_MOST) return n;
+        due -= need;
+        if (grains != NULL) grains[n] = grain;
+    }
+}
+
+/* Velocities of the grains that are due, then places for them, one after the other until one finds
+   no room. */
+static dem2d_result dem2di_feed_place(dem2di_filler *filler, dem2di_feed *feed, int *placed) {
+    const dem2d_inlet_desc *desc = feed->desc;
+    int tries = desc->tries > 0 ? desc->tries : 100;
+    dem2d_result result = DEM2D_OK;
+    *placed = 0;
+    for (int i = 0; i < filler->count; i++)
+        filler->cell = dem2di_max(filler->cell, 2 * dem2di_filler_radius(filler, i) + filler->gap);
+    for (int i = 0; i < filler->count; i++) {
+        dem2d_vec *v = &feed->grains[i].velocity;
+        *v = dem2di_add(*v, desc->velocity);
+        if (desc->spread > 0) {
+            v->x += desc->spread * dem2d_random_normal(&filler->random);
+            v->y += desc->spread * dem2d_random_normal(&filler->random);
+        }
+        for (int k = 0; k < tries && !(filler->poses[i].scale > 0); k++) {
+            result = dem2di_filler_try(filler, i, &filler->area.box, true);
+            if (result != DEM2D_OK) return result;
+        }
+        if (!(filler->poses[i].scale > 0)) return DEM2D_OK;
+        dem2di_filler_put(filler, i);
+        ++*placed;
+    }
+    return DEM2D_OK;
+}
+
+/* Put in the grains that are due; afterwards feed->inlet is the state of the inlet. */
+static dem2d_result dem2di_feed_run(dem2di_filler *filler, dem2di_feed *feed, double due) {
+    dem2d_world *world = filler->world;
+    dem2d_inlet *inlet = &feed->inlet;
+    dem2d_filling done;
+    int placed = 0;
+    (void)dem2di_feed_due(world, feed, due, feed->grains);
+    filler->grains = feed->grains;
+    filler->count = feed->count;
+    filler->random = inlet->seed + inlet->random;
+    dem2d_result result = dem2di_filler_open(filler);
+    if (result != DEM2D_OK) return result;
+    result = dem2di_feed_place(filler, feed, &placed);
+    if (result == DEM2D_OK) result = dem2di_check_grains(world, feed->grains, placed);
+    if (result == DEM2D_OK) result = dem2di_filler_add(filler, NULL, 0, &done);
+    for (int i = 0; i < placed; i++) {
+        double mass = dem2di_grain_mass(world, &feed->grains[i]);
+        due -= feed->desc->mass_rate > 0 ? mass : 1;
+        inlet->mass += mass;
+        inlet->area += dem2di_grain_area(world, &feed->grains[i]);
+    }
+    inlet->due = dem2di_max(0, due);
+    if (placed < feed->count) {
+        inlet->missed += inlet->due;
+        inlet->due = 0;
+    }
+    inlet->count += placed;
+    inlet->random = filler->random - inlet->seed;
+    dem2di_filler_close(filler);
+    return result;
+}
+
+static dem2d_result dem2di_feed_check(const dem2d_env *env, const dem2d_inlet_desc *desc,
+                                      double seconds, const dem2d_inlet *inlet) {
+    dem2d_result result = dem2di_check_fields(env, DEM2DI_ALL(dem2di_inlet_fields), desc);
+    if (result == DEM2D_OK) result = dem2di_check_number(env, "seconds", seconds, DEM2DI_FROM_0);
+    if (result == DEM2D_OK)
+        result = dem2di_check_number(env, "inlet.due", inlet->due, DEM2DI_FROM_0);
+    if (result == DEM2D_OK && desc->mass_rate > 0 && desc->number_rate > 0)
+        return dem2di_fail(env, DEM2D_OUT_OF_RANGE, -1,
+                           "mass_rate = %g and number_rate = %g: one has to be 0", desc->mass_rate,
+                           desc->number_rate);
+    return result;
+}
+
+DEM2D_API dem2d_result dem2d_world_feed(dem2d_world *world, const dem2d_inlet_desc *desc,
+                                        double seconds, dem2d_inlet *inlet) {
+    dem2di_feed feed;
+    dem2di_filler filler;
+    if (world == NULL || desc == NULL || inlet == NULL) return DEM2D_NULL_ARGUMENT;
+    const dem2d_env *env = &world->env;
+    memset((void *)&filler, 0, sizeof filler);
+    dem2d_result result = dem2di_feed_check(env, desc, seconds, inlet);
+    if (result == DEM2D_OK) result = dem2di_area_make(env, &desc->region, &filler.area);
+    if (result == DEM2D_OK) result = dem2di_curve_make(world, desc->grading, &feed.curve);
+    if (result != DEM2D_OK) return result;
+    feed.desc = desc;
+    feed.inlet = *inlet;
+    dem2di_kind_shares(world, desc->grading, feed.shares);
+    filler.world = world;
+    filler.gap = desc->gap;
+    filler.turned = !desc->keep_angles;
+    double due = inlet->due + seconds * dem2di_max(desc->mass_rate, desc->number_rate);
+    feed.count = dem2di_feed_due(world, &feed, due, NULL);
+    if (feed.count == DEM2DI_INLET_MOST)
+        return dem2di_fail(env, DEM2D_OUT_OF_RANGE, -1, "seconds = %g: %d grains or more are due",
+                           seconds, feed.count);
+    feed.inlet.due = due;
+    if (feed.count > 0) {
+        size_t count = (size_t)feed.count;
+        feed.grains = (dem2d_particle_desc *)dem2di_allocate(env, count, sizeof *feed.grains);
+        if (feed.grains == NULL) return dem2di_fail_memory(env, feed.count, "grains");
+        result = dem2di_feed_run(&filler, &feed, due);
+        dem2di_release(env, feed.grains, count, sizeof *feed.grains);
+    }
+    if (result == DEM2D_OK) *inlet = feed.inlet;
+    return result;
 }
 
 /* ============================================================================================

@@ -76,6 +76,10 @@ enum {
     SEGMENT, /* dem2d_wall_desc once more */
     QUERY,
     GRID,
+    GRADING,
+    DRAW,
+    FILL,
+    INLET,
     DESCS
 };
 
@@ -356,10 +360,20 @@ typedef struct args {
         dem2d_stress stress;
         dem2d_query_desc query;
         dem2d_grid_desc grid;
+        dem2d_grading_desc grading;
+        dem2d_draw_desc draw;
+        dem2d_fill_desc fill;
+        dem2d_inlet_desc inlet;
         dem2d_particle_arrays particles;
         dem2d_contact_arrays contacts;
     } d;
     dem2d_box box;
+    dem2d_grading_desc grading; /* of a sample */
+    dem2d_grain_kind kind;
+    dem2d_grade curve[2];
+    const dem2d_region *where;
+    dem2d_region area;
+    dem2d_inlet *state, inlet;
     const char *names[NAMED];
     double values[NAMED];
     dem2d_vec p[12], q[5];
@@ -515,6 +529,43 @@ static void with_contacts(args *a, fixture *f) {
 static void with_grid(args *a, fixture *f) {
     (void)f;
     a->d.grid = good_grid();
+}
+static void with_grading(args *a, fixture *f) { /* small grains of one kind */
+    a->kind.share = 1, a->kind.grain = good_particle(f);
+    a->curve[0].size = 0.003, a->curve[1].size = 0.006, a->curve[1].passing = 1;
+    a->d.grading.points = a->curve, a->d.grading.point_count = 2;
+    a->d.grading.kinds = &a->kind, a->d.grading.kind_count = 1;
+}
+static void with_draw(args *a, fixture *f) {
+    with_grading(a, f);
+    a->grading = a->d.grading;
+    memset(&a->d, 0, sizeof a->d);
+    a->d.draw.grading = &a->grading, a->d.draw.count = 5;
+}
+static void with_fill(args *a, fixture *f) { /* between the grains that are there */
+    with_draw(a, f);
+    memset(&a->d, 0, sizeof a->d);
+    a->d.fill.grading = &a->grading, a->d.fill.count = 5, a->d.fill.method = DEM2D_FILL_RANDOM;
+    a->d.fill.region.box = a->box;
+}
+static void with_inlet(args *a, fixture *f) {
+    with_draw(a, f);
+    memset(&a->d, 0, sizeof a->d);
+    a->d.inlet.grading = &a->grading, a->d.inlet.number_rate = 10;
+    a->d.inlet.region.box = a->box, a->state = &a->inlet;
+}
+static void with_where(args *a, fixture *f) {
+    (void)f;
+    a->where = &a->area, a->area.box = a->box;
+}
+static void with_measure(args *a, fixture *f) {
+    (void)f;
+    a->number = DEM2D_MEASURE_AREA;
+}
+static dem2d_result draw_of(const dem2d_world *world, const void *grading, args *a) {
+    dem2d_draw_desc draw = {0};
+    draw.grading = grading, draw.count = 5;
+    return dem2d_world_draw(world, &draw, (dem2d_particle_desc *)a->out, 5, (int *)a->second);
 }
 static void with_save(args *a, fixture *f) {
     (void)f;
@@ -951,7 +1002,32 @@ typedef struct function {
     F(grid_write_csv, dem2d_grid_write_csv(v->grid, v->desc, NULL),                               \
       DESCRIBED(SAVE, with_save), IN_GRID, ARG(desc, "path and write", POINTER))                  \
     F(grid_write_vti, dem2d_grid_write_vti(v->grid, v->desc, NULL),                               \
-      DESCRIBED(SAVE, with_save), IN_GRID, ARG(desc, "path and write", POINTER))
+      DESCRIBED(SAVE, with_save), IN_GRID, ARG(desc, "path and write", POINTER))               \
+    F(world_draw, dem2d_world_draw(v->world, v->desc, v->out, v->count, v->second),               \
+      DESCRIBED(DRAW, with_draw), IN_WORLD, THE_DESC, OUT, CAPACITY, SECOND)                      \
+    F(world_draw_grading, draw_of(v->world, v->desc, v),                                          \
+      DESCRIBED(GRADING, with_grading), IN_WORLD, THE_DESC, OUT, SECOND,                          \
+      ARG(curve[0].size, "points[0]", FINITE), ARG(curve[1].passing, "points[1]", FINITE),        \
+      ARG(kind.share, "share", FINITE),                                                           \
+      ARG(kind.grain.shape, "shape", SHAPE_ID), ARG(kind.grain.material, "material", MATERIAL_ID),\
+      ARG(kind.grain.velocity, "velocity", VECTOR))                                               \
+    F(world_grading,                                                                              \
+      dem2d_world_grading(v->world, (dem2d_measure)v->number, v->a, v->count, v->out),            \
+      DESCRIBED(NO_DESC, with_measure), IN_WORLD,                                                 \
+      ARG_INT(number, "measure", 0, DEM2D_MEASURE_COUNT - 1, OUT_OF_RANGE),                       \
+      ARG(a, "sizes", POINTER), ARG_INT(count, "count", 0, INT_MAX, OUT_OF_RANGE),                \
+      ARG(series_a[0], "sizes[", FINITE), OUT)                                                    \
+    F(world_fill, dem2d_world_fill(v->world, v->desc, v->out, v->count, v->second),               \
+      DESCRIBED(FILL, with_fill), IN_WORLD, THE_DESC, OUT, CAPACITY, SECOND)                      \
+    F(world_remove_in, dem2d_world_remove_in(v->world, v->where, v->out),                         \
+      DESCRIBED(NO_DESC, with_where), IN_WORLD, ARG(where, "region", POINTER),                    \
+      ARG(area.box.lower, "region.box.lower", VECTOR),                                            \
+      ARG(area.box.upper, "region.box.upper", UPPER), ARG(out, "flow", OPTIONAL))                 \
+    F(world_flow, dem2d_world_flow(v->world, v->vector, v->direction, v->out),                    \
+      LOGS, IN_WORLD, ARG(vector, "from", VECTOR), ARG(direction, "to", VECTOR), OUT)             \
+    F(world_feed, dem2d_world_feed(v->world, v->desc, v->x, v->state),                            \
+      DESCRIBED(INLET, with_inlet), IN_WORLD, THE_DESC, ARG(x, "seconds", NOT_NEGATIVE),          \
+      ARG(state, "inlet", POINTER), ARG(inlet.due, "inlet.due", NOT_NEGATIVE))
 /* clang-format on */
 
 #define FUNCTION_CALL(name, expression, ...)   \

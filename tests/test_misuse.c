@@ -12,9 +12,9 @@
 /* --- the fields of descs --------------------------------------------------------------------- */
 
 static const char *const desc_names[DESCS] = {
-    "custom",   "reduction", "image",    "fit",  "virtual", "contact", "world",
-    "material", "pair",      "particle", "wall", "save",    "load",    "svg",
-    "vtp",      "pvd",       "csv",      "wall", "query",   "grid"};
+    "custom", "reduction", "image", "fit",  "virtual", "contact", "world", "material",
+    "pair",   "particle",  "wall",  "save", "load",    "svg",     "vtp",   "pvd",
+    "csv",    "wall",      "query", "grid", "grading", "draw",    "fill",  "inlet"};
 
 #define FIELD(type, field, ...) \
     { .name = #field, .offset = offsetof(dem2d_##type, field), .kind = __VA_ARGS__ }
@@ -67,6 +67,11 @@ static const struct special {
     {CSV, FIELD(csv_desc, names, POINTER)},
     {CSV, FIELD(csv_desc, values, POINTER)},
     {CSV, FIELD(csv_desc, write, POINTER)},
+    {GRADING, FIELD(grading_desc, points, POINTER)},
+    {GRADING, FIELD(grading_desc, point_count, INTEGER, .low = 1, .high = 256)},
+    {FILL, FIELD(fill_desc, grading, POINTER)},
+    {FILL, FIELD(fill_desc, region.box.upper, UPPER)},
+    {INLET, FIELD(inlet_desc, region.box.upper, UPPER)},
 };
 
 typedef struct desc_rows {
@@ -75,7 +80,7 @@ typedef struct desc_rows {
 } desc_rows;
 
 static desc_rows descs[DESCS];
-static field_row field_rows[256]; /* they hold the names */
+static field_row field_rows[512]; /* they hold the names */
 
 /* What follows of a field's type and range. The callbacks here need their user pointers. */
 static row row_of(const field_row *f) {
@@ -541,6 +546,8 @@ static void test_all_functions(void **state) {
                                          "strain",
                                          "world_hash",
                                          "grid_destroy",
+                                         "random_uniform",
+                                         "random_normal",
                                          "law_builtin"};
     char line[256];
     int found = 0, missing = 0;
