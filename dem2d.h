@@ -2377,7 +2377,8 @@ typedef struct dem2d_filling {
 /// (NOT_REACHED, the log tells the number and the solid fraction that were reached), unless
 /// desc->partial. ids (may be NULL if capacity is 0) gets the first `capacity` ids, in the order of
 /// the grains given or drawn; generation 0 for a grain that found no room. Errors: also those of
-/// dem2d_world_add_particle, of dem2d_world_draw, and of dem2d_outline_measure.
+/// dem2d_world_add_particle, of dem2d_world_draw, and of dem2d_outline_measure; OUT_OF_RANGE in a
+/// periodic cell.
 DEM2D_API dem2d_result dem2d_world_fill(dem2d_world *world, const dem2d_fill_desc *desc,
                                         dem2d_particle_id *ids, int capacity,
                                         dem2d_filling *filling);
@@ -2396,7 +2397,7 @@ DEM2D_API dem2d_result dem2d_world_remove_in(dem2d_world *world, const dem2d_reg
 /// Add to flow the particles (no sensors) whose centroids have crossed the line from one point to
 /// another (m) in the last step: those that went to its left, less those that went to its right. To
 /// be called after each step, or at the start of each: in dem2d_world_desc.loads. What a caller has
-/// moved has not crossed. Errors: NOT_FINITE, OUT_OF_RANGE (the points are the same).
+/// moved has not crossed. Errors: NOT_FINITE, OUT_OF_RANGE (the points are the same; in a cell).
 DEM2D_API dem2d_result dem2d_world_flow(const dem2d_world *world, dem2d_vec from, dem2d_vec to,
                                         dem2d_flow *flow);
 
@@ -23162,8 +23163,8 @@ DEM2D_API double dem2d_random_normal(uint64_t *state) {
 /* --- gradings ----------------------------------------------------------------------------------
  */
 
-#define DEM2DI_CLASSES 256    /* of a curve at most */
-#define DEM2DI_LAW_CLASSES 48 /* of a law: over three decades of size each spans 15 % */
+#define DEM2DI_CURVE_CLASSES 256 /* of a curve at most */
+#define DEM2DI_LAW_CLASSES 48    /* of a law: over three decades of size each spans 15 % */
 #define DEM2DI_SAMPLE_KINDS 256
 
 /* Sizes whose squares, also those of their ratios, are normal numbers. */
@@ -23171,7 +23172,7 @@ DEM2D_API double dem2d_random_normal(uint64_t *state) {
 
 static const dem2di_field dem2di_grading_fields[] = {
     DEM2DI_ROW(dem2d_grading_desc, points, DEM2DI_OPTIONAL, "- NULL; required for POINTS"),
-    DEM2DI_ROW(dem2d_grading_desc, point_count, DEM2DI_WHOLE(0, DEM2DI_CLASSES), "- 0"),
+    DEM2DI_ROW(dem2d_grading_desc, point_count, DEM2DI_WHOLE(0, DEM2DI_CURVE_CLASSES), "- 0"),
     DEM2DI_ROW(dem2d_grading_desc, kinds, DEM2DI_REQUIRED, "- none"),
     DEM2DI_ROW(dem2d_grading_desc, kind_count, DEM2DI_WHOLE(1, DEM2DI_SAMPLE_KINDS), "- none"),
     DEM2DI_ROW(dem2d_grading_desc, measure, DEM2DI_CHOICE(DEM2D_MEASURE_COUNT), "- MASS"),
@@ -23199,7 +23200,7 @@ typedef struct dem2di_class {
 } dem2di_class;
 
 typedef struct dem2di_curve {
-    dem2di_class classes[DEM2DI_CLASSES];
+    dem2di_class classes[DEM2DI_CURVE_CLASSES];
     int count;
     bool by_number;
 } dem2di_curve;
@@ -23493,7 +23494,7 @@ static dem2d_result dem2di_sample_draw(const dem2d_world *world, const dem2d_dra
                                        dem2d_particle_desc **grains, int *count) {
     const dem2d_env *env = &world->env;
     dem2di_curve curve;
-    dem2di_quota quotas[DEM2DI_CLASSES];
+    dem2di_quota quotas[DEM2DI_CURVE_CLASSES];
     dem2d_result result = dem2di_curve_make(world, desc->grading, &curve);
     if (result != DEM2D_OK) return result;
     double squares = desc->area * (4 / DEM2DI_PI), number = desc->count;
@@ -24125,6 +24126,7 @@ DEM2D_API dem2d_result dem2d_world_flow(const dem2d_world *world, dem2d_vec from
     dem2d_result result = dem2di_check_vec(&world->env, "from", from);
     if (result == DEM2D_OK) result = dem2di_check_vec(&world->env, "to", to);
     if (result != DEM2D_OK) return result;
+    if (world->periodic) return dem2di_fail(&world->env, DEM2D_OUT_OF_RANGE, -1, "flow in a cell");
     dem2d_vec e = dem2di_sub(to, from);
     if (!(dem2di_dot(e, e) > 0 && dem2di_finite(dem2di_dot(e, e))))
         return dem2di_fail(&world->env, DEM2D_OUT_OF_RANGE, -1,
