@@ -13,8 +13,9 @@
    0.06 m.
 
    Sweeps, each from the base case with one number changed:
-       stiffness   k_n/P; k_n = k_t; the packing is made with the same
-       rate        inertial number, as dem2d_world_inertial_number defines it; with dashpots
+       stiffness   k_n/P; k_n = k_t; the packing of 1000 comes to rest with the new one first
+       rate        inertial number, as dem2d_world_inertial_number defines it (with the mass m of a
+                   disc, rate sqrt(m/P) is 0.89 of it); with dashpots
        rate-local  the same with local damping 0.7, without dashpots
        step        time step over `safe` of dem2d_world_time_step_bounds, in the packed sample with
                    friction and dashpots
@@ -318,7 +319,7 @@ static bool at_rest(const sample *s) {
            e.unbalanced < 1e-3;
 }
 
-/* Presses the rows together, without friction, until all is at rest. */
+/* Presses the grains together, without friction, until all is at rest. */
 static void pack(sample *s) {
     const int batch = 200;
     int batches = 0;
@@ -327,13 +328,85 @@ static void pack(sample *s) {
     expect_ok(dem2d_world_set_time_step(s->world, s->time_step), "time step");
     expect_ok(dem2d_world_set_damping(s->world, 0.3, 0), "damping");
     hold_pressure(s);
-    stir(s);
     /* at I = 0.01 a strain of 1 takes 100 / rate_of_1: time enough for a strain of 100 */
     const double most = 1e4 / s->rate_of_1 / s->time_step / batch;
     do {
         expect_ok(dem2d_world_step(s->world, batch, NULL), "step");
         if (++batches > most) bench_fail("a packing does not come to rest");
     } while (!at_rest(s));
+}
+
+/* Where grains and walls are now. */
+static bed save_sample(const sample *s, const bed *from) {
+    bed b = make_bed(from->count);
+    b.shapes = from->shapes, b.shape_count = from->shape_count;
+    for (int i = 0; i < b.count; i++) {
+        dem2d_particle_info info;
+        expect_ok(dem2d_world_get_particle(s->world, s->ids[i], &info), "particle");
+        b.grains[i] = from->grains[i];
+        b.grains[i].x = info.pose.position.x, b.grains[i].y = info.pose.position.y;
+        b.grains[i].angle = dem2d_rot_angle(info.pose.rotation);
+    }
+    b.left = wall_place(s, LEFT), b.right = wall_place(s, RIGHT);
+    b.bottom = wall_place(s, BOTTOM), b.top = wall_place(s, TOP);
+    return b;
+}
+
+/* Rows, stirred and packed at the base case's stiffness. */
+static bed pack_rows(int kind, int seed) {
+    setting usual = {kind, {0}};
+    memcpy(usual.of, base, sizeof base);
+    bed rows = draw_sample(kind, seed);
+    sample s = open_sample(&usual, &rows);
+    stir(&s);
+    pack(&s);
+    const bed packed = save_sample(&s, &rows);
+    close_sample(&s);
+    free(rows.grains);
+    return packed;
+}
+
+/* The same packing with another stiffness, changed by factors of 3.2 at most, each until it is at
+   rest: so the samples of a seed differ as little as they can. */
+static bed change_stiffness(const bed *packed, int kind, double to) {
+    const double from = base[STIFFNESS_RATIO];
+    const int stages = (int)ceil(fabs(log(to / from)) / log(3.2));
+    setting usual = {kind, {0}};
+    memcpy(usual.of, base, sizeof base);
+    bed b = *packed;
+    b.grains = get_memory((size_t)b.count, sizeof *b.grains);
+    memcpy(b.grains, packed->grains, (size_t)b.count * sizeof *b.grains);
+    for (int k = 1; k <= stages; k++) {
+        usual.of[STIFFNESS_RATIO] = k == stages ? to : from * pow(to / from, (double)k / stages);
+        sample s = open_sample(&usual, &b);
+        pack(&s);
+        const bed next = save_sample(&s, &b);
+        close_sample(&s);
+        free(b.grains);
+        b = next;
+    }
+    return b;
+}
+
+/* The packing of a case: of its grains, seed and stiffness, with what else the base case has. The
+   last ones are kept, because most cases begin with them. */
+static const bed *packed_bed(const setting *c, int seed) {
+    static bed packed, changed;
+    static int last_kind, last_seed;
+    static double last_stiffness;
+    const double stiffness = c->of[STIFFNESS_RATIO];
+    if (c->kind != last_kind || seed != last_seed) {
+        free(packed.grains);
+        packed = pack_rows(c->kind, seed);
+        last_kind = c->kind, last_seed = seed, last_stiffness = 0;
+    }
+    if (stiffness == base[STIFFNESS_RATIO]) return &packed;
+    if (stiffness != last_stiffness) {
+        free(changed.grains);
+        changed = change_stiffness(&packed, c->kind, stiffness);
+        last_stiffness = stiffness;
+    }
+    return &changed;
 }
 
 /* --- shear ------------------------------------------------------------------------------------ */
@@ -412,45 +485,6 @@ static void shear(sample *s, const setting *c, double *out) {
     }
     out[STEPS] = (double)done;
     read_curve(ratio, out);
-}
-
-/* Where grains and walls are now. */
-static bed save_sample(const sample *s, const bed *from) {
-    bed b = make_bed(from->count);
-    b.shapes = from->shapes, b.shape_count = from->shape_count;
-    for (int i = 0; i < b.count; i++) {
-        dem2d_particle_info info;
-        expect_ok(dem2d_world_get_particle(s->world, s->ids[i], &info), "particle");
-        b.grains[i] = from->grains[i];
-        b.grains[i].x = info.pose.position.x, b.grains[i].y = info.pose.position.y;
-        b.grains[i].angle = dem2d_rot_angle(info.pose.rotation);
-    }
-    b.left = wall_place(s, LEFT), b.right = wall_place(s, RIGHT);
-    b.bottom = wall_place(s, BOTTOM), b.top = wall_place(s, TOP);
-    return b;
-}
-
-/* The packing of a case: of its grains, seed and stiffness, with what else the base case has. The
-   last one is kept, because most cases begin with it. */
-static const bed *packed_bed(const setting *c, int seed) {
-    static bed packed;
-    static int last_kind, last_seed;
-    static double last_stiffness;
-    const double stiffness = c->of[STIFFNESS_RATIO];
-    if (c->kind != last_kind || seed != last_seed || stiffness != last_stiffness) {
-        setting usual = *c;
-        memcpy(usual.of, base, sizeof base);
-        usual.of[STIFFNESS_RATIO] = stiffness;
-        bed rows = draw_sample(c->kind, seed);
-        sample s = open_sample(&usual, &rows);
-        pack(&s);
-        free(packed.grains);
-        packed = save_sample(&s, &rows);
-        close_sample(&s);
-        free(rows.grains);
-        last_kind = c->kind, last_seed = seed, last_stiffness = stiffness;
-    }
-    return &packed;
 }
 
 /* A fraction of the safe step of the packing's contacts, which the first step finds: that one takes
