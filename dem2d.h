@@ -302,6 +302,8 @@ HOW TO
                          dem2d_world_desc.loads. The work is in the ledger.
     leave out the walls  dem2d_world_desc.cell makes the world periodic. dem2d_world_stress with the
                          area of the cell is then the stress of a sample without any border.
+    deform a cell        dem2d_world_deform: shear, compression, both, at any time. Then
+                         dem2d_world_get_cell for the cell, its strain rates and its stress.
     share a scene        Each world holds its own grains, and copies (ghosts) of the others' grains
       out to processes   within reach, with the same names. dem2d_world_desc.gather gives each ghost
                          the force that its owner has found: the worlds then move like one, to the
@@ -1385,6 +1387,26 @@ typedef struct dem2d_cell {
     dem2d_vec origin; ///< m, the corner: the cell is origin + s a + t b, 0 <= s, t < 1
 } dem2d_cell;
 
+/// How a cell deforms: by a homogeneous flow with the velocity (xx x + xy y, yy y) at x, y from the
+/// corner of the cell. The corner stays where it is, and the cell vector a along x. All zero: the
+/// cell keeps its shape. Rates of extension are positive. Time step times |xx|, |xy|, |yy|: at most
+/// 0.1.
+///
+/// While the cell deforms, all velocities of particles that you read or set are fluctuations c
+/// about the flow. A particle moves with c plus the flow at its place: dx/dt = c + L x, dc/dt = F/m
+/// - L c, with the velocity gradient L. Fixed particles have c = 0 and move with the flow, driven
+/// ones keep the c that they are given. Damping acts on c and on spins; the flow turns no particle.
+/// Contacts use the true relative velocities of the particles. The momentum P of the fluctuations
+/// would change by -L P: when the cell starts to deform, the mean velocity of the free particles is
+/// taken off, and P is 0 from then on. When b leans by more than half of a, the cell of the vectors
+/// a and b + a, or b - a, takes its place: it has the same lattice, and particles keep their
+/// contacts. The steps are of second order (implicit midpoint rule).
+typedef struct dem2d_deformation_desc {
+    double xx; ///< 1/s, rate of extension along x
+    double xy; ///< 1/s, simple shear: change of the velocity along x with y
+    double yy; ///< 1/s, rate of extension along y
+} dem2d_deformation_desc;
+
 /// A world. Only time_step has no default.
 typedef struct dem2d_world_desc {
     double time_step;          ///< s, > 0
@@ -1733,6 +1755,9 @@ DEM2D_API dem2d_result dem2d_world_get_wall_part(const dem2d_world *world, dem2d
 DEM2D_API dem2d_result dem2d_world_set_gravity(dem2d_world *world, dem2d_vec gravity);
 /// Change local ([0, 1)) and global (1/s, >= 0) damping.
 DEM2D_API dem2d_result dem2d_world_set_damping(dem2d_world *world, double local, double global);
+/// Let the cell deform from the next step on. Errors: NOT_FINITE, OUT_OF_RANGE (a rate times the
+/// time step above 0.1; a world that is not periodic along a and b), OUT_OF_MEMORY.
+DEM2D_API dem2d_result dem2d_world_deform(dem2d_world *world, const dem2d_deformation_desc *desc);
 /// Change the time step (s, > 0) from the next move on.
 DEM2D_API dem2d_result dem2d_world_set_time_step(dem2d_world *world, double time_step);
 /// Give a particle another material: mass and inertia change, its contacts keep their springs.
@@ -1837,6 +1862,7 @@ typedef struct dem2d_ledger {
     /// nothing.
     double turnover;
     double loads; ///< work of the external loads on the free particles
+    double cell;  ///< work of the cell that deforms: -area (contact + kinetic stress) : L over time
 } dem2d_ledger;
 
 /// Stress tensor, compression positive, Pa.
@@ -1846,6 +1872,17 @@ typedef struct dem2d_stress {
     double yx; ///< force along x across a face with normal y
     double yy; ///< normal, y
 } dem2d_stress;
+
+/// A periodic cell and the stress in it.
+typedef struct dem2d_cell_info {
+    dem2d_cell cell;                    ///< m, now
+    dem2d_deformation_desc deformation; ///< 1/s, in the last step
+    double area;          ///< m2, of the cell at the last force pass; 0 where only one
+                          ///< direction is periodic: then there is no stress
+    dem2d_stress contact; ///< Pa, of the contacts at the last force pass
+    dem2d_stress kinetic; ///< Pa, of the fluctuations: sum of m c c, c the mean of the half steps
+                          ///< before and after the last force pass. The stress is the sum of both
+} dem2d_cell_info;
 
 /// Mean and deviator of a stress in the plane.
 typedef struct dem2d_principal {
@@ -1938,6 +1975,8 @@ DEM2D_API dem2d_result dem2d_world_contacts(const dem2d_world *world, dem2d_cont
 DEM2D_API dem2d_result dem2d_world_energy(const dem2d_world *world, dem2d_energy *energy);
 /// The energy balance of a world with desc.ledger. Errors: OUT_OF_RANGE for a world without it.
 DEM2D_API dem2d_result dem2d_world_ledger(const dem2d_world *world, dem2d_ledger *ledger);
+/// The periodic cell of a world and the stress in it. Without a cell all is 0.
+DEM2D_API dem2d_result dem2d_world_get_cell(const dem2d_world *world, dem2d_cell_info *info);
 /// Love-Weber stress: (1/area) times the sum of f l over the contacts, walls included; area > 0,
 /// m2. This is the stress of the contacts; that of the motion is dem2d_average.kinetic. Errors:
 /// NOT_FINITE, OUT_OF_RANGE (area).
@@ -12377,6 +12416,7 @@ enum {
     DEM2DI_BY_WALLS,
     DEM2DI_DRIVING,
     DEM2DI_BY_DAMPING,
+    DEM2DI_BY_CELL,
     DEM2DI_HALVES,
     DEM2DI_BY_FRICTION = DEM2DI_HALVES,
     DEM2DI_BY_DASHPOTS,
@@ -12422,6 +12462,7 @@ typedef enum dem2di_group {
     DEM2DI_DISPLACEMENTS, /* of bodies, where plan.turns */
     DEM2DI_MADE,          /* of bodies, where some are redirected */
     DEM2DI_IMAGES,
+    DEM2DI_FLOWING,   /* of slots, where the cell deforms */
     DEM2DI_EXCHANGED, /* of ids, where the caller may change the sums */
     DEM2DI_WALLS_EXCHANGED,
     DEM2DI_STARTS, /* of the contacts of bodies, and the end of the last */
@@ -12537,7 +12578,11 @@ struct dem2d_world {
     bool one_sided;                /* a wall with parts has */
     int wall_count, part_count;
 
-    dem2d_cell cell;
+    dem2d_cell cell, cell_before;     /* now; at the last force pass */
+    dem2d_deformation_desc flow;      /* from the next step on, */
+    dem2d_deformation_desc flow_made; /* in the step that was made, */
+    dem2di_velocities *fluctuations;  /* while velocities are those of contacts, and `made` */
+    dem2di_velocities *made_fluctuations;
     bool periodic;                      /* there is a cell: one of its vectors is not zero */
     bool wrap_due;                      /* no memory was left to move particles into the cell */
     int image_first, image_count;       /* slots of images: from the first on, so many */
@@ -12660,6 +12705,14 @@ static const dem2di_field dem2di_setting_fields[] = {
     DEM2DI_SAVED("cell_a", dem2d_world, cell.a, DEM2DI_VECTOR),
     DEM2DI_SAVED("cell_b", dem2d_world, cell.b, DEM2DI_VECTOR),
     DEM2DI_SAVED("cell_origin", dem2d_world, cell.origin, DEM2DI_VECTOR),
+    DEM2DI_SAVED("last_cell_a", dem2d_world, cell_before.a, DEM2DI_VECTOR),
+    DEM2DI_SAVED("last_cell_b", dem2d_world, cell_before.b, DEM2DI_VECTOR),
+    DEM2DI_SAVED("flow_xx", dem2d_world, flow.xx, DEM2DI_FINITE),
+    DEM2DI_SAVED("flow_xy", dem2d_world, flow.xy, DEM2DI_FINITE),
+    DEM2DI_SAVED("flow_yy", dem2d_world, flow.yy, DEM2DI_FINITE),
+    DEM2DI_SAVED("last_flow_xx", dem2d_world, flow_made.xx, DEM2DI_FINITE),
+    DEM2DI_SAVED("last_flow_xy", dem2d_world, flow_made.xy, DEM2DI_FINITE),
+    DEM2DI_SAVED("last_flow_yy", dem2d_world, flow_made.yy, DEM2DI_FINITE),
     DEM2DI_SAVED("timed", dem2d_world, timed, DEM2DI_ANY_NUMBER)}; /* a sum, which may overflow */
 
 /* What of the list outlives it, counters, lengths. */
@@ -12746,6 +12799,8 @@ static const dem2di_field dem2di_ledger_fields[] = {
     DEM2DI_ACCOUNT("half_driving", half[DEM2DI_DRIVING]),
     DEM2DI_ACCOUNT("damping", sum[DEM2DI_BY_DAMPING]),
     DEM2DI_ACCOUNT("half_damping", half[DEM2DI_BY_DAMPING]),
+    DEM2DI_ACCOUNT("cell", sum[DEM2DI_BY_CELL]),
+    DEM2DI_ACCOUNT("half_cell", half[DEM2DI_BY_CELL]),
     DEM2DI_ACCOUNT("friction", sum[DEM2DI_BY_FRICTION]),
     DEM2DI_ACCOUNT("dashpots", sum[DEM2DI_BY_DASHPOTS]),
     DEM2DI_ACCOUNT("kinetic", kinetic),
@@ -13008,6 +13063,8 @@ static const dem2di_column dem2di_columns[] = {
     DEM2DI_COLUMN("last_velocities", MADE, made, DEM2DI_MOVES | DEM2DI_HASHED, velocity_fields),
     DEM2DI_COLUMN("images", IMAGES, images, DEM2DI_FIRST, image_fields),
     DEM2DI_UNSAVED(IMAGES, images_next, 0),
+    DEM2DI_UNSAVED(FLOWING, fluctuations, 0),
+    DEM2DI_UNSAVED(FLOWING, made_fluctuations, 0),
     DEM2DI_UNSAVED(SUMS, sums, DEM2DI_MOVES),
     DEM2DI_UNSAVED(EXCHANGED, exchange.force, 0),
     DEM2DI_UNSAVED(EXCHANGED, exchange.torque, 0),
@@ -13266,7 +13323,7 @@ static dem2d_result dem2di_out_of_memory(const dem2d_world *world, const char *w
 
 /* ============================================================================================
    >>cell  The periodic cell: images of particles, wraps
-   uses: config, math, memory, broad, motion, world
+   uses: config, math, memory, fields, broad, motion, world
    ============================================================================================ */
 
 /* Particles are kept in the cell: after each step a centroid that has left it is moved back by
@@ -13283,6 +13340,17 @@ static dem2d_result dem2di_out_of_memory(const dem2d_world *world, const char *w
    Pairs of the same two are ordered by t, then s: neither a wrap nor another choice of the cell
    vector b changes this order, so that sums keep their bits. */
 
+/* A cell deforms with the velocity gradient L about its corner, in whole steps of the map
+       x -> T x,   T = (1 - dt/2 L)^-1 (1 + dt/2 L)
+   of positions from the corner, cell vectors and so of images. Velocities c are fluctuations:
+       (1 + dt/2 Lk) c+ = (1 - dt/2 Lk) c- + dt F/m,   Lk = (L- + L+)/2
+       (1 - dt/2 L+) x+ = (1 + dt/2 L+) x + dt c+
+   with - and + for the half steps before and after the force pass. The velocity with which a
+   contact moves, (d - d-)/dt for the line d from A to B now and a step ago, is the difference of
+       u = (1 + dt/2 L-)^-1 (c- + L- x)
+   of the two (section step). The flow brings the partners at a distance d together by at most
+   |L| dt d in a step: this uses up the list and the separation bounds besides the paths of c. */
+
 /* The particle that a slot shows. */
 static inline int dem2di_owner(const dem2d_world *world, int slot) {
     return world->image_count == 0 || slot < world->image_first
@@ -13291,8 +13359,7 @@ static inline int dem2di_owner(const dem2d_world *world, int slot) {
 }
 
 /* From a particle to its image. */
-static inline dem2d_vec dem2di_cell_shift(const dem2d_world *world, int along_a, int along_b) {
-    const dem2d_cell *cell = &world->cell;
+static inline dem2d_vec dem2di_cell_shift(const dem2d_cell *cell, int along_a, int along_b) {
     return dem2di_vec(along_a * cell->a.x + along_b * cell->b.x, along_b * cell->b.y);
 }
 
@@ -13328,7 +13395,7 @@ static dem2d_vec dem2di_wrapped(const dem2d_world *world, dem2d_vec x) {
     const dem2di_fractions f = dem2di_fractions_make(&world->cell);
     int out[2];
     if (!world->periodic || !dem2di_cells_out(&f, x, out)) return x;
-    return dem2di_sub(x, dem2di_cell_shift(world, out[0], out[1]));
+    return dem2di_sub(x, dem2di_cell_shift(&world->cell, out[0], out[1]));
 }
 
 static dem2d_result dem2di_check_cell(const dem2d_env *env, const dem2d_cell *cell) {
@@ -13347,8 +13414,73 @@ static dem2d_result dem2di_check_cell(const dem2d_env *env, const dem2d_cell *ce
 }
 
 static void dem2di_cell_set(dem2d_world *world, const dem2d_cell *cell) {
-    world->cell = *cell;
+    world->cell = world->cell_before = *cell;
     world->periodic = cell->a.x > 0 || cell->b.y > 0;
+}
+
+/* --- velocity gradients ------------------------------------------------------------------------
+ */
+
+static const dem2di_field dem2di_deformation_fields[] = {
+    DEM2DI_ROW(dem2d_deformation_desc, xx, DEM2DI_FINITE, "1/s 0"),
+    DEM2DI_ROW(dem2d_deformation_desc, xy, DEM2DI_FINITE, "1/s 0"),
+    DEM2DI_ROW(dem2d_deformation_desc, yy, DEM2DI_FINITE, "1/s 0"),
+};
+
+/* Greatest change of a length in a step, of the length. */
+#define DEM2DI_FLOW_MOST 0.1
+
+static inline bool dem2di_flows(const dem2d_deformation_desc *flow) {
+    return flow->xx != 0 || flow->xy != 0 || flow->yy != 0;
+}
+
+/* At least the greatest change of a vector of length 1. */
+static double dem2di_flow_size(const dem2d_deformation_desc *flow) {
+    return sqrt(flow->xx * flow->xx + flow->xy * flow->xy + flow->yy * flow->yy);
+}
+
+static dem2d_deformation_desc dem2di_flow_mean(const dem2d_deformation_desc *one,
+                                               const dem2d_deformation_desc *other) {
+    dem2d_deformation_desc mean;
+    mean.xx = (one->xx + other->xx) / 2;
+    mean.xy = (one->xy + other->xy) / 2;
+    mean.yy = (one->yy + other->yy) / 2;
+    return mean;
+}
+
+/* L v. */
+static inline dem2d_vec dem2di_flow_at(const dem2d_deformation_desc *flow, dem2d_vec v) {
+    return dem2di_vec(flow->xx * v.x + flow->xy * v.y, flow->yy * v.y);
+}
+
+/* The w of (1 + h L) w = v. */
+static inline dem2d_vec dem2di_flow_solve(const dem2d_deformation_desc *flow, double h,
+                                          dem2d_vec v) {
+    dem2d_vec w;
+    w.y = v.y / (1 + h * flow->yy);
+    w.x = (v.x - h * flow->xy * w.y) / (1 + h * flow->xx);
+    return w;
+}
+
+/* A vector between two points that go with the flow, a step later. */
+static inline dem2d_vec dem2di_flow_map(const dem2d_deformation_desc *flow, double time_step,
+                                        dem2d_vec v) {
+    v = dem2di_along(v, time_step / 2, dem2di_flow_at(flow, v));
+    return dem2di_flow_solve(flow, -time_step / 2, v);
+}
+
+static dem2d_result dem2di_check_flow(const dem2d_env *env, const dem2d_deformation_desc *flow,
+                                      double time_step) {
+    const double rates[3] = {flow->xx, flow->xy, flow->yy};
+    static const char *const names[3] = {"xx", "xy", "yy"};
+    dem2d_result result = dem2di_check_fields(env, DEM2DI_ALL(dem2di_deformation_fields), flow);
+    if (result != DEM2D_OK) return result;
+    for (int k = 0; k < 3; k++)
+        if (!(fabs(rates[k]) * time_step <= DEM2DI_FLOW_MOST))
+            return dem2di_fail(env, DEM2D_OUT_OF_RANGE, -1,
+                               "%s = %g times the time step %g is above 0.1", names[k], rates[k],
+                               time_step);
+    return DEM2D_OK;
 }
 
 /* A position that is given, of a particle or of an object like it. */
@@ -13367,7 +13499,7 @@ static dem2d_result dem2di_check_place(const dem2d_world *world, dem2d_vec x) {
 
 /* An iterator over the shifts that put a point into a box; without a cell the only one is 0. */
 typedef struct dem2di_shifts {
-    const dem2d_world *world;
+    const dem2d_cell *cell;
     dem2d_box box;
     dem2d_vec x;
     int along_a, along_b; /* the shift */
@@ -13385,18 +13517,18 @@ static void dem2di_shift_range(double x, double size, double low, double high, i
 }
 
 static void dem2di_shifts_row(dem2di_shifts *at) {
-    const dem2d_cell *cell = &at->world->cell;
-    const double x = at->x.x + at->along_b * cell->b.x;
-    dem2di_shift_range(x, cell->a.x, at->box.lower.x, at->box.upper.x, &at->along_a, &at->last_a);
+    const double x = at->x.x + at->along_b * at->cell->b.x;
+    dem2di_shift_range(x, at->cell->a.x, at->box.lower.x, at->box.upper.x, &at->along_a,
+                       &at->last_a);
 }
 
-static dem2di_shifts dem2di_shifts_start(const dem2d_world *world, dem2d_vec x,
+static dem2di_shifts dem2di_shifts_start(const dem2d_cell *cell, dem2d_vec x,
                                          const dem2d_box *box) {
     dem2di_shifts at;
-    at.world = world;
+    at.cell = cell;
     at.box = *box;
     at.x = x;
-    dem2di_shift_range(x.y, world->cell.b.y, box->lower.y, box->upper.y, &at.along_b, &at.last_b);
+    dem2di_shift_range(x.y, cell->b.y, box->lower.y, box->upper.y, &at.along_b, &at.last_b);
     dem2di_shifts_row(&at);
     at.along_a--;
     return at;
@@ -13422,7 +13554,7 @@ static inline void dem2di_image_move(dem2d_world *world, int k) {
     if (image->owner < 0) return;
     dem2di_state *now = &world->now[slot];
     *now = world->now[image->owner];
-    now->x = dem2di_add(now->x, dem2di_cell_shift(world, image->shift[0], image->shift[1]));
+    now->x = dem2di_add(now->x, dem2di_cell_shift(&world->cell, image->shift[0], image->shift[1]));
     if (world->plan.turns) world->displacement[slot] = world->displacement[image->owner];
 }
 
@@ -13512,7 +13644,7 @@ static void dem2di_wrap(dem2d_world *world, int slot, const int out[2]) {
         world->images[k].shift[0] += out[0];
         world->images[k].shift[1] += out[1];
     }
-    dem2d_vec way = dem2di_cell_shift(world, out[0], out[1]);
+    dem2d_vec way = dem2di_cell_shift(&world->cell, out[0], out[1]);
     world->now[slot].x = dem2di_sub(world->now[slot].x, way);
     for (int k = list->first[slot]; k < list->first[slot + 1]; k++) {
         const int i = list->adjacent[k];
@@ -13550,10 +13682,29 @@ static bool dem2di_wrap_all(dem2d_world *world) {
 
 /* The positions after a step, in the cell, and those of the images. What finds no memory is tried
    again before the next step. */
-static void dem2di_cell_commit(dem2d_world *world) {
-    if (!world->periodic) return;
+static void dem2di_cell_wrap(dem2d_world *world) {
     world->wrap_due = !dem2di_wrap_all(world);
     for (int k = 0; k < world->image_count; k++) dem2di_image_move(world, k);
+}
+
+/* The cell after a step, and what is in it. A cell that leans by more than half of a is replaced by
+   another one of the same lattice, with b - lean a for b: s a + t b = (s + lean t) a + t (b - lean
+   a). */
+static void dem2di_cell_commit(dem2d_world *world) {
+    dem2d_cell *cell = &world->cell;
+    if (!world->periodic) return;
+    world->cell_before = *cell;
+    world->flow_made = world->flow;
+    if (dem2di_flows(&world->flow)) {
+        cell->a = dem2di_flow_map(&world->flow, world->time_step, cell->a);
+        cell->b = dem2di_flow_map(&world->flow, world->time_step, cell->b);
+        const int lean = (int)floor(cell->b.x / cell->a.x + 0.5);
+        cell->b.x -= lean * cell->a.x;
+        for (int k = 0; k < world->image_count; k++)
+            world->images[k].shift[0] += lean * world->images[k].shift[1];
+        world->list_stale = world->list_stale || lean != 0; /* there will be many images */
+    }
+    dem2di_cell_wrap(world);
 }
 
 /* ============================================================================================
@@ -14722,6 +14873,8 @@ DEM2D_API dem2d_result dem2d_world_set_time_step(dem2d_world *world, double time
     dem2d_result result = dem2di_check_one(&world->env, dem2di_world_fields,
                                            offsetof(dem2d_world_desc, time_step), &time_step);
     if (result != DEM2D_OK) return result;
+    result = dem2di_check_flow(&world->env, &world->flow, time_step);
+    if (result != DEM2D_OK) return result;
     if (time_step == world->time_step) return DEM2D_OK;
     world->timed = dem2di_time(world);
     world->timed_at = world->steps;
@@ -14729,6 +14882,40 @@ DEM2D_API dem2d_result dem2d_world_set_time_step(dem2d_world *world, double time
     world->time_step = time_step;
     if (world->steps == 0) world->made_step = time_step;
     world->ledger.edited = true;
+    dem2di_edited(world);
+    return DEM2D_OK;
+}
+
+/* The mean velocity of the free particles is taken off them: their momentum is 0 then. */
+static void dem2di_momentum_clear(dem2d_world *world) {
+    dem2d_vec momentum = dem2di_vec(0, 0);
+    double mass = 0;
+    for (int place = 0; place < world->id_count; place++) {
+        const int slot = dem2di_slot_at(world, place);
+        if (slot < 0 || !(world->inverse[slot].mass > 0)) continue;
+        const double own = dem2di_body_mass(world, &world->bodies[slot]);
+        momentum = dem2di_along(momentum, own, world->now[slot].v);
+        mass += own;
+    }
+    for (int slot = 0; slot < world->body_count && mass > 0; slot++) {
+        const dem2di_state *now = &world->now[slot];
+        if (world->bodies[slot].shape_index < 0 || !(world->inverse[slot].mass > 0)) continue;
+        (void)dem2di_drive(world, slot, dem2di_along(now->v, -1 / mass, momentum), now->w);
+    }
+}
+
+DEM2D_API dem2d_result dem2d_world_deform(dem2d_world *world, const dem2d_deformation_desc *desc) {
+    if (world == NULL || desc == NULL) return DEM2D_NULL_ARGUMENT;
+    dem2d_result result = dem2di_check_flow(&world->env, desc, world->time_step);
+    if (result != DEM2D_OK) return result;
+    const bool starts = dem2di_flows(desc) && !dem2di_flows(&world->flow);
+    if (dem2di_flows(desc) && !(world->cell.a.x > 0 && world->cell.b.y > 0))
+        return dem2di_fail(&world->env, DEM2D_OUT_OF_RANGE, -1,
+                           "a world that is not periodic along a and b can't be deformed");
+    if (starts && !dem2di_group_reserve(world, DEM2DI_MADE, dem2di_slots(world)))
+        return dem2di_out_of_memory(world, "velocities");
+    if (starts) dem2di_momentum_clear(world);
+    world->flow = *desc;
     dem2di_edited(world);
     return DEM2D_OK;
 }
@@ -16791,7 +16978,7 @@ static bool dem2di_build_image(dem2di_build *build, int owner, int along_a, int 
 static dem2di_disc dem2di_image_disc(const dem2di_build *build, const dem2di_image *image,
                                      int slot) {
     dem2di_disc disc = build->grid.discs[image->owner];
-    dem2d_vec way = dem2di_cell_shift(build->world, image->shift[0], image->shift[1]);
+    dem2d_vec way = dem2di_cell_shift(&build->world->cell, image->shift[0], image->shift[1]);
     disc.centre = dem2di_add(disc.centre, way);
     disc.slot = slot;
     return disc;
@@ -16842,7 +17029,7 @@ static bool dem2di_build_images(dem2di_build *build) {
         dem2d_box box = grid->box;
         box.lower = dem2di_sub(box.lower, dem2di_vec(reach, reach));
         box.upper = dem2di_add(box.upper, dem2di_vec(reach, reach));
-        dem2di_shifts at = dem2di_shifts_start(world, grid->discs[i].centre, &box);
+        dem2di_shifts at = dem2di_shifts_start(&world->cell, grid->discs[i].centre, &box);
         while (dem2di_shifts_next(&at)) {
             if (at.along_a == 0 && at.along_b == 0) continue;
             if (!dem2di_build_image(build, i, at.along_a, at.along_b)) return false;
@@ -17156,7 +17343,7 @@ static void dem2di_displacement_task(void *context, int begin, int end) {
 static bool dem2di_bounded(const dem2d_world *world, const dem2di_plan *plan, int contacts) {
     double far = 0, size = 0, heavy = 0, light = 0, slender = 0, stiff = 0, ratio = 0, rolling = 0;
     double speed = DEM2DI_SPEED_SURE, spin = DEM2DI_TURN_SURE / world->time_step;
-    double belt = 0, turn = 0;
+    double belt = 0, turn = 0, flow = dem2di_flow_size(&world->flow);
     double load = world->loaded ? DEM2DI_LOAD_SURE : 0;
     bool circles = true;
     for (int i = 0; i < world->body_count; i++) {
@@ -17187,7 +17374,7 @@ static bool dem2di_bounded(const dem2d_world *world, const dem2di_plan *plan, in
         rolling = dem2di_max(rolling, law->rolling_friction);
     }
     double depth = 2 * (far + 2 * size), time = DEM2DI_LIST_STEPS * world->time_step;
-    speed += belt + turn * depth;
+    speed += belt + turn * depth + 4 * flow * depth;
     double closing = 2 * (speed + depth / world->time_step),
            dashpot = 2 * ratio * sqrt(heavy * stiff);
     double force = (contacts + 1.0) * (stiff * depth + dashpot * closing); /* damping doubles */
@@ -17537,7 +17724,7 @@ static dem2d_result dem2di_prepare(dem2d_world *world, bool *listed) {
 
 /* ============================================================================================
    >>ledger  The ledger of energies: what is stored, and what went where in a step
-   uses: config, math, broad, law, motion, world, objects
+   uses: config, math, broad, law, motion, world, cell, objects
    ============================================================================================ */
 
 /* How the two of a contact moved against each other in the step that was made: those who have been
@@ -17678,6 +17865,11 @@ static void dem2di_observe_particle(const dem2d_world *world, int slot, dem2di_l
     dem2d_vec drag = dem2di_scale(dem2di_sub(made->v, old->v), mass / world->time_step);
     const dem2di_load external = dem2di_external(world, slot);
     drag = dem2di_sub(dem2di_sub(drag, dem2di_add(load.force, external.force)), weight);
+    if (world->periodic) {
+        const dem2d_deformation_desc flow = dem2di_flow_mean(&world->flow_made, &world->flow);
+        const dem2d_vec both = dem2di_flow_at(&flow, dem2di_add(made->v, old->v));
+        if (dem2di_flows(&flow)) drag = dem2di_along(drag, mass / 2, both);
+    }
     double brake = (made->w - old->w) * (inertia / world->time_step);
     brake -= load.torque + external.torque;
     for (int k = 0; k < 2; k++) {
@@ -17704,7 +17896,7 @@ static double dem2di_ledger_error(const dem2di_ledger *ledger) {
     return ledger->kinetic + stored->normal + stored->tangential + stored->rolling +
            sum[DEM2DI_BY_FRICTION] + sum[DEM2DI_BY_DASHPOTS] + sum[DEM2DI_BY_DAMPING] -
            sum[DEM2DI_GRAVITY] - sum[DEM2DI_BY_LOADS] - sum[DEM2DI_BY_WALLS] - sum[DEM2DI_DRIVING] -
-           ledger->given;
+           sum[DEM2DI_BY_CELL] - ledger->given;
 }
 
 /* What has gone from account to account since `last`. */
@@ -19766,6 +19958,135 @@ static double dem2di_integrate_pass(dem2d_world *world) {
     return world->list_displacement + sqrt(most) * world->time_step + world->roundoff_displacement;
 }
 
+/* --- the motion of a cell that deforms: see section cell ----------------------------------------
+ */
+
+/* Velocities of contacts in place of fluctuations, of the particles from begin to end; these are
+   kept. */
+static void dem2di_flow_range(dem2d_world *world, int begin, int end) {
+    const dem2d_deformation_desc flow = world->flow_made;
+    const double half = world->made_step / 2;
+    for (int i = begin; i < end; i++) {
+        dem2di_state *now = &world->now[i];
+        dem2d_vec way = dem2di_flow_at(&flow, dem2di_sub(now->x, world->cell.origin));
+        world->fluctuations[i].v = now->v;
+        now->v = dem2di_flow_solve(&flow, half, dem2di_add(now->v, way));
+        if (!world->redirected) continue;
+        world->made_fluctuations[i] = world->made[i];
+        world->made[i].v = dem2di_flow_solve(&flow, half, dem2di_add(world->made[i].v, way));
+    }
+}
+
+static void dem2di_flow_task(void *context, int begin, int end) {
+    dem2d_world *world = (dem2d_world *)context;
+    int last = dem2di_block_end((end - 1) * DEM2DI_BLOCK, DEM2DI_BLOCK, world->body_count);
+    dem2di_flow_range(world, begin * DEM2DI_BLOCK, last);
+}
+
+/* Before what looks at contacts: velocities are those with which they move. */
+static void dem2di_flow_enter(dem2d_world *world) {
+    if (!world->periodic || !dem2di_flows(&world->flow_made)) return;
+    dem2di_run(world, DEM2D_PHASE_MOTION, dem2di_blocks(world->body_count, DEM2DI_BLOCK),
+               dem2di_flow_task, world);
+    if (world->image_count > 0)
+        dem2di_flow_range(world, world->image_first, world->image_first + world->image_count);
+}
+
+/* And back. */
+static void dem2di_flow_leave(dem2d_world *world) {
+    const int slots = dem2di_slots(world);
+    if (!world->periodic || !dem2di_flows(&world->flow_made)) return;
+    for (int i = 0; i < slots; i++) {
+        if (i == world->body_count && world->image_count > 0) i = world->image_first;
+        world->now[i].v = world->fluctuations[i].v;
+        if (world->redirected) world->made[i] = world->made_fluctuations[i];
+    }
+}
+
+/* The first half of the flow: fluctuations before the forces act on them, of free particles. */
+static void dem2di_flow_begin_task(void *context, int begin, int end) {
+    dem2d_world *world = (dem2d_world *)context;
+    const dem2d_deformation_desc flow = dem2di_flow_mean(&world->flow_made, &world->flow);
+    int last = dem2di_block_end((end - 1) * DEM2DI_BLOCK, DEM2DI_BLOCK, world->body_count);
+    for (int i = begin * DEM2DI_BLOCK; i < last; i++) {
+        dem2di_state *now = &world->now[i];
+        world->fluctuations[i].v = now->v;
+        if (!(world->inverse[i].mass > 0)) continue;
+        now->v = dem2di_along(now->v, -world->time_step / 2, dem2di_flow_at(&flow, now->v));
+    }
+}
+
+/* The second half: what integrate has made of them, and the positions that follow. The displacement
+   grows by what integrate has not counted: see dem2di_displaced. The two of a listed pair are apart
+   by R + 2 s of both at most, while the list lasts. As s is at most (skin + 1/4) R, this is below
+   (1.5 + 2 skin) R. */
+static void dem2di_flow_end_task(void *context, int begin, int end) {
+    dem2d_world *world = (dem2d_world *)context;
+    const dem2d_deformation_desc mean = dem2di_flow_mean(&world->flow_made, &world->flow);
+    const double dt = world->time_step, strain = dem2di_flow_size(&world->flow) * dt;
+    const double far = 2 + 2 * world->skin;
+    int last = dem2di_block_end((end - 1) * DEM2DI_BLOCK, DEM2DI_BLOCK, world->body_count);
+    for (int i = begin * DEM2DI_BLOCK; i < last; i++) {
+        dem2di_state *next = &world->before[i], *now = &world->now[i];
+        const dem2d_vec went = next->v, from = dem2di_sub(now->x, world->cell.origin);
+        now->v = world->fluctuations[i].v;
+        if (world->inverse[i].mass > 0) next->v = dem2di_flow_solve(&mean, dt / 2, next->v);
+        dem2d_vec to = dem2di_along(from, dt / 2, dem2di_flow_at(&world->flow, from));
+        to = dem2di_flow_solve(&world->flow, -dt / 2, dem2di_along(to, dt, next->v));
+        next->x = dem2di_add(world->cell.origin, to);
+        if (!world->plan.turns) continue;
+        double more = dem2di_length(dem2di_sub(next->v, went)) * dt;
+        more += strain * (far * next->radius + dem2di_length(next->v) * dt);
+        world->next_displacement[i] += more * (1 + 4 * DBL_EPSILON);
+    }
+}
+
+/* The integrate pass in a cell that deforms. Returns the part of the skins used up. A pair that is
+   not listed was apart by the skins: |d| >= R + s of both together. After a strain e the flow has
+   made of this at least exp(-e) |d|, and of paths p of c at most exp(e) p, so that they are apart
+   while s >= exp(2e) p + (exp(e) - 1) R. With e up to 0.1: exp(2e) < 1.25, exp(e) - 1 < 1.06 e, and
+   R/s is at most 1/skin. */
+static double dem2di_flow_pass(dem2d_world *world) {
+    const int blocks = dem2di_blocks(world->body_count, DEM2DI_BLOCK);
+    const double used = world->list_displacement;
+    const double strain = dem2di_flow_size(&world->flow) * world->time_step;
+    dem2di_run(world, DEM2D_PHASE_MOTION, blocks, dem2di_flow_begin_task, world);
+    double path = dem2di_integrate_pass(world) - used;
+    dem2di_run(world, DEM2D_PHASE_MOTION, blocks, dem2di_flow_end_task, world);
+    return used + 1.25 * (1 + strain) * path + dem2di_max(10, 1.06 / world->skin) * strain;
+}
+
+/* The stress times the area: of the contacts, and of the fluctuations at the last force pass. */
+static void dem2di_cell_work(const dem2d_world *world, double power[2][DEM2DI_HALVES]) {
+    const dem2di_list *list = &world->list;
+    const dem2d_deformation_desc *flow[2];
+    double xx = 0, yx = 0, yy = 0;
+    flow[0] = &world->flow_made;
+    flow[1] = &world->flow;
+    if (!world->periodic || !(dem2di_flows(flow[0]) || dem2di_flows(flow[1]))) return;
+    for (int place = 0; place < world->id_count; place++) {
+        const int slot = dem2di_slot_at(world, place);
+        if (slot < 0) continue;
+        const dem2d_vec c = dem2di_add(world->now[slot].v, world->before[slot].v);
+        const double mass =
+            world->inverse[slot].mass > 0 ? dem2di_body_mass(world, &world->bodies[slot]) / 4 : 0;
+        xx += mass * c.x * c.x;
+        yx += mass * c.y * c.x;
+        yy += mass * c.y * c.y;
+        for (int k = list->own[slot]; k < list->first[slot + 1]; k++) {
+            dem2di_contact contact;
+            if (!dem2di_contact_get(world, &list->contacts, list->adjacent[k], &contact)) continue;
+            const dem2d_vec f = dem2di_contact_force(&contact);
+            const dem2d_vec d = dem2di_branch_of(&contact, false);
+            xx += d.x * f.x;
+            yx += d.y * f.x;
+            yy += d.y * f.y;
+        }
+    }
+    for (int k = 0; k < 2; k++)
+        power[k][DEM2DI_BY_CELL] -= xx * flow[k]->xx + yx * flow[k]->xy + yy * flow[k]->yy;
+}
+
 /* The rest of the ledger, after the motion: work at the velocities before and behind. */
 static void dem2di_observe_motion(dem2d_world *world, const dem2di_ledger *last) {
     dem2di_ledger *ledger = &world->ledger;
@@ -19777,6 +20098,7 @@ static void dem2di_observe_motion(dem2d_world *world, const dem2di_ledger *last)
         dem2di_load load = dem2di_sum_of(world, slot, world->plan.spin);
         dem2di_observe_particle(world, slot, load, power, &ledger->kinetic);
     }
+    dem2di_cell_work(world, power);
     for (int place = 0; place < world->wall_count; place++) {
         int j = world->walls[place].placed;
         const dem2di_wall_state *old = &world->wall_now[j], *made = &world->wall_next[j];
@@ -20341,19 +20663,24 @@ typedef struct dem2di_trial {
 /* The passes that may be refused, up to the last check. */
 static dem2d_result dem2di_step_try(dem2d_world *world, dem2di_trial *trial) {
     if (world->set_loads != NULL) world->set_loads(world->loads_user, world);
-    if (world->wrap_due) dem2di_cell_commit(world);
+    if (world->wrap_due) dem2di_cell_wrap(world);
     if (world->wrap_due) return dem2di_out_of_memory(world, "images in the cell");
     if (!dem2di_sums_reserve(world)) return dem2di_out_of_memory(world, "sums of forces");
+    const bool flows = dem2di_flows(&world->flow) || dem2di_flows(&world->flow_made);
     if (!dem2di_group_reserve(world, DEM2DI_EVENTS, world->event_capacity))
         return dem2di_out_of_memory(world, "events");
     dem2d_result result = dem2di_prepare(world, &trial->listed);
     if (result != DEM2D_OK) return result;
     world->list_stale = trial->listed; /* if the step fails, the next try builds a list as well */
+    if (flows && !dem2di_group_reserve(world, DEM2DI_FLOWING, dem2di_slots(world)))
+        return dem2di_out_of_memory(world, "velocities in the cell");
     bool due = dem2di_check_is_due(world);
     bool back = dem2di_looks_back(world, &world->plan, world->bounded, world->softness);
     if (back && !dem2di_keep_last(world)) return dem2di_out_of_memory(world, "contacts");
     world->keeps_last = trial->back = back;
+    dem2di_flow_enter(world);
     dem2di_force_pass(world, &trial->count);
+    dem2di_flow_leave(world);
     if (due) result = dem2di_check_step(world, &trial->slow, &trial->fast);
     if (result != DEM2D_OK) return result;
     dem2di_wall_sums(world);
@@ -20377,9 +20704,12 @@ static dem2d_result dem2di_step(dem2d_world *world) {
     }
     const dem2di_ledger ledger = world->ledger;
     dem2di_order_commit(world); /* nothing fails from here on */
+    if (ledger.kept || world->plan.events) dem2di_flow_enter(world);
     if (ledger.kept) dem2di_observe_contacts(world);
     dem2di_observe_touches(world);
-    double path = dem2di_integrate_pass(world);
+    if (ledger.kept || world->plan.events) dem2di_flow_leave(world);
+    const bool flows = dem2di_flows(&world->flow) || dem2di_flows(&world->flow_made);
+    double path = flows ? dem2di_flow_pass(world) : dem2di_integrate_pass(world);
     if (ledger.kept) dem2di_observe_motion(world, &ledger);
     bool used_up = trial.used_up || path > 1 - DEM2DI_LIST_STEPS * DBL_EPSILON ||
                    world->steps - world->listed_at >= DEM2DI_LIST_STEPS;
@@ -20598,7 +20928,7 @@ DEM2D_API dem2d_result dem2d_world_materials(const dem2d_world *world, dem2d_mat
    particles may have gone back into the cell since. */
 static void dem2di_shift_seen(const dem2d_world *world, const dem2di_key *key, dem2d_vec branch,
                               int shift[2]) {
-    const dem2di_fractions f = dem2di_fractions_make(&world->cell);
+    const dem2di_fractions f = dem2di_fractions_make(&world->cell_before);
     if (!world->periodic) return;
     const int owner = dem2di_owner(world, key->b);
     dem2d_vec apart = dem2di_sub(world->before[owner].x, world->before[key->a].x);
@@ -20693,6 +21023,7 @@ DEM2D_API dem2d_result dem2d_world_ledger(const dem2d_world *world, dem2d_ledger
     ledger->closure = own->closure;
     ledger->turnover = own->turnover;
     ledger->loads = own->sum[DEM2DI_BY_LOADS];
+    ledger->cell = own->sum[DEM2DI_BY_CELL];
     return DEM2D_OK;
 }
 
@@ -20723,6 +21054,25 @@ DEM2D_API dem2d_result dem2d_world_stress(const dem2d_world *world, double area,
         dem2di_stress_add(&sum, iterator.branch, dem2di_contact_force(&iterator.contact));
     *stress = dem2di_stress_over(&sum, area);
     return DEM2D_OK;
+}
+
+DEM2D_API dem2d_result dem2d_world_get_cell(const dem2d_world *world, dem2d_cell_info *info) {
+    if (world == NULL || info == NULL) return DEM2D_NULL_ARGUMENT;
+    memset(info, 0, sizeof *info);
+    info->cell = world->cell;
+    info->deformation = world->flow_made;
+    info->area = world->cell_before.a.x * world->cell_before.b.y;
+    if (!(info->area > 0)) return DEM2D_OK;
+    dem2d_stress sum = {0, 0, 0, 0};
+    for (int place = 0, i; (i = dem2di_next_particle(world, &place)) >= 0;) {
+        if (!(world->inverse[i].mass > 0)) continue;
+        const double mass = dem2di_body_mass(world, &world->bodies[i]);
+        const dem2di_velocities made = dem2di_velocities_made(world, i);
+        const dem2d_vec c = dem2di_scale(dem2di_add(world->before[i].v, made.v), 0.5);
+        dem2di_stress_add(&sum, dem2di_scale(c, mass), c);
+    }
+    info->kinetic = dem2di_stress_over(&sum, info->area);
+    return dem2d_world_stress(world, info->area, &info->contact);
 }
 
 static double dem2di_body_area(const dem2d_world *world, const dem2di_body *body) {
@@ -20890,9 +21240,9 @@ static double dem2di_images_inside(const dem2d_world *world, int slot, const dem
     double area = 0;
     box.lower = dem2di_sub(region->lower, reach);
     box.upper = dem2di_add(region->upper, reach);
-    dem2di_shifts at = dem2di_shifts_start(world, state->x, &box);
+    dem2di_shifts at = dem2di_shifts_start(&world->cell_before, state->x, &box);
     while (dem2di_shifts_next(&at)) {
-        dem2d_vec way = dem2di_cell_shift(world, at.along_a, at.along_b);
+        dem2d_vec way = dem2di_cell_shift(&world->cell_before, at.along_a, at.along_b);
         seen.lower = dem2di_sub(region->lower, way);
         seen.upper = dem2di_sub(region->upper, way);
         area += dem2di_area_inside(world, slot, &seen);
@@ -25289,9 +25639,22 @@ static bool dem2di_is_own_image(const dem2d_world *w, int slot) {
 static void dem2di_finish_images(dem2di_loader *loader) {
     dem2d_world *w = loader->world;
     const int down = w->image_first - w->body_count;
+    dem2d_cell last = w->cell_before;
+    last.origin = w->cell.origin;
     dem2di_load_check(loader, dem2di_check_cell(loader->env, &w->cell));
+    dem2di_load_check(loader, dem2di_check_cell(loader->env, &last));
+    dem2di_load_check(loader, dem2di_check_flow(loader->env, &w->flow, w->time_step));
+    dem2di_load_check(loader, dem2di_check_flow(loader->env, &w->flow_made, w->made_step));
+    dem2di_load_expect(loader,
+                       (last.a.x > 0) == (w->cell.a.x > 0) && (last.b.y > 0) == (w->cell.b.y > 0),
+                       "the last cell");
+    dem2di_load_expect(loader,
+                       (w->cell.a.x > 0 && w->cell.b.y > 0) ||
+                           !(dem2di_flows(&w->flow) || dem2di_flows(&w->flow_made)),
+                       "a cell that deforms");
     if (!dem2di_load_good(loader)) return;
     dem2di_cell_set(w, &w->cell);
+    w->cell_before = last;
     dem2di_load_expect(loader, w->image_count == 0 || (w->periodic && down >= 0), "images");
     if (!dem2di_load_good(loader) || w->image_count == 0) return;
     for (int i = 0; i < w->list.pairs; i++)

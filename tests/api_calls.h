@@ -80,6 +80,7 @@ enum {
     DRAW,
     FILL,
     INLET,
+    DEFORMATION,
     DESCS
 };
 
@@ -364,6 +365,7 @@ typedef struct args {
         dem2d_draw_desc draw;
         dem2d_fill_desc fill;
         dem2d_inlet_desc inlet;
+        dem2d_deformation_desc deformation;
         dem2d_particle_arrays particles;
         dem2d_contact_arrays contacts;
     } d;
@@ -566,6 +568,10 @@ static dem2d_result draw_of(const dem2d_world *world, const void *grading, args 
     dem2d_draw_desc draw = {0};
     draw.grading = grading, draw.count = 5;
     return dem2d_world_draw(world, &draw, (dem2d_particle_desc *)a->out, 5, (int *)a->second);
+}
+static void with_deformation(args *a, fixture *f) { /* none: the world has no cell */
+    (void)f;
+    memset(&a->d.deformation, 0, sizeof a->d.deformation);
 }
 static void with_save(args *a, fixture *f) {
     (void)f;
@@ -1027,7 +1033,10 @@ typedef struct function {
       LOGS, IN_WORLD, ARG(vector, "from", VECTOR), ARG(direction, "to", VECTOR), OUT)             \
     F(world_feed, dem2d_world_feed(v->world, v->desc, v->x, v->state),                            \
       DESCRIBED(INLET, with_inlet), IN_WORLD, THE_DESC, ARG(x, "seconds", NOT_NEGATIVE),          \
-      ARG(state, "inlet", POINTER), ARG(inlet.due, "inlet.due", NOT_NEGATIVE))
+      ARG(state, "inlet", POINTER), ARG(inlet.due, "inlet.due", NOT_NEGATIVE))                    \
+    F(world_deform, dem2d_world_deform(v->world, v->desc),                                        \
+      DESCRIBED(DEFORMATION, with_deformation), IN_WORLD, THE_DESC)                               \
+    F(world_get_cell, dem2d_world_get_cell(v->world, v->out), LOGS, IN_WORLD, OUT)
 /* clang-format on */
 
 #define FUNCTION_CALL(name, expression, ...)   \

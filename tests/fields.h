@@ -85,6 +85,7 @@ bool fields_get(int number, field_row *row) {
         {"dem2d_pair_desc", DEM2DI_ALL(dem2di_pair_fields)},
         {"dem2d_particle_desc", DEM2DI_ALL(dem2di_particle_fields)},
         {"dem2d_wall_desc", DEM2DI_ALL(dem2di_wall_fields)},
+        {"dem2d_deformation_desc", DEM2DI_ALL(dem2di_deformation_fields)},
         {"dem2d_query_desc", DEM2DI_ALL(query_fields)},
         {"dem2d_grid_desc", DEM2DI_ALL(dem2di_grid_fields)},
         {"dem2d_grading_desc", DEM2DI_ALL(dem2di_grading_fields)},

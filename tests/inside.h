@@ -201,7 +201,8 @@ static bool inside_images_hold(const dem2d_world *w) {
         if (owner < 0) continue;
         if (!inside_lives(w, owner)) return inside_fail("the owner of an image is gone", k);
         dem2di_state is = w->now[owner];
-        is.x = dem2di_add(is.x, dem2di_cell_shift(w, w->images[k].shift[0], w->images[k].shift[1]));
+        is.x = dem2di_add(
+            is.x, dem2di_cell_shift(&w->cell, w->images[k].shift[0], w->images[k].shift[1]));
         if (memcmp(&is, &w->now[slot], sizeof is) != 0 ||
             w->inverse[slot].mass != w->inverse[owner].mass ||
             w->bodies[slot].index != w->bodies[owner].index ||

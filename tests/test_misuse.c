@@ -12,9 +12,10 @@
 /* --- the fields of descs --------------------------------------------------------------------- */
 
 static const char *const desc_names[DESCS] = {
-    "custom", "reduction", "image", "fit",  "virtual", "contact", "world", "material",
-    "pair",   "particle",  "wall",  "save", "load",    "svg",     "vtp",   "pvd",
-    "csv",    "wall",      "query", "grid", "grading", "draw",    "fill",  "inlet"};
+    "custom",   "reduction", "image",    "fit",        "virtual", "contact", "world",
+    "material", "pair",      "particle", "wall",       "save",    "load",    "svg",
+    "vtp",      "pvd",       "csv",      "wall",       "query",   "grid",    "grading",
+    "draw",     "fill",      "inlet",    "deformation"};
 
 #define FIELD(type, field, ...) \
     { .name = #field, .offset = offsetof(dem2d_##type, field), .kind = __VA_ARGS__ }
