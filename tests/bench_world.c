@@ -3,9 +3,10 @@
 
    PARTS: the scenes discs, polygons (4 to 7 sides), ellipses (aspect 1 to 2.5), beziers (10 arcs),
    fourier (order 8) and mixed (all five), each settled under gravity and in the biaxial test; laws:
-   settled discs beside LAMMPS with the same law (friction, dashpots, rolling friction); and time
-   against error by dt, order (of Fourier series) and skin; and the time of a list of pairs by sizes
-   (ratio of radii). --most leaves out larger scenes.
+   settled discs beside LAMMPS with the same law (friction, dashpots, rolling friction); time against
+   error by dt, order (of Fourier series) and skin; the time of a list of pairs by sizes (ratio of
+   radii); and moving discs, where lists are much of the time: in a box, of equal and of many sizes,
+   and falling on segments. --most leaves out larger scenes.
 
    Scenes. Circles of equal area have diameters uniform in 0.04 to 0.06 m; density 2700, kn = kt =
    1e7 N/m, friction 0.2, time step 1e-4 s, 32 templates a model, scaled.
@@ -36,9 +37,9 @@
    Part laws: equal stiffness, friction, dashpots and rolling friction, no local damping; both go
    from the same positions and velocities, and are compared after 200 steps.
 
-   Writes world.csv, laws.csv, dt.csv, order.csv, skin.csv, sizes.csv and, where gnuplot is
-   installed, pictures of all but laws to OUTDIR, build/bench_world by default. Exit status: 0, 1 if
-   bits differed, 2 if something failed. Speed never fails. */
+   Writes world.csv, laws.csv, dt.csv, order.csv, skin.csv, sizes.csv, moving.csv and, where gnuplot
+   is installed, pictures of world, dt, order and skin to OUTDIR, build/bench_world by default. Exit
+   status: 0, 1 if bits differed, 2 if something failed. Speed never fails. */
 #define _POSIX_C_SOURCE 200809L
 #define DEM2D_IMPLEMENTATION
 #include "dem2d.h"
@@ -65,14 +66,14 @@
 #define BATCHES 7
 #define SKINS 4 /* that LAMMPS may choose from */
 
-enum { PART_LAWS = SCENES, PART_DT, PART_ORDER, PART_SKIN, PART_SIZES, PARTS };
+enum { PART_LAWS = SCENES, PART_DT, PART_ORDER, PART_SKIN, PART_SIZES, PART_MOVING, PARTS };
 enum { SETTLED, BIAXIAL, TESTS };
 enum { LEFT, RIGHT, BOTTOM, TOP, WALLS };
 
 static const char *const model_names[MODELS] = {"circle", "ellipse", "polygon", "bezier", "fs"};
 static const char *const part_names[PARTS] = {"discs",   "polygons", "ellipses", "beziers",
                                               "fourier", "mixed",    "laws",     "dt",
-                                              "order",   "skin",     "sizes"};
+                                              "order",   "skin",     "sizes",    "moving"};
 static const char *const test_names[TESTS] = {"settled", "biaxial"};
 
 /* On a core, of this thread. */
@@ -1729,6 +1730,120 @@ static void measure_sizes(void) {
     fclose(csv);
 }
 
+/* --- moving discs --- */
+
+/* Discs in cells of a square, a little beside their middles, that fly about, or fall on a floor of
+   segments that go up and down by a fifth of the mean diameter. */
+typedef struct moving {
+    const char *name;
+    int count;
+    double ratio;    /* of the greatest radius to the least; 1: radii uniform in 0.02 to 0.03 m */
+    double fraction; /* of the area */
+    double speed;    /* m/s, of each component at most */
+    double time_step, gravity;
+    int segments; /* in place of the floor */
+} moving;
+
+static const moving movings[] = {{"moving", 10000, 1, 0.6, 1, TIME_STEP, 0, 0},
+                                 {"moving", 160000, 1, 0.6, 1, TIME_STEP, 0, 0},
+                                 {"ratio 10", 10000, 10, 0.5, 0.2, TIME_STEP / 10, 0, 0},
+                                 {"ratio 10", 160000, 10, 0.5, 0.2, TIME_STEP / 10, 0, 0},
+                                 {"falling", 10000, 1, 0.6, 0.1, TIME_STEP, GRAVITY, 0},
+                                 {"on segments", 10000, 1, 0.6, 0.1, TIME_STEP, GRAVITY, 1000}};
+
+static void add_moving_walls(dem2d_world *world, const moving *m, dem2d_material_id stone,
+                             double side) {
+    static const double normals[WALLS][2] = {{1, 0}, {-1, 0}, {0, -1}, {0, 1}};
+    dem2d_wall_id id;
+    for (int w = 0; w < WALLS; w++) {
+        dem2d_wall_desc wall = {0};
+        wall.material = stone;
+        wall.normal.x = normals[w][0], wall.normal.y = normals[w][1];
+        *(w < 2 ? &wall.point.x : &wall.point.y) = w == 1 || w == 2 ? side : 0;
+        if (w == 3 && m->segments > 0) continue; /* the floor */
+        expect_ok(dem2d_world_add_wall(world, &wall, &id), "wall");
+    }
+    for (int i = 0; i < m->segments; i++) {
+        dem2d_wall_desc wall = {0};
+        wall.material = stone, wall.segment = true;
+        wall.point.x = side * i / m->segments, wall.end.x = side * (i + 1) / m->segments;
+        *(i % 2 ? &wall.point.y : &wall.end.y) = -0.01;
+        expect_ok(dem2d_world_add_wall(world, &wall, &id), "segment");
+    }
+}
+
+static dem2d_world *open_moving(const moving *m, int count) {
+    dem2d_world *world;
+    dem2d_world_desc scene = {0};
+    dem2d_material_desc stone = {.density = DENSITY, .normal_stiffness = STIFFNESS};
+    dem2d_particle_desc grain = {0};
+    stone.tangential_stiffness = STIFFNESS, stone.friction = FRICTION;
+    scene.time_step = m->time_step, scene.gravity.y = -m->gravity;
+    scene.local_damping = m->gravity > 0 ? 0.3 : 0;
+    scene.particle_capacity = count, scene.skip_time_step_check = m->ratio > 1;
+    expect_ok(dem2d_world_create(&scene, &world), "world");
+    expect_ok(dem2d_world_add_material(world, &stone, &grain.material), "material");
+    expect_ok(dem2d_world_add_shape(world, templates[0], &grain.shape), "shape");
+    double area = 0, *radii = get_memory((size_t)count, sizeof *radii);
+    for (int i = 0; i < count; i++) {
+        radii[i] = m->ratio > 1 ? 0.02 / sqrt(bed_uniform(1, m->ratio * m->ratio))
+                                : bed_uniform(0.02, 0.03);
+        area += PI * radii[i] * radii[i];
+    }
+    const int columns = (int)ceil(sqrt(count));
+    const double side = sqrt(area / m->fraction), cell = side / columns;
+    for (int i = 0; i < count; i++) {
+        dem2d_particle_id id;
+        grain.scale = radii[i];
+        grain.position.x = (i % columns + 0.5 + bed_uniform(-0.2, 0.2)) * cell;
+        grain.position.y = ((int)(i / columns) + 0.5 + bed_uniform(-0.2, 0.2)) * cell;
+        grain.velocity.x = bed_uniform(-m->speed, m->speed);
+        grain.velocity.y = bed_uniform(-m->speed, m->speed);
+        expect_ok(dem2d_world_add_particle(world, &grain, &id), "particle");
+    }
+    free(radii);
+    add_moving_walls(world, m, grain.material, side);
+    return world;
+}
+
+/* Batches of a run as long as the discs take to leave their places by some radii; mean of all. */
+static void measure_moving_scene(const moving *m, FILE *csv) {
+    const int count = opt.quick ? m->count / 8 : m->count, steps = count > 50000 ? 40 : 150;
+    dem2d_world *world = open_moving(m, count);
+    dem2d_stats before, stats;
+    double ns[BATCHES], mean = 0;
+    expect_ok(dem2d_world_step(world, 200, NULL), "step");
+    expect_ok(dem2d_world_stats(world, &before), "stats");
+    for (int i = 0; i < BATCHES; i++) {
+        const double start = busy_seconds();
+        expect_ok(dem2d_world_step(world, steps, NULL), "step");
+        ns[i] = 1e9 * (busy_seconds() - start) / ((double)steps * count);
+        mean += ns[i] / BATCHES;
+    }
+    expect_ok(dem2d_world_stats(world, &stats), "stats");
+    const figure f = summary(ns, BATCHES);
+    const double lists =
+        1000.0 * (double)(stats.list_rebuilds - before.list_rebuilds) / (BATCHES * steps);
+    const double contacts = (double)(stats.contacts + stats.wall_contacts) / count;
+    printf("%-12s %8d %6g | %7.1f (%.0f-%.0f) | %7.1f | %8.1f %10.2f\n", m->name, count, m->ratio,
+           mean, f.low, f.high, lists, (double)stats.pairs / count, contacts);
+    fprintf(csv, "%s,%d,%g,%d,%.6g,%.6g,%.6g,%.6g,%.6g,%.6g\n", m->name, count, m->ratio,
+            m->segments, mean, f.low, f.high, lists, (double)stats.pairs / count, contacts);
+    dem2d_world_destroy(world);
+}
+
+static void measure_moving(void) {
+    FILE *csv = create("moving.csv");
+    printf("\nMoving discs, ns per particle-step with lists: mean (min-max) of %d batches\n"
+           "%-12s %8s %6s | %-15s | %7s | %8s %10s\n",
+           BATCHES, "scene", "N", "ratio", "ns", "lists/k", "pairs/N", "contacts/N");
+    fprintf(csv, "scene,particles,ratio,segments,ns_mean,ns_min,ns_max,lists_per_1000_steps,"
+                 "pairs_per_particle,contacts_per_particle\n");
+    for (int i = 0; i < COUNT_OF(movings); i++)
+        if (movings[i].count <= opt.most) measure_moving_scene(&movings[i], csv);
+    fclose(csv);
+}
+
 static bool parse_parts(char *list) {
     for (char *name = strtok(list, ","); name; name = strtok(NULL, ",")) {
         int i = 0;
@@ -1776,6 +1891,7 @@ int main(int argc, char **argv) {
     if (opt.parts[PART_ORDER]) measure_orders();
     if (opt.parts[PART_SKIN]) measure_skins();
     if (opt.parts[PART_SIZES]) measure_sizes();
+    if (opt.parts[PART_MOVING]) measure_moving();
     const int differ = print_aims();
     printf("\n");
     draw_times();
