@@ -11319,7 +11319,7 @@ typedef struct dem2di_disc {
     int slot;      /* of the particle */
     uint8_t level; /* its cells are 2^-level of the largest, at least twice its reach */
     bool fixed;    /* two fixed ones are no pair */
-    bool circle;   /* two circles are a pair of the first kind, others of the second */
+    int8_t other;  /* 0 of a circle, -1 of others: two circles are a pair of the first kind */
 } dem2di_disc;
 
 #define DEM2DI_LEVELS 31
@@ -11329,15 +11329,15 @@ typedef struct dem2di_disc {
    them. Finer cells may be far more than discs: they share a hash table, whose heads come behind
    these. The arrays are the caller's. */
 typedef struct dem2di_grid {
-    dem2di_disc *discs;  /* by slot of the particle */
     dem2di_disc *sorted; /* by cell */
-    int *place; /* for each disc the head of its cell; after the sort its index in sorted */
+    int *place; /* by slot: the head of the disc's cell; after the sort its index in sorted */
     int *heads; /* cells + 1: where each cell begins in sorted */
-    int count, cells, table;  /* discs; heads of all cells, of the hash table */
-    int dense;                /* levels that are not in the hash table: */
-    int first[DEM2DI_LEVELS]; /* head of their first cell, */
-    int width[DEM2DI_LEVELS]; /* and cells in a row */
-    double size;              /* of the cells of level 0 */
+    int count, cells, table;       /* discs; heads of all cells, of the hash table */
+    int dense;                     /* levels that are not in the hash table: */
+    int first[DEM2DI_LEVELS];      /* head of their first cell, */
+    int width[DEM2DI_LEVELS];      /* and cells in a row */
+    double size;                   /* of the cells of level 0 */
+    double inverse[DEM2DI_LEVELS]; /* of the size of the cells of each level */
     dem2d_box box;   /* holds the centres: cells are counted from its lower corner, so that distant
                         scenes keep their digits */
     uint32_t levels; /* bit mask of the levels in use */
@@ -11351,15 +11351,23 @@ typedef struct dem2di_grid {
    their heads takes less time than to place the disc. All levels together have a third more. */
 #define DEM2DI_CELLS_PER_DISC 4.0
 
+static double dem2di_cell_size(const dem2di_grid *grid, int level) {
+    return grid->size / (double)((uint32_t)1 << level);
+}
+
 /* The heads that discs in the box need when these are the least and the greatest reach. The hash
    table has about one disc in each slot. */
 static void dem2di_grid_plan(dem2di_grid *grid, double least, double most) {
     double size = most * DEM2DI_CELL, limit = DEM2DI_CELLS_PER_DISC * grid->count + 64;
     dem2d_vec side = dem2di_sub(grid->box.upper, grid->box.lower);
     grid->size = size;
+    grid->levels = 0;
     grid->dense = grid->cells = grid->table = 0;
+    for (int level = 0; level < DEM2DI_LEVELS; level++)
+        grid->inverse[level] = dem2di_min(DBL_MAX, 1 / dem2di_cell_size(grid, level));
     for (int level = 0; level < DEM2DI_LEVELS; level++, size /= 2) {
-        double columns = floor(side.x / size) + 3, rows = floor(side.y / size) + 3;
+        double columns = floor(side.x * grid->inverse[level]) + 3;
+        double rows = floor(side.y * grid->inverse[level]) + 3;
         if (!(columns * rows <= limit)) {
             for (grid->table = 64; grid->table < grid->count;) grid->table *= 2;
             break;
@@ -11373,14 +11381,9 @@ static void dem2di_grid_plan(dem2di_grid *grid, double least, double most) {
     grid->cells += grid->table;
 }
 
-static double dem2di_cell_size(const dem2di_grid *grid, int level) {
-    return grid->size / (double)((uint32_t)1 << level);
-}
-
-/* Cell number of a coordinate in the box. From 2^62 cells on all coordinates share a cell: slow but
-   correct. */
-static inline int64_t dem2di_cell_of(double coordinate, double size) {
-    double cell = coordinate / size;
+/* Cell number of a coordinate in the box, in widths of a cell. From 2^62 cells on all coordinates
+   share a cell: slow but correct. */
+static inline int64_t dem2di_cell_of(double cell) {
     return cell < 4611686018427387904.0 ? (int64_t)cell : (int64_t)1 << 62;
 }
 
@@ -11388,10 +11391,10 @@ typedef struct dem2di_cell {
     int64_t x, y;
 } dem2di_cell;
 
-static inline dem2di_cell dem2di_cell_at(const dem2di_grid *grid, dem2d_vec point, double size) {
+static inline dem2di_cell dem2di_cell_at(const dem2di_grid *grid, dem2d_vec point, int level) {
     dem2di_cell cell;
-    cell.x = dem2di_cell_of(point.x - grid->box.lower.x, size);
-    cell.y = dem2di_cell_of(point.y - grid->box.lower.y, size);
+    cell.x = dem2di_cell_of((point.x - grid->box.lower.x) * grid->inverse[level]);
+    cell.y = dem2di_cell_of((point.y - grid->box.lower.y) * grid->inverse[level]);
     return cell;
 }
 
@@ -11409,19 +11412,16 @@ static inline int dem2di_cell_head(const dem2di_grid *grid, int64_t x, int64_t y
     return grid->cells - grid->table + (int)(slot & (uint64_t)(grid->table - 1));
 }
 
-/* Level and cell of the discs from begin to end. */
-static void dem2di_grid_place(const dem2di_grid *grid, int begin, int end) {
-    for (int i = begin; i < end; i++) {
-        dem2di_disc *disc = &grid->discs[i];
-        double size = grid->size;
-        disc->level = 0;
-        while (disc->reach * (2 * DEM2DI_CELL) <= size && disc->level < DEM2DI_LEVELS - 1) {
-            size /= 2;
-            disc->level++;
-        }
-        dem2di_cell cell = dem2di_cell_at(grid, disc->centre, size);
-        grid->place[i] = dem2di_cell_head(grid, cell.x, cell.y, disc->level);
+/* The level of a disc by its reach, and the head of its cell. */
+static inline int dem2di_grid_place(const dem2di_grid *grid, dem2di_disc *disc) {
+    double size = grid->size;
+    disc->level = 0;
+    while (disc->reach * (2 * DEM2DI_CELL) <= size && disc->level < DEM2DI_LEVELS - 1) {
+        size /= 2;
+        disc->level++;
     }
+    dem2di_cell cell = dem2di_cell_at(grid, disc->centre, disc->level);
+    return dem2di_cell_head(grid, cell.x, cell.y, disc->level);
 }
 
 /* Exclusive prefix sums: each number becomes the sum of those before it. Returns the sum of all. */
@@ -11435,20 +11435,12 @@ static int dem2di_starts(int *numbers, int count) {
     return sum;
 }
 
-/* Counting sort by cell; in a cell the order of the discs stays. */
+/* Counting sort by cell, of the places only; in a cell the order of the slots stays. */
 static void dem2di_grid_sort(dem2di_grid *grid) {
-    grid->levels = 0;
     memset(grid->heads, 0, ((size_t)grid->cells + 1) * sizeof *grid->heads);
-    for (int i = 0; i < grid->count; i++) {
-        grid->levels |= (uint32_t)1 << grid->discs[i].level;
-        grid->heads[grid->place[i]]++;
-    }
+    for (int i = 0; i < grid->count; i++) grid->heads[grid->place[i]]++;
     for (int sum = 0, c = 0; c <= grid->cells; c++) grid->heads[c] = sum += grid->heads[c];
-    for (int i = grid->count - 1; i >= 0; i--) {
-        int place = --grid->heads[grid->place[i]];
-        grid->sorted[place] = grid->discs[i];
-        grid->place[i] = place;
-    }
+    for (int i = grid->count - 1; i >= 0; i--) grid->place[i] = --grid->heads[grid->place[i]];
 }
 
 /* Who is in which groups and meets which: 0 stands for all. */
@@ -11473,7 +11465,6 @@ static inline bool dem2di_meet(const dem2di_groups *a, const dem2di_groups *b) {
 typedef struct dem2di_finds {
     dem2di_key *to; /* room + 1: the last is written over */
     int room, count;
-    int others, walls;           /* of these pairs that are not of two circles; with walls */
     const dem2di_groups *groups; /* of the slots; NULL: all meet */
 } dem2di_finds;
 
@@ -11482,35 +11473,44 @@ static inline void dem2di_find(dem2di_finds *finds, int a, int b) {
     to->a = a;
     to->b = b;
     finds->count++;
-    finds->others += b < 0;
-    finds->walls += a < 0;
 }
 
-static inline bool dem2di_discs_near(const dem2di_disc *a, const dem2di_disc *b) {
+/* Do two discs overlap? */
+static inline bool dem2di_discs_meet(const dem2di_disc *a, const dem2di_disc *b) {
     dem2d_vec d = dem2di_sub(b->centre, a->centre);
     double both = a->reach + b->reach;
-    return (dem2di_dot(d, d) < both * both) & !(a->fixed & b->fixed);
+    return dem2di_dot(d, d) < both * both;
 }
 
-/* Find partners among the sorted discs from begin to end: without branches, as half of these discs
-   are partners. */
-static inline void dem2di_grid_range(const dem2di_grid *grid, const dem2di_disc *own, int begin,
-                                     int end, int level, dem2di_finds *finds) {
-    int count = finds->count, others = finds->others;
+/* Find partners among the sorted discs from begin to end: without branches, as a third of these
+   discs are partners. Plain: there is room for all of them, they are all of the level, and no two
+   are kept apart by groups or because both are fixed. */
+static DEM2DI_INLINE void dem2di_grid_loop(const dem2di_grid *grid, const dem2di_disc *own,
+                                           int begin, int end, int level, bool plain,
+                                           dem2di_finds *finds) {
+    const int slot = own->slot, own_other = own->other;
+    int count = finds->count;
     for (int k = begin; k < end; k++) {
         const dem2di_disc *other = &grid->sorted[k];
-        int near = dem2di_discs_near(own, other) & (other->level == level);
-        int apart = !(own->circle & other->circle); /* kinds */
-        if (finds->groups != NULL && near)
-            near = dem2di_meet(&finds->groups[own->slot], &finds->groups[other->slot]);
-        dem2di_key *to = &finds->to[count < finds->room ? count : finds->room];
-        to->a = own->slot;
-        to->b = other->slot ^ -apart;
+        bool near = dem2di_discs_meet(own, other);
+        if (!plain) near = near && other->level == level && !(own->fixed && other->fixed);
+        if (!plain && near && finds->groups != NULL)
+            near = dem2di_meet(&finds->groups[slot], &finds->groups[other->slot]);
+        dem2di_key *to = &finds->to[plain || count < finds->room ? count : finds->room];
+        to->a = slot;
+        to->b = other->slot ^ (own_other | other->other); /* ~ it where one is no circle */
         count += near;
-        others += near & apart;
     }
     finds->count = count;
-    finds->others = others;
+}
+
+static inline void dem2di_grid_range(const dem2di_grid *grid, const dem2di_disc *own, int begin,
+                                     int end, int level, dem2di_finds *finds) {
+    if (level < grid->dense && finds->groups == NULL && !own->fixed &&
+        end - begin <= finds->room - finds->count)
+        dem2di_grid_loop(grid, own, begin, end, level, true, finds);
+    else
+        dem2di_grid_loop(grid, own, begin, end, level, false, finds);
 }
 
 /* Cells of a row from x to `last`, as many as have their discs together: from begin to end in
@@ -11526,9 +11526,8 @@ static inline int64_t dem2di_grid_run(const dem2di_grid *grid, int64_t x, int64_
 }
 
 /* Find partners in the cells of a row from x0 to x1, in the first of them from `after` on. */
-static inline void dem2di_grid_row(const dem2di_grid *grid, const dem2di_disc *own, int64_t x0,
-                                   int64_t x1, int64_t y, int level, int after,
-                                   dem2di_finds *finds) {
+static void dem2di_grid_row(const dem2di_grid *grid, const dem2di_disc *own, int64_t x0, int64_t x1,
+                            int64_t y, int level, int after, dem2di_finds *finds) {
     for (int64_t x = x0; x <= x1; after = 0) {
         int begin, end;
         x = dem2di_grid_run(grid, x, x1, y, level, &begin, &end);
@@ -11536,20 +11535,35 @@ static inline void dem2di_grid_row(const dem2di_grid *grid, const dem2di_disc *o
     }
 }
 
-/* Find the partners of a disc so that each pair is found once: on its own level the discs after it
-   in its cell, and those in cells to the right and above; on coarser levels all around. Discs that
-   overlap are at most one cell apart, so the cost is linear for any mixture of sizes. */
-static void dem2di_grid_partners(const dem2di_grid *grid, int disc, dem2di_finds *finds) {
-    const dem2di_disc *own = &grid->discs[disc];
+/* The same in the three cells of a row around a cell that is not in the hash table. */
+static inline void dem2di_grid_three(const dem2di_grid *grid, const dem2di_disc *own, int head,
+                                     int level, dem2di_finds *finds) {
+    dem2di_grid_range(grid, own, grid->heads[head - 1], grid->heads[head + 2], level, finds);
+}
+
+/* Find the partners of a disc, which is at a place in sorted, so that each pair is found once: on
+   its own level the discs after it in its cell, and those in cells to the right and above; on
+   coarser levels all around. Discs that overlap are at most one cell apart, so the cost is linear
+   for any mixture of sizes. */
+static void dem2di_grid_partners(const dem2di_grid *grid, int place, dem2di_finds *finds) {
+    const dem2di_disc *own = &grid->sorted[place];
     for (int level = 0; level <= own->level; level++) {
         if (!(grid->levels >> level & 1)) continue;
-        dem2di_cell cell = dem2di_cell_at(grid, own->centre, dem2di_cell_size(grid, level));
-        int64_t x = cell.x, y = cell.y;
-        bool same = level == own->level;
-        dem2di_grid_row(grid, own, same ? x : x - 1, x + 1, y, level,
-                        same ? grid->place[disc] + 1 : 0, finds);
-        dem2di_grid_row(grid, own, x - 1, x + 1, y + 1, level, 0, finds);
-        if (!same) dem2di_grid_row(grid, own, x - 1, x + 1, y - 1, level, 0, finds);
+        const dem2di_cell cell = dem2di_cell_at(grid, own->centre, level);
+        const int64_t x = cell.x, y = cell.y;
+        const bool same = level == own->level;
+        if (level < grid->dense) {
+            const int head = dem2di_cell_head(grid, x, y, level), width = grid->width[level];
+            if (same) dem2di_grid_range(grid, own, place + 1, grid->heads[head + 2], level, finds);
+            if (!same) dem2di_grid_three(grid, own, head - width, level, finds);
+            if (!same) dem2di_grid_three(grid, own, head, level, finds);
+            dem2di_grid_three(grid, own, head + width, level, finds);
+        } else {
+            dem2di_grid_row(grid, own, same ? x : x - 1, x + 1, y, level, same ? place + 1 : 0,
+                            finds);
+            dem2di_grid_row(grid, own, x - 1, x + 1, y + 1, level, 0, finds);
+            if (!same) dem2di_grid_row(grid, own, x - 1, x + 1, y - 1, level, 0, finds);
+        }
     }
 }
 
@@ -12354,17 +12368,28 @@ typedef struct dem2di_stiffest {
     int at[2];
 } dem2di_stiffest;
 
+/* Greatest values of some particles: how large and fast they are, and how easily they move. */
+typedef struct dem2di_extremes {
+    double far, size;             /* m, of a position (dem2di_size_of); radius */
+    double speed, spin, load;     /* of velocities (likewise), external loads */
+    double heavy, light, slender; /* mass of the free, 1/mass, 1/inertia */
+    bool others;                  /* some are no circles */
+} dem2di_extremes;
+
 /* What one block of parallel work found. */
 typedef struct dem2di_block_result {
     dem2di_count count;
     dem2di_stiffest stiffest;
-    double most;   /* greatest reach of the discs; greatest square of speed over skin */
-    double least;  /* least reach of the discs */
-    dem2d_box box; /* of their centres */
-    bool strayed;  /* contacts of the last force pass may be off the list: see dem2di_find_lost */
+    dem2di_extremes extremes;
+    double most;  /* greatest reach of the discs; greatest square of speed over skin */
+    double least; /* least reach of the discs */
+    double most_inverse, least_inverse; /* of inverse_skin_squared */
+    dem2d_box box;                      /* of the centres of the discs */
+    bool strayed; /* contacts of the last force pass may be off the list: see dem2di_find_lost */
     int finds, found, room; /* of the search: the first of what it found, how many; room for the
                                next list's */
     int starts[3];          /* where these go in the list, by kinds */
+    uint32_t levels;        /* of the discs: bit mask */
     int fast;               /* slot of the one of least rank that may pass through others, or -1 */
     int64_t spread;         /* sum of the distances in memory of the partners found */
     int changes;            /* contacts that close or open */
@@ -12515,9 +12540,10 @@ struct dem2d_world {
     dem2d_solver solver;
     dem2d_face_rule faces;
 
-    bool keeps_last; /* the force pass keeps the contacts of the last one */
-    bool keeps_sums; /* steps keep the sums of forces: a caller changes them, or reads them */
-    bool sums_fresh; /* what is kept are the sums of the contacts as they are now */
+    bool keeps_last;  /* the force pass keeps the contacts of the last one, */
+    bool keeps_walls; /* or those with walls */
+    bool keeps_sums;  /* steps keep the sums of forces: a caller changes them, or reads them */
+    bool sums_fresh;  /* what is kept are the sums of the contacts as they are now */
     bool check_time_step;
     bool check_due;    /* an edit since the last check of the time step and the speeds can matter */
     int plan_due;      /* steps for which the features in use are found anew, see dem2di_prepare */
@@ -12534,7 +12560,8 @@ struct dem2d_world {
     double rounding;              /* m, of a position */
     dem2d_box box;                /* holds all centres while the list lasts */
     bool bounded;                 /* no state can become infinite while the list lasts */
-    double softness; /* of the list: times the stiffness of a contact it bounds all eigenvalues */
+    double softness; /* of the list: times the stiffness of a contact it bounds all eigenvalues; 0
+                        until a check of the time step asks for it */
     double spread;   /* mean distance in memory of two partners when last sorted */
     int64_t steps, rebuilds, slow_time_step, fast_motion, listed_at;
     int64_t timed_at; /* steps when the time step was last changed */
@@ -13299,21 +13326,43 @@ static size_t dem2di_contacts_largest(const dem2di_plan *plan, int discs, int co
     return most;
 }
 
-/* Contacts from `first` to before `end` as they are into list.last, or (`back`) as they were from
-   there. */
-static void dem2di_contacts_keep(dem2d_world *world, int first, int end, bool back) {
+/* A column of contacts and that of list.last. */
+typedef struct dem2di_kept {
+    char *now, *last;
+    size_t size;
+    int begin; /* the first contact that has an element */
+} dem2di_kept;
+
+/* The columns that are kept and in use; returns how many. */
+static int dem2di_kept_find(const dem2d_world *world, dem2di_kept *kept) {
     const dem2di_list *list = &world->list;
+    int count = 0;
     for (int k = 0; k < DEM2DI_COLUMNS; k++) {
         const dem2di_column *column = &dem2di_columns[k];
         if (!(column->treatment & DEM2DI_KEPT)) continue;
-        int begin = dem2di_contacts_begin(&world->plan, list->discs, list->count, column->group);
-        int from = first > begin ? first - begin : 0;
-        if (end - begin <= from) continue;
-        size_t at = (size_t)from * column->size, bytes = (size_t)(end - begin) * column->size - at;
         dem2di_column last = dem2di_column_last(column);
-        char *now = (char *)dem2di_column_get(world, column) + at;
-        char *then = (char *)dem2di_column_get(world, &last) + at;
-        memcpy(back ? now : then, back ? then : now, bytes);
+        dem2di_kept *to = &kept[count];
+        to->now = (char *)dem2di_column_get(world, column);
+        to->last = (char *)dem2di_column_get(world, &last);
+        to->size = column->size;
+        to->begin = dem2di_contacts_begin(&world->plan, list->discs, list->count, column->group);
+        count += to->begin < list->count;
+    }
+    return count;
+}
+
+/* Contacts from `first` to before `end` as they are into list.last, or (`back`) as they were from
+   there. */
+static void dem2di_contacts_keep(const dem2di_kept *kept, int columns, int first, int end,
+                                 bool back) {
+    for (int k = 0; k < columns; k++) {
+        const size_t size = kept[k].size;
+        const int from = first > kept[k].begin ? first : kept[k].begin;
+        if (end <= from) continue;
+        const size_t at = (size_t)(from - kept[k].begin) * size,
+                     bytes = (size_t)(end - from) * size;
+        memcpy((back ? kept[k].now : kept[k].last) + at, (back ? kept[k].last : kept[k].now) + at,
+               bytes);
     }
 }
 
@@ -16398,28 +16447,35 @@ static void dem2di_order_commit(dem2d_world *world) {
 /* --- the contacts of each particle ------------------------------------------------------------ */
 
 /* What the contacts of a particle are sorted by: their partners' ranks, walls behind. */
-static uint32_t dem2di_adjacency_rank(const dem2d_world *world, int slot, int contact) {
+static inline int dem2di_adjacency_rank(const dem2d_world *world, int slot, int contact) {
     const dem2di_key *key = &world->list.keys[contact];
-    if (contact >= world->list.pairs) return ((uint32_t)1 << 30) + (uint32_t)key->b;
-    return (uint32_t)world->bodies[key->a == slot ? key->b : key->a].rank;
+    const bool wall = contact >= world->list.pairs, as_a = key->a == slot;
+    const int rank = world->bodies[wall || !as_a ? key->a : key->b].rank;
+    return wall ? (1 << 30) + key->b : rank;
 }
 
-/* Up to so many contacts of a particle are sorted with their ranks beside them. */
-#define DEM2DI_FEW_CONTACTS 16
+/* Up to so many contacts of a particle are sorted by counting: most have a handful. */
+#define DEM2DI_FEW_CONTACTS 8
 
-/* The contacts of a particle by insertion: most have a handful. Returns of how many it is B. */
+/* The few contacts of a particle in order: the place of each is how many have a lower rank, or the
+   same and come before. No branch depends on the ranks. Returns of how many it is B. */
 static int dem2di_adjacency_sort_few(const dem2d_world *world, int slot, int *run, int count) {
-    uint64_t ranked[DEM2DI_FEW_CONTACTS];
-    int as_b = 0;
+    int rank[DEM2DI_FEW_CONTACTS], place[DEM2DI_FEW_CONTACTS], contact[DEM2DI_FEW_CONTACTS];
+    int as_b = 0, own = world->bodies[slot].rank;
     for (int i = 0; i < count; i++) {
-        uint64_t rank = dem2di_adjacency_rank(world, slot, run[i]);
-        uint64_t contact = rank << 32 | (uint32_t)run[i];
-        int k = i;
-        for (; k > 0 && ranked[k - 1] > contact; k--) ranked[k] = ranked[k - 1];
-        ranked[k] = contact;
-        as_b += rank < (uint64_t)world->bodies[slot].rank;
+        const int contact_rank = dem2di_adjacency_rank(world, slot, run[i]);
+        int before = 0;
+        for (int k = 0; k < i; k++) {
+            const int follows = rank[k] > contact_rank;
+            place[k] += follows;
+            before += 1 - follows;
+        }
+        contact[i] = run[i];
+        rank[i] = contact_rank;
+        place[i] = before;
+        as_b += contact_rank < own;
     }
-    for (int i = 0; i < count; i++) run[i] = (int)(uint32_t)ranked[i];
+    for (int i = 0; i < count; i++) run[place[i]] = contact[i];
     return as_b;
 }
 
@@ -16457,29 +16513,34 @@ static int dem2di_adjacency_images(const dem2d_world *world, int slot, int *run,
     return as_b + own;
 }
 
-/* Each particle's contacts in order; many by Shell's sort (Ciura's gaps): a particle that is a
-   hundred times larger than its neighbours has hundreds. */
-static void dem2di_adjacency_sort_task(void *context, int begin, int end) {
+/* The same for many by Shell's sort (Ciura's gaps): a particle that is a hundred times larger than
+   its neighbours has hundreds. */
+static int dem2di_adjacency_sort_many(const dem2d_world *world, int slot, int *run, int count) {
     static const int gaps[] = {301, 132, 57, 23, 10, 4, 1};
+    int as_b = 0;
+    for (int g = 0; g < 7; g++)
+        for (int i = gaps[g]; i < count; i++) {
+            int contact = run[i], k = i, rank = dem2di_adjacency_rank(world, slot, contact);
+            for (; k >= gaps[g] && dem2di_adjacency_rank(world, slot, run[k - gaps[g]]) > rank;
+                 k -= gaps[g])
+                run[k] = run[k - gaps[g]];
+            run[k] = contact;
+        }
+    while (as_b < count && world->list.keys[run[as_b]].a != slot) as_b++;
+    return as_b;
+}
+
+/* Each particle's contacts in order. */
+static void dem2di_adjacency_sort_task(void *context, int begin, int end) {
     const dem2d_world *world = (const dem2d_world *)context;
     const dem2di_list *list = &world->list;
     int last = dem2di_block_end((end - 1) * DEM2DI_BLOCK, DEM2DI_BLOCK, world->body_count);
     for (int slot = begin * DEM2DI_BLOCK; slot < last; slot++) {
         int *run = list->adjacent + list->first[slot];
-        int count = list->first[slot + 1] - list->first[slot], as_b = 0;
-        bool few = count <= DEM2DI_FEW_CONTACTS;
-        if (few) as_b = dem2di_adjacency_sort_few(world, slot, run, count);
-        for (int g = 0; g < 7 && !few; g++) {
-            for (int i = gaps[g]; i < count; i++) {
-                int contact = run[i], k = i;
-                uint32_t rank = dem2di_adjacency_rank(world, slot, contact);
-                for (; k >= gaps[g] && dem2di_adjacency_rank(world, slot, run[k - gaps[g]]) > rank;
-                     k -= gaps[g])
-                    run[k] = run[k - gaps[g]];
-                run[k] = contact;
-            }
-        }
-        while (!few && as_b < count && list->keys[run[as_b]].a != slot) as_b++;
+        int count = list->first[slot + 1] - list->first[slot];
+        int as_b = count <= DEM2DI_FEW_CONTACTS
+                       ? dem2di_adjacency_sort_few(world, slot, run, count)
+                       : dem2di_adjacency_sort_many(world, slot, run, count);
         if (world->image_count > 0) as_b = dem2di_adjacency_images(world, slot, run, count, as_b);
         list->own[slot] = list->first[slot] + as_b;
     }
@@ -16647,17 +16708,17 @@ typedef struct dem2di_build {
     dem2d_world *world;
     dem2di_plan plan;
     dem2di_grid grid;
+    double *reach;            /* of the discs, by slots */
     int *planes, plane_count; /* parts that are half-planes */
-    dem2di_key *finds;        /* of the search, block by block */
+    dem2di_key *finds;        /* of the search, block by block; then keys */
     int room;                 /* for these */
-    bool strayed;             /* as in the blocks' results */
+    dem2di_block_result all;  /* of the reaches of all blocks */
     int total[DEM2DI_KINDS];
-    dem2di_key *keys;                    /* as in the list, */
-    int *old;                            /* and its contact in the old list, or -1 */
+    int *old;                            /* of the new list: its contact in the old one, or -1 */
     dem2di_order *wall_contacts, *spare; /* part, rank of particle; slot */
-    char *column;                        /* room for a column of contacts, where the grid was */
-    bool bounded, back; /* as in the world; whether the next step may look back on contacts */
-    double softness;
+    char *column;                        /* room for a column of contacts, where the search was */
+    bool bounded, back;      /* as in the world; whether the next step may look back on contacts */
+    double softness;         /* as in the world */
     int image_base;          /* an image that was found has this plus its number for a slot, */
     int images, lost_images; /* so many are in world->images_next: near ones, then those of contacts
                                 whose partners are out of reach */
@@ -16735,75 +16796,133 @@ static bool dem2di_plan_fits(const dem2di_plan *one, const dem2di_plan *other) {
            one->joints == other->joints && one->events == other->events;
 }
 
-/* The disc of a particle. Returns whether a contact that it had in the last force pass may be out
-   of reach now: it has been moved further than a step does, or has another size. */
-static bool dem2di_disc_make(const dem2di_build *build, int slot, dem2di_disc *disc) {
+static inline void dem2di_extremes_add(const dem2d_world *world, int slot, dem2di_extremes *most) {
+    const dem2di_state *now = &world->now[slot];
+    const dem2di_inverse inverse = world->inverse[slot];
+    if (world->loaded) most->load = dem2di_max(most->load, dem2di_load_size(&world->loads[slot]));
+    most->far = dem2di_max(most->far, dem2di_size_of(now->x));
+    most->size = dem2di_max(most->size, now->radius);
+    most->speed = dem2di_max(most->speed, dem2di_size_of(now->v));
+    most->spin = dem2di_max(most->spin, fabs(now->w));
+    most->light = dem2di_max(most->light, inverse.mass);
+    most->slender = dem2di_max(most->slender, inverse.inertia);
+    if (inverse.mass > 0) most->heavy = dem2di_max(most->heavy, 1 / inverse.mass);
+    most->others = most->others || !dem2di_is_circle(world, slot);
+}
+
+static void dem2di_extremes_meet(dem2di_extremes *most, const dem2di_extremes *other) {
+    most->far = dem2di_max(most->far, other->far);
+    most->size = dem2di_max(most->size, other->size);
+    most->speed = dem2di_max(most->speed, other->speed);
+    most->spin = dem2di_max(most->spin, other->spin);
+    most->load = dem2di_max(most->load, other->load);
+    most->heavy = dem2di_max(most->heavy, other->heavy);
+    most->light = dem2di_max(most->light, other->light);
+    most->slender = dem2di_max(most->slender, other->slender);
+    most->others = most->others || other->others;
+}
+
+/* The reach of a particle's disc, and what follows from its skin. Returns whether a contact that it
+   had in the last force pass may be out of reach now: it has been moved further than a step does,
+   or has another size. */
+static inline bool dem2di_reach_make(const dem2di_build *build, int slot) {
     dem2d_world *world = build->world;
-    const dem2di_body *body = &world->bodies[slot];
     const dem2di_state *now = &world->now[slot], *before = &world->before[slot];
     double skin =
         dem2di_max(dem2di_skin_of(world, now->radius, now->v), DEM2DI_ROUNDOFF * now->radius);
     dem2d_vec moved = dem2di_sub(now->x, before->x);
     world->inverse_skin_squared[slot] = 1 / (skin * skin);
-    disc->centre = now->x;
-    disc->reach = now->radius + skin;
-    disc->slot = slot;
-    disc->fixed = body->motion == DEM2D_FIXED;
-    disc->circle = dem2di_shape_of(world, body)->type == DEM2D_CIRCLE && dem2di_has_discs(world);
-    return (disc->fixed && world->plan_due > 0) || before->radius != now->radius ||
-           !(dem2di_dot(moved, moved) < skin * skin / 4);
+    build->reach[slot] = now->radius + skin;
+    return (world->plan_due > 0 && world->bodies[slot].motion == DEM2D_FIXED) ||
+           before->radius != now->radius || !(dem2di_dot(moved, moved) < skin * skin / 4);
 }
 
-static void dem2di_disc_task(void *context, int begin, int end) {
+/* The disc of a particle, once its reach is known. */
+static inline dem2di_disc dem2di_disc_of(const dem2di_build *build, int slot) {
+    const dem2d_world *world = build->world;
+    const dem2di_body *body = &world->bodies[slot];
+    bool circle = dem2di_shape_of(world, body)->type == DEM2D_CIRCLE && dem2di_has_discs(world);
+    dem2di_disc disc;
+    disc.centre = world->now[slot].x;
+    disc.reach = build->reach[slot];
+    disc.slot = slot;
+    disc.level = 0;
+    disc.fixed = body->motion == DEM2D_FIXED;
+    disc.other = circle ? 0 : -1;
+    return disc;
+}
+
+/* What one pass over the states finds for the list. */
+static void dem2di_reach_task(void *context, int begin, int end) {
     const dem2di_build *build = (const dem2di_build *)context;
+    const dem2d_world *world = build->world;
     for (int block = begin; block < end; block++) {
-        dem2di_block_result *result = &build->world->block_results[block];
+        dem2di_block_result *result = &world->block_results[block];
         int first = block * DEM2DI_BLOCK;
         int last = dem2di_block_end(first, DEM2DI_BLOCK, build->grid.count);
-        dem2d_box box = {build->world->now[first].x, build->world->now[first].x};
-        double least = HUGE_VAL, most = 0;
+        dem2d_box box = {world->now[first].x, world->now[first].x};
+        dem2di_extremes extremes;
+        double least = HUGE_VAL, most = 0, least_inverse = HUGE_VAL, most_inverse = 0;
         bool strayed = false;
+        memset(&extremes, 0, sizeof extremes);
         for (int i = first; i < last; i++) {
-            dem2di_disc *disc = &build->grid.discs[i];
-            strayed |= dem2di_disc_make(build, i, disc);
-            least = dem2di_min(least, disc->reach);
-            most = dem2di_max(most, disc->reach);
-            box.lower.x = dem2di_min(box.lower.x, disc->centre.x);
-            box.lower.y = dem2di_min(box.lower.y, disc->centre.y);
-            box.upper.x = dem2di_max(box.upper.x, disc->centre.x);
-            box.upper.y = dem2di_max(box.upper.y, disc->centre.y);
+            strayed |= dem2di_reach_make(build, i);
+            least = dem2di_min(least, build->reach[i]);
+            most = dem2di_max(most, build->reach[i]);
+            least_inverse = dem2di_min(least_inverse, world->inverse_skin_squared[i]);
+            most_inverse = dem2di_max(most_inverse, world->inverse_skin_squared[i]);
+            dem2di_box_add(&box, world->now[i].x);
+            dem2di_extremes_add(world, i, &extremes);
         }
+        result->box = box;
+        result->extremes = extremes;
         result->least = least;
         result->most = most;
-        result->box = box;
+        result->least_inverse = least_inverse;
+        result->most_inverse = most_inverse;
         result->strayed = strayed;
     }
 }
 
-/* The blocks' discs together, and the cells that they need. */
+/* The blocks' results together, the cells that the discs need, and skins of the walls. */
 static void dem2di_discs_survey(dem2di_build *build) {
+    dem2d_world *world = build->world;
     dem2di_grid *grid = &build->grid;
-    const dem2di_block_result *results = build->world->block_results;
-    double least = HUGE_VAL, most = 0;
-    for (int k = 0; k < dem2di_blocks(grid->count, DEM2DI_BLOCK); k++) {
-        const dem2d_box *box = &results[k].box;
-        if (k == 0) grid->box = *box;
-        grid->box.lower.x = dem2di_min(grid->box.lower.x, box->lower.x);
-        grid->box.lower.y = dem2di_min(grid->box.lower.y, box->lower.y);
-        grid->box.upper.x = dem2di_max(grid->box.upper.x, box->upper.x);
-        grid->box.upper.y = dem2di_max(grid->box.upper.y, box->upper.y);
-        least = dem2di_min(least, results[k].least);
-        most = dem2di_max(most, results[k].most);
-        build->strayed |= results[k].strayed;
+    dem2di_block_result *all = &build->all;
+    if (grid->count > 0) *all = world->block_results[0];
+    if (grid->count == 0) all->box = world->box, all->least_inverse = HUGE_VAL;
+    for (int k = 1; k < dem2di_blocks(grid->count, DEM2DI_BLOCK); k++) {
+        const dem2di_block_result *result = &world->block_results[k];
+        dem2di_box_add(&all->box, result->box.lower);
+        dem2di_box_add(&all->box, result->box.upper);
+        dem2di_extremes_meet(&all->extremes, &result->extremes);
+        all->least = dem2di_min(all->least, result->least);
+        all->most = dem2di_max(all->most, result->most);
+        all->least_inverse = dem2di_min(all->least_inverse, result->least_inverse);
+        all->most_inverse = dem2di_max(all->most_inverse, result->most_inverse);
+        all->strayed |= result->strayed;
     }
-    if (grid->count > 0) dem2di_grid_plan(grid, least, most);
+    grid->box = all->box;
+    if (grid->count > 0) dem2di_grid_plan(grid, all->least, all->most);
+    for (int j = 0; j < world->wall_count; j++)
+        world->walls[j].skin =
+            dem2di_skin_of(world, all->extremes.size, dem2di_wall_speed(world, j));
 }
 
+/* Cells of the discs, and the levels in use. */
 static void dem2di_place_task(void *context, int begin, int end) {
     const dem2di_build *build = (const dem2di_build *)context;
-    int first = begin * DEM2DI_BLOCK;
-    int last = dem2di_block_end((end - 1) * DEM2DI_BLOCK, DEM2DI_BLOCK, build->grid.count);
-    dem2di_grid_place(&build->grid, first, last);
+    for (int block = begin; block < end; block++) {
+        int first = block * DEM2DI_BLOCK;
+        int last = dem2di_block_end(first, DEM2DI_BLOCK, build->grid.count);
+        uint32_t levels = 0;
+        for (int i = first; i < last; i++) {
+            dem2di_disc disc = dem2di_disc_of(build, i);
+            build->grid.place[i] = dem2di_grid_place(&build->grid, &disc);
+            levels |= (uint32_t)1 << disc.level;
+        }
+        build->world->block_results[block].levels = levels;
+    }
 }
 
 static void dem2di_grid_task(void *context, int begin, int end) {
@@ -16811,9 +16930,27 @@ static void dem2di_grid_task(void *context, int begin, int end) {
     (void)begin;
     (void)end;
     dem2di_grid_sort(&build->grid);
+    for (int k = 0; k < dem2di_blocks(build->grid.count, DEM2DI_BLOCK); k++)
+        build->grid.levels |= build->world->block_results[k].levels;
     build->plane_count = 0;
     for (int j = 0; j < build->world->part_count; j++)
         if (!(build->world->parts[j].extent > 0)) build->planes[build->plane_count++] = j;
+}
+
+/* The disc of a particle, once the discs are sorted. */
+static inline const dem2di_disc *dem2di_disc_at(const dem2di_build *build, int slot) {
+    return &build->grid.sorted[build->grid.place[slot]];
+}
+
+/* The discs to the places that the sort has found. */
+static void dem2di_sorted_task(void *context, int begin, int end) {
+    const dem2di_build *build = (const dem2di_build *)context;
+    int last = dem2di_block_end((end - 1) * DEM2DI_BLOCK, DEM2DI_BLOCK, build->grid.count);
+    for (int i = begin * DEM2DI_BLOCK; i < last; i++) {
+        dem2di_disc disc = dem2di_disc_of(build, i);
+        (void)dem2di_grid_place(&build->grid, &disc);
+        build->grid.sorted[build->grid.place[i]] = disc;
+    }
 }
 
 /* Is a part of a wall within the skins of a particle, and may be a contact? A segment is within its
@@ -16867,10 +17004,10 @@ static void dem2di_find_part(const dem2d_world *world, const dem2di_disc *disc, 
 static void dem2di_search_particles(const dem2di_build *build, int block, dem2di_finds *finds) {
     const dem2d_world *world = build->world;
     const dem2di_block_result *result = &world->block_results[block];
-    const dem2di_disc *discs = build->grid.discs;
-    int first = block * DEM2DI_BLOCK,
-        last = dem2di_block_end(first, DEM2DI_BLOCK, world->body_count);
-    for (int i = first; i < last; i++) dem2di_grid_partners(&build->grid, i, finds);
+    const dem2di_grid *grid = &build->grid;
+    int first = block * DEM2DI_BLOCK;
+    int last = dem2di_block_end(first, DEM2DI_BLOCK, world->body_count);
+    for (int i = first; i < last; i++) dem2di_grid_partners(grid, grid->place[i], finds);
     for (int k = 0; k < build->plane_count; k++) {
         int part = build->planes[k];
         dem2d_vec normal = dem2di_surface_normal(&world->surfaces[part]), nearest;
@@ -16879,9 +17016,10 @@ static void dem2di_search_particles(const dem2di_build *build, int block, dem2di
         if (!(dem2di_part_distance(world, part, nearest) <
               result->most + world->walls[world->parts[part].wall].skin))
             continue;
-        for (int i = first; i < last; i++)
-            if (dem2di_part_is_near(world, &discs[i], part))
-                dem2di_find_part(world, &discs[i], part, finds);
+        for (int i = first; i < last; i++) {
+            const dem2di_disc *disc = dem2di_disc_at(build, i);
+            if (dem2di_part_is_near(world, disc, part)) dem2di_find_part(world, disc, part, finds);
+        }
     }
 }
 
@@ -16894,7 +17032,7 @@ static void dem2di_search_cells(const dem2di_build *build, int part, int begin, 
     for (int k = begin; k < end; k++) {
         const dem2di_disc *disc = &grid->sorted[k];
         if (disc->level != level || !dem2di_part_is_near(world, disc, part)) continue;
-        dem2di_cell at = dem2di_cell_at(grid, disc->centre, dem2di_cell_size(grid, level));
+        dem2di_cell at = dem2di_cell_at(grid, disc->centre, level);
         if (at.x < cells[0].x || at.x > cells[1].x || at.y < cells[0].y || at.y > cells[1].y)
             continue;
         dem2di_find_part(world, disc, part, finds);
@@ -16934,8 +17072,8 @@ static void dem2di_search_segment(const dem2di_build *build, int part, dem2di_fi
             !dem2di_around_piece(&grid->box, surface, 0, extent, r, corner))
             continue;
         for (int k = 0; k < 2; k++) {
-            cells[k].x = dem2di_cell_of(corner[k].x, size);
-            cells[k].y = dem2di_cell_of(corner[k].y, size);
+            cells[k].x = dem2di_cell_of(corner[k].x * grid->inverse[level]);
+            cells[k].y = dem2di_cell_of(corner[k].y * grid->inverse[level]);
         }
         if (cells[1].x - cells[0].x >= grid->count - (cells[1].y - cells[0].y)) {
             dem2di_search_cells(build, part, 0, grid->count, level, cells, finds);
@@ -16947,7 +17085,8 @@ static void dem2di_search_segment(const dem2di_build *build, int part, dem2di_fi
             double high = dem2di_min(extent, dem2di_max(0, dem2di_max(t0, t1)));
             if (!(fabs(way) > 0)) low = 0, high = extent;
             if (!dem2di_around_piece(&grid->box, surface, low, high, r, corner)) continue;
-            int64_t x = dem2di_cell_of(corner[0].x, size), last = dem2di_cell_of(corner[1].x, size);
+            int64_t x = dem2di_cell_of(corner[0].x * grid->inverse[level]);
+            int64_t last = dem2di_cell_of(corner[1].x * grid->inverse[level]);
             while (x <= last) {
                 int begin, end;
                 dem2di_cell run[2] = {{x, y}, {0, y}};
@@ -16977,7 +17116,7 @@ static bool dem2di_build_image(dem2di_build *build, int owner, int along_a, int 
 /* The disc of an image, with that for its slot. */
 static dem2di_disc dem2di_image_disc(const dem2di_build *build, const dem2di_image *image,
                                      int slot) {
-    dem2di_disc disc = build->grid.discs[image->owner];
+    dem2di_disc disc = *dem2di_disc_at(build, image->owner);
     dem2d_vec way = dem2di_cell_shift(&build->world->cell, image->shift[0], image->shift[1]);
     disc.centre = dem2di_add(disc.centre, way);
     disc.slot = slot;
@@ -16989,8 +17128,9 @@ static bool dem2di_listed_far(const dem2di_build *build, const dem2di_key *key) 
     dem2di_image image;
     image.owner = dem2di_owner(build->world, key->b);
     dem2di_shift_of(build->world, key->b, image.shift);
-    const dem2di_disc disc = dem2di_image_disc(build, &image, key->b);
-    return !dem2di_discs_near(&build->grid.discs[key->a], &disc);
+    const dem2di_disc two = dem2di_image_disc(build, &image, key->b);
+    const dem2di_disc *one = dem2di_disc_at(build, key->a);
+    return !dem2di_discs_meet(one, &two) || (one->fixed && two.fixed);
 }
 
 /* Is B of a listed pair an image with a shift? One with the shift 0 is as good as its owner. */
@@ -17004,7 +17144,7 @@ static bool dem2di_is_shifted(const dem2d_world *world, int slot) {
 static bool dem2di_build_lost_images(dem2di_build *build) {
     const dem2d_world *world = build->world;
     const dem2di_list *list = &world->list;
-    for (int i = 0; i < list->pairs && build->strayed; i++) {
+    for (int i = 0; i < list->pairs && build->all.strayed; i++) {
         const dem2di_key *key = &list->keys[i];
         int shift[2];
         if (!(list->contacts.depth[i] > 0) || !dem2di_is_shifted(world, key->b)) continue;
@@ -17025,11 +17165,11 @@ static bool dem2di_build_images(dem2di_build *build) {
     build->image_base = world->body_count;
     for (int i = 0; i < world->body_count && world->periodic; i++) {
         const double far = dem2di_size_of(grid->box.lower) + dem2di_size_of(grid->box.upper);
-        const double reach = grid->discs[i].reach + grid->size / 2 + DEM2DI_ROUNDOFF * far;
+        const double reach = build->reach[i] + grid->size / 2 + DEM2DI_ROUNDOFF * far;
         dem2d_box box = grid->box;
         box.lower = dem2di_sub(box.lower, dem2di_vec(reach, reach));
         box.upper = dem2di_add(box.upper, dem2di_vec(reach, reach));
-        dem2di_shifts at = dem2di_shifts_start(&world->cell, grid->discs[i].centre, &box);
+        dem2di_shifts at = dem2di_shifts_start(&world->cell, world->now[i].x, &box);
         while (dem2di_shifts_next(&at)) {
             if (at.along_a == 0 && at.along_b == 0) continue;
             if (!dem2di_build_image(build, i, at.along_a, at.along_b)) return false;
@@ -17058,14 +17198,15 @@ static void dem2di_image_range(const dem2di_build *build, int k, const dem2di_di
     const dem2di_image *image = &world->images_next[k];
     for (int i = begin; i < end; i++) {
         const dem2di_disc *other = &grid->sorted[i];
-        if (other->level != level || !dem2di_discs_near(other, own)) continue;
-        dem2di_cell at = dem2di_cell_at(grid, other->centre, dem2di_cell_size(grid, level));
+        if (other->level != level || !dem2di_discs_meet(other, own)) continue;
+        if (other->fixed && own->fixed) continue;
+        dem2di_cell at = dem2di_cell_at(grid, other->centre, level);
         if (at.x < row[0].x || at.x > row[1].x || at.y < row[0].y || at.y > row[1].y) continue;
         if (!dem2di_meets_image(world, other->slot, image)) continue;
         if (finds->groups != NULL &&
             !dem2di_meet(&finds->groups[image->owner], &finds->groups[other->slot]))
             continue;
-        dem2di_find(finds, other->slot, own->circle && other->circle ? own->slot : ~own->slot);
+        dem2di_find(finds, other->slot, own->slot ^ (own->other | other->other));
     }
 }
 
@@ -17084,10 +17225,10 @@ static void dem2di_image_partners(const dem2di_build *build, int k, dem2di_finds
         if (!(grid->levels >> level & 1) || from.x < -r || from.y < -r || from.x > side.x + r ||
             from.y > side.y + r)
             continue;
-        cells[0].x = dem2di_cell_of(dem2di_max(0, from.x - r), size);
-        cells[0].y = dem2di_cell_of(dem2di_max(0, from.y - r), size);
-        cells[1].x = dem2di_cell_of(dem2di_min(side.x, from.x + r), size);
-        cells[1].y = dem2di_cell_of(dem2di_min(side.y, from.y + r), size);
+        cells[0].x = dem2di_cell_of(dem2di_max(0, from.x - r) * grid->inverse[level]);
+        cells[0].y = dem2di_cell_of(dem2di_max(0, from.y - r) * grid->inverse[level]);
+        cells[1].x = dem2di_cell_of(dem2di_min(side.x, from.x + r) * grid->inverse[level]);
+        cells[1].y = dem2di_cell_of(dem2di_min(side.y, from.y + r) * grid->inverse[level]);
         if (cells[1].x - cells[0].x >= grid->count - (cells[1].y - cells[0].y)) {
             dem2di_image_range(build, k, &own, 0, grid->count, level, cells, finds);
             continue;
@@ -17105,19 +17246,20 @@ static void dem2di_image_partners(const dem2di_build *build, int k, dem2di_finds
     }
 }
 
-/* Images of the same owners as in the list that are needed, in their order; the keys of the next
-   list get their slots. */
+/* Images of the same owners as in the list that are needed, in their order; the keys of the
+   next list, which are in place, get their slots. */
 static void dem2di_build_images_keep(dem2di_build *build, int pairs) {
     dem2d_world *world = build->world;
     dem2di_image *images = world->images_next;
+    dem2di_key *keys = world->list.keys;
     const int base = build->image_base, found = build->images + build->lost_images;
     int used = 0;
     for (int i = 0; i < pairs; i++)
-        if (build->keys[i].b >= base) images[build->keys[i].b - base].row = 0;
+        if (keys[i].b >= base) images[keys[i].b - base].row = 0;
     for (int k = 0; k < found; k++)
         if (images[k].row == 0) images[k].row = used++;
     for (int i = 0; i < pairs; i++)
-        if (build->keys[i].b >= base) build->keys[i].b = base + images[build->keys[i].b - base].row;
+        if (keys[i].b >= base) keys[i].b = base + images[keys[i].b - base].row;
     for (int k = 0; k < found; k++)
         if (images[k].row >= 0) images[images[k].row] = images[k];
     world->images_next = world->images;
@@ -17132,19 +17274,24 @@ static void dem2di_build_images_keep(dem2di_build *build, int pairs) {
 static void dem2di_find_lost(const dem2di_build *build, dem2di_finds *finds) {
     const dem2d_world *world = build->world;
     const dem2di_list *list = &world->list;
-    const dem2di_disc *discs = build->grid.discs;
     int image = build->image_base + build->images;
-    for (int i = build->strayed ? 0 : list->pairs; i < list->count; i++) {
+    for (int i = build->all.strayed ? 0 : list->pairs; i < list->count; i++) {
         int a = list->keys[i].a, b = list->keys[i].b;
         if (!(list->contacts.depth[i] > 0)) continue;
+        const dem2di_disc *one = dem2di_disc_at(build, a);
         if (i >= list->pairs) {
-            if (!dem2di_number_is_near(world, &discs[a], b)) dem2di_find(finds, ~a, b);
+            if (!dem2di_number_is_near(world, one, b)) dem2di_find(finds, ~a, b);
         } else if (dem2di_listed_far(build, &list->keys[i])) {
             const int owner = dem2di_owner(world, b);
             b = dem2di_is_shifted(world, b) ? image++ : owner;
-            dem2di_find(finds, a, discs[a].circle && discs[owner].circle ? b : ~b);
+            dem2di_find(finds, a, b ^ (one->other | dem2di_disc_at(build, owner)->other));
         }
     }
+}
+
+/* The kind of contact that was found. */
+static inline int dem2di_kind_of(const dem2di_key *found) {
+    return found->a < 0 ? DEM2DI_WALL_CONTACTS : found->b < 0 ? DEM2DI_OTHERS : DEM2DI_DISCS;
 }
 
 static void dem2di_search_task(void *context, int begin, int end) {
@@ -17155,7 +17302,7 @@ static void dem2di_search_task(void *context, int begin, int end) {
     for (int block = begin; block < end; block++) {
         dem2di_block_result *result = &world->block_results[block];
         int first = (block - bodies) * DEM2DI_BLOCK_OTHERS;
-        dem2di_finds finds = {build->finds + result->finds, result->room, 0, 0, 0,
+        dem2di_finds finds = {build->finds + result->finds, result->room, 0,
                               dem2di_groups_used(world)};
         if (block < bodies)
             dem2di_search_particles(build, block, &finds);
@@ -17168,9 +17315,9 @@ static void dem2di_search_task(void *context, int begin, int end) {
                  j++)
                 if (world->parts[j].extent > 0) dem2di_search_segment(build, j, &finds);
         result->found = finds.count;
-        result->starts[DEM2DI_DISCS] = finds.count - finds.others - finds.walls;
-        result->starts[DEM2DI_OTHERS] = finds.others;
-        result->starts[DEM2DI_WALL_CONTACTS] = finds.walls;
+        memset(result->starts, 0, sizeof result->starts);
+        for (int k = 0; k < finds.count && k < finds.room; k++)
+            result->starts[dem2di_kind_of(&finds.to[k])]++;
     }
 }
 
@@ -17194,14 +17341,19 @@ static int dem2di_listed_image(const dem2di_build *build, const dem2di_key *key)
     return -1;
 }
 
-/* The contact that two partners had in the old list, or -1. */
-static int dem2di_listed(const dem2d_world *world, const dem2di_key *key, bool wall) {
+/* The contact that two partners had in the old list, or -1. First the one that follows the last one
+   found is tried: most of a list comes in the order of the old one. */
+static int dem2di_listed(const dem2d_world *world, const dem2di_key *key, bool wall, int *last) {
     const dem2di_list *list = &world->list;
+    const int begin = wall ? list->pairs : 0, end = wall ? list->count : list->pairs;
+    const int next = *last + 1;
+    if (next >= begin && next < end && list->keys[next].a == key->a && list->keys[next].b == key->b)
+        return *last = next;
     for (int k = list->own[key->a]; k < list->first[key->a + 1]; k++) {
         int contact = list->adjacent[k];
         const dem2di_key *old = &list->keys[contact]; /* a < 0 if it was forgotten */
-        if (old->a == key->a && old->b == key->b && (contact >= list->pairs) == wall)
-            return contact;
+        if (old->a == key->a && old->b == key->b && contact >= begin && contact < end)
+            return *last = contact;
     }
     return -1;
 }
@@ -17215,24 +17367,27 @@ typedef struct dem2di_carry {
     int begin, old_begin, count; /* numbers of the first elements; of contacts in the new list */
 } dem2di_carry;
 
-static void dem2di_carry_task(void *context, int begin, int end) {
-    const dem2di_carry *carry = (const dem2di_carry *)context;
-    const size_t size = carry->size;
-    int items = carry->count - carry->begin;
-    int last = dem2di_block_end((end - 1) * DEM2DI_BLOCK, DEM2DI_BLOCK, items);
-    for (int i = begin * DEM2DI_BLOCK; i < last; i++) {
-        int old = carry->old[carry->begin + i];
+static DEM2DI_INLINE void dem2di_carry_range(const dem2di_carry *carry, int begin, int end,
+                                             size_t size) {
+    const int *old = carry->old + carry->begin;
+    for (int i = begin; i < end; i++) {
+        const int from = old[i] - carry->old_begin;
         char *to = carry->to + (size_t)i * size;
-        if (size == sizeof(double)) { /* most columns: without calls */
-            double value = 0;
-            if (old >= carry->old_begin)
-                memcpy(&value, carry->from + (size_t)(old - carry->old_begin) * size, sizeof value);
-            memcpy(to, &value, sizeof value);
-        } else if (old >= carry->old_begin)
-            memcpy(to, carry->from + (size_t)(old - carry->old_begin) * size, size);
+        if (from >= 0)
+            memcpy(to, carry->from + (size_t)from * size, size);
         else
             memset(to, 0, size);
     }
+}
+
+static void dem2di_carry_task(void *context, int begin, int end) {
+    const dem2di_carry *carry = (const dem2di_carry *)context;
+    int items = carry->count - carry->begin, first = begin * DEM2DI_BLOCK;
+    int last = dem2di_block_end((end - 1) * DEM2DI_BLOCK, DEM2DI_BLOCK, items);
+    if (carry->size == sizeof(double)) /* most columns: without calls */
+        dem2di_carry_range(carry, first, last, sizeof(double));
+    else
+        dem2di_carry_range(carry, first, last, carry->size);
 }
 
 /* The contacts of the old list to their places in the new one. Pairs that were not listed were
@@ -17265,7 +17420,7 @@ static void dem2di_carry_others(const dem2di_build *build, int discs, int pairs)
     dem2d_world *world = build->world;
     const dem2di_contacts *contacts = &world->list.contacts;
     for (int i = discs; i < pairs; i++) {
-        const dem2di_key *key = &build->keys[i];
+        const dem2di_key *key = &world->list.keys[i];
         if (world->plan.turns)
             contacts->history[i - discs].bound -=
                 world->displacement[key->a] +
@@ -17273,15 +17428,17 @@ static void dem2di_carry_others(const dem2di_build *build, int discs, int pairs)
     }
 }
 
-/* What the search found, by kinds, with the contacts in the old list. */
+/* What the search found, the one of lower rank first, and their contacts in the old list, by
+   kinds. */
 static void dem2di_fill_task(void *context, int begin, int end) {
     const dem2di_build *build = (const dem2di_build *)context;
     const dem2d_world *world = build->world;
     const dem2di_body *bodies = world->bodies;
     for (int block = begin; block < end; block++) {
         dem2di_block_result *result = &world->block_results[block];
-        const dem2di_key *finds = build->finds + result->finds;
+        dem2di_key *finds = build->finds + result->finds;
         int64_t spread = 0;
+        int last[2] = {-1, -1};
         for (int k = 0; k < result->found; k++) {
             int a = finds[k].a, b = finds[k].b, kind = b < 0 ? DEM2DI_OTHERS : DEM2DI_DISCS;
             if (a < 0) {
@@ -17291,13 +17448,14 @@ static void dem2di_fill_task(void *context, int begin, int end) {
                 continue;
             }
             if (b < 0) b = ~b;
-            int at = result->starts[kind]++;
-            int owner = dem2di_build_owner(build, b);
-            bool turned = bodies[a].rank > bodies[owner].rank;
-            build->keys[at].a = turned ? b : a;
-            build->keys[at].b = turned ? a : b;
-            build->old[at] = world->periodic ? dem2di_listed_image(build, &build->keys[at])
-                                             : dem2di_listed(world, &build->keys[at], false);
+            const int owner = dem2di_build_owner(build, b);
+            const bool turned = bodies[a].rank > bodies[owner].rank;
+            const dem2di_key key = {turned ? b : a, turned ? a : b};
+            build->old[result->starts[kind]++] =
+                world->periodic ? dem2di_listed_image(build, &key)
+                                : dem2di_listed(world, &key, false, &last[kind]);
+            finds[k].a = key.a;
+            finds[k].b = kind == DEM2DI_OTHERS ? ~key.b : key.b;
             spread += a < owner ? owner - a : a - owner;
         }
         result->spread = spread;
@@ -17308,14 +17466,42 @@ static void dem2di_fill_task(void *context, int begin, int end) {
 static void dem2di_wall_contacts_task(void *context, int begin, int end) {
     dem2di_build *build = (dem2di_build *)context;
     int count = build->total[DEM2DI_WALL_CONTACTS];
-    int pairs = build->total[DEM2DI_DISCS] + build->total[DEM2DI_OTHERS];
+    int pairs = build->total[DEM2DI_DISCS] + build->total[DEM2DI_OTHERS], last = -1;
     (void)begin;
     (void)end;
     dem2di_sort(build->wall_contacts, build->spare, count);
     for (int i = 0; i < count; i++) {
-        build->keys[pairs + i].a = build->wall_contacts[i].value;
-        build->keys[pairs + i].b = (int)(build->wall_contacts[i].key >> 32);
-        build->old[pairs + i] = dem2di_listed(build->world, &build->keys[pairs + i], true);
+        const dem2di_order *item = &build->wall_contacts[i];
+        const dem2di_key key = {item->value, (int)(item->key >> 32)};
+        build->old[pairs + i] = dem2di_listed(build->world, &key, true, &last);
+    }
+}
+
+/* What was found over the keys of the old list, each block from its end. */
+static void dem2di_keys_task(void *context, int begin, int end) {
+    const dem2di_build *build = (const dem2di_build *)context;
+    dem2di_key *keys = build->world->list.keys;
+    for (int block = begin; block < end; block++) {
+        dem2di_block_result *result = &build->world->block_results[block];
+        const dem2di_key *finds = build->finds + result->finds;
+        for (int k = result->found - 1; k >= 0; k--) {
+            const dem2di_key found = finds[k];
+            if (found.a < 0) continue; /* with walls */
+            int at = --result->starts[found.b < 0 ? DEM2DI_OTHERS : DEM2DI_DISCS];
+            keys[at].a = found.a;
+            keys[at].b = found.b < 0 ? ~found.b : found.b;
+        }
+    }
+}
+
+static void dem2di_keys_set(dem2di_build *build) {
+    int pairs = build->total[DEM2DI_DISCS] + build->total[DEM2DI_OTHERS];
+    dem2di_key *keys = build->world->list.keys;
+    dem2di_run(build->world, DEM2D_PHASE_LIST, dem2di_search_blocks(build->world), dem2di_keys_task,
+               build);
+    for (int i = 0; i < build->total[DEM2DI_WALL_CONTACTS]; i++) {
+        keys[pairs + i].a = build->wall_contacts[i].value;
+        keys[pairs + i].b = (int)(build->wall_contacts[i].key >> 32);
     }
 }
 
@@ -17340,24 +17526,13 @@ static void dem2di_displacement_task(void *context, int begin, int end) {
    so no overlap exceeds the scene, and no force its stiffness times that. With `steps` steps, this
    is true of any sane scene; where it is not, each step is tried before it is taken. Speeds and
    gravity up to these values may be set without asking again. */
-static bool dem2di_bounded(const dem2d_world *world, const dem2di_plan *plan, int contacts) {
-    double far = 0, size = 0, heavy = 0, light = 0, slender = 0, stiff = 0, ratio = 0, rolling = 0;
-    double speed = DEM2DI_SPEED_SURE, spin = DEM2DI_TURN_SURE / world->time_step;
+static bool dem2di_bounded(const dem2d_world *world, const dem2di_plan *plan, int contacts,
+                           const dem2di_extremes *most) {
+    double far = most->far, heavy = most->heavy, stiff = 0, ratio = 0, rolling = 0;
+    double speed = dem2di_max(DEM2DI_SPEED_SURE, most->speed);
+    double spin = dem2di_max(DEM2DI_TURN_SURE / world->time_step, most->spin);
     double belt = 0, turn = 0, flow = dem2di_flow_size(&world->flow);
-    double load = world->loaded ? DEM2DI_LOAD_SURE : 0;
-    bool circles = true;
-    for (int i = 0; i < world->body_count; i++) {
-        const dem2di_state *now = &world->now[i];
-        if (world->loaded) load = dem2di_max(load, dem2di_load_size(&world->loads[i]));
-        far = dem2di_max(far, dem2di_size_of(now->x));
-        speed = dem2di_max(speed, dem2di_size_of(now->v));
-        spin = dem2di_max(spin, fabs(now->w));
-        size = dem2di_max(size, now->radius);
-        light = dem2di_max(light, world->inverse[i].mass);
-        if (world->inverse[i].mass > 0) heavy = dem2di_max(heavy, 1 / world->inverse[i].mass);
-        slender = dem2di_max(slender, world->inverse[i].inertia);
-        circles = circles && dem2di_is_circle(world, i);
-    }
+    double load = world->loaded ? dem2di_max(DEM2DI_LOAD_SURE, most->load) : 0;
     for (int j = 0; j < world->wall_count; j++) {
         const dem2d_wall_desc *wall = &world->walls[j].desc;
         far = dem2di_max(far, dem2di_size_of(world->wall_now[j].point) + world->walls[j].radius);
@@ -17373,16 +17548,16 @@ static bool dem2di_bounded(const dem2d_world *world, const dem2di_plan *plan, in
         ratio = dem2di_max(ratio, law->damping_ratio * (1 + law->friction));
         rolling = dem2di_max(rolling, law->rolling_friction);
     }
-    double depth = 2 * (far + 2 * size), time = DEM2DI_LIST_STEPS * world->time_step;
+    double depth = 2 * (far + 2 * most->size), time = DEM2DI_LIST_STEPS * world->time_step;
     speed += belt + turn * depth + 4 * flow * depth;
     double closing = 2 * (speed + depth / world->time_step),
            dashpot = 2 * ratio * sqrt(heavy * stiff);
     double force = (contacts + 1.0) * (stiff * depth + dashpot * closing); /* damping doubles */
-    speed +=
-        2 * time *
-        (dem2di_max(DEM2DI_SPEED_SURE, dem2di_size_of(world->gravity)) + (force + load) * light);
-    spin += 2 * time * ((force * 2 * size * (1 + rolling) + load) * slender);
-    bool known = plan->terms == 0 || (circles && world->law == NULL);
+    speed += 2 * time *
+             (dem2di_max(DEM2DI_SPEED_SURE, dem2di_size_of(world->gravity)) +
+              (force + load) * most->light);
+    spin += 2 * time * ((force * 2 * most->size * (1 + rolling) + load) * most->slender);
+    bool known = plan->terms == 0 || (!most->others && world->law == NULL);
     return far + time * speed < 1e300 && force * heavy < 1e300 &&
            spin * world->time_step < 1e50 && /* its cube is finite */
            known && world->solver == DEM2D_CERTIFIED;
@@ -17390,51 +17565,54 @@ static bool dem2di_bounded(const dem2d_world *world, const dem2di_plan *plan, in
 
 /* How far the rounding of a position moves a particle in a step, and the box that holds all centres
    while the list lasts. */
-static void dem2di_extent_set(dem2d_world *world) {
-    double far = 0, size = 0, inverse = 0, least = HUGE_VAL;
-    dem2d_box *box = &world->box;
-    for (int i = 0; i < world->body_count; i++) {
-        dem2d_vec x = world->now[i].x;
-        box->lower.x = i == 0 ? x.x : dem2di_min(box->lower.x, x.x);
-        box->lower.y = i == 0 ? x.y : dem2di_min(box->lower.y, x.y);
-        box->upper.x = i == 0 ? x.x : dem2di_max(box->upper.x, x.x);
-        box->upper.y = i == 0 ? x.y : dem2di_max(box->upper.y, x.y);
-        far = dem2di_max(far, dem2di_size_of(x));
-        size = dem2di_max(size, world->now[i].radius);
-        inverse = dem2di_max(inverse, world->inverse_skin_squared[i]);
-        least = dem2di_min(least, world->inverse_skin_squared[i]);
-    }
-    double skin = 1 / sqrt(least); /* the greatest */
-    box->lower = dem2di_sub(box->lower, dem2di_vec(skin, skin));
-    box->upper = dem2di_add(box->upper, dem2di_vec(skin, skin));
-    world->rounding =
-        2 * DBL_EPSILON * (far + size); /* half an ulp of both coordinates, and more */
-    world->roundoff_displacement = world->rounding * sqrt(inverse);
+static void dem2di_extent_set(dem2d_world *world, const dem2di_block_result *all) {
+    double skin = 1 / sqrt(all->least_inverse); /* the greatest */
+    world->box.lower = dem2di_sub(all->box.lower, dem2di_vec(skin, skin));
+    world->box.upper = dem2di_add(all->box.upper, dem2di_vec(skin, skin));
+    world->rounding = 2 * DBL_EPSILON *
+                      (all->extremes.far + all->extremes.size); /* half an ulp of both coordinates,
+                                                                   and more */
+    world->roundoff_displacement = world->rounding * sqrt(all->most_inverse);
 }
 
 /* No eigenvalue of a particle is above the sum of the traces of its contacts. Of two circles a
    contact's is at most 2 (kn + kt) (1/m + R^2/I) with the greater radius, as the contact point may
-   lie outside of the smaller one; of a circle and a wall it is less. The greatest sum over kn + kt,
-   infinite with other shapes. */
-static double dem2di_softness_of(const dem2di_build *build, double *sums) {
-    const dem2d_world *world = build->world;
-    int pairs = build->total[DEM2DI_DISCS] + build->total[DEM2DI_OTHERS], n = world->body_count;
-    double most = 0, *light = sums + n, *slender = light + n; /* 2/m, 2/I */
-    if (build->total[DEM2DI_OTHERS] > 0 || build->plan.terms != 0 || build->plan.turns)
-        return HUGE_VAL;
-    for (int i = 0; i < n; i++) {
-        sums[i] = 0;
-        light[i] = 2 / dem2di_body_mass(world, &world->bodies[i]);
-        slender[i] = 2 / dem2di_body_inertia(world, &world->bodies[i]);
+   lie outside of the smaller one; of a circle and a wall it is less. Here R is the greatest radius
+   of all. The greatest sum over kn + kt, from the numbers of contacts (NULL: those listed), which
+   are of circles alone. */
+static double dem2di_softness_of(const dem2d_world *world, const int *numbers) {
+    const int *first = world->list.first;
+    double size = 0, most = 0;
+    for (int i = 0; i < world->body_count; i++) size = dem2di_max(size, world->now[i].radius);
+    for (int i = 0; i < world->body_count; i++) {
+        const dem2di_body *body = &world->bodies[i];
+        const int number = numbers != NULL ? numbers[i] : first[i + 1] - first[i];
+        const double light = 1 / dem2di_body_mass(world, body);
+        const double slender = 1 / dem2di_body_inertia(world, body);
+        most = dem2di_max(most, 2 * number * (light + size * size * slender));
     }
-    for (int i = 0; i < pairs + build->total[DEM2DI_WALL_CONTACTS]; i++) {
-        int a = build->keys[i].a, b = i < pairs ? dem2di_build_owner(build, build->keys[i].b) : a;
-        double radius = dem2di_max(world->now[a].radius, world->now[b].radius);
-        sums[a] += light[a] + radius * radius * slender[a];
-        if (i < pairs) sums[b] += light[b] + radius * radius * slender[b];
-    }
-    for (int i = 0; i < n; i++) most = dem2di_max(most, sums[i]);
     return most;
+}
+
+/* May softness tell anything? */
+static bool dem2di_softness_holds(const dem2di_plan *plan, int others) {
+    return others == 0 && plan->terms == 0 && !plan->turns;
+}
+
+/* Softness of the contacts that were found, whose numbers come over what the search needed. */
+static double dem2di_build_softness(const dem2di_build *build) {
+    const dem2d_world *world = build->world;
+    int *numbers = (int *)(void *)build->reach;
+    if (!dem2di_softness_holds(&build->plan, build->total[DEM2DI_OTHERS])) return HUGE_VAL;
+    memset(numbers, 0, (size_t)world->body_count * sizeof *numbers);
+    for (int block = 0; block < dem2di_search_blocks(world); block++) {
+        const dem2di_key *finds = build->finds + world->block_results[block].finds;
+        for (int k = 0; k < world->block_results[block].found; k++) {
+            numbers[finds[k].a < 0 ? ~finds[k].a : finds[k].a]++;
+            if (finds[k].a >= 0) numbers[dem2di_build_owner(build, finds[k].b)]++;
+        }
+    }
+    return dem2di_softness_of(world, numbers);
 }
 
 /* Scratch memory of a step with so many contacts, or its size where there is none yet: `back` if it
@@ -17511,15 +17689,25 @@ static bool dem2di_is_soft(const dem2d_world *world, double softness) {
     return dem2di_greatest_stiffness(world) * softness * square <= 4;
 }
 
+/* May the next step be refused for a time step that some particle does not stand? */
+static bool dem2di_stiffness_matters(const dem2d_world *world, double softness) {
+    return world->check_time_step && dem2di_check_is_due(world) && !dem2di_is_soft(world, softness);
+}
+
 /* May the next step look back on the contacts of the last force pass once those of its own are
-   there? The ledger and joints do, and a step that may be refused: by the caller,
-   for a time step that some particle may not stand, or a state that may become infinite. */
-static bool dem2di_looks_back(const dem2d_world *world, const dem2di_plan *plan, bool bounded,
-                              double softness) {
-    bool soft = dem2di_is_soft(world, softness);
-    bool checked = world->check_time_step && dem2di_check_is_due(world);
-    return world->ledger.kept || plan->joints || !bounded || world->gather != NULL ||
-           world->commit != NULL || (checked && !soft);
+   there? The ledger does, and a step that may be refused: by the caller, for a time step that some
+   particle may not stand, or a state that may become infinite. Joints look back on contacts with
+   walls. */
+static bool dem2di_looks_back(const dem2d_world *world, bool bounded, double softness) {
+    return world->ledger.kept || !bounded || world->gather != NULL || world->commit != NULL ||
+           dem2di_stiffness_matters(world, softness);
+}
+
+/* Softness is found for the steps with a check alone; that of the list as it is now. */
+static void dem2di_softness_set(dem2d_world *world) {
+    if (!world->check_time_step || !dem2di_check_is_due(world) || world->softness > 0) return;
+    const bool holds = dem2di_softness_holds(&world->plan, world->list.pairs - world->list.discs);
+    world->softness = holds ? dem2di_softness_of(world, NULL) : HUGE_VAL;
 }
 
 /* Scratch memory for the search and for what it finds, as far as is known. Contacts on their way
@@ -17533,7 +17721,7 @@ static bool dem2di_build_cut(dem2di_build *build) {
         dem2di_cutter cutter = {pass == 0 ? NULL : world->scratch, 0};
         dem2di_grid *grid = &build->grid;
         build->column = cutter.memory;
-        grid->discs = (dem2di_disc *)dem2di_cut(&cutter, n, sizeof *grid->discs);
+        build->reach = (double *)dem2di_cut(&cutter, n, sizeof *build->reach);
         grid->sorted = (dem2di_disc *)dem2di_cut(&cutter, n, sizeof *grid->sorted);
         grid->place = (int *)dem2di_cut(&cutter, n, sizeof *grid->place);
         build->planes = (int *)dem2di_cut(&cutter, (size_t)world->part_count, sizeof(int));
@@ -17541,7 +17729,6 @@ static bool dem2di_build_cut(dem2di_build *build) {
         build->finds = (dem2di_key *)dem2di_cut(&cutter, (size_t)build->room, sizeof(dem2di_key));
         size_t column = dem2di_contacts_largest(&build->plan, discs, count);
         if (column > cutter.used) (void)dem2di_cut(&cutter, column - cutter.used, 1);
-        build->keys = (dem2di_key *)dem2di_cut(&cutter, (size_t)count, sizeof *build->keys);
         build->old = (int *)dem2di_cut(&cutter, (size_t)count, sizeof *build->old);
         build->wall_contacts =
             (dem2di_order *)dem2di_cut(&cutter, walls, sizeof *build->wall_contacts);
@@ -17596,11 +17783,12 @@ static bool dem2di_build_search(dem2di_build *build) {
     bool full = true;
     build->grid.count = world->body_count;
     if (!dem2di_build_cut(build)) return false;
-    dem2di_run(world, DEM2D_PHASE_LIST, blocks, dem2di_disc_task, build);
+    dem2di_run(world, DEM2D_PHASE_LIST, blocks, dem2di_reach_task, build);
     dem2di_discs_survey(build);
     if (!dem2di_build_cut(build)) return false;
     dem2di_run(world, DEM2D_PHASE_LIST, blocks, dem2di_place_task, build);
     dem2di_run(world, DEM2D_PHASE_LIST, 1, dem2di_grid_task, build);
+    dem2di_run(world, DEM2D_PHASE_LIST, blocks, dem2di_sorted_task, build);
     if (!dem2di_build_images(build)) return false;
     while (full)
         if (!dem2di_search_pass(build, &full)) return false;
@@ -17630,13 +17818,13 @@ static void dem2di_build_finish(dem2di_build *build) {
     dem2di_list *list = &world->list;
     int discs = build->total[DEM2DI_DISCS], pairs = discs + build->total[DEM2DI_OTHERS];
     int count = pairs + build->total[DEM2DI_WALL_CONTACTS];
+    dem2di_keys_set(build);
     dem2di_carry_over(build, discs, count);
     dem2di_carry_others(build, discs, pairs);
     list->discs = discs;
     list->pairs = pairs;
     list->count = count;
     if (world->periodic) dem2di_build_images_keep(build, pairs);
-    if (count > 0) memcpy(list->keys, build->keys, (size_t)count * sizeof *list->keys);
     if (world->plan.turns != build->plan.turns) dem2di_reorient(world, build->plan.turns);
     world->plan = build->plan;
     if (world->plan.turns)
@@ -17646,7 +17834,7 @@ static void dem2di_build_finish(dem2di_build *build) {
     world->immovable = dem2di_some_immovable(world);
     dem2di_loads_clear(world);
     dem2di_adjacency_make(world);
-    dem2di_extent_set(world);
+    dem2di_extent_set(world, &build->all);
     world->bounded = build->bounded;
     world->softness = build->softness;
     for (int j = 0; j < world->wall_count; j++)
@@ -17678,16 +17866,12 @@ static dem2d_result dem2di_build_list(dem2d_world *world, const dem2di_plan *pla
     dem2di_build build;
     memset(&build, 0, sizeof build);
     build.world = world;
-    double skin = world->skin, interval = world->interval, largest = 0;
+    double skin = world->skin, interval = world->interval;
     bool sorted = world->scattered;
     bool room = dem2di_block_results_reserve(world, 0, 0) && dem2di_order_names(world) &&
                 dem2di_arrange(world);
     if (room) {
         dem2di_tune_skin(world);
-        for (int i = 0; i < world->body_count; i++)
-            largest = dem2di_max(largest, world->now[i].radius);
-        for (int j = 0; j < world->wall_count; j++)
-            world->walls[j].skin = dem2di_skin_of(world, largest, dem2di_wall_speed(world, j));
         build.plan = *plan;
         room = !build.plan.turns ||
                dem2di_group_reserve(world, DEM2DI_DISPLACEMENTS, dem2di_slots(world));
@@ -17697,9 +17881,11 @@ static dem2d_result dem2di_build_list(dem2d_world *world, const dem2di_plan *pla
     dem2di_run(world, DEM2D_PHASE_LIST, 1, dem2di_wall_contacts_task, &build);
     build.bounded = dem2di_bounded(world, &build.plan,
                                    build.total[DEM2DI_DISCS] + build.total[DEM2DI_OTHERS] +
-                                       build.total[DEM2DI_WALL_CONTACTS]);
-    build.softness = dem2di_softness_of(&build, (double *)(void *)world->scratch);
-    build.back = dem2di_looks_back(world, &build.plan, build.bounded, build.softness);
+                                       build.total[DEM2DI_WALL_CONTACTS],
+                                   &build.all.extremes);
+    if (world->check_time_step && dem2di_check_is_due(world))
+        build.softness = dem2di_build_softness(&build);
+    build.back = build.plan.joints || dem2di_looks_back(world, build.bounded, build.softness);
     if (!dem2di_build_cut(&build)) return dem2di_list_failed(world, skin, interval);
     dem2di_build_finish(&build);
     dem2di_watch_spread(world, sorted);
@@ -17718,7 +17904,11 @@ static dem2d_result dem2di_prepare(dem2d_world *world, bool *listed) {
     if (world->plan.friction && !plan.friction) dem2di_loads_clear(world); /* torques of circles */
     world->plan = plan;
     world->immovable = dem2di_some_immovable(world);
-    world->bounded = dem2di_bounded(world, &plan, world->list.count);
+    dem2di_extremes most;
+    memset(&most, 0, sizeof most);
+    for (int i = 0; i < world->body_count; i++)
+        if (world->bodies[i].shape_index >= 0) dem2di_extremes_add(world, i, &most);
+    world->bounded = dem2di_bounded(world, &plan, world->list.count, &most);
     return DEM2D_OK;
 }
 
@@ -18895,6 +19085,12 @@ typedef struct dem2di_wall_rows {
     int parts, count;
 } dem2di_wall_rows;
 
+/* Is a wall near a particle? Contacts with walls are the last of its contacts. */
+static inline bool dem2di_has_walls(const dem2di_list *list, int slot) {
+    const int end = list->first[slot + 1];
+    return end > list->first[slot] && list->adjacent[end - 1] >= list->pairs;
+}
+
 static dem2di_wall_rows dem2di_wall_rows_of(const dem2d_world *world, int slot) {
     const dem2di_list *list = &world->list;
     dem2di_wall_rows rows;
@@ -19403,7 +19599,7 @@ static void dem2di_joined_task(void *context, int begin, int end) {
         int first = block * DEM2DI_BLOCK;
         memset(count, 0, sizeof *count);
         for (int i = first; i < dem2di_block_end(first, DEM2DI_BLOCK, world->body_count); i++)
-            dem2di_update_joined(world, i, count);
+            if (dem2di_has_walls(&world->list, i)) dem2di_update_joined(world, i, count);
     }
 }
 
@@ -19501,6 +19697,10 @@ static void dem2di_force_task(void *context, int begin, int end) {
     dem2d_world *world = (dem2d_world *)context;
     const dem2di_list *list = &world->list;
     int discs = dem2di_blocks(list->discs, DEM2DI_BLOCK);
+    const bool keeps = world->keeps_last || world->keeps_walls;
+    const int kept_from = world->keeps_last ? 0 : list->pairs;
+    dem2di_kept kept[DEM2DI_COLUMNS];
+    const int columns = keeps ? dem2di_kept_find(world, kept) : 0;
     for (int block = begin; block < end; block++) {
         dem2di_count *count = &world->block_results[block].count;
         bool round = block < discs;
@@ -19508,7 +19708,8 @@ static void dem2di_force_task(void *context, int begin, int end) {
         int first = round ? block * size : list->discs + (block - discs) * size;
         int last = dem2di_block_end(first, size, round ? list->discs : list->count);
         memset(count, 0, sizeof *count);
-        if (world->keeps_last) dem2di_contacts_keep(world, first, last, false);
+        if (keeps)
+            dem2di_contacts_keep(kept, columns, first > kept_from ? first : kept_from, last, false);
         if (round && world->law != NULL)
             dem2di_discs_by_rows(world, first, last, count);
         else if (round)
@@ -20675,9 +20876,12 @@ static dem2d_result dem2di_step_try(dem2d_world *world, dem2di_trial *trial) {
     if (flows && !dem2di_group_reserve(world, DEM2DI_FLOWING, dem2di_slots(world)))
         return dem2di_out_of_memory(world, "velocities in the cell");
     bool due = dem2di_check_is_due(world);
-    bool back = dem2di_looks_back(world, &world->plan, world->bounded, world->softness);
-    if (back && !dem2di_keep_last(world)) return dem2di_out_of_memory(world, "contacts");
+    dem2di_softness_set(world);
+    bool back = dem2di_looks_back(world, world->bounded, world->softness);
+    if ((back || world->plan.joints) && !dem2di_keep_last(world))
+        return dem2di_out_of_memory(world, "contacts");
     world->keeps_last = trial->back = back;
+    world->keeps_walls = world->plan.joints;
     dem2di_flow_enter(world);
     dem2di_force_pass(world, &trial->count);
     dem2di_flow_leave(world);
@@ -20699,7 +20903,9 @@ static dem2d_result dem2di_step(dem2d_world *world) {
     if (world->commit != NULL) agreed = world->commit(world->exchange_user, result);
     if (result == DEM2D_OK) result = agreed;
     if (result != DEM2D_OK) {
-        if (trial.back) dem2di_contacts_keep(world, 0, world->list.count, true);
+        dem2di_kept kept[DEM2DI_COLUMNS];
+        if (trial.back)
+            dem2di_contacts_keep(kept, dem2di_kept_find(world, kept), 0, world->list.count, true);
         return result;
     }
     const dem2di_ledger ledger = world->ledger;
@@ -24023,8 +24229,8 @@ static int *dem2di_filler_head(const dem2di_filler *filler, int level, dem2di_ce
 static dem2di_cell dem2di_filler_cell(const dem2di_filler *filler, dem2d_vec point, double size) {
     dem2d_vec from = dem2di_sub(point, filler->area.box.lower);
     dem2di_cell cell;
-    cell.x = dem2di_cell_of(dem2di_max(0, from.x), size);
-    cell.y = dem2di_cell_of(dem2di_max(0, from.y), size);
+    cell.x = dem2di_cell_of(dem2di_max(0, from.x) / size);
+    cell.y = dem2di_cell_of(dem2di_max(0, from.y) / size);
     return cell;
 }
 

@@ -70,7 +70,8 @@ static int count_missed(const dem2d_world *world) {
                 continue;
             dem2di_key key = {b, a};
             if (world->bodies[a].index < world->bodies[b].index) key.a = a, key.b = b;
-            const int listed = dem2di_listed(world, &key, false);
+            int last = -1;
+            const int listed = dem2di_listed(world, &key, false, &last);
             missed += listed < 0 || (!dem2di_immovable(world, listed) &&
                                      !(world->list.contacts.depth[listed] > 0));
         }
