@@ -12225,6 +12225,8 @@ typedef struct dem2di_wall {
     uint32_t generation;
     int users; /* walls that span to it */
     bool alive;
+    bool quiet; /* stands still without a closed contact, and its states before, now and next are
+                   the same bits: steps pass it over */
     int rank;   /* place in the order of the walls' names and indices */
     int placed; /* the wall at the place of this one's index */
 } dem2di_wall;
@@ -12390,6 +12392,7 @@ typedef struct dem2di_block_result {
                                next list's */
     int starts[3];          /* where these go in the list, by kinds */
     uint32_t levels;        /* of the discs: bit mask */
+    bool walls;             /* some particle has listed contacts with walls */
     int fast;               /* slot of the one of least rank that may pass through others, or -1 */
     int64_t spread;         /* sum of the distances in memory of the partners found */
     int changes;            /* contacts that close or open */
@@ -15498,6 +15501,7 @@ static void dem2di_wall_place(dem2d_world *world, int slot, const dem2d_wall_des
         if (wall->span[i] >= 0) world->walls[wall->span[i]].users++;
     }
     dem2di_wall_state *now = &world->wall_now[slot];
+    wall->quiet = false;
     now->point = desc->point; /* the velocities stay those of the step that was made */
     now->angle = now->rest = 0;
     now->q = dem2d_rot_make(0);
@@ -15743,6 +15747,7 @@ DEM2D_API dem2d_result dem2d_world_drive_wall(dem2d_world *world, dem2d_wall_id 
     for (int j = 0; j < world->wall_count; j++) /* it may have rested beside them */
         if (j != slot && world->walls[j].alive && world->walls[j].desc.segment)
             world->joints_due = wall->desc.segment || world->joints_due;
+    wall->quiet = false;
     wall->desc.mode = DEM2D_WALL_MOVING;
     wall->desc.velocity = velocity;
     wall->desc.angular_velocity = angular_velocity;
@@ -16530,19 +16535,32 @@ static int dem2di_adjacency_sort_many(const dem2d_world *world, int slot, int *r
     return as_b;
 }
 
+/* Is a wall near a particle? Contacts with walls are the last of its contacts. */
+static inline bool dem2di_has_walls(const dem2di_list *list, int slot) {
+    const int end = list->first[slot + 1];
+    return end > list->first[slot] && list->adjacent[end - 1] >= list->pairs;
+}
+
 /* Each particle's contacts in order. */
 static void dem2di_adjacency_sort_task(void *context, int begin, int end) {
     const dem2d_world *world = (const dem2d_world *)context;
     const dem2di_list *list = &world->list;
-    int last = dem2di_block_end((end - 1) * DEM2DI_BLOCK, DEM2DI_BLOCK, world->body_count);
-    for (int slot = begin * DEM2DI_BLOCK; slot < last; slot++) {
-        int *run = list->adjacent + list->first[slot];
-        int count = list->first[slot + 1] - list->first[slot];
-        int as_b = count <= DEM2DI_FEW_CONTACTS
-                       ? dem2di_adjacency_sort_few(world, slot, run, count)
-                       : dem2di_adjacency_sort_many(world, slot, run, count);
-        if (world->image_count > 0) as_b = dem2di_adjacency_images(world, slot, run, count, as_b);
-        list->own[slot] = list->first[slot] + as_b;
+    for (int block = begin; block < end; block++) {
+        int first = block * DEM2DI_BLOCK;
+        int last = dem2di_block_end(first, DEM2DI_BLOCK, world->body_count);
+        bool walls = false;
+        for (int slot = first; slot < last; slot++) {
+            int *run = list->adjacent + list->first[slot];
+            int count = list->first[slot + 1] - list->first[slot];
+            int as_b = count <= DEM2DI_FEW_CONTACTS
+                           ? dem2di_adjacency_sort_few(world, slot, run, count)
+                           : dem2di_adjacency_sort_many(world, slot, run, count);
+            if (world->image_count > 0)
+                as_b = dem2di_adjacency_images(world, slot, run, count, as_b);
+            list->own[slot] = list->first[slot] + as_b;
+            walls |= dem2di_has_walls(list, slot);
+        }
+        world->block_results[block].walls = walls;
     }
 }
 
@@ -19085,12 +19103,6 @@ typedef struct dem2di_wall_rows {
     int parts, count;
 } dem2di_wall_rows;
 
-/* Is a wall near a particle? Contacts with walls are the last of its contacts. */
-static inline bool dem2di_has_walls(const dem2di_list *list, int slot) {
-    const int end = list->first[slot + 1];
-    return end > list->first[slot] && list->adjacent[end - 1] >= list->pairs;
-}
-
 static dem2di_wall_rows dem2di_wall_rows_of(const dem2d_world *world, int slot) {
     const dem2di_list *list = &world->list;
     dem2di_wall_rows rows;
@@ -19598,6 +19610,7 @@ static void dem2di_joined_task(void *context, int begin, int end) {
         dem2di_count *count = &world->block_results[block].count;
         int first = block * DEM2DI_BLOCK;
         memset(count, 0, sizeof *count);
+        if (!world->block_results[block].walls) continue;
         for (int i = first; i < dem2di_block_end(first, DEM2DI_BLOCK, world->body_count); i++)
             if (dem2di_has_walls(&world->list, i)) dem2di_update_joined(world, i, count);
     }
@@ -19746,18 +19759,25 @@ static double dem2di_point_pair_weight(const dem2di_point_pair *pair) {
     return pair->weight[0] + pair->weight[1];
 }
 
-/* Forces on the walls, in the order of the particles' ranks. */
+/* Forces on the walls, in the order of the particles' ranks; first none. */
+static void dem2di_wall_begin(dem2d_world *world, int j) {
+    dem2di_wall_state *next = &world->wall_next[j];
+    *next = world->wall_now[j];
+    next->force = dem2di_vec(0, 0);
+    next->torque = next->shear = 0;
+    world->walls[j].quiet = false;
+}
+
 static void dem2di_wall_sums(dem2d_world *world) {
     const dem2di_list *list = &world->list;
-    for (int j = 0; j < world->wall_count; j++) {
-        world->wall_next[j] = world->wall_now[j];
-        world->wall_next[j].force = dem2di_vec(0, 0);
-        world->wall_next[j].torque = world->wall_next[j].shear = 0;
-    }
+    for (int j = 0; j < world->wall_count; j++)
+        if (!world->walls[j].quiet || world->gather != NULL) dem2di_wall_begin(world, j);
     for (int i = list->pairs; i < list->count; i++) {
         dem2di_contact contact;
         if (!dem2di_contact_get(world, &list->contacts, i, &contact)) continue;
-        dem2di_wall_state *wall = &world->wall_next[dem2di_wall_of(world, i)];
+        const int j = dem2di_wall_of(world, i);
+        if (world->walls[j].quiet) dem2di_wall_begin(world, j);
+        dem2di_wall_state *wall = &world->wall_next[j];
         wall->force = dem2di_add(wall->force, dem2di_contact_force(&contact));
         wall->torque += dem2di_torque_b(&contact, dem2di_moment_of(world, &list->contacts, i));
         wall->shear += contact.shear;
@@ -20075,9 +20095,9 @@ static bool dem2di_control_pass(dem2d_world *world) {
     int begin = list->pairs, end;
     for (int place = 0; place < world->wall_count; place++) {
         int j = world->walls[place].placed;
-        const dem2di_wall *wall = &world->walls[j];
+        dem2di_wall *wall = &world->walls[j];
         dem2di_wall_state *next = &world->wall_next[j];
-        if (!wall->alive) continue;
+        if (!wall->alive || wall->quiet) continue;
         if (wall->desc.mode == DEM2D_WALL_SERVO) {
             while (begin < list->count && list->keys[begin].b < wall->first) begin++;
             for (end = begin; end < list->count && dem2di_wall_of(world, end) == j;) end++;
@@ -20092,6 +20112,9 @@ static bool dem2di_control_pass(dem2d_world *world) {
         if (next->w != 0) dem2di_wall_rotate(next, next->w * world->time_step);
         if (wall->desc.mode != DEM2D_WALL_STILL || wall->reshaped)
             stale = stale || !(dem2di_wall_change(world, world->wall_next, j) <= wall->skin);
+        else
+            wall->quiet = memcmp(next, &world->wall_now[j], sizeof *next) == 0 &&
+                          memcmp(next, &world->wall_before[j], sizeof *next) == 0;
     }
     return stale;
 }
@@ -20827,7 +20850,8 @@ static void dem2di_made(dem2d_world *world) {
 static void dem2di_commit(dem2d_world *world) {
     dem2di_columns_swap(world);
     for (int j = 0; j < world->wall_count; j++)
-        if (world->walls[j].desc.mode != DEM2D_WALL_STILL) dem2di_surfaces_set(world, j);
+        if (!world->walls[j].quiet && world->walls[j].desc.mode != DEM2D_WALL_STILL)
+            dem2di_surfaces_set(world, j);
     dem2di_made(world);
     dem2di_cell_commit(world);
     world->steps++;
@@ -20846,7 +20870,8 @@ static dem2d_result dem2di_check_states(const dem2d_world *world, const dem2di_c
                            "particle %d would get a state that is not finite",
                            world->bodies[slot].index);
     for (int j = 0; j < world->wall_count; j++)
-        if (world->walls[j].alive && (free_hand || world->walls[j].desc.mode != DEM2D_WALL_STILL) &&
+        if (world->walls[j].alive && !world->walls[j].quiet &&
+            (free_hand || world->walls[j].desc.mode != DEM2D_WALL_STILL) &&
             !(dem2di_vec_finite(world->wall_next[j].point) &&
               dem2di_finite(world->wall_next[j].drift) && fabs(world->wall_next[j].angle) <= 4 &&
               (!free_hand || dem2di_vec_finite(world->wall_next[j].force))))
