@@ -4,9 +4,13 @@
 
    Drops mixed grains into a box, on one thread and on several, and prints both times. Exit status:
    0 if all poses and velocities are the same bits, 1 if not, 2 for bad usage. Built without
-   -fopenmp, the loop below is an ordinary one. At the end of a loop OpenMP's threads may wait for
-   each other without giving the processor away: where other programs run, too, that can take longer
-   than the work, and OMP_WAIT_POLICY=passive in the environment helps.
+   -fopenmp, the loop below is an ordinary one.
+
+   At the end of a loop OpenMP's threads wait for each other without giving their processors away.
+   Steps are short, so this is the fastest way where each thread has a processor for itself: leave
+   OMP_WAIT_POLICY alone there. Where other programs need the processors, waiting threads hold up
+   those that they wait for, and steps take many times as long. There take fewer threads, or set
+   OMP_WAIT_POLICY=passive: threads then sleep while they wait, and each wake-up costs time.
 */
 #define _POSIX_C_SOURCE 200809L
 #define DEM2D_IMPLEMENTATION
