@@ -2084,7 +2084,8 @@ DEM2D_API void dem2d_grid_destroy(dem2d_grid *grid);
 /// forces that no field has. The kinetic stress is that of the velocities less the mean velocity of
 /// all that was added to the cell; its trace over twice the density is the granular temperature.
 ///
-/// In a periodic cell the grid has to be periodic with the same periods, b.x of the cell 0.
+/// In a periodic cell the grid has to be periodic with the same periods; if b of the cell is
+/// oblique, with nx = 1.
 ///
 /// Errors: NULL_ARGUMENT, NOT_FINITE, OUT_OF_RANGE (weight; a particle longer than a period; the
 /// periods of the world's cell are others).
@@ -21985,10 +21986,13 @@ static bool dem2di_coarse_weigh(dem2d_grid *grid, dem2d_vec point, dem2d_vec b) 
         edges[k] = dem2di_crossings_start(at[axis] + reach, along[axis], periodic ? -DBL_MAX : 0,
                                           periodic ? DBL_MAX : dem2di_coarse_count(grid, axis));
     }
-    for (double from = 0, to; from < 1; from = to) {
-        to = 1;
+    for (double from = 0; from < 1;) { /* edges that are the same to rounding count once */
+        double to = 1;
         for (int k = 0; k < 4; k++) to = dem2di_min(to, dem2di_crossings_next(&edges[k]));
-        if (to > from) dem2di_coarse_gauss(grid, at, along, from, to);
+        if (to == 1 || to - from > DEM2DI_ROUNDOFF) {
+            dem2di_coarse_gauss(grid, at, along, from, to);
+            from = to;
+        }
         for (int k = 0; k < 4 && to < 1; k++)
             if (dem2di_crossings_next(&edges[k]) <= to)
                 edges[k].number += along[k / 2] > 0 ? 1 : -1;
@@ -22241,20 +22245,22 @@ static dem2d_result dem2di_check_periods(const dem2d_grid *grid, const dem2d_wor
     return DEM2D_OK;
 }
 
-/* Two periods are the same to rounding. */
-static bool dem2di_same_period(double one, double other) {
-    return fabs(one - other) <= DEM2DI_ROUNDOFF * other;
+/* Is the side of a box from low to high a period, within the rounding of the box's numbers? */
+static bool dem2di_is_period(double low, double high, double period) {
+    return fabs(high - low - period) <= DEM2DI_ROUNDOFF * (fabs(low) + fabs(high) + period);
 }
 
-/* A world that is periodic needs a grid with the same periods. */
+/* A world that is periodic needs a grid with the same periods. Along an oblique vector an image is
+   moved along x as well: a single cell along x does not notice. */
 static dem2d_result dem2di_check_grid_cell(const dem2d_grid *grid, const dem2d_world *world) {
     const dem2d_cell *cell = &world->cell;
     const dem2d_grid_desc *desc = &grid->desc;
-    const dem2d_vec side = dem2di_sub(desc->box.upper, desc->box.lower);
-    if (!world->periodic) return DEM2D_OK;
-    if (desc->angle == 0 && cell->b.x == 0 &&
-        (!(cell->a.x > 0) || (desc->periodic_x && dem2di_same_period(side.x, cell->a.x))) &&
-        (!(cell->b.y > 0) || (desc->periodic_y && dem2di_same_period(side.y, cell->b.y))))
+    const dem2d_vec low = desc->box.lower, high = desc->box.upper;
+    bool x = desc->periodic_x && dem2di_is_period(low.x, high.x, cell->a.x);
+    bool y = desc->periodic_y && dem2di_is_period(low.y, high.y, cell->b.y);
+    bool upright = cell->b.x == 0 || (cell->a.x > 0 && desc->nx == 1);
+    if (!world->periodic ||
+        (desc->angle == 0 && upright && (x || !(cell->a.x > 0)) && (y || !(cell->b.y > 0))))
         return DEM2D_OK;
     return dem2di_fail(&grid->env, DEM2D_OUT_OF_RANGE, -1,
                        "box: the grid does not have the periods of the world's cell");

@@ -541,6 +541,51 @@ static void test_flow_balance(void **state) {
     close_scene(&s);
 }
 
+/* The profile of an oblique cell: its sums, and the same for another second vector, as
+   the images are the same. */
+static void test_oblique(void **state) {
+    (void)state;
+    const dem2d_material_desc stone = stone_desc(0, 0);
+    for (int k = 0; k < 3; k++) {
+        dem2d_world_desc desc;
+        memset(&desc, 0, sizeof desc);
+        desc.time_step = 1e-4, desc.skip_time_step_check = true;
+        desc.cell.a = vec(0.6, 0), desc.cell.b = vec(k == 1 ? 0.27 : k == 2 ? -0.33 : 0, 0.7);
+        const scene s = open_scene(&desc, &stone);
+        const dem2d_shape_id disc = give_shape(&s, make_disc(0.1));
+        for (int i = 0; i < 12; i++) {
+            const dem2d_particle_desc g =
+                grain_desc(&s, disc, 1, vec(0.19 * (i % 3) + 0.05 * (i / 3), 0.173 * (i / 3)));
+            (void)add_grain(&s, &g);
+        }
+        step(&s, 1);
+        dem2d_grid_desc d = {0};
+        d.nx = 1, d.ny = 10, d.periodic_x = d.periodic_y = true, d.width_y = 0.2;
+        d.box.lower = vec(100.1, -3), d.box.upper = vec(100.7, -2.3);
+        dem2d_stress whole;
+        assert_ok(dem2d_world_stress(s.world, 0.6 * 0.7, &whole));
+        const int count = fields_of(&s, &d, k == 1 ? others : cells);
+        const dem2d_average *c = k == 1 ? others : cells;
+        long double xx = 0, yy = 0, mass = 0;
+        for (int i = 0; i < count; i++)
+            xx += c[i].contact.xx / 10, yy += c[i].contact.yy / 10, mass += c[i].density * 0.042L;
+        assert_true(whole.xx > 0 && whole.yy > 0);
+        assert_near(xx, whole.xx, 1e-12L);
+        assert_near(yy, whole.yy, 1e-12L);
+        assert_near(mass, 12 * 2700 * 0.01L * TEST_PI, 1e-12L);
+        for (int i = 0; k == 2 && i < count; i++) {
+            assert_near(cells[i].density, others[i].density, 1e-9L);
+            assert_near(cells[i].contact.xx, others[i].contact.xx, 1e-9L);
+        }
+        dem2d_grid *grid;
+        d.nx = 2;
+        assert_ok(dem2d_grid_create(NULL, &d, &grid));
+        assert_result(dem2d_grid_add(grid, s.world, 1), k == 0 ? DEM2D_OK : DEM2D_OUT_OF_RANGE);
+        dem2d_grid_destroy(grid);
+        close_scene(&s);
+    }
+}
+
 /* --- boundary, groups ------------------------------------------------------------------------ */
 
 /* The fields of two groups: sums of numbers are those of both together, and what one pushes at the
@@ -803,8 +848,8 @@ int main(void) {
         cmocka_unit_test(test_flow_balance), cmocka_unit_test(test_groups),
         cmocka_unit_test(test_time_mean),    cmocka_unit_test(test_regions),
         cmocka_unit_test(test_whole),        cmocka_unit_test(test_bits),
-        cmocka_unit_test(test_turned),       cmocka_unit_test(test_files),
-        cmocka_unit_test(test_refused),
+        cmocka_unit_test(test_turned),       cmocka_unit_test(test_oblique),
+        cmocka_unit_test(test_files),        cmocka_unit_test(test_refused),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }
