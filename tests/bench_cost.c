@@ -39,7 +39,9 @@ typedef struct bench {
     dem2d_vec *at;
     double *radius;
     double width, height;
-    bool ask; /* for energy and stress, each step */
+    bool ask;         /* for energy and stress, each step */
+    bool averages;    /* each step is added */
+    dem2d_grid *grid; /* to this */
 } bench;
 
 static void add_wall(bench *b, int i, dem2d_wall_mode mode) {
@@ -68,6 +70,7 @@ static void get_arrays(bench *b, int count) {
 }
 
 static void close_bench(bench *b) {
+    dem2d_grid_destroy(b->grid);
     dem2d_world_destroy(b->world);
     free(b->ids), free(b->at), free(b->radius);
 }
@@ -407,6 +410,16 @@ static void add_other_wall(bench *b, int state, bool segment) {
     expect_ok(dem2d_world_add_wall(b->world, &desc, &id), "wall");
 }
 
+/* Cells of a mean diameter, smoothed over two. OFF: it is there, but nothing is added. */
+static void add_grid(bench *b, int state) {
+    dem2d_grid_desc desc = {0};
+    desc.nx = (int)(b->width / 0.05) + 4, desc.ny = (int)(b->height / 0.05) + 4;
+    desc.box.lower.x = desc.box.lower.y = -0.1, desc.width_x = desc.width_y = 0.1;
+    desc.box.upper.x = 0.05 * desc.nx - 0.1, desc.box.upper.y = 0.05 * desc.ny - 0.1;
+    expect_ok(dem2d_grid_create(NULL, &desc, &b->grid), "grid");
+    b->averages = state == ON;
+}
+
 /* With the discs in place: what is there from now on. */
 static void add_feature(bench *b, const char *feature, int state) {
     dem2d_energy e;
@@ -425,6 +438,7 @@ static void add_feature(bench *b, const char *feature, int state) {
         b->ask = state == ON;
         expect_ok(dem2d_world_energy(b->world, &e), "energy");
     }
+    if (strcmp(feature, "fields") == 0) add_grid(b, state);
 }
 
 static void set_spin(bench *b, double spin) {
@@ -462,12 +476,13 @@ void measured(bench *b, int steps);
 void measured(bench *b, int steps) {
     dem2d_energy e;
     dem2d_stress s;
-    const int stride = b->ask ? 1 : b->kept.renewal > 0 ? b->kept.renewal : steps;
+    const int stride = b->ask || b->averages ? 1 : b->kept.renewal > 0 ? b->kept.renewal : steps;
     for (int done = 0; done < steps; done += stride) {
         if (b->kept.renewal > 0) b->world->list_stale = true;
         expect_ok(dem2d_world_step(b->world, stride, NULL), "step");
         if (b->ask) expect_ok(dem2d_world_energy(b->world, &e), "energy");
         if (b->ask) expect_ok(dem2d_world_stress(b->world, 1, &s), "stress");
+        if (b->averages) expect_ok(dem2d_grid_add(b->grid, b->world, 1), "fields");
     }
 }
 

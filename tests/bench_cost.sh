@@ -76,6 +76,7 @@ wall
 segment
 empty region
 energy, stress
+fields
 ledger
 parallel_for
 gaps of discs
