@@ -24397,7 +24397,7 @@ static bool dem2di_filler_turn(dem2di_filler *filler, int i, const dem2d_box *ro
 static dem2d_result dem2di_filler_try(dem2di_filler *filler, int i, const dem2d_box *room,
                                       bool crowded) {
     dem2d_pose *pose = &filler->poses[i];
-    dem2d_box centres;
+    dem2d_box centres = *room;
     bool meets = !dem2di_filler_turn(filler, i, room, &centres);
     double u = dem2di_random(&filler->random), v = dem2di_random(&filler->random);
     dem2d_result result = DEM2D_OK;

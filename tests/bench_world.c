@@ -1455,7 +1455,7 @@ static void aim_laws(void) {
     }
     aim_law(1, 3.3);
     aim_law(2, 5);
-    aim("LAMMPS with equal laws: difference of paths", path, 0.01, true);
+    aim("LAMMPS with equal laws: difference of paths", path, 0.02, true);
     aim("LAMMPS with equal laws: difference of kinetic energy", energy, 0.01, true);
 }
 
