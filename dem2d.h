@@ -495,6 +495,7 @@ in use is decided after an edit)
     fixed particles, walls, segments, parallel_for        +1    present, but nothing touches them
     polygons for a tenth of the circles                 +521
     energy and stress queried in every step            +1810
+    fields added to a grid in every step              +31400    cells of a diameter, width two
     the ledger of energies                             +1791
     a dashpot                                            +70    with friction; as the next two rows:
     a dashpot and rolling friction                      +240    in beds of bench-guard
@@ -21808,6 +21809,7 @@ typedef struct dem2di_coarse_cell {
    a periodic window is longer than the grid, what is beyond `count` comes round to the first. */
 typedef struct dem2di_window {
     int first, span, count;
+    int begin, end; /* of the shares of a point that are not 0 */
 } dem2di_window;
 
 struct dem2d_grid {
@@ -21888,23 +21890,34 @@ static bool dem2di_coarse_open(dem2d_grid *grid, const double at[2], const doubl
     return true;
 }
 
+/* The shares of a point in the columns or rows of the window, and which are not 0. */
+static void dem2di_coarse_share(dem2d_grid *grid, int axis, double at) {
+    dem2di_window *window = &grid->windows[axis];
+    double reach = grid->reach[axis], *shares = grid->shares[axis];
+    bool folds = window->span > window->count;
+    double from = dem2di_clamp(floor(at - reach) - window->first, 0, window->span);
+    double to = dem2di_clamp(floor(at + reach) + 1 - window->first, from, window->span);
+    double below = dem2di_smooth_step(window->first + from - at, reach);
+    window->begin = folds ? 0 : (int)from;
+    window->end = folds ? window->count : (int)to;
+    if (folds) memset(shares, 0, (size_t)window->count * sizeof *shares);
+    for (int i = (int)from; i < (int)to; i++) {
+        double up_to = dem2di_smooth_step(window->first + (i + 1) - at, reach);
+        if (folds)
+            shares[i % window->count] += up_to - below;
+        else
+            shares[i] = up_to - below;
+        below = up_to;
+    }
+}
+
 /* Add the weights of a point times a factor. */
 static void dem2di_coarse_blend(dem2d_grid *grid, const double at[2], double factor) {
-    for (int k = 0; k < 2; k++) {
-        const dem2di_window *window = &grid->windows[k];
-        double *shares = grid->shares[k];
-        double left = window->first - at[k], below = dem2di_smooth_step(left, grid->reach[k]);
-        memset(shares, 0, (size_t)window->count * sizeof *shares);
-        for (int i = 0; i < window->span; i++) {
-            double up_to = dem2di_smooth_step(left + (i + 1), grid->reach[k]);
-            shares[i % window->count] += up_to - below;
-            below = up_to;
-        }
-    }
-    int columns = grid->windows[0].count, rows = grid->windows[1].count;
-    for (int j = 0; j < rows; j++) {
-        double *row = grid->weights + j * columns, share = factor * grid->shares[1][j];
-        for (int i = 0; i < columns; i++) row[i] += share * grid->shares[0][i];
+    const dem2di_window *columns = &grid->windows[0], *rows = &grid->windows[1];
+    for (int k = 0; k < 2; k++) dem2di_coarse_share(grid, k, at[k]);
+    for (int j = rows->begin; j < rows->end; j++) {
+        double *row = grid->weights + j * columns->count, share = factor * grid->shares[1][j];
+        for (int i = columns->begin; i < columns->end; i++) row[i] += share * grid->shares[0][i];
     }
 }
 
@@ -21968,7 +21981,7 @@ static bool dem2di_coarse_weigh(dem2d_grid *grid, dem2d_vec point, dem2d_vec b) 
     along[1] = turned.y / grid->side.y;
     dem2di_coarse_place(grid, point, at);
     if (grid->radius > 0) {
-        const dem2di_window one = {0, 1, 1};
+        const dem2di_window one = {0, 1, 1, 0, 1};
         grid->windows[0] = grid->windows[1] = one;
         grid->weights[0] = dem2di_circle_part(grid, point, b);
         return grid->weights[0] > 0;
