@@ -1774,6 +1774,7 @@ static void add_moving_walls(dem2d_world *world, const moving *m, dem2d_material
 
 static dem2d_world *open_moving(const moving *m, int count) {
     dem2d_world *world;
+    dem2d_relaxation relaxation;
     dem2d_world_desc scene = {0};
     dem2d_material_desc stone = {.density = DENSITY, .normal_stiffness = STIFFNESS};
     dem2d_particle_desc grain = {0};
@@ -1803,6 +1804,7 @@ static dem2d_world *open_moving(const moving *m, int count) {
     }
     free(radii);
     add_moving_walls(world, m, grain.material, side);
+    expect_ok(dem2d_world_relax(world, 1e-3, 300, &relaxation), "places without overlaps");
     return world;
 }
 

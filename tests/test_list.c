@@ -609,6 +609,81 @@ static void test_segments_listed(void **state) {
     check_segments(30, 1000, 1e300, 20); /* where all cells of a row are one */
 }
 
+/* --- walls that steps pass over -----------------------------------------------------------------
+   A wall that stands still without a contact is passed over until a contact or the caller ends its
+   rest. The same scene with all walls looked at in every step has the same bits. */
+
+enum { FLOOR_PIECES = 12, WALL_STEPS = 900 };
+
+typedef struct floor_scene {
+    scene s;
+    dem2d_wall_id walls[FLOOR_PIECES];
+} floor_scene;
+
+static dem2d_wall_desc floor_piece(const floor_scene *f, int i) {
+    dem2d_wall_desc wall = {0};
+    wall.segment = true, wall.material = f->s.material;
+    wall.point.x = 1.5 * i, wall.end.x = 1.5 * (i + 1);
+    wall.point.y = i % 2 * 0.3, wall.end.y = (i + 1) % 2 * 0.3;
+    return wall;
+}
+
+static floor_scene open_floor(void) {
+    dem2d_world_desc desc = quiet_desc();
+    floor_scene f;
+    desc.time_step = 1e-3, desc.gravity.y = -9.8, desc.ledger = true;
+    f.s = open_scene(&desc, 1e6, 0.4);
+    for (int i = 0; i < FLOOR_PIECES; i++) {
+        const dem2d_wall_desc wall = floor_piece(&f, i);
+        assert_ok(dem2d_world_add_wall(f.s.world, &wall, &f.walls[i]));
+    }
+    for (int i = 0; i < 42; i++)
+        add(&f.s, i % 2, 0.4, 2 + i % 14, 0.9 + 0.9 * (int)(i / 14), i % 3 - 1);
+    return f;
+}
+
+/* Shifts, drives, stops a piece, or makes it a belt or a wall under stress. */
+static void edit_piece(const floor_scene *f, int i, int kind, double amount) {
+    const dem2d_wall_id id = f->walls[i];
+    dem2d_wall_desc wall = floor_piece(f, i);
+    if (kind == 0) wall.point.y -= 0.05 * amount, wall.end.y -= 0.05 * amount;
+    if (kind == 1) wall.surface_speed = amount;
+    if (kind == 2) wall.mode = DEM2D_WALL_SERVO, wall.stress = 100 * amount, wall.max_speed = 0.1;
+    assert_ok(dem2d_world_set_wall(f->s.world, id, &wall));
+    if (kind > 3)
+        assert_ok(dem2d_world_drive_wall(f->s.world, id, dem2di_vec(0, -0.1 * amount),
+                                         kind == 5 ? 0.2 * amount : 0));
+}
+
+static void test_quiet_walls(void **state) {
+    const floor_scene f = open_floor(), other = open_floor();
+    uint64_t random = 5;
+    int quiet = 0, woken = 0;
+    (void)state;
+    for (int k = 0; k < WALL_STEPS; k++) {
+        if (k % 45 == 44) {
+            const int piece = (int)random_between(&random, 0, FLOOR_PIECES);
+            const int kind = (int)random_between(&random, 0, 6);
+            const double amount = random_between(&random, 0.5, 1);
+            edit_piece(&f, piece, kind, amount);
+            edit_piece(&other, piece, kind, amount);
+        }
+        for (int j = 0; j < FLOOR_PIECES; j++) other.s.world->walls[j].quiet = false;
+        bool was[FLOOR_PIECES];
+        for (int j = 0; j < FLOOR_PIECES; j++) was[j] = f.s.world->walls[j].quiet;
+        assert_ok(dem2d_world_step(f.s.world, 1, NULL));
+        assert_ok(dem2d_world_step(other.s.world, 1, NULL));
+        assert_true(dem2d_world_hash(f.s.world) == dem2d_world_hash(other.s.world));
+        for (int j = 0; j < FLOOR_PIECES; j++) {
+            quiet += was[j];
+            woken += was[j] && !f.s.world->walls[j].quiet;
+        }
+    }
+    assert_true(quiet > WALL_STEPS && woken > 20);
+    dem2d_world_destroy(f.s.world);
+    dem2d_world_destroy(other.s.world);
+}
+
 int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(test_clouds),      cmocka_unit_test(test_far_crawl),
@@ -619,6 +694,7 @@ int main(void) {
         cmocka_unit_test(test_deep_lever),  cmocka_unit_test(test_fast),
         cmocka_unit_test(test_falls_fast),  cmocka_unit_test(test_checks),
         cmocka_unit_test(test_fast_custom), cmocka_unit_test(test_segments_listed),
+        cmocka_unit_test(test_quiet_walls),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }
