@@ -2057,8 +2057,8 @@ typedef struct dem2d_average {
 } dem2d_average;
 
 /// Create an empty grid; *grid is the caller's, to be released by dem2d_grid_destroy. It belongs to
-/// no world and is in no snapshot. env may be NULL. Errors: NULL_ARGUMENT, OUT_OF_RANGE,
-/// NOT_FINITE, OUT_OF_MEMORY.
+/// no world and is in no snapshot, and takes 152 bytes for each cell. env may be NULL. Errors:
+/// NULL_ARGUMENT, OUT_OF_RANGE, NOT_FINITE, OUT_OF_MEMORY.
 DEM2D_API dem2d_result dem2d_grid_create(const dem2d_env *env, const dem2d_grid_desc *desc,
                                          dem2d_grid **grid);
 /// Release a grid; NULL is allowed.
@@ -2086,7 +2086,7 @@ DEM2D_API void dem2d_grid_destroy(dem2d_grid *grid);
 /// all that was added to the cell; its trace over twice the density is the granular temperature.
 ///
 /// In a periodic cell the grid has to be periodic with the same periods; if b of the cell is
-/// oblique, with nx = 1.
+/// oblique, with nx = 1. While the cell deforms, velocities are the fluctuations about its flow.
 ///
 /// Errors: NULL_ARGUMENT, NOT_FINITE, OUT_OF_RANGE (weight; a particle longer than a period; the
 /// periods of the world's cell are others).

@@ -357,6 +357,42 @@ static void test_totals(void **state) {
     close_scene(&s);
 }
 
+/* Boxes on a chain of segments: contacts at vertices count with their signs. */
+static void test_joints(void **state) {
+    (void)state;
+    static const dem2d_vec corners[4] = {{0, 0}, {0.2, 0}, {0.2, 0.1}, {0, 0.1}};
+    static const dem2d_vec points[5] = {{0, 0.8}, {0, 0.1}, {0.4, 0.104}, {0.9, 0.1}, {0.9, 0.8}};
+    static dem2d_contact_info list[CONTACTS];
+    dem2d_material_desc stone = stone_desc(5e6, 0.3);
+    dem2d_world_desc desc;
+    memset(&desc, 0, sizeof desc);
+    stone.damping_ratio = 0.2, desc.time_step = 1e-4, desc.gravity = vec(0, -300);
+    const scene s = open_scene(&desc, &stone);
+    const dem2d_shape_id box = give_shape(&s, make_polygon(corners, 4, 0.01));
+    dem2d_wall_desc chain = plane_desc(&s, vec(0, 0), vec(0, 0));
+    chain.points = points, chain.count = 5;
+    (void)add_wall(&s, &chain);
+    for (int i = 0; i < 9; i++) {
+        dem2d_particle_desc g =
+            grain_desc(&s, box, 1, vec(0.17 + 0.22 * (i % 3), 0.3 + 0.16 * (i / 3)));
+        g.angle = i % 2 ? 0 : -0.02;
+        (void)add_grain(&s, &g);
+    }
+    int vertices = 0;
+    for (int i = 0; i < 4000 && vertices == 0; i++) {
+        step(&s, 1);
+        const int count = contacts_of(&s, list, CONTACTS);
+        for (int k = 0; k < count; k++) vertices += list[k].feature > 0;
+    }
+    assert_true(vertices > 0);
+    find_grains(&s, 0);
+    const dem2d_grid_desc wide = wide_desc(0.1);
+    const int count = fields_of(&s, &wide, cells);
+    const dem2d_average total = total_of(count, 2 * 2.2 / count);
+    check_totals(&s, &total);
+    close_scene(&s);
+}
+
 /* Periodic: nothing is lost without a margin, and a box that begins elsewhere has the same cells in
    another order. */
 static void test_periodic(void **state) {
@@ -584,6 +620,43 @@ static void test_oblique(void **state) {
         dem2d_grid_destroy(grid);
         close_scene(&s);
     }
+}
+
+/* In a cell that is sheared: sums of the profile are the stresses of the cell, with velocities less
+   the flow. */
+static void test_sheared(void **state) {
+    (void)state;
+    const dem2d_material_desc stone = stone_desc(5e6, 0.4);
+    dem2d_deformation_desc shear = {0, 3, 0};
+    dem2d_cell_info info;
+    dem2d_world_desc desc;
+    memset(&desc, 0, sizeof desc);
+    desc.time_step = 1e-4, desc.cell.a = vec(0.8, 0), desc.cell.b = vec(0, 0.7);
+    const scene s = open_scene(&desc, &stone);
+    const dem2d_shape_id disc = give_shape(&s, make_disc(0.052));
+    for (int i = 0; i < 56; i++) {
+        dem2d_particle_desc g =
+            grain_desc(&s, disc, i % 3 ? 0.9 : 1, vec(0.1 * (i % 8), 0.1 * (i / 8)));
+        g.velocity = vec(uniform(-1, 1), uniform(-1, 1));
+        (void)add_grain(&s, &g);
+    }
+    assert_ok(dem2d_world_deform(s.world, &shear));
+    step(&s, 700);
+    assert_ok(dem2d_world_get_cell(s.world, &info));
+    assert_true(fabs(info.cell.b.x) > 0.01);
+    dem2d_grid_desc d = {0};
+    d.nx = 1, d.ny = 9, d.periodic_x = d.periodic_y = true, d.width_y = 0.1;
+    d.box.upper = vec(0.8, 0.7);
+    const int count = fields_of(&s, &d, cells);
+    long double contact = 0, kinetic = 0;
+    for (int i = 0; i < count; i++) {
+        contact += cells[i].contact.xy / count;
+        kinetic += cells[i].kinetic.yy / count;
+        kinetic += cells[i].momentum.y * cells[i].velocity.y / count;
+    }
+    assert_near(contact, info.contact.xy, 1e-11L);
+    assert_near(kinetic, info.kinetic.yy, 1e-11L);
+    close_scene(&s);
 }
 
 /* --- boundary, groups ------------------------------------------------------------------------ */
@@ -849,6 +922,7 @@ int main(void) {
         cmocka_unit_test(test_time_mean),    cmocka_unit_test(test_regions),
         cmocka_unit_test(test_whole),        cmocka_unit_test(test_bits),
         cmocka_unit_test(test_turned),       cmocka_unit_test(test_oblique),
+        cmocka_unit_test(test_sheared),      cmocka_unit_test(test_joints),
         cmocka_unit_test(test_files),        cmocka_unit_test(test_refused),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
