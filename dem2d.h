@@ -24,7 +24,7 @@ CONTENTS (search for the anchor, ">>" and the word)
                     coarse-grained fields                                   >>api-grids
                     queries of space                                        >>api-queries
                     particles and contacts in bulk                          >>api-bulk
-                    gradings, filling, inlets and outlets                   >>api-generators
+                    gradings, filling, growth, inlets and outlets           >>api-generators
                     state hash, snapshots                                   >>api-snapshot
                     writers                                                 >>api-writers
     Implementation  compiler, constants, floating point                     >>config
@@ -59,7 +59,7 @@ CONTENTS (search for the anchor, ">>" and the word)
                     coarse-grained fields on grids                          >>grids
                     overlaps, rays, the nearest                             >>queries
                     particles and contacts from and into arrays             >>bulk
-                    gradings, filling, inlets and outlets                   >>generators
+                    gradings, filling, growth, inlets and outlets           >>generators
                     bytes to a callback or a file                           >>output
                     state hash, snapshots                                   >>snapshot
                     pictures, files for ParaView, histories                 >>writers
@@ -332,6 +332,8 @@ HOW TO
                          shapes and materials by shares. dem2d_world_grading: the curve of a world.
     fill a region        dem2d_world_fill: a box or the inside of an outline, with grains of a
                          grading or of yours, on a lattice or by random sequential addition.
+    pack grains          dem2d_world_fill loosely, then dem2d_world_grow: sizes grow while the world
+                         steps, to a stress or a solid fraction; friction 0 for dense packings.
     put grains in over   dem2d_world_feed: a rate of mass or number in a region, with velocities.
       time, take them    dem2d_world_remove_in: what is in a region goes. dem2d_world_flow: what has
       out, count them    crossed a line in a step. Both add up number, mass and area.
@@ -2286,7 +2288,7 @@ DEM2D_API dem2d_result dem2d_world_read_contacts(const dem2d_world *world,
                                                  int *count);
 
 /* ============================================================================================
-   >>api-generators  Gradings, filling, inlets and outlets; random numbers
+   >>api-generators  Gradings, filling, growth, inlets and outlets; random numbers
    ============================================================================================ */
 
 /// Random number, uniform in [0, 1), with the same bits from every compiler (splitmix64). The state
@@ -2474,6 +2476,40 @@ typedef struct dem2d_inlet {
 /// Errors: those of dem2d_world_fill but NOT_REACHED; OUT_OF_RANGE (both rates above 0).
 DEM2D_API dem2d_result dem2d_world_feed(dem2d_world *world, const dem2d_inlet_desc *desc,
                                         double seconds, dem2d_inlet *inlet);
+
+/// How grains grow to a packing. Give either a stress or a solid fraction.
+typedef struct dem2d_growth_desc {
+    double area;           ///< m2, > 0, of the sample: of a box of walls, or of the cell
+    double stress;         ///< Pa, >= 0, mean stress (xx + yy)/2 that is to be reached; or 0
+    double solid_fraction; ///< >= 0, of the area, that is to be reached; or 0
+    double friction;       ///< coefficient, >= 0, of all contacts meanwhile: 0 for dense packings
+    double local_damping;  ///< [0, 1), meanwhile
+    /// 1/s, >= 0, greatest relative growth of sizes; 0, with a stress: an inertial number of 0.01
+    double rate;
+    double tolerance; ///< >= 0, of the stress, and of the unbalanced force; 0 for 0.01
+} dem2d_growth_desc;
+
+/// What dem2d_world_grow has done.
+typedef struct dem2d_growth {
+    int steps;             ///< taken
+    bool reached;          ///< what was to be reached
+    double factor;         ///< all sizes have been multiplied by it
+    double stress;         ///< Pa, mean
+    double solid_fraction; ///< area of all particles over the area of the sample
+    double unbalanced;     ///< mean resultant over mean contact force: see dem2d_equilibrium
+} dem2d_growth;
+
+/// Let all free particles (no sensors) grow by the same factor while the world steps, in at most
+/// `steps` steps (>= 0): until the mean stress is reached and the particles are at rest, or until
+/// the solid fraction is reached. Contacts keep their springs. Meanwhile all contacts have the
+/// friction of the desc, and the world its local damping; then they have their own again. Sizes
+/// change every 10 steps, by 1 % at most. They grow at the rate below a tenth of the stress, then
+/// at 0.3 of the rate, less in the last 5 %; above the stress they shrink, the more the greater the
+/// excess. If growth->reached is false, the next call goes on; the bits do not depend on how steps
+/// are shared out among calls, in tens. A step that fails ends the growth with its result; sizes
+/// stay as they are then. Errors: those of dem2d_world_step; OUT_OF_RANGE.
+DEM2D_API dem2d_result dem2d_world_grow(dem2d_world *world, const dem2d_growth_desc *desc,
+                                        int steps, dem2d_growth *growth);
 
 /* ============================================================================================
    >>api-snapshot  State hash, snapshots
@@ -23737,9 +23773,9 @@ DEM2D_API dem2d_result dem2d_world_read_contacts(const dem2d_world *world,
 }
 
 /* ============================================================================================
-   >>generators  Gradings, filling, inlets and outlets
-   uses: config, math, memory, fields, shapes, outlines, contact, broad, world, objects, walls,
-         measures, queries
+   >>generators  Gradings, filling, growth, inlets and outlets
+   uses: config, math, memory, fields, shapes, outlines, contact, broad, world, cell, objects,
+         walls, step, measures, queries
    ============================================================================================ */
 
 /* HOW A PACKING IS MADE
@@ -23748,6 +23784,7 @@ DEM2D_API dem2d_result dem2d_world_read_contacts(const dem2d_world *world,
                 down -> kinds in turn -> shuffled descs (dem2di_sample_draw)
      fill       descs, region -> places (dem2di_filler), which change nothing in the world; then all
                 that have found one are added, for which memory is reserved before
+     growth     stress, sizes -> other sizes, every ten steps
    The random numbers of each are one stream, in an order that depends on nothing but the desc and
    on what is in the way. */
 
@@ -24917,6 +24954,208 @@ DEM2D_API dem2d_result dem2d_world_feed(dem2d_world *world, const dem2d_inlet_de
         dem2di_release(env, feed.grains, count, sizeof *feed.grains);
     }
     if (result == DEM2D_OK) *inlet = feed.inlet;
+    return result;
+}
+
+/* --- growth ------------------------------------------------------------------------------------
+   To the neighbour list and to the known gaps of pairs, growth is a displacement: no support value
+   rises by more than the growth of the bounding radius. */
+
+static const dem2di_field dem2di_growth_fields[] = {
+    DEM2DI_ROW(dem2d_growth_desc, area, DEM2DI_POSITIVE, "m2 none"),
+    DEM2DI_ROW(dem2d_growth_desc, stress, DEM2DI_FROM_0, "Pa 0; or solid_fraction"),
+    DEM2DI_ROW(dem2d_growth_desc, solid_fraction, DEM2DI_FROM_0, "- 0; or stress"),
+    DEM2DI_ROW(dem2d_growth_desc, friction, DEM2DI_FROM_0, "- 0"),
+    DEM2DI_ROW(dem2d_growth_desc, local_damping, DEM2DI_FRACTION, "- 0"),
+    DEM2DI_ROW(dem2d_growth_desc, rate, DEM2DI_FROM_0, "1/s by the inertial number"),
+    DEM2DI_ROW(dem2d_growth_desc, tolerance, DEM2DI_FROM_0, "- 0.01"),
+};
+
+#define DEM2DI_GROWTH_STEPS 10     /* from one change of the sizes to the next */
+#define DEM2DI_GROWTH_MOST 0.01    /* of the sizes in a change: they can't pass each other */
+#define DEM2DI_GROWTH_INERTIA 0.01 /* inertial number: sizes grow by a few thousand steps to jam */
+
+/* The free particles of a growing sample, and all of them. */
+typedef struct dem2di_sample {
+    int count;   /* of free ones */
+    double mass; /* kg/m, of them */
+    double free; /* m2, of them */
+    double all;  /* m2, of all */
+} dem2di_sample;
+
+static dem2di_sample dem2di_sample_of(const dem2d_world *world) {
+    dem2di_sample sample = {0, 0, 0, 0};
+    for (int place = 0, slot; (slot = dem2di_next_grain(world, &place)) >= 0;) {
+        const dem2di_body *body = &world->bodies[slot];
+        double area = dem2di_body_area(world, body);
+        sample.all += area;
+        if (body->motion != DEM2D_FREE) continue;
+        sample.free += area;
+        sample.mass += dem2di_body_mass(world, body);
+        sample.count++;
+    }
+    return sample;
+}
+
+/* All free particles get other sizes. */
+static void dem2di_sizes_multiply(dem2d_world *world, double factor) {
+    double most = 0;
+    for (int i = 0; i < world->body_count; i++) {
+        dem2di_body *body = &world->bodies[i];
+        if (body->shape_index < 0 || body->motion != DEM2D_FREE) continue;
+        if (dem2di_groups_at(world, i).sensor) continue;
+        double circumscribed = dem2di_shape_of(world, body)->circumscribed;
+        double grown = fabs(factor - 1) * (circumscribed * body->scale) * (1 + 4 * DBL_EPSILON);
+        body->scale *= factor;
+        world->now[i].radius = world->before[i].radius = circumscribed * body->scale;
+        world->inverse[i] = dem2di_inverse_of(world, body);
+        if (world->plan.turns) {
+            world->displacement[i] += grown * (1 + 4 * DBL_EPSILON);
+            world->lever[i] *= factor;
+        }
+        most = dem2di_max(most, grown * sqrt(world->inverse_skin_squared[i]));
+    }
+    dem2di_images_make(world);
+    world->tree.made = world->sums_fresh = false;
+    world->ledger.edited = true;
+    if (world->list_stale) return;
+    world->list_displacement += most;
+    world->list_stale = world->list_used_up =
+        !(world->list_displacement <= 1 - DEM2DI_LIST_STEPS * DBL_EPSILON);
+}
+
+/* The mean stress at the last force pass. */
+static double dem2di_mean_stress(const dem2d_world *world, double area) {
+    dem2d_stress stress = {0, 0, 0, 0};
+    (void)dem2d_world_stress(world, area, &stress);
+    return stress.xx / 2 + stress.yy / 2;
+}
+
+/* The stiffest normal spring that materials have with each other. */
+static double dem2di_stiffest_spring(const dem2d_world *world) {
+    double most = 0;
+    for (int i = 0; i < world->material_count * world->material_count; i++)
+        most =
+            dem2di_max(most, dem2di_law(world, i / world->material_count, i % world->material_count)
+                                 ->normal_stiffness);
+    return most;
+}
+
+/* By what factor sizes change now. Where the stress is too great, the relative change in time is
+   that of the overlaps, stress over stiffness, in three times sqrt(mass/stiffness). */
+static double dem2di_growth_factor(const dem2d_world *world, const dem2d_growth_desc *desc,
+                                   const dem2di_sample *sample) {
+    double change = 0, rate = desc->rate, time = DEM2DI_GROWTH_STEPS * world->time_step;
+    if (!(desc->stress > 0)) {
+        double aim = (desc->solid_fraction * desc->area - (sample->all - sample->free));
+        change = sqrt(dem2di_max(0, aim) / sample->free) - 1;
+        return 1 + dem2di_max(-rate * time, dem2di_min(rate * time, change));
+    }
+    double part = dem2di_mean_stress(world, desc->area) / desc->stress;
+    double mass = sample->mass / sample->count, stiffness = dem2di_stiffest_spring(world);
+    if (!(rate > 0)) rate = DEM2DI_GROWTH_INERTIA * sqrt(desc->stress / mass);
+    if (part < 0.1)
+        change = rate;
+    else if (part < 1)
+        change = rate * 0.3 * dem2di_min(1, (1 - part) / 0.05);
+    else
+        change = (1 - part) * (desc->stress / stiffness) / (3 * sqrt(mass / stiffness));
+    return 1 + dem2di_max(-rate, change) * time;
+}
+
+/* What a growth has reached by now. */
+static void dem2di_growth_measure(const dem2d_world *world, const dem2d_growth_desc *desc,
+                                  dem2d_growth *growth) {
+    double tolerance = desc->tolerance > 0 ? desc->tolerance : 0.01;
+    dem2d_equilibrium rest;
+    (void)dem2d_world_equilibrium(world, &rest);
+    growth->stress = dem2di_mean_stress(world, desc->area);
+    growth->solid_fraction = dem2di_sample_of(world).all / desc->area;
+    growth->unbalanced = rest.unbalanced;
+    growth->reached =
+        desc->stress > 0
+            ? fabs(growth->stress / desc->stress - 1) <= tolerance && rest.unbalanced <= tolerance
+            : fabs(growth->solid_fraction / desc->solid_fraction - 1) <= 1e-12;
+}
+
+/* All contacts get a friction, which changes places with the one that they have. */
+static void dem2di_frictions_swap(dem2d_world *world, double *frictions) {
+    for (int i = 0; i < world->material_count * world->material_count; i++) {
+        dem2d_pair_desc *law =
+            dem2di_law(world, i / world->material_count, i % world->material_count);
+        double own = law->friction;
+        law->friction = frictions[i];
+        if (!(law->tangential_stiffness > 0) && world->law == NULL) law->friction = 0;
+        frictions[i] = own;
+    }
+    world->check_due = world->ledger.edited = true;
+    dem2di_edited(world);
+}
+
+static dem2d_result dem2di_growth_check(const dem2d_world *world, const dem2d_growth_desc *desc,
+                                        int steps) {
+    const dem2d_env *env = &world->env;
+    dem2d_result result = dem2di_check_fields(env, DEM2DI_ALL(dem2di_growth_fields), desc);
+    if (result == DEM2D_OK) result = dem2di_check_number(env, "steps", steps, DEM2DI_COUNT);
+    if (result != DEM2D_OK) return result;
+    if ((desc->stress > 0) == (desc->solid_fraction > 0))
+        return dem2di_fail(env, DEM2D_OUT_OF_RANGE, -1,
+                           "stress = %g and solid_fraction = %g: one has to be 0", desc->stress,
+                           desc->solid_fraction);
+    if (!(desc->stress > 0) && !(desc->rate > 0))
+        return dem2di_fail(env, DEM2D_OUT_OF_RANGE, -1, "rate = %g is not > 0, without a stress",
+                           desc->rate);
+    dem2di_sample sample = dem2di_sample_of(world);
+    if (sample.count == 0)
+        return dem2di_fail(env, DEM2D_OUT_OF_RANGE, -1, "no free particles that could grow");
+    if (!(desc->stress > 0) && !(desc->solid_fraction * desc->area > sample.all - sample.free))
+        return dem2di_fail(env, DEM2D_OUT_OF_RANGE, -1,
+                           "solid_fraction = %g: particles that are not free fill %g",
+                           desc->solid_fraction, (sample.all - sample.free) / desc->area);
+    return DEM2D_OK;
+}
+
+/* Growth with the friction and damping of the world as they are. */
+static dem2d_result dem2di_growth_run(dem2d_world *world, const dem2d_growth_desc *desc, int steps,
+                                      dem2d_growth *growth) {
+    dem2d_result result = DEM2D_OK;
+    dem2di_growth_measure(world, desc, growth);
+    while (result == DEM2D_OK && growth->steps < steps && !growth->reached) {
+        const dem2di_sample sample = dem2di_sample_of(world);
+        double factor = dem2di_growth_factor(world, desc, &sample);
+        int done = 0, left = steps - growth->steps;
+        factor = dem2di_max(1 - DEM2DI_GROWTH_MOST, dem2di_min(1 + DEM2DI_GROWTH_MOST, factor));
+        dem2di_sizes_multiply(world, factor);
+        growth->factor *= factor;
+        result =
+            dem2d_world_step(world, left < DEM2DI_GROWTH_STEPS ? left : DEM2DI_GROWTH_STEPS, &done);
+        growth->steps += done;
+        dem2di_growth_measure(world, desc, growth);
+    }
+    return result;
+}
+
+DEM2D_API dem2d_result dem2d_world_grow(dem2d_world *world, const dem2d_growth_desc *desc,
+                                        int steps, dem2d_growth *growth) {
+    dem2d_growth done;
+    if (world == NULL || desc == NULL || growth == NULL) return DEM2D_NULL_ARGUMENT;
+    dem2d_result result = dem2d_world_step(world, 0, NULL); /* not by a callback of a step */
+    if (result == DEM2D_OK) result = dem2di_growth_check(world, desc, steps);
+    if (result != DEM2D_OK) return result;
+    int laws = world->material_count * world->material_count;
+    double *frictions = (double *)dem2di_allocate(&world->env, (size_t)laws, sizeof *frictions);
+    if (frictions == NULL) return dem2di_fail_memory(&world->env, laws, "frictions");
+    for (int i = 0; i < laws; i++) frictions[i] = desc->friction;
+    double damping = world->local_damping;
+    memset(&done, 0, sizeof done);
+    done.factor = 1;
+    dem2di_frictions_swap(world, frictions);
+    world->local_damping = desc->local_damping;
+    result = dem2di_growth_run(world, desc, steps, &done);
+    world->local_damping = damping;
+    dem2di_frictions_swap(world, frictions);
+    dem2di_release(&world->env, frictions, (size_t)laws, sizeof *frictions);
+    if (result == DEM2D_OK) *growth = done;
     return result;
 }
 

@@ -81,6 +81,7 @@ enum {
     FILL,
     INLET,
     DEFORMATION,
+    GROWTH,
     DESCS
 };
 
@@ -366,6 +367,7 @@ typedef struct args {
         dem2d_fill_desc fill;
         dem2d_inlet_desc inlet;
         dem2d_deformation_desc deformation;
+        dem2d_growth_desc growth;
         dem2d_particle_arrays particles;
         dem2d_contact_arrays contacts;
     } d;
@@ -555,6 +557,10 @@ static void with_inlet(args *a, fixture *f) {
     memset(&a->d, 0, sizeof a->d);
     a->d.inlet.grading = &a->grading, a->d.inlet.number_rate = 10;
     a->d.inlet.region.box = a->box, a->state = &a->inlet;
+}
+static void with_growth(args *a, fixture *f) { /* of 0 steps: others fail half way */
+    (void)f;
+    a->d.growth.area = 1, a->d.growth.stress = 100, a->count = 0;
 }
 static void with_where(args *a, fixture *f) {
     (void)f;
@@ -1034,6 +1040,9 @@ typedef struct function {
     F(world_feed, dem2d_world_feed(v->world, v->desc, v->x, v->state),                            \
       DESCRIBED(INLET, with_inlet), IN_WORLD, THE_DESC, ARG(x, "seconds", NOT_NEGATIVE),          \
       ARG(state, "inlet", POINTER), ARG(inlet.due, "inlet.due", NOT_NEGATIVE))                    \
+    F(world_grow, dem2d_world_grow(v->world, v->desc, v->count, v->out),                          \
+      DESCRIBED(GROWTH, with_growth), IN_WORLD, THE_DESC,                                         \
+      ARG_INT(count, "steps", 0, INT_MAX, OUT_OF_RANGE), OUT)                                     \
     F(world_deform, dem2d_world_deform(v->world, v->desc),                                        \
       DESCRIBED(DEFORMATION, with_deformation), IN_WORLD, THE_DESC)                               \
     F(world_get_cell, dem2d_world_get_cell(v->world, v->out), LOGS, IN_WORLD, OUT)

@@ -92,6 +92,7 @@ bool fields_get(int number, field_row *row) {
         {"dem2d_draw_desc", DEM2DI_ALL(dem2di_draw_fields)},
         {"dem2d_fill_desc", DEM2DI_ALL(dem2di_fill_fields)},
         {"dem2d_inlet_desc", DEM2DI_ALL(dem2di_inlet_fields)},
+        {"dem2d_growth_desc", DEM2DI_ALL(dem2di_growth_fields)},
         {"dem2d_save_desc", DEM2DI_ALL(save_fields)},
         {"dem2d_load_desc", DEM2DI_ALL(load_fields)},
         {"dem2d_svg_desc", DEM2DI_ALL(dem2di_svg_fields)},

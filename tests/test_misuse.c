@@ -12,10 +12,10 @@
 /* --- the fields of descs --------------------------------------------------------------------- */
 
 static const char *const desc_names[DESCS] = {
-    "custom",   "reduction", "image",    "fit",        "virtual", "contact", "world",
-    "material", "pair",      "particle", "wall",       "save",    "load",    "svg",
-    "vtp",      "pvd",       "csv",      "wall",       "query",   "grid",    "grading",
-    "draw",     "fill",      "inlet",    "deformation"};
+    "custom",   "reduction", "image",    "fit",         "virtual", "contact", "world",
+    "material", "pair",      "particle", "wall",        "save",    "load",    "svg",
+    "vtp",      "pvd",       "csv",      "wall",        "query",   "grid",    "grading",
+    "draw",     "fill",      "inlet",    "deformation", "growth"};
 
 #define FIELD(type, field, ...) \
     { .name = #field, .offset = offsetof(dem2d_##type, field), .kind = __VA_ARGS__ }
@@ -73,6 +73,7 @@ static const struct special {
     {FILL, FIELD(fill_desc, grading, POINTER)},
     {FILL, FIELD(fill_desc, region.box.upper, UPPER)},
     {INLET, FIELD(inlet_desc, region.box.upper, UPPER)},
+    {GROWTH, FIELD(growth_desc, stress, POSITIVE)},
 };
 
 typedef struct desc_rows {
