@@ -138,7 +138,7 @@ static void test_stress(void **state) {
 /* The same bits with another skin, in several calls, and in a world that was saved and loaded in
    between: growth uses up the bounds of gaps and lists as far as it has to. */
 static void test_bits(void **state) {
-    enum { STEPS = 16000 };
+    enum { STEPS = 10000 };
     static const double skins[4] = {0, 0.5, 0.02, 0};
     uint64_t hashes[4];
     (void)state;
