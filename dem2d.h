@@ -22407,13 +22407,16 @@ DEM2D_API dem2d_result dem2d_world_average_circle(const dem2d_world *world, dem2
    mixture and distant scenes cost no more.
 
    A question visits the nodes that are within its limit, the nearer child first, and looks at each
-   item of a leaf; then at each half-plane. */
+   item of a leaf; then at each half-plane. For the first hit of a ray, an item whose shape needs a
+   search waits: its circles, inscribed and bounding, say between which distances the hit is, and
+   lower the limit at once; the search is made for those few that are still within it at the end. */
 
 /* Of a ray: distance of tangent and chord at a right angle to the surface, of the radius. A hundred
    times the rounding errors of support points. */
 #define DEM2DI_RAY 1e-12
 
 #define DEM2DI_LEAF 8        /* items in a leaf at most: the minimum is flat */
+#define DEM2DI_WAITING 16    /* items that a ray keeps waiting: more than two leaves have */
 #define DEM2DI_TREE_DEPTH 64 /* more than levels of a tree of 2^31 items */
 
 /* Lists of up to this many are sorted by insertion: a radix sort counts 256 digits for a byte. */
@@ -22425,6 +22428,12 @@ typedef enum dem2di_ask {
     DEM2DI_ASK_RAY,
     DEM2DI_ASK_NEAREST
 } dem2di_ask;
+
+/* An item that a ray may hit, from this distance on. */
+typedef struct dem2di_waiting {
+    double from;
+    int item;
+} dem2di_waiting;
 
 typedef struct dem2di_question {
     dem2d_world *world;
@@ -22444,6 +22453,8 @@ typedef struct dem2di_question {
     int count;                /* of tree.found */
     int item;                 /* the nearest, */
     dem2d_hit hit;            /* if there is one */
+    int waits;                /* of the first hit of a ray: items that are not yet looked at */
+    dem2di_waiting waiting[DEM2DI_WAITING];
 } dem2di_question;
 
 /* --- the tree ----------------------------------------------------------------------------------
@@ -22556,10 +22567,13 @@ static double dem2di_inverse_component(double component) {
    has 1 over the components of the unit direction. */
 static inline void dem2di_ray_box(dem2d_vec origin, dem2d_vec inverse, const dem2d_box *box,
                                   double in[2]) {
-    double x0 = (box->lower.x - origin.x) * inverse.x, x1 = (box->upper.x - origin.x) * inverse.x;
-    double y0 = (box->lower.y - origin.y) * inverse.y, y1 = (box->upper.y - origin.y) * inverse.y;
-    in[0] = dem2di_max(0, dem2di_max(dem2di_min(x0, x1), dem2di_min(y0, y1)));
-    in[1] = dem2di_min(dem2di_max(x0, x1), dem2di_max(y0, y1));
+    bool west = inverse.x < 0, south = inverse.y < 0; /* the same for all boxes of a ray */
+    double x0 = ((west ? box->upper.x : box->lower.x) - origin.x) * inverse.x;
+    double x1 = ((west ? box->lower.x : box->upper.x) - origin.x) * inverse.x;
+    double y0 = ((south ? box->upper.y : box->lower.y) - origin.y) * inverse.y;
+    double y1 = ((south ? box->lower.y : box->upper.y) - origin.y) * inverse.y;
+    in[0] = dem2di_max(0, dem2di_max(x0, y0));
+    in[1] = dem2di_min(x1, y1);
 }
 
 /* From a point to the nearest point of a box; 0 inside. */
@@ -22570,19 +22584,15 @@ static inline dem2d_vec dem2di_to_box(dem2d_vec point, const dem2d_box *box) {
 }
 
 /* How far what is in a box is at least; HUGE_VAL: it does not matter. */
-static double dem2di_reach(const dem2di_question *question, const dem2d_box *box) {
+static DEM2DI_INLINE double dem2di_reach(const dem2di_question *question, const dem2d_box *box) {
     const dem2d_box *own = &question->box;
     double in[2];
-    switch (question->ask) {
-    case DEM2DI_ASK_RAY:
+    if (question->ask == DEM2DI_ASK_RAY) {
         dem2di_ray_box(question->origin, question->inverse, box, in);
         return in[0] <= in[1] ? in[0] : HUGE_VAL;
-    case DEM2DI_ASK_NEAREST:
-        return dem2di_length(dem2di_to_box(question->origin, box));
-    case DEM2DI_ASK_REGION:
-    case DEM2DI_ASK_WALL:
-        break;
     }
+    if (question->ask == DEM2DI_ASK_NEAREST)
+        return dem2di_length(dem2di_to_box(question->origin, box));
     return own->lower.x <= box->upper.x && own->upper.x >= box->lower.x &&
                    own->lower.y <= box->upper.y && own->upper.y >= box->lower.y
                ? 0
@@ -22747,10 +22757,12 @@ static bool dem2di_polygon_entry(const dem2d_shape *shape, dem2d_vec p, dem2d_ve
 }
 
 /* Two support points of a shape, relative to p, the first to the left of the line and the second to
-   its right. The entry is between their normals. */
+   its right. The entry is between their normals. At first these are at a right angle to the line,
+   and their points are not known where it is sure that the line hits. */
 typedef struct dem2di_straddle {
     dem2d_vec u[2], s[2];
     double side[2]; /* distance from the line, >= 0 and <= 0 */
+    bool known[2];
 } dem2di_straddle;
 
 /* The support point of a normal comes in, in the place of the one on its side. */
@@ -22759,38 +22771,86 @@ static void dem2di_straddle_put(dem2di_straddle *both, int end, dem2d_vec d, dem
     both->u[end] = u;
     both->s[end] = s;
     both->side[end] = dem2di_cross(d, s);
+    both->known[end] = true;
 }
 
-/* The next normal: a step of Newton's, of which the next support point is on the line to first
-   order (its distance changes by rho u.d for each radian), or every third time, and where that
-   leaves the bracket, the normal of the chord. */
-static dem2d_vec dem2di_straddle_next(const dem2di_straddle *both, dem2d_vec u, double turn,
-                                      bool chord) {
-    dem2d_vec next, middle;
-    if (!chord && fabs(turn) < 1 && dem2di_unit(dem2di_along(u, turn, dem2di_perp(u)), &next) &&
-        dem2di_cross(both->u[0], next) > 0 && dem2di_cross(next, both->u[1]) > 0)
-        return next;
-    if (dem2di_unit(dem2di_right(dem2di_sub(both->s[1], both->s[0])), &next)) return next;
-    middle = dem2di_add(both->u[0], both->u[1]);
-    return dem2di_unit(middle, &next) ? next : u;
+/* Finds the points that are not known; false when both are on one side. */
+static bool dem2di_straddle_know(const dem2d_shape *shape, dem2d_vec p, dem2d_vec d,
+                                 dem2di_straddle *both) {
+    for (int end = 0; end < 2; end++) {
+        dem2d_vec u = both->u[end];
+        if (both->known[end]) continue;
+        dem2di_straddle_put(both, end, d, u, dem2di_sub(dem2di_support(shape, u, NULL), p));
+    }
+    return both->side[0] >= 0 && both->side[1] <= 0;
 }
+
+/* How far behind the crossing of the tangent at s the entry may be, at a right angle to the
+   surface: the chord of the straddle is behind it. */
+static double dem2di_chord_gap(const dem2di_straddle *both, dem2d_vec d, double at, double facing) {
+    double width = both->side[0] - both->side[1], share = width > 0 ? both->side[0] / width : 0;
+    double from = dem2di_dot(both->s[0], d), to = dem2di_dot(both->s[1], d);
+    if (!both->known[0] || !both->known[1]) return HUGE_VAL;
+    return (from + share * (to - from) - at) * -facing;
+}
+
+/* The same by a ball within the shape, of the least radius of curvature r beside the normal u,
+   which the tangent touches at a distance `far` from the crossing. From there the line enters the
+   ball after t, t^2 - 2 b t + far^2 <= 0 with b = r |u.d| - far, so that t <= far^2/b if b >= far.
+   The ball lies within as far as the table of radii reaches: 2 pi/128 = 0.049. */
+static double dem2di_ball_gap(const dem2d_shape *shape, dem2d_vec u, double far, double facing) {
+    double radii[2];
+    dem2di_least_rho(shape, u, radii);
+    double r = dem2di_min(radii[0], radii[1]), b = -r * facing - far;
+    return far < 0.04 * r && b >= far ? far * far / b * -facing : HUGE_VAL;
+}
+
+/* The next normal: where the line enters the circle of curvature; false when that leaves the
+   straddle. With a point so near that its chord would do, it is aimed as far beyond the line as
+   that is before it. */
+static bool dem2di_straddle_curve(const dem2di_straddle *both, dem2d_vec d, dem2d_vec s, double rho,
+                                  double facing, double tolerance, dem2d_vec *u) {
+    double side = dem2di_cross(d, s), centre = side - rho * dem2di_cross(d, *u);
+    double far = side / facing, beyond = 2 * far * far <= tolerance * rho ? side : 0;
+    double sine = -(centre + beyond) / rho;
+    if (!(fabs(sine) < 1)) return false;
+    dem2d_vec next = dem2di_along(dem2di_scale(dem2di_perp(d), sine), -sqrt(1 - sine * sine), d);
+    if (!(dem2di_cross(both->u[0], next) > 0 && dem2di_cross(next, both->u[1]) > 0)) return false;
+    *u = next;
+    return true;
+}
+
+/* The normal of the chord, or where there is none, the middle. */
+static void dem2di_straddle_chord(const dem2di_straddle *both, dem2d_vec *u) {
+    if (dem2di_unit(dem2di_right(dem2di_sub(both->s[1], both->s[0])), u)) return;
+    dem2d_vec next;
+    if (dem2di_unit(dem2di_add(both->u[0], both->u[1]), &next)) *u = next;
+}
+
+/* Steps by circles of curvature alone before a chord has its turn, and between two chords. */
+#define DEM2DI_CURVES_FIRST 5
+#define DEM2DI_CURVES 2
 
 /* Any support function h. The tangent with the normal u is crossed at (h(u) - u.p)/(u.d), if u
    faces the line (u.d < 0); the entry is the greatest of these. Its support point is on the line:
-   the points to both sides, whose distance from the line is monotone in the angle of u, are brought
-   together. The entry lies between the greatest crossing of a tangent and that of the chord. */
+   the distance of support points from the line is monotone in the angle of u. Circles of curvature
+   lead there, at least as fast as Newton's steps; chords keep the points to both sides apart. The
+   entry lies between the greatest crossing of a tangent and that of a ball within, or of a
+   chord. */
 static bool dem2di_support_entry(const dem2d_shape *shape, dem2d_vec p, dem2d_vec d,
                                  dem2di_entry *entry) {
     dem2di_straddle both;
-    double square = shape->circumscribed * shape->circumscribed - dem2di_dot(p, p);
-    dem2d_vec u = dem2di_negate(d), across = dem2di_perp(d);
-    if (square > 0) (void)dem2di_unit(dem2di_along(p, -sqrt(square), d), &u); /* of the circle */
-    for (int end = 0; end < 2; end++, across = dem2di_negate(across))
-        dem2di_straddle_put(&both, end, d, across,
-                            dem2di_sub(dem2di_support(shape, across, NULL), p));
-    if (both.side[0] < 0 || both.side[1] > 0) return false;
+    double square = dem2di_dot(p, p), tolerance = DEM2DI_RAY * shape->circumscribed;
+    double left = shape->circumscribed * shape->circumscribed - square;
+    bool sure = square < shape->inscribed * shape->inscribed && shape->type != DEM2D_CUSTOM;
+    dem2d_vec u = dem2di_negate(d);
+    if (left > 0) (void)dem2di_unit(dem2di_along(p, -sqrt(left), d), &u); /* of the circle */
+    memset(&both, 0, sizeof both);
+    both.u[0] = dem2di_perp(d);
+    both.u[1] = dem2di_negate(both.u[0]);
+    if (!sure && !dem2di_straddle_know(shape, p, d, &both)) return false;
     entry->at = -HUGE_VAL;
-    for (int i = 0; i < 128; i++) {
+    for (int i = 0, curves = DEM2DI_CURVES_FIRST; i < 128; i++, curves--) {
         double rho, facing = dem2di_dot(u, d);
         dem2d_vec s = dem2di_sub(dem2di_support(shape, u, &rho), p);
         double side = dem2di_cross(d, s), at = dem2di_dot(s, u) / facing;
@@ -22799,11 +22859,13 @@ static bool dem2di_support_entry(const dem2d_shape *shape, dem2d_vec p, dem2d_ve
             entry->at = at;
             entry->normal = u;
         }
-        double width = both.side[0] - both.side[1], share = width > 0 ? both.side[0] / width : 0;
-        double from = dem2di_dot(both.s[0], d), to = dem2di_dot(both.s[1], d);
-        double inside = from + share * (to - from);
-        if ((inside - entry->at) * -facing <= DEM2DI_RAY * shape->circumscribed) break;
-        u = dem2di_straddle_next(&both, u, -side / (rho * facing), i % 3 == 2);
+        if (dem2di_ball_gap(shape, u, fabs(side / facing), facing) <= tolerance ||
+            dem2di_chord_gap(&both, d, entry->at, facing) <= tolerance)
+            break;
+        if (curves > 0 && dem2di_straddle_curve(&both, d, s, rho, facing, tolerance, &u)) continue;
+        if (curves <= 0) curves = DEM2DI_CURVES + 1;
+        (void)dem2di_straddle_know(shape, p, d, &both);
+        dem2di_straddle_chord(&both, &u);
     }
     return true;
 }
@@ -23019,7 +23081,7 @@ static void dem2di_item_ask(dem2di_question *question, int item) {
         found->value = item;
         return;
     }
-    bool later = question->count > 0 && hit.distance == question->limit &&
+    bool later = question->count > 0 && hit.distance == question->hit.distance &&
                  dem2di_item_rank(world, item) > dem2di_item_rank(world, question->item);
     if (later) return;
     question->count = 1;
@@ -23028,34 +23090,95 @@ static void dem2di_item_ask(dem2di_question *question, int item) {
     question->limit = hit.distance;
 }
 
-/* Nodes within the limit, the nearer child first. */
+/* The items that wait are looked at, the nearest first. */
+static void dem2di_waiting_ask(dem2di_question *question) {
+    dem2di_waiting *waiting = question->waiting;
+    for (; question->waits > 0; question->waits--) {
+        int next = 0;
+        for (int k = 1; k < question->waits; k++)
+            if (waiting[k].from < waiting[next].from) next = k;
+        if (!(waiting[next].from <= question->limit)) break;
+        int item = waiting[next].item;
+        waiting[next] = waiting[question->waits - 1];
+        dem2di_item_ask(question, item);
+    }
+    question->waits = 0;
+}
+
+/* A ray towards an item, for its first hit. Shapes that need a search wait until the circles of
+   others have shown that most are behind the hit: the ray enters a shape not before its bounding
+   circle. One that goes through the inscribed circle as well hits what is wanted there at most;
+   what is farther does not matter from then on. */
+static void dem2di_item_cast(dem2di_question *question, int item) {
+    const dem2di_state *state = &question->world->now[item];
+    const dem2di_body *body = &question->world->bodies[item];
+    dem2d_vec from = dem2di_sub(question->origin, state->x), d = question->direction;
+    double foot = -dem2di_dot(from, d), arm = dem2di_cross(d, from), radius = state->radius;
+    if (fabs(arm) > radius || foot + radius < 0 || foot - radius > question->limit) return;
+    const dem2d_shape *shape = dem2di_shape_of(question->world, body);
+    if (shape->type != DEM2D_BEZIER && shape->type != DEM2D_FOURIER) {
+        dem2di_item_ask(question, item);
+        return;
+    }
+    double inner = shape->inscribed * body->scale, in = (inner - arm) * (inner + arm);
+    double margin = DEM2DI_ROUNDOFF * (dem2di_size_of(from) + radius);
+    double nearest = foot - sqrt((radius - arm) * (radius + arm)) - margin;
+    if (nearest > question->limit || !dem2di_item_wanted(question, item)) return;
+    if (in > 0 && foot > 0)
+        question->limit = dem2di_min(question->limit, dem2di_max(0, foot - sqrt(in)) + margin);
+    question->waiting[question->waits].from = nearest;
+    question->waiting[question->waits++].item = item;
+}
+
+static void dem2di_leaf_cast(dem2di_question *question, const int *items, int count) {
+    if (question->waits + count > DEM2DI_WAITING) dem2di_waiting_ask(question);
+    for (int i = 0; i < count; i++) {
+        if (items[i] >= 0)
+            dem2di_item_cast(question, items[i]);
+        else
+            dem2di_item_ask(question, items[i]);
+    }
+}
+
+static void dem2di_leaf_ask(dem2di_question *question, int leaf) {
+    const dem2di_tree *tree = &question->world->tree;
+    int begin = dem2di_leaf_begin(tree, leaf), end = dem2di_leaf_begin(tree, leaf + 1);
+    if (question->ask == DEM2DI_ASK_RAY && !question->all) {
+        dem2di_leaf_cast(question, tree->items + begin, end - begin);
+        return;
+    }
+    for (int i = begin; i < end; i++) dem2di_item_ask(question, tree->items[i]);
+}
+
+/* Nodes within the limit: on with the nearer child, the other one waits. */
 static void dem2di_tree_ask(dem2di_question *question) {
     const dem2di_tree *tree = &question->world->tree;
     struct {
         int node;
         double reach;
     } stack[DEM2DI_TREE_DEPTH];
-    int depth = 0;
-    stack[depth].node = 0;
-    stack[depth++].reach = dem2di_reach(question, &tree->boxes[0]);
-    while (depth-- > 0) {
-        int node = stack[depth].node, leaf = node - (tree->leaves - 1);
-        if (stack[depth].reach > question->limit) continue;
-        if (leaf >= 0) {
-            for (int i = dem2di_leaf_begin(tree, leaf); i < dem2di_leaf_begin(tree, leaf + 1); i++)
-                dem2di_item_ask(question, tree->items[i]);
-            continue;
+    int depth = 0, node = 0;
+    double reach = dem2di_reach(question, &tree->boxes[0]);
+    for (;;) {
+        while (reach <= question->limit && node < tree->leaves - 1) {
+            node = 2 * node + 1;
+            reach = dem2di_reach(question, &tree->boxes[node]);
+            double other = dem2di_reach(question, &tree->boxes[node + 1]);
+            bool second = other < reach;
+            double later = second ? reach : other;
+            if (later <= question->limit) {
+                stack[depth].node = node + !second;
+                stack[depth++].reach = later;
+            }
+            node += second;
+            reach = second ? other : reach;
         }
-        double reach[2];
-        for (int k = 0; k < 2; k++)
-            reach[k] = dem2di_reach(question, &tree->boxes[2 * node + 1 + k]);
-        for (int k = 0; k < 2; k++) { /* the last one is taken first */
-            int child = (reach[0] < reach[1]) == (k == 0);
-            if (reach[child] > question->limit) continue;
-            stack[depth].node = 2 * node + 1 + child;
-            stack[depth++].reach = reach[child];
-        }
+        if (reach <= question->limit) dem2di_leaf_ask(question, node - (tree->leaves - 1));
+        if (depth == 0) break;
+        node = stack[--depth].node;
+        reach = stack[depth].reach;
     }
+    dem2di_waiting_ask(question);
 }
 
 static dem2d_result dem2di_question_ask(dem2di_question *question) {
@@ -23074,7 +23197,7 @@ static dem2d_result dem2di_question_ask(dem2di_question *question) {
 static dem2di_question dem2di_question_make(dem2d_world *world, dem2di_ask ask,
                                             const dem2d_query_desc *desc) {
     dem2di_question question;
-    memset(&question, 0, sizeof question);
+    memset(&question, 0, offsetof(dem2di_question, waiting));
     question.world = world;
     question.ask = ask;
     if (desc != NULL) question.desc = *desc;

@@ -87,10 +87,12 @@ typedef struct body {
     bool there;
 } body;
 
+/* A half-plane, a segment, or a segment of a chain. */
 typedef struct plane {
     bool segment;
     dem2d_vec from, to, normal;
     dem2d_wall_id id;
+    int part;
 } plane;
 
 static double body_support(const body *b, int i) {
@@ -152,7 +154,7 @@ static double plane_gap(const plane *w, dem2d_vec p) {
 /* --- a scene -----------------------------------------------------------------------------------
  */
 
-enum { BODIES = 240, PLANES = 5 };
+enum { BODIES = 240, PLANES = 8 }; /* half-planes, segment, open chain, closed chain */
 
 typedef struct crowd {
     scene s;
@@ -186,19 +188,67 @@ static double angle_at(int turn) {
 static void crowd_add(crowd *c, body *b) {
     dem2d_particle_desc desc = grain_desc(&c->s, c->shape_id[b->kind], b->scale, b->at);
     desc.angle = angle_at(b->turn), desc.motion = DEM2D_FIXED;
+    desc.groups.sensor = b->turn % 7 == 0;
     b->id = add_grain(&c->s, &desc);
+}
+
+static const dem2d_vec paddle[3] = {{0.3, 1.2}, {0.6, 1.3}, {0.4, 1.6}};
+static const dem2d_vec paddle_pivot = {0.45, 1.35};
+#define PADDLE_TURN 0.7 /* rad, in the one step that is made */
+#define CROWD_STEP 1e-6
+
+/* The walls: half-planes; a one-sided chain, a sensor, a paddle that turns. */
+static void crowd_add_planes(crowd *c) {
+    const dem2d_vec open[3] = {{0.2, 0.5}, {0.9, 0.7}, {1.4, 0.4}};
+    dem2d_wall_desc desc = plane_desc(&c->s, vec(0, 0.1), vec(0, 1));
+    for (int i = 0; i < PLANES; i++) {
+        plane *w = &c->planes[i];
+        w->segment = i >= 2;
+        if (i >= 3) w->part = (i - 3) % 2;
+        if (i >= 5) w->part = i - 5;
+    }
+    c->planes[0].from = desc.point, c->planes[0].normal = desc.normal;
+    c->planes[0].id = add_wall(&c->s, &desc);
+    const double length = hypot(1, 0.2);
+    desc.point = c->planes[1].from = vec(1.9, 0), desc.normal = vec(-1, 0.2);
+    c->planes[1].normal = vec(-1 / length, 0.2 / length);
+    c->planes[1].id = add_wall(&c->s, &desc);
+    desc.segment = true, desc.groups.sensor = true;
+    desc.point = c->planes[2].from = vec(1, 1.2), desc.end = c->planes[2].to = vec(1, 1.9);
+    c->planes[2].id = add_wall(&c->s, &desc);
+    desc.segment = desc.groups.sensor = false, desc.points = open, desc.count = 3;
+    desc.one_sided = true;
+    const dem2d_wall_id chain = add_wall(&c->s, &desc);
+    desc.one_sided = false, desc.points = paddle, desc.closed = true, desc.pivot = paddle_pivot;
+    desc.mode = DEM2D_WALL_MOVING, desc.angular_velocity = PADDLE_TURN / CROWD_STEP;
+    const dem2d_wall_id turning = add_wall(&c->s, &desc);
+    for (int i = 3; i < PLANES; i++) {
+        plane *w = &c->planes[i];
+        const dem2d_vec *points = i < 5 ? open : paddle;
+        w->id = i < 5 ? chain : turning;
+        w->from = points[w->part], w->to = points[(w->part + 1) % 3];
+    }
+}
+
+/* The step: the paddle turns about its pivot, all else is fixed. */
+static void crowd_step(crowd *c) {
+    const dem2d_vec u = direction(PADDLE_TURN);
+    dem2d_vec at[3];
+    step(&c->s, 1);
+    for (int k = 0; k < 3; k++) {
+        const dem2d_vec arm = minus(paddle[k], paddle_pivot);
+        at[k] = vec(paddle_pivot.x + u.x * arm.x - u.y * arm.y,
+                    paddle_pivot.y + u.y * arm.x + u.x * arm.y);
+    }
+    for (int k = 0; k < 3; k++)
+        c->planes[5 + k].from = at[k], c->planes[5 + k].to = at[(k + 1) % 3];
 }
 
 static void crowd_make(crowd *c, uint64_t seed) {
     const dem2d_material_desc material = stone_desc(1e6, 0.3);
-    const dem2d_vec at[PLANES][2] = {{{0, 0.1}, {0, 1}},
-                                     {{1.9, 0}, {-1, 0.2}},
-                                     {{0.2, 0.5}, {0.9, 0.7}},
-                                     {{0.9, 0.7}, {1.4, 0.4}},
-                                     {{1, 1.2}, {1, 1.9}}};
     dem2d_world_desc desc = {0};
     memset(c, 0, sizeof *c);
-    c->random = seed, desc.time_step = 1e-6;
+    c->random = seed, desc.time_step = CROWD_STEP;
     c->s = open_scene(&desc, &material);
     for (int kind = 0; kind < KINDS; kind++)
         c->shape_id[kind] = copy_shape(&c->s, c->shape[kind] = make_kind(kind));
@@ -206,14 +256,7 @@ static void crowd_make(crowd *c, uint64_t seed) {
         c->bodies[i] = random_body(c);
         crowd_add(c, &c->bodies[i]);
     }
-    for (int i = 0; i < PLANES; i++) {
-        plane *w = &c->planes[i];
-        const double length = hypot(at[i][1].x, at[i][1].y);
-        w->segment = i >= 2, w->from = at[i][0], w->to = at[i][1];
-        w->normal = vec(at[i][1].x / length, at[i][1].y / length);
-        w->id = w->segment ? add_segment(&c->s, at[i][0], at[i][1])
-                           : add_plane(&c->s, at[i][0].x, at[i][0].y, at[i][1].x, at[i][1].y);
-    }
+    crowd_add_planes(c);
 }
 
 static void crowd_end(crowd *c) {
@@ -262,15 +305,16 @@ static void check_found(const crowd *c, const answer *expected, const dem2d_foun
     int64_t last = -1;
     for (int k = 0; k < count; k++) {
         const bool wall = found[k].wall.generation != 0;
-        const int64_t rank =
-            wall ? (int64_t)1 << 32 | found[k].wall.index : (int64_t)found[k].particle.index;
+        const int64_t rank = wall ? ((int64_t)found[k].wall.index + 1) << 32 | found[k].part
+                                  : (int64_t)found[k].particle.index;
         assert_true(wall != (found[k].particle.generation != 0));
         assert_true(rank > last);
         last = rank;
         for (int i = 0; i < MOST; i++)
             if (i < BODIES ? !wall && c->bodies[i].there &&
                                  same_particle(c->bodies[i].id, found[k].particle)
-                           : wall && c->planes[i - BODIES].id.index == found[k].wall.index)
+                           : wall && c->planes[i - BODIES].id.index == found[k].wall.index &&
+                                 c->planes[i - BODIES].part == found[k].part)
                 seen[i] = true;
     }
     for (int i = 0; i < MOST; i++) {
@@ -446,8 +490,10 @@ static void check_ray(crowd *c, double length) {
     for (int k = 1; k < count; k++)
         for (int j = k; j > 0; j--) {
             const bool wall[2] = {found[j - 1].wall.generation != 0, found[j].wall.generation != 0};
+            const int64_t at = (int64_t)found[j].wall.index << 32 | found[j].part;
+            const int64_t before = (int64_t)found[j - 1].wall.index << 32 | found[j - 1].part;
             const bool less = wall[0] != wall[1] ? wall[0]
-                              : wall[0]          ? found[j].wall.index < found[j - 1].wall.index
+                              : wall[0]          ? at < before
                                         : found[j].particle.index < found[j - 1].particle.index;
             if (!less) break;
             const dem2d_found swap = found[j];
@@ -461,6 +507,7 @@ static void check_ray(crowd *c, double length) {
         assert_memory_equal(&first.found.particle, &hits[0].found.particle,
                             sizeof(dem2d_particle_id));
         assert_memory_equal(&first.found.wall, &hits[0].found.wall, sizeof(dem2d_wall_id));
+        assert_int_equal(first.found.part, hits[0].found.part);
     }
     assert_true(count > 0 || (first.found.particle.generation == 0 &&
                               first.found.wall.generation == 0 && first.distance == 0));
@@ -504,7 +551,7 @@ static void test_random(void **state) {
     crowd_make(&c, 3);
     for (int round = 0; round < rounds; round++) {
         if (round % 50 == 49) crowd_shuffle(&c);
-        if (round == rounds / 2) step(&c.s, 1); /* before and after the first step */
+        if (round == rounds / 2) crowd_step(&c); /* before and after the first step */
         for (int k = 0; k < 10; k++) {
             dem2d_box box;
             const double width = 0.5 * pow(random_between(&c.random, 0, 1), 2);
@@ -743,49 +790,62 @@ static void test_pile(void **state) {
     assert_true(hash[0] == hash[1]);
 }
 
-/* A game: 60 pictures a second of 200 grains. A ray from above picks the top grain, and a spring to
-   the mouse lifts it out of the heap; there it hangs with its weight on the spring. */
-static void test_game(void **state) {
+/* --- counted work ------------------------------------------------------------------------------
+ */
+
+static int64_t calls;
+
+static dem2d_vec counted_support(void *user, dem2d_vec u, double *rho) {
+    (void)user;
+    calls++;
+    if (rho != NULL) *rho = 0.4;
+    return vec(0.4 * u.x, 0.4 * u.y);
+}
+
+/* Boxes in a lattice of discs that count their support points: the work depends on what a box cuts,
+   not on how many grains there are; those within the box take none. A ray takes that of the first
+   hit alone. */
+static void test_work(void **state) {
     (void)state;
-    enum { GRAINS = 200, STEPS = 167 };
-    const dem2d_material_desc material = stone_desc(1e6, 0.5);
-    const dem2d_query_desc grains = {.skip_walls = true};
-    dem2d_world_desc desc = {0};
-    dem2d_hit picked;
-    dem2d_vec mouse = vec(1, 0);
-    desc.time_step = 1.0 / 60 / STEPS, desc.gravity.y = -9.81, desc.global_damping = 1;
-    scene s = open_scene(&desc, &material);
-    dem2d_shape_id shapes[KINDS];
-    for (int k = 0; k < KINDS; k++) shapes[k] = give_shape(&s, make_kind(k));
-    add_floor(&s), add_plane(&s, 0, 0, 1, 0), add_plane(&s, 2, 0, -1, 0);
-    for (int i = 0; i < GRAINS; i++) {
-        dem2d_particle_desc grain = grain_desc(&s, shapes[i % KINDS], 1,
-                                               vec(0.07 + 0.13 * (i % 15), 0.07 + 0.13 * (i / 15)));
-        grain.angle = i;
-        add_grain(&s, &grain);
-    }
-    for (int frame = 0; frame < 60; frame++) step(&s, STEPS); /* they fall */
-    assert_ok(dem2d_world_cast_ray(s.world, vec(1, 9), vec(0, -1), 0, &grains, &picked));
-    const dem2d_particle_id id = picked.found.particle;
-    assert_int_not_equal(id.generation, 0);
-    const double mass = grain_of(&s, id).mass, k = 200 * mass, c = 20 * mass; /* 1/s2, 1/s */
-    for (int frame = 0; frame < 180; frame++) {
-        const double share = frame < 60 ? frame / 60.0 : 1;
-        mouse = vec(1, picked.point.y + share * (3 - picked.point.y));
-        for (int n = 0; n < STEPS; n += 10) { /* the spring follows the grain */
-            const dem2d_particle_info info = grain_of(&s, id);
-            const dem2d_vec to = minus(mouse, info.pose.position);
-            const dem2d_vec force =
-                vec(k * to.x - c * info.velocity.x, k * to.y - c * info.velocity.y);
-            assert_ok(dem2d_world_set_load(s.world, id, force, 0));
-            step(&s, n + 10 <= STEPS ? 10 : STEPS - n);
+    int64_t boxes[2][4], rays[2];
+    for (int k = 0; k < 2; k++) {
+        const dem2d_material_desc material = stone_desc(1e6, 0.3);
+        const int side = k == 0 ? 40 : 120;
+        dem2d_custom_desc custom = {.support = counted_support, .rho_min = 0.4, .inscribed = 0.4};
+        dem2d_world_desc desc = {0};
+        dem2d_shape *shape;
+        dem2d_hit hit;
+        int count;
+        desc.time_step = 1e-6;
+        const scene s = open_scene(&desc, &material);
+        assert_ok(dem2d_shape_create_custom(NULL, &custom, &shape));
+        dem2d_particle_desc grain = grain_desc(&s, give_shape(&s, shape), 1, vec(0, 0));
+        for (int i = 0; i < side * side; i++) {
+            grain.position = vec(i % side - side / 2, i / side - side / 2);
+            add_grain(&s, &grain);
         }
+        for (int n = 0; n < 4; n++) {
+            const double half = 2 + 4 * n; /* its edges pass through centres */
+            const dem2d_box box = {{-half, -half}, {half, half}};
+            calls = 0;
+            assert_ok(dem2d_world_query_box(s.world, &box, NULL, NULL, 0, &count));
+            boxes[k][n] = calls;
+            assert_int_equal(count, (int)((2 * half + 1) * (2 * half + 1)));
+            assert_true(calls == 0); /* a box has the centres of all that it finds */
+        }
+        const dem2d_box cut = {{-10.7, -10.7}, {10.7, 10.7}}; /* cuts 4 rows of 21 */
+        calls = 0;
+        assert_ok(dem2d_world_query_box(s.world, &cut, NULL, NULL, 0, &count));
+        boxes[k][0] = calls;
+        assert_between((double)calls, 4 * 21, 10 * 4 * 21);
+        calls = 0;
+        assert_ok(dem2d_world_cast_ray(s.world, vec(-side, 0.1), vec(1, 0), 0, NULL, &hit));
+        assert_near(hit.distance, side - side / 2 - sqrt(0.16 - 0.01), 1e-11);
+        rays[k] = calls;
+        close_scene(&s);
     }
-    assert_within(grain_of(&s, id).pose.position.y, 3 - mass * 9.81 / k, 1e-3);
-    assert_within(grain_of(&s, id).pose.position.x, 1, 1e-3);
-    assert_ok(dem2d_world_nearest(s.world, mouse, 0.2, &grains, &picked));
-    assert_memory_equal(&picked.found.particle, &id, sizeof id);
-    close_scene(&s);
+    assert_memory_equal(boxes[0], boxes[1], sizeof boxes[0]);
+    assert_between((double)rays[1], 1, (double)rays[0] + 8);
 }
 
 int main(void) {
@@ -793,7 +853,7 @@ int main(void) {
         cmocka_unit_test(test_random),      cmocka_unit_test(test_rays),
         cmocka_unit_test(test_custom_rays), cmocka_unit_test(test_contract),
         cmocka_unit_test(test_extremes),    cmocka_unit_test(test_pile),
-        cmocka_unit_test(test_game),
+        cmocka_unit_test(test_work),
     };
     return cmocka_run_group_tests(tests, oracle_make, NULL);
 }
