@@ -23586,19 +23586,24 @@ DEM2D_API dem2d_result dem2d_world_particle_contacts(const dem2d_world *world, d
    uses: config, math, memory, fields, law, motion, world, cell, objects, list, step, measures
    ============================================================================================ */
 
-/* Particles are read array by array, each in the order of the slots, in which the columns are read
-   one line after the other; rows are where the ids put them. Sums of contact forces take two
-   passes: the force of each contact into the arrays of loads, which are scratch between two steps,
+/* Rows are read in the order of ids, block by block, each block array by array: its lines of the
+   columns, which may be anywhere, stay in the cache meanwhile, and those of the next block are on
+   their way. Sums of contact forces that the step has not kept are taken in two passes over the
+   slots: the force of each contact into the arrays of loads, which are scratch between two steps,
    then those of each particle, in the order of the step. What is 0 there stays 0. */
 
 #define DEM2DI_STRIDE DEM2DI_WHOLE_OR_0(16, 1 << 20) /* bytes; an id, a vector fit in */
 
-/* Where particles go: of each slot the row, or -1. */
+/* Rows of a block: states and sums of two of them, 12 kB, take a part of a first-level cache. */
+#define DEM2DI_ROWS 64
+
+/* The rows of a block, and the slots that they are read from. */
 typedef struct dem2di_rows_of {
-    dem2d_world *world;
+    const dem2d_world *world;
     const dem2d_particle_arrays *arrays;
-    int *rows;
-    int begin, end; /* slots of the present block, whose lines stay in the cache */
+    const dem2di_state *states; /* of the instant that is asked for */
+    const dem2di_load *sums;    /* of slots; NULL: not wanted */
+    int first, count, slots[DEM2DI_ROWS];
 } dem2di_rows_of;
 
 /* Row i of a caller's array. */
@@ -23606,29 +23611,64 @@ static inline void *dem2di_row_at(void *array, int row, int stride, size_t size)
     return (char *)array + (size_t)row * (stride > 0 ? (size_t)stride : size);
 }
 
-/* Scratch for the loads of a step and for the rows behind them. The loads stay where they are. */
-static bool dem2di_rows_make(dem2di_rows_of *to, int capacity) {
-    dem2d_world *world = to->world;
+/* The force of each contact, where the sums have to be taken anew. */
+static void dem2di_read_contact_forces(dem2d_world *world) {
     const dem2di_list *list = &world->list;
+    const dem2di_contacts *from = &list->contacts;
+    for (int i = 0; i < list->count; i++) {
+        double force = from->force[i], shear = from->shear[i];
+        world->load_x[i] = from->normal_x[i] * force - from->normal_y[i] * shear;
+        world->load_y[i] = from->normal_y[i] * force + from->normal_x[i] * shear;
+    }
+}
+
+/* The sums of all slots, as kept or in scratch behind the loads of a step, which stay where they
+   are; false when there is no memory. */
+static bool dem2di_read_sums(dem2d_world *world, const dem2d_particle_arrays *arrays,
+                             const dem2di_load **sums) {
+    const dem2di_list *list = &world->list;
+    bool forces = arrays->forces != NULL, torques = arrays->torques != NULL;
+    *sums = NULL;
+    if (!forces && !torques) return true;
+    *sums = world->sums;
+    if (world->sums_fresh) return true;
     size_t slots = (size_t)world->body_count;
     size_t loads =
         dem2di_step_cut(world, NULL, list->discs, list->pairs, list->count, &world->plan, false);
-    bool room = dem2di_scratch_reserve(world, loads + slots * sizeof(int));
+    bool room = dem2di_scratch_reserve(world, loads + slots * sizeof(dem2di_load));
     (void)dem2di_step_cut(world, world->scratch, list->discs, list->pairs, list->count,
                           &world->plan, false);
     if (!room) return false;
-    to->rows = slots > 0 ? (int *)(void *)(world->scratch + loads) : NULL;
-    for (size_t i = 0; i < slots; i++) to->rows[i] = -1;
-    for (int index = 0, row = 0; index < world->id_count && row < capacity; index++)
-        if (world->ids[index].slot >= 0) to->rows[world->ids[index].slot] = row++;
+    dem2di_load *made = slots > 0 ? (dem2di_load *)(void *)(world->scratch + loads) : NULL;
+    if (forces) dem2di_read_contact_forces(world);
+    for (int i = 0; i < world->body_count; i++) {
+        if (forces) made[i].force = dem2di_gather(world, i, false).force;
+        made[i].torque = torques ? dem2di_load_of(world, i).torque : 0;
+    }
+    *sums = made;
     return true;
+}
+
+/* The slots of the next rows: from `index` on, below a row. What is read of them is fetched. */
+static void dem2di_rows_next(dem2di_rows_of *to, int *index, int rows) {
+    const dem2d_world *world = to->world;
+    to->first += to->count;
+    to->count = 0;
+    for (; *index < world->id_count && to->count < DEM2DI_ROWS; (*index)++) {
+        int slot = world->ids[*index].slot;
+        if (slot < 0) continue;
+        if (to->first + to->count >= rows) return;
+        to->slots[to->count++] = slot;
+        DEM2DI_PREFETCH(&to->states[slot].x, 0);
+        DEM2DI_PREFETCH(&to->states[slot].radius, 0);
+        if (to->sums != NULL) DEM2DI_PREFETCH(&to->sums[slot].force, 0);
+    }
 }
 
 /* One array: `value` of each slot i. */
 #define DEM2DI_READ(to, type, array, value)                                                 \
-    for (int i = (to)->begin; i < (to)->end && (to)->arrays->array != NULL; i++) {          \
-        int row = (to)->rows[i];                                                            \
-        if (row < 0) continue;                                                              \
+    for (int k = 0; k < (to)->count && (to)->arrays->array != NULL; k++) {                  \
+        int i = (to)->slots[k], row = (to)->first + k;                                      \
         const type number = value;                                                          \
         memcpy(dem2di_row_at((to)->arrays->array, row, (to)->arrays->stride, sizeof(type)), \
                &number, sizeof number);                                                     \
@@ -23643,12 +23683,11 @@ static double dem2di_angle_of(const dem2d_world *world, const dem2di_state *stat
 
 static void dem2di_read_states(const dem2di_rows_of *to) {
     const dem2d_world *world = to->world;
-    const bool mean = to->arrays->at_forces;
-    const dem2di_state *states = mean ? world->before : world->now;
+    const dem2di_state *states = to->states;
     DEM2DI_READ(to, dem2d_vec, positions, states[i].x)
     DEM2DI_READ(to, double, angles, dem2di_angle_of(world, &states[i]))
     DEM2DI_READ(to, dem2d_rot, rotations, dem2di_pose_of(world, states, i).rotation)
-    if (!mean) {
+    if (!to->arrays->at_forces) {
         DEM2DI_READ(to, dem2d_vec, velocities, states[i].v)
         DEM2DI_READ(to, double, angular_velocities, states[i].w)
         return;
@@ -23657,32 +23696,10 @@ static void dem2di_read_states(const dem2di_rows_of *to) {
     DEM2DI_READ(to, double, angular_velocities, dem2di_velocities_mean(world, i).w)
 }
 
-/* The force of each contact, where the sums have to be taken anew. */
-static void dem2di_read_contact_forces(const dem2di_rows_of *to) {
-    dem2d_world *world = to->world;
-    const dem2di_list *list = &world->list;
-    const dem2di_contacts *from = &list->contacts;
-    if (to->arrays->forces == NULL || world->sums_fresh) return;
-    for (int i = 0; i < list->count; i++) {
-        double force = from->force[i], shear = from->shear[i];
-        world->load_x[i] = from->normal_x[i] * force - from->normal_y[i] * shear;
-        world->load_y[i] = from->normal_y[i] * force + from->normal_x[i] * shear;
-    }
-}
-
-static void dem2di_read_forces(const dem2di_rows_of *to) {
-    const dem2d_world *world = to->world;
-    if (world->sums_fresh) {
-        DEM2DI_READ(to, dem2d_vec, forces, world->sums[i].force)
-        DEM2DI_READ(to, double, torques, world->sums[i].torque)
-        return;
-    }
-    DEM2DI_READ(to, dem2d_vec, forces, dem2di_gather(world, i, false).force)
-    DEM2DI_READ(to, double, torques, dem2di_load_of(world, i).torque)
-}
-
 static void dem2di_read_bodies(const dem2di_rows_of *to) {
     const dem2d_world *world = to->world;
+    DEM2DI_READ(to, dem2d_vec, forces, to->sums[i].force)
+    DEM2DI_READ(to, double, torques, to->sums[i].torque)
     DEM2DI_READ(to, dem2d_particle_id, ids, dem2di_particle_id(world, i))
     DEM2DI_READ(to, dem2d_vec, loads, dem2di_external(world, i).force)
     DEM2DI_READ(to, double, load_torques, dem2di_external(world, i).torque)
@@ -23701,14 +23718,19 @@ DEM2D_API dem2d_result dem2d_world_read_particles(dem2d_world *world,
     if (result == DEM2D_OK)
         result = dem2di_check_number(&world->env, "capacity", capacity, DEM2DI_COUNT);
     if (result != DEM2D_OK) return result;
-    dem2di_rows_of to = {world, arrays, NULL, 0, 0};
-    if (!dem2di_rows_make(&to, capacity)) return dem2di_out_of_memory(world, "rows of particles");
-    dem2di_read_contact_forces(&to);
-    for (; to.begin < world->body_count; to.begin = to.end) {
-        to.end = dem2di_block_end(to.begin, DEM2DI_BLOCK, world->body_count);
-        dem2di_read_states(&to);
-        dem2di_read_forces(&to);
-        dem2di_read_bodies(&to);
+    dem2di_rows_of block[2]; /* that which is read, and the next */
+    memset(&block[1], 0, sizeof block[1]);
+    if (!dem2di_read_sums(world, arrays, &block[1].sums))
+        return dem2di_out_of_memory(world, "sums of forces");
+    block[1].world = world;
+    block[1].arrays = arrays;
+    block[1].states = arrays->at_forces ? world->before : world->now;
+    int index = 0;
+    for (dem2di_rows_next(&block[1], &index, capacity); block[1].count > 0;) {
+        block[0] = block[1];
+        dem2di_rows_next(&block[1], &index, capacity);
+        dem2di_read_states(&block[0]);
+        dem2di_read_bodies(&block[0]);
     }
     if (arrays->forces != NULL || arrays->torques != NULL) world->keeps_sums = true;
     *count = world->body_count - world->holes;
