@@ -1348,13 +1348,15 @@ typedef struct dem2d_sums {
     int particles;         ///< rows of the next two
     dem2d_vec *force;      ///< N/m, on each particle, without gravity
     double *torque;        ///< N, likewise, about the centroid
-    int walls;             ///< rows of the next
+    int walls;             ///< rows of the next two
     dem2d_vec *wall_force; ///< N/m, of the particles on each wall
+    double *wall_torque;   ///< N, likewise: about the pivot of a wall that turns
 } dem2d_sums;
 
 /// Called in each step when the contact forces are summed up, before anything moves, by the thread
 /// that called the step. What it leaves in the sums moves the particles, enters the ledger, and is
-/// the force on the walls; queries go on to describe the contacts. (A servo wall answers to its own
+/// the force on the walls (dem2d_wall_info.torque is that of the contacts, the work of the ledger
+/// that of wall_torque); queries go on to describe the contacts. (A servo wall answers to its own
 /// contacts.) It must not call functions of this world. A step that is refused, or runs out of
 /// memory, may be tried again, with another call.
 typedef void dem2d_gather_fn(void *user, dem2d_sums *sums);
@@ -13137,6 +13139,7 @@ static const dem2di_column dem2di_columns[] = {
     DEM2DI_UNSAVED(EXCHANGED, exchange.force, 0),
     DEM2DI_UNSAVED(EXCHANGED, exchange.torque, 0),
     DEM2DI_UNSAVED(WALLS_EXCHANGED, exchange.wall_force, 0),
+    DEM2DI_UNSAVED(WALLS_EXCHANGED, exchange.wall_torque, 0),
     DEM2DI_UNSAVED(STARTS, list.first, 0),
     DEM2DI_COLUMN("wall_ids", WALLS, walls, DEM2DI_FIRST | DEM2DI_HASHED, wall_id_fields),
     DEM2DI_COLUMN("walls", WALLS, walls, DEM2DI_SHARES | DEM2DI_HASHED, wall_fields),
@@ -19877,11 +19880,16 @@ static void dem2di_exchange(dem2d_world *world) {
                 sums->torque[index] = slot >= 0 ? world->sums[slot].torque : none.torque;
             }
         }
-        for (int j = 0; j < world->wall_count; j++)
-            if (back)
-                world->wall_next[j].force = sums->wall_force[j];
-            else
-                sums->wall_force[j] = world->wall_next[j].force;
+        for (int j = 0; j < world->wall_count; j++) {
+            dem2di_wall_state *next = &world->wall_next[j];
+            if (back) {
+                next->force = sums->wall_force[j];
+                next->torque = sums->wall_torque[j];
+            } else {
+                sums->wall_force[j] = next->force;
+                sums->wall_torque[j] = next->torque;
+            }
+        }
         if (!back) world->gather(world->exchange_user, sums);
     }
 }

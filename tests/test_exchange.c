@@ -331,10 +331,60 @@ static void test_loaded(void **state) {
     close_scene(&s), close_scene(&t);
 }
 
+/* Torques on a wall that turns: the callback gets those of the contacts, and what it leaves is in
+   the work of the ledger. */
+typedef struct motor {
+    double torque, factor; /* that was got; by which it is changed */
+} motor;
+
+static void turn_motor(void *user, dem2d_sums *sums) {
+    motor *m = user;
+    assert_int_equal(sums->walls, 1);
+    m->torque = sums->wall_torque[0];
+    sums->wall_torque[0] *= m->factor;
+}
+
+static void test_wall_torque(void **state) {
+    (void)state;
+    double work[2];
+    for (int k = 0; k < 2; k++) {
+        dem2d_material_desc stone = stone_desc(5e6, 0.5);
+        dem2d_vec ring[24];
+        dem2d_world_desc desc;
+        motor m = {0, 1 + k};
+        memset(&desc, 0, sizeof desc);
+        desc.time_step = 1e-4, desc.gravity = vec(0, -9.81), desc.ledger = true;
+        stone.damping_ratio = 0.3;
+        desc.gather = turn_motor, desc.exchange_user = &m;
+        const scene s = open_scene(&desc, &stone);
+        dem2d_wall_desc drum = plane_desc(&s, vec(0, 0), vec(0, 0));
+        for (int i = 0; i < 24; i++) {
+            const dem2d_vec u = direction(i * 2 * (double)TEST_PI / 24);
+            ring[i] = vec(0.1 + 0.3 * u.x, 0.3 * u.y);
+        }
+        drum.points = ring, drum.count = 24, drum.closed = true, drum.pivot = vec(0.1, 0);
+        drum.mode = DEM2D_WALL_MOVING, drum.angular_velocity = 2;
+        const dem2d_wall_id wall = add_wall(&s, &drum);
+        for (int i = 0; i < 12; i++)
+            add_shape(&s, make_disc(0.04), DEM2D_FREE, vec(0.085 * (i % 4), 0.1 - 0.085 * (i / 4)),
+                      0, vec(0, 0), 0);
+        for (int n = 0; n < 200; n++) {
+            step(&s, 50);
+            assert_within(m.torque, wall_of(&s, wall).torque, 1e-12 * 12 * 13.6 * 9.81);
+        }
+        assert_true(m.torque < -1); /* the grains lie behind the lowest point */
+        work[k] = ledger_of(&s).walls;
+        close_scene(&s);
+    }
+    assert_true(work[0] > 1);
+    assert_near(work[1], 2 * work[0], 1e-12); /* the wall moves by its angular velocity alone */
+}
+
 int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(test_two_worlds), cmocka_unit_test(test_added_force),
         cmocka_unit_test(test_bad_sums),   cmocka_unit_test(test_refused),
-        cmocka_unit_test(test_own_errors), cmocka_unit_test(test_loaded)};
+        cmocka_unit_test(test_own_errors), cmocka_unit_test(test_loaded),
+        cmocka_unit_test(test_wall_torque)};
     return cmocka_run_group_tests(tests, NULL, NULL);
 }
