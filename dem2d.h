@@ -2194,8 +2194,9 @@ DEM2D_API dem2d_result dem2d_world_cast_ray_all(dem2d_world *world, dem2d_vec or
 DEM2D_API dem2d_result dem2d_world_nearest(dem2d_world *world, dem2d_vec point, double range,
                                            const dem2d_query_desc *desc, dem2d_hit *hit);
 /// Greatest overlap (m) that a new particle would have with particles and walls that it meets; 0 if
-/// it touches none. Above a few percent of its radius, it would be thrown out at high speed: see
-/// dem2d_world_relax. Errors: those of dem2d_world_add_particle.
+/// it touches none. A one-sided wall counts if the shorter way out is to its left. Above a few
+/// percent of its radius, the particle would be thrown out at high speed: see dem2d_world_relax.
+/// Errors: those of dem2d_world_add_particle.
 DEM2D_API dem2d_result dem2d_world_overlap_at(dem2d_world *world, const dem2d_particle_desc *desc,
                                               double *overlap);
 
@@ -23416,6 +23417,13 @@ DEM2D_API dem2d_result dem2d_world_nearest(dem2d_world *world, dem2d_vec point, 
 /* --- overlaps ----------------------------------------------------------------------------------
  */
 
+/* Is a particle that overlaps a part, with the normal towards the part, on the side to which a
+   one-sided wall does not push? */
+static bool dem2di_is_behind(const dem2d_world *world, int part, dem2d_vec normal) {
+    return world->walls[world->parts[part].wall].desc.one_sided &&
+           dem2di_dot(normal, dem2di_surface_normal(&world->surfaces[part])) > 0;
+}
+
 /* Overlap of the region of a question with an item, and the normal towards the item. */
 static double dem2di_overlap_with(const dem2di_question *question, int item, dem2d_vec *normal) {
     const dem2d_world *world = question->world;
@@ -23444,7 +23452,7 @@ static double dem2di_overlap_with(const dem2di_question *question, int item, dem
     }
     if (result != DEM2D_OK) return 0; /* of sizes that numbers have no squares of */
     *normal = contact.normal;
-    return contact.depth;
+    return item < 0 && dem2di_is_behind(world, -1 - item, contact.normal) ? 0 : contact.depth;
 }
 
 DEM2D_API dem2d_result dem2d_world_overlap_at(dem2d_world *world, const dem2d_particle_desc *desc,
