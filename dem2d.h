@@ -1769,8 +1769,12 @@ DEM2D_API dem2d_result dem2d_world_set_time_step(dem2d_world *world, double time
 DEM2D_API dem2d_result dem2d_world_set_material(dem2d_world *world, dem2d_particle_id id,
                                                 dem2d_material_id material);
 /// Give a particle another template or scale (> 0): radius, mass and inertia change, position,
-/// angle and velocities stay, its contacts lose their history. Errors: OUT_OF_RANGE (also a mass
-/// that is not a normal number).
+/// angle and velocities stay. With another template its contacts end. With another scale alone they
+/// go on: tangential and rolling springs keep their forces, whatever the new size (friction limits
+/// them in the next step), and a law of yours its state; only contacts of particles whose bounding
+/// circles no longer overlap end at once. A scale that grows by a part of the overlaps in each call
+/// is gentle; one that grows more pushes the neighbours away at high speed: see dem2d_world_relax.
+/// Errors: OUT_OF_RANGE (also a mass that is not a normal number).
 DEM2D_API dem2d_result dem2d_world_set_shape(dem2d_world *world, dem2d_particle_id id,
                                              dem2d_shape_id shape, double scale);
 /// The desc of a world as it is now: a world created from it has the same settings. Capacities and
@@ -15036,6 +15040,27 @@ DEM2D_API dem2d_result dem2d_world_set_material(dem2d_world *world, dem2d_partic
     return DEM2D_OK;
 }
 
+/* A particle has another scale. Its contacts go on, but for those whose bounding circles are apart
+   now, which the next list need not have; the gaps that are known of others no longer hold. */
+static void dem2di_resized(dem2d_world *world, int slot) {
+    const dem2di_list *list = &world->list;
+    for (int k = list->first[slot]; k < list->first[slot + 1]; k++) {
+        int i = list->adjacent[k];
+        const dem2di_key *key = &list->keys[i];
+        if (key->a < 0) continue;
+        if (i >= list->discs) list->contacts.history[i - list->discs].bound = 0;
+        if (i >= list->pairs || !(list->contacts.depth[i] > 0)) continue;
+        const dem2di_state *a = &world->now[key->a], *b = &world->now[key->b];
+        dem2d_vec d = dem2di_centre_line(a->x, b->x);
+        double reach = a->radius + b->radius;
+        if (dem2di_dot(d, d) < reach * reach) continue;
+        dem2di_touch_end(world, i);
+        dem2di_contact_end(world, i);
+    }
+    world->sums_fresh = false;
+    world->list_stale = world->ledger.edited = true;
+}
+
 DEM2D_API dem2d_result dem2d_world_set_shape(dem2d_world *world, dem2d_particle_id id,
                                              dem2d_shape_id shape, double scale) {
     if (world == NULL) return DEM2D_NULL_ARGUMENT;
@@ -15057,7 +15082,10 @@ DEM2D_API dem2d_result dem2d_world_set_shape(dem2d_world *world, dem2d_particle_
     double radius = dem2di_shape_of(world, &changed)->circumscribed * scale;
     world->now[slot].radius = world->before[slot].radius = radius;
     dem2di_images_follow(world, slot);
-    dem2di_forget(world, slot);
+    if (changed.shape_index == old.shape_index)
+        dem2di_resized(world, slot);
+    else
+        dem2di_forget(world, slot);
     world->tree.made = false;
     world->check_due = true;
     dem2di_edited(world);
