@@ -47,8 +47,9 @@ static int print_pairs(void) {
 /* The script of a world, in short. */
 static void tell(uint64_t seed, int64_t index) {
     static const char *const events[EVENT_KINDS] = {
-        "add",         "remove", "move",    "load",    "drive",     "add wall", "set wall",
-        "remove wall", "pair",   "gravity", "damping", "time step", "refused"};
+        "add",         "remove", "move",     "load",    "drive",     "add wall",  "set wall",
+        "remove wall", "pair",   "gravity",  "damping", "time step", "refused",   "groups",
+        "scale",       "shape",  "material", "rows",    "relax",     "drive wall"};
     static world_script s;
     world_make_script(seed, index, &s);
     printf("time step %g, %d steps, gravity %g, damping %g %g, skin %g, solver %d, faces %d%s\n",
@@ -77,6 +78,10 @@ static void tell(uint64_t seed, int64_t index) {
                j < s.walls_at_first ? "" : " (later)", w->segment ? "segment" : "half-plane",
                (int)w->mode, w->material.index, w->point.x, w->point.y,
                w->segment ? w->end.x : w->normal.x, w->segment ? w->end.y : w->normal.y);
+        if (w->count > 0)
+            printf("    chain of %d%s%s, turns by %g\n", w->count, w->closed ? ", closed" : "",
+                   w->one_sided ? ", one-sided" : "", w->angular_velocity);
+        if (w->surface_speed != 0) printf("    belt, %g\n", w->surface_speed);
     }
     for (int k = 0; k < s.event_count; k++)
         printf("step %d: %s %d (%d)\n", s.events[k].step, events[s.events[k].kind],

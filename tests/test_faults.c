@@ -199,6 +199,45 @@ static dem2d_result life_arrays(life *l, int i) {
     return dem2d_world_write_particles(l->world, &a, 3);
 }
 
+/* A grain of other groups, then a sensor, with a number of the caller's. */
+static dem2d_result life_groups(life *l, int i) {
+    const dem2d_groups groups = {2, 0, i == 22};
+    const dem2d_result result = dem2d_world_set_groups(l->world, l->grains[i], groups);
+    if (result != DEM2D_OK) return result;
+    return dem2d_world_set_user_data(l->world, l->grains[i], (uint64_t)i);
+}
+
+/* A grain grows, and another gets the material of the first. */
+static dem2d_result life_change(life *l, int i) {
+    dem2d_particle_desc d;
+    assert_ok(dem2d_world_get_particle_desc(l->world, l->grains[i], &d));
+    const dem2d_result result =
+        dem2d_world_set_shape(l->world, l->grains[i], d.shape, 1.001 * d.scale);
+    if (result != DEM2D_OK) return result;
+    return dem2d_world_set_material(l->world, l->grains[i + 1], l->materials[0]);
+}
+
+/* A search tree, then moves with it. */
+static dem2d_result life_relax(life *l, int i) {
+    dem2d_relaxation done;
+    dem2d_hit hit;
+    (void)i;
+    const dem2d_result result =
+        dem2d_world_cast_ray(l->world, vec(-1, 0.3), vec(1, 0), 0, NULL, &hit);
+    if (result != DEM2D_OK) return result;
+    return dem2d_world_relax(l->world, 0.01, 2, &done);
+}
+
+/* A chain with one side, which nothing has been near. */
+static dem2d_result life_chain(life *l, int i) {
+    static const dem2d_vec points[3] = {{0.1, 0.7}, {0.2, 0.65}, {0.3, 0.7}};
+    dem2d_wall_desc d = {0};
+    dem2d_wall_id id;
+    (void)i;
+    d.material = l->materials[0], d.points = points, d.count = 3, d.one_sided = true;
+    return dem2d_world_add_wall(l->world, &d, &id);
+}
+
 static dem2d_result life_rub(life *l, int i) {
     dem2d_pair_desc d = pair_desc(1e6, 5e5, 0.4);
     if (l->desc->full == LATE) d.damping_ratio = 0.2, d.rolling_friction = 0.1;
@@ -256,6 +295,10 @@ static const life_event events[] = {
     {"load", life_load, 12, 14},
     {"step", life_step, 0, 3},
     {"arrays", life_arrays, 20, 20},
+    {"groups", life_groups, 22, 23},
+    {"change", life_change, 24, 24},
+    {"ray and relax", life_relax, 0, 0},
+    {"add chain", life_chain, 0, 0},
     {"step", life_step, 0, 30},
     {"save and load", life_reload, 0, 0},
     {"add wall", life_wall, WALLS - 1, WALLS - 1},
