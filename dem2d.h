@@ -293,13 +293,18 @@ HOW TO
                          rolling_friction for grains that should not roll; else friction, damping.
     hear contacts        dem2d_world_desc.event_capacity, then dem2d_world_events: which contacts
                          closed and opened, where, how fast, with which impulse. A short hit
-                         between two calls is told as well.
+                         between two calls is told as well (examples/game.c).
     read many at once    dem2d_world_read_particles, dem2d_world_read_contacts: into arrays of
                          yours, as many as you name; with a stride into a struct of yours.
                          dem2d_world_write_particles sets positions, velocities and loads from them.
+                             struct row { dem2d_vec x; double angle; } rows[1000];
+                             dem2d_particle_arrays a = {sizeof(struct row)}; // the stride
+                             a.positions = &rows[0].x, a.angles = &rows[0].angle;
+                             dem2d_world_read_particles(world, &a, 1000, &count);
     push grains          dem2d_world_set_load: a force and a torque until you set others. What
-                         changes from step to step (drag, magnets, motors) is set by
-                         dem2d_world_desc.loads. The work is in the ledger.
+                         changes from step to step (drag, magnets, motors, a spring to the mouse) is
+                         set by dem2d_world_desc.loads (examples/drag.c, examples/game.c). The work
+                         is in the ledger.
     leave out the walls  dem2d_world_desc.cell makes the world periodic. dem2d_world_stress with the
                          area of the cell is then the stress of a sample without any border.
     deform a cell        dem2d_world_deform: shear, compression, both, at any time. Then
@@ -340,11 +345,13 @@ HOW TO
     use random numbers   dem2d_random_uniform, dem2d_random_normal: the same bits everywhere.
     put grains in        dem2d_world_overlap_at tells how deep a new particle would be in others;
                          dem2d_world_relax moves those that overlap apart, without speed.
-    change a grain       dem2d_world_set_material, dem2d_world_set_shape (template and scale).
+    change a grain       dem2d_world_set_material, dem2d_world_set_shape (template and scale; with
+                         another scale alone, contacts keep their springs, so that grains can grow).
     choose who meets     groups of particles and walls: category and mask. dem2d_world_set_groups,
       whom               dem2d_world_set_wall. dem2d_world_set_user_data keeps a number of yours.
     detect without       groups.sensor of a particle or wall, then dem2d_world_particle_overlaps or
-      pushing            dem2d_world_wall_overlaps as often as you want to know.
+      pushing            dem2d_world_wall_overlaps as often as you want to know; at least twice
+                         while a grain passes, if you count grains (examples/counter.c).
     build a hopper       a wall with points: a chain of segments. Or walls with segment: where two
                          meet, a particle has one contact.
     turn a drum          a closed chain, MOVING, with an angular_velocity about its pivot; a mixer's
