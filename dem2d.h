@@ -385,13 +385,14 @@ HOW TO
     tell it is at rest   dem2d_world_equilibrium: unbalanced below 1e-3, a small kinetic_ratio.
     load it slowly       dem2d_world_inertial_number below 5e-4: with dashpots the peak of q/p is
                          then within 1 % of that of slower tests. Local damping 0.7 makes grains
-                         rate dependent: at 1e-3 it adds 19 % to the q/p of sheared discs, 4 % to
+                         rate dependent: at 1e-3 it adds 16 % to the q/p of sheared discs, 6 % to
                          that of real grains. A strain takes steps in proportion to the square root
                          of stiffness over pressure, and to 1 / (inertial number).
-    choose a stiffness   normal_stiffness over the pressure: from 4,000 on the peak of q/p is within
-                         1 % of that of rigid grains, from 7,000 on the coordination number is. At
-                         100 q/p is 12 to 19 % too high, and grains overlap by 4 % of their radius.
-                         (These and the numbers above are from make -C tests bench-rigid.)
+    choose a stiffness   normal_stiffness over the pressure: from 5,000 on the peak of q/p is within
+                         1 % of that of rigid grains; the coordination number still falls by 3 %
+                         from 10,000 to 100,000. At 100 the q/p of sheared grains is 13 to 18 % too
+                         high, and grains overlap by 4 to 5 % of their radius. (These and the
+                         numbers above are from make -C tests bench-rigid.)
     explain its strength dem2d_world_fabric: anisotropies of contacts and forces, and the q/p that
                          they predict; dem2d_world_histogram for polar diagrams.
     look in ParaView     dem2d_world_write_vtp, a file for each part and time; dem2d_pvd_write
