@@ -3808,25 +3808,71 @@ static inline dem2d_vec dem2di_arc_support(const dem2di_arc *arc, dem2d_vec u, d
     return dem2di_arc_point(arc, t);
 }
 
-/* s = p u + p' t and rho = p + p'' with the powers of z = ux + i uy: first z .. z^4, then four
-   terms at a time by z^4, so that the chain of dependent products is a quarter of the order. The
-   four terms are written out: gcc then keeps them in registers, which halves the time. */
-static dem2d_vec dem2di_fourier_support(const dem2d_shape *shape, dem2d_vec u, double *rho) {
-    double x1 = u.x, y1 = u.y, x2 = x1 * x1 - y1 * y1, y2 = 2 * x1 * y1;
-    double x3 = x2 * x1 - y2 * y1, y3 = x2 * y1 + y2 * x1, x4 = x2 * x2 - y2 * y2, y4 = 2 * x2 * y2;
-    const double fx = x4, fy = y4;
-    double p = 0, q = 0, r = 0, p_odd = 0, q_odd = 0, r_odd = 0;
+/* Sums over the terms 1 and 2 of each block of a Fourier series, and over 3 and 4. */
+typedef struct dem2di_series_sums {
+    double p, p_odd, q, q_odd, r, r_odd;
+} dem2di_series_sums;
+
+#if defined(__GNUC__)
+/* Two doubles at once. */
+typedef double dem2di_two_lanes __attribute__((vector_size(16)));
+
+static DEM2DI_INLINE dem2di_two_lanes dem2di_lanes_at(const double *from) {
+    dem2di_two_lanes lanes;
+    memcpy(&lanes, from, sizeof lanes);
+    return lanes;
+}
+
+/* {a0 + a1, b0 + b1} */
+static DEM2DI_INLINE dem2di_two_lanes dem2di_lanes_sums(dem2di_two_lanes a, dem2di_two_lanes b) {
+    const dem2di_two_lanes first = {a[0], b[0]}, second = {a[1], b[1]};
+    return first + second;
+}
+
+/* The sums of a series: the powers z, z^2 and z^3, z^4 side by side, the operations of the plain
+   path. */
+static DEM2DI_INLINE dem2di_series_sums dem2di_series_add(const dem2d_shape *shape,
+                                                          const double x[4], const double y[4]) {
     const dem2di_block *block = shape->blocks, *end = block + dem2di_block_count(shape->count);
-    while (block < end) {
+    const dem2di_two_lanes fx = {x[3], x[3]}, fy = {y[3], y[3]};
+    dem2di_two_lanes x1 = {x[0], x[1]}, y1 = {y[0], y[1]}, x3 = {x[2], x[3]}, y3 = {y[2], y[3]};
+    dem2di_two_lanes p = {0, 0}, q = {0, 0}, r = {0, 0};
+    for (; block < end; block++) {
+        dem2di_two_lanes e1 = dem2di_lanes_at(block->a) * x1 + dem2di_lanes_at(block->b) * y1;
+        dem2di_two_lanes e3 =
+            dem2di_lanes_at(block->a + 2) * x3 + dem2di_lanes_at(block->b + 2) * y3;
+        p += dem2di_lanes_sums(e1, e3);
+        r += dem2di_lanes_sums(dem2di_lanes_at(block->square) * e1,
+                               dem2di_lanes_at(block->square + 2) * e3);
+        q += dem2di_lanes_sums(dem2di_lanes_at(block->nb) * x1 - dem2di_lanes_at(block->na) * y1,
+                               dem2di_lanes_at(block->nb + 2) * x3 -
+                                   dem2di_lanes_at(block->na + 2) * y3);
+        dem2di_two_lanes turned = x1 * fx - y1 * fy;
+        y1 = x1 * fy + y1 * fx, x1 = turned;
+        turned = x3 * fx - y3 * fy;
+        y3 = x3 * fy + y3 * fx, x3 = turned;
+    }
+    dem2di_series_sums sums = {p[0], p[1], q[0], q[1], r[0], r[1]};
+    return sums;
+}
+#else
+/* The same, plain. The four terms are written out: compilers then keep them in registers. */
+static dem2di_series_sums dem2di_series_add(const dem2d_shape *shape, const double x[4],
+                                            const double y[4]) {
+    const dem2di_block *block = shape->blocks, *end = block + dem2di_block_count(shape->count);
+    const double fx = x[3], fy = y[3];
+    double x1 = x[0], x2 = x[1], x3 = x[2], x4 = x[3], y1 = y[0], y2 = y[1], y3 = y[2], y4 = y[3];
+    dem2di_series_sums s = {0, 0, 0, 0, 0, 0};
+    for (; block < end; block++) {
         double e1 = block->a[0] * x1 + block->b[0] * y1, e2 = block->a[1] * x2 + block->b[1] * y2;
         double e3 = block->a[2] * x3 + block->b[2] * y3, e4 = block->a[3] * x4 + block->b[3] * y4;
-        p += e1 + e2;
-        p_odd += e3 + e4;
-        r += block->square[0] * e1 + block->square[1] * e2;
-        r_odd += block->square[2] * e3 + block->square[3] * e4;
-        q += (block->nb[0] * x1 - block->na[0] * y1) + (block->nb[1] * x2 - block->na[1] * y2);
-        q_odd += (block->nb[2] * x3 - block->na[2] * y3) + (block->nb[3] * x4 - block->na[3] * y4);
-        if (++block == end) break;
+        s.p += e1 + e2;
+        s.p_odd += e3 + e4;
+        s.r += block->square[0] * e1 + block->square[1] * e2;
+        s.r_odd += block->square[2] * e3 + block->square[3] * e4;
+        s.q += (block->nb[0] * x1 - block->na[0] * y1) + (block->nb[1] * x2 - block->na[1] * y2);
+        s.q_odd +=
+            (block->nb[2] * x3 - block->na[2] * y3) + (block->nb[3] * x4 - block->na[3] * y4);
         double turned = x1 * fx - y1 * fy;
         y1 = x1 * fy + y1 * fx, x1 = turned;
         turned = x2 * fx - y2 * fy;
@@ -3836,8 +3882,19 @@ static dem2d_vec dem2di_fourier_support(const dem2d_shape *shape, dem2d_vec u, d
         turned = x4 * fx - y4 * fy;
         y4 = x4 * fy + y4 * fx, x4 = turned;
     }
-    double value = shape->a + (p + p_odd), slope = q + q_odd;
-    if (rho != NULL) *rho = dem2di_max(0, value - (r + r_odd));
+    return s;
+}
+#endif
+
+/* s = p u + p' t and rho = p + p'' with the powers of z = ux + i uy: first z .. z^4, then four
+   terms at a time by z^4, so that the chain of dependent products is a quarter of the order. */
+static dem2d_vec dem2di_fourier_support(const dem2d_shape *shape, dem2d_vec u, double *rho) {
+    double x1 = u.x, y1 = u.y, x2 = x1 * x1 - y1 * y1, y2 = 2 * x1 * y1;
+    const double x[4] = {x1, x2, x2 * x1 - y2 * y1, x2 * x2 - y2 * y2};
+    const double y[4] = {y1, y2, x2 * y1 + y2 * x1, 2 * x2 * y2};
+    const dem2di_series_sums sums = dem2di_series_add(shape, x, y);
+    double value = shape->a + (sums.p + sums.p_odd), slope = sums.q + sums.q_odd;
+    if (rho != NULL) *rho = dem2di_max(0, value - (sums.r + sums.r_odd));
     return dem2di_vec(value * u.x - slope * u.y, value * u.y + slope * u.x);
 }
 
@@ -8912,12 +8969,13 @@ static inline void dem2di_vertex_set(const dem2di_pair *pair, dem2d_vec a, dem2d
 }
 
 /* Support point of A minus B minus d; rho (may be NULL) gets the radii of curvature of A and B. */
-static inline void dem2di_minkowski(dem2di_pair *pair, dem2d_vec u, double rho[2],
-                                    dem2di_vertex *v) {
-    double *rho_a = rho, *rho_b = rho != NULL ? rho + 1 : NULL;
+static DEM2DI_INLINE void dem2di_minkowski(dem2di_pair *pair, dem2d_vec u, double rho[2],
+                                           dem2di_vertex *v) {
+    double radius_a, radius_b; /* in registers, as a caller's rho may be */
+    double *rho_a = rho != NULL ? &radius_a : NULL, *rho_b = rho != NULL ? &radius_b : NULL;
     dem2d_vec a = dem2di_support(pair->a, dem2di_turn_back(pair->ra, u), rho_a);
     dem2d_vec b = dem2di_support(pair->b, dem2di_turn_back(pair->rb, dem2di_negate(u)), rho_b);
-    if (rho != NULL) rho[0] *= pair->scale_a, rho[1] *= pair->scale_b;
+    if (rho != NULL) rho[0] = radius_a * pair->scale_a, rho[1] = radius_b * pair->scale_b;
     pair->calls++;
     dem2di_vertex_set(pair, dem2di_scale(dem2di_turn(pair->ra, a), pair->scale_a),
                       dem2di_scale(dem2di_turn(pair->rb, b), pair->scale_b), v);
@@ -10172,42 +10230,59 @@ static bool dem2di_descend(dem2di_pair *pair, dem2d_vec u, bool evaluated, doubl
     return false;
 }
 
-/* The result of a descent at a stationary direction: the foot of the origin on an edge; else
-   Newton's last step on the osculating circle, which leaves an error of its angle squared, unless
+/* The result of Newton's step from an evaluation, which turns by an angle with this sine and
+   1 - cosine: on the osculating circle, which leaves an error of the angle squared. */
+static DEM2DI_INLINE void dem2di_step_on(const dem2di_eval *eval, double sine, double fall,
+                                         dem2di_search *search) {
+    const double ux = eval->u.x, uy = eval->u.y;
+    const double dx = -sine * uy - fall * ux, dy = sine * ux - fall * uy;
+    const double nx = ux + dx, ny = uy + dy;
+    const double f =
+        1.5 - (nx * nx + ny * ny) / 2; /* normalises: steps and starts change the length */
+    search->normal.x = nx * f;
+    search->normal.y = ny * f;
+    search->a.x = eval->v[0].a.x + eval->rho[0] * dx;
+    search->a.y = eval->v[0].a.y + eval->rho[0] * dy;
+    search->b.x = eval->v[0].b.x - eval->rho[1] * dx;
+    search->b.y = eval->v[0].b.y - eval->rho[1] * dy;
+}
+
+/* Up to this e^2/2 the sine of an angle e is its tangent, and 1 - cosine and the decrease of h,
+   which is bend e^2/2, have errors of e^4. Steps are above it only with a tolerance above 1e-6. */
+#define DEM2DI_SMALL_FALL 1e-8
+
+/* The result of a descent at a stationary direction that is no edge: Newton's last step, unless
    no_step. */
-static void dem2di_descend_finish(const dem2di_eval *eval, dem2di_search *search) {
-    const dem2di_vertex *v = eval->v;
-    double ux = eval->u.x, uy = eval->u.y, slope = eval->slope[0];
-    search->normal.x = ux;
-    search->normal.y = uy;
-    search->upper = eval->h;
-    if (eval->edge) {
-        double t = slope < 0 ? slope / (slope - eval->slope[1]) : 0;
-        search->a = dem2di_along(v[0].a, t, dem2di_sub(v[1].a, v[0].a));
-        search->b = dem2di_along(v[0].b, t, dem2di_sub(v[1].b, v[0].b));
-        return;
-    }
-    /* e is the tangent of the angle; for small e the sine is e, and 1 - cosine and the decrease of
-       h, bend e^2/2, have errors of e^4 */
+static void dem2di_finish_step(const dem2di_eval *eval, dem2di_search *search) {
+    const double slope = eval->slope[0];
     double e = -slope / (eval->rho[0] + eval->rho[1] - eval->h), fall = e * e / 2, half = 0.5;
     if (eval->no_step) e = fall = 0;
     double tangent = e;
-    if (fall > 1e-8) { /* only with a tolerance above 1e-6 */
+    if (fall > DEM2DI_SMALL_FALL) {
         double root = sqrt(1 + e * e);
         half = 1 / (1 + root);
         fall = e * e * half / root;
         e /= root;
     }
-    double dx = -e * uy - fall * ux, dy = e * ux - fall * uy;
-    double nx = ux + dx, ny = uy + dy;
-    double f = 1.5 - (nx * nx + ny * ny) / 2; /* normalises: steps and starts change the length */
-    search->normal.x = nx * f;
-    search->normal.y = ny * f;
+    dem2di_step_on(eval, e, fall, search);
     search->upper = eval->h + slope * tangent * half;
-    search->a.x = v->a.x + eval->rho[0] * dx;
-    search->a.y = v->a.y + eval->rho[0] * dy;
-    search->b.x = v->b.x - eval->rho[1] * dx;
-    search->b.y = v->b.y - eval->rho[1] * dy;
+}
+
+/* The result of a descent at a stationary direction: the foot of the origin on an edge, else
+   Newton's last step. */
+static void dem2di_descend_finish(const dem2di_eval *eval, dem2di_search *search) {
+    const dem2di_vertex *v = eval->v;
+    double slope = eval->slope[0];
+    if (!eval->edge) {
+        dem2di_finish_step(eval, search);
+        return;
+    }
+    search->normal.x = eval->u.x;
+    search->normal.y = eval->u.y;
+    search->upper = eval->h;
+    double t = slope < 0 ? slope / (slope - eval->slope[1]) : 0;
+    search->a = dem2di_along(v[0].a, t, dem2di_sub(v[1].a, v[0].a));
+    search->b = dem2di_along(v[0].b, t, dem2di_sub(v[1].b, v[0].b));
 }
 
 /* Lower bounds of the pair's rho over one sector's width from u: [0] clockwise, [1]
@@ -10416,52 +10491,76 @@ typedef struct dem2di_demand {
     bool detect;      /* any separating direction is enough */
 } dem2di_demand;
 
+static inline double dem2di_rest_angle(double relative, bool detect) {
+    return (detect ? 0.3 : 0.1) * sqrt(dem2di_max(relative, DEM2DI_ROUNDOFF));
+}
+
 static inline dem2di_demand dem2di_demand_of(const dem2di_pair *pair, double tolerance,
                                              bool detect) {
     dem2di_demand demand;
     double relative = dem2di_max(tolerance, DEM2DI_ROUNDOFF);
     demand.tolerance = relative * pair->size;
-    demand.angle = (detect ? 0.3 : 0.1) * sqrt(relative);
+    demand.angle = dem2di_rest_angle(relative, detect);
     demand.detect = detect;
     return demand;
 }
 
 /* Is an evaluation of a pair without edges at the minimum, with all that dem2di_descend,
    dem2di_descend_finish and dem2di_certify would ask of it, and the radius as proof? True only if
-   these would end there with the same bits: the conditions are theirs or stricter (the product in
-   place of a quotient: by 1e-9, where rounding is 1e-15). */
+   these would end there with the same bits: the conditions are theirs, or imply them. With e the
+   angle and t the tolerance of the search, S the size, r the least and q the greatest radius, b the
+   curvature of h and s its slope, they are
+     b > 0, |s| <= e b, s^2 <= e^2 b S, s^2 q <= 2 S e^2 b^2, s^2 <= 1e-10 r S,
+     r - h > 0, s^2 <= 2 t (r - h);
+   here r - h <= b and e^2 S <= t, so that s^2 <= e^2 (r - h) S is enough for three of them. Other
+   roundings than theirs are 1e-15, for which s^2 is taken 1e-9 greater. No short circuits: loops
+   over many pairs turn this into vector instructions. */
+static DEM2DI_INLINE bool dem2di_rest_found(double size, double least_a, double least_b,
+                                            double most, const dem2di_eval *eval,
+                                            const dem2di_demand *demand, dem2di_search *search) {
+    const double h = eval->h, slope = eval->slope[0], square = slope * slope;
+    const double bend = eval->rho[0] + eval->rho[1] - h, turn = demand->angle * bend;
+    const double room = least_a + least_b - h, roundoff = DEM2DI_ROUNDOFF * size;
+    const double above = square * (1 + 1e-9), least = least_a < least_b ? least_a : least_b;
+    const double by_room = demand->angle * demand->angle * room, by_step = 1e-10 * least;
+    const double flat = by_room < by_step ? by_room : by_step;
+    const double e = -slope / bend, fall = e * e / 2;
+    dem2di_step_on(eval, e, fall, search);
+    search->upper = h + slope * e * 0.5;
+    search->lower = search->upper - square / (2 * room);
+    return (room > 0) & (room <= bend) & (bend * DEM2DI_ROUNDOFF < size) & (fabs(slope) <= turn) &
+           (above <= flat * size) & (above * most <= 2 * size * (turn * turn)) &
+           (fall <= DEM2DI_SMALL_FALL) & !((h >= -roundoff) & (search->lower < -roundoff)) &
+           !(demand->detect & (h < -roundoff));
+}
+
+/* The same for a pair, whose radii are looked up. */
 static DEM2DI_INLINE bool dem2di_rests_by_radius(const dem2di_pair *pair, const dem2di_eval *eval,
                                                  const dem2di_demand *demand,
                                                  dem2di_search *search) {
     const dem2d_shape *a = pair->a, *b = pair->b;
-    const double h = eval->h, square = eval->slope[0] * eval->slope[0];
-    const double bend = eval->rho[0] + eval->rho[1] - h, turn = demand->angle * bend;
     const double least_a = a->rho_min * pair->scale_a, least_b = b->rho_min * pair->scale_b;
     const double most = a->rho_max * pair->scale_a + b->rho_max * pair->scale_b;
-    const double room = least_a + least_b - h, roundoff = DEM2DI_ROUNDOFF * pair->size;
-    bool stationary = dem2di_curves_up(pair, bend) & (fabs(eval->slope[0]) <= turn) &
-                      (square <= demand->angle * demand->angle * bend * pair->size);
-    bool smooth = ((square * most) * (1 + 1e-9) <= 2 * pair->size * (turn * turn)) &
-                  (square <= 1e-10 * dem2di_min(least_a, least_b) * pair->size);
-    bool proved = (room > 0) & (square <= 2 * demand->tolerance * room);
-    if (!(stationary & smooth & proved) || (demand->detect && h < -roundoff)) return false;
-    dem2di_descend_finish(eval, search);
-    search->lower = search->upper - square / (2 * room);
-    search->proof = DEM2D_BY_RADIUS;
-    return !(h >= -roundoff && search->lower < -roundoff);
+    return dem2di_rest_found(pair->size, least_a, least_b, most, eval, demand, search);
 }
 
 /* Try the direction of the last step for a pair without edges; false if it is not known to be the
-   answer. */
+   answer. The evaluation is then that of the direction. */
 static DEM2DI_INLINE bool dem2di_smooth_last(dem2di_pair *pair, dem2d_vec start,
                                              const dem2di_demand *demand, dem2di_eval *eval,
                                              dem2di_search *search) {
-    dem2di_eval_smooth(pair, start, eval);
-    if (dem2di_edges_unknown(pair->a) || dem2di_edges_unknown(pair->b)) return false;
-    eval->no_step = false;
+    dem2di_eval at; /* of its own, which compilers keep in registers */
+    dem2di_eval_smooth(pair, start, &at);
+    at.no_step = false;
     search->iterations = 1;
     dem2di_feature_clear(search);
-    return dem2di_rests_by_radius(pair, eval, demand, search);
+    if (!dem2di_edges_unknown(pair->a) && !dem2di_edges_unknown(pair->b) &&
+        dem2di_rests_by_radius(pair, &at, demand, search)) {
+        search->proof = DEM2D_BY_RADIUS;
+        return true;
+    }
+    *eval = at;
+    return false;
 }
 
 /* Least overlap or greatest gap, certified, where neither dem2di_edge_last nor dem2di_smooth_last
@@ -11961,6 +12060,14 @@ static DEM2DI_INLINE void dem2di_law_points(dem2di_law_rows *rows, double time_s
         else
             rows->shear[k] = dem2di_held(limit, last - kt * rate * time_step);
     }
+}
+
+/* Springs and friction of a contact of one point: what dem2di_law_springs makes of its row. */
+static DEM2DI_INLINE void dem2di_law_one(const dem2d_pair_desc *law, double slip, double last_shear,
+                                         double time_step, dem2di_contact *contact) {
+    contact->force = law->normal_stiffness * contact->depth;
+    contact->shear = dem2di_held(law->friction * contact->force,
+                                 last_shear - law->tangential_stiffness * slip * time_step);
 }
 
 /* Moments against rolling, held within their limits (Ai et al. 2011, model C, but for the dashpot,
@@ -14047,13 +14154,17 @@ static inline int dem2di_wall_of(const dem2d_world *world, int contact) {
     return world->parts[dem2di_part_of(world->list.keys[contact].b)].wall;
 }
 
-/* How the two of a listed contact meet; B is a particle or a wall. */
-static inline const dem2d_pair_desc *dem2di_law_of(const dem2d_world *world, int contact) {
+/* How the two of a listed contact meet; B is a wall or a particle. */
+static DEM2DI_INLINE const dem2d_pair_desc *dem2di_law_with(const dem2d_world *world, int contact,
+                                                            bool wall) {
     const dem2di_key *key = &world->list.keys[contact];
-    int material = contact >= world->list.pairs
-                       ? (int)world->walls[dem2di_wall_of(world, contact)].desc.material.index
-                       : world->bodies[key->b].material;
+    int material = wall ? (int)world->walls[dem2di_wall_of(world, contact)].desc.material.index
+                        : world->bodies[key->b].material;
     return dem2di_law(world, world->bodies[key->a].material, material);
+}
+
+static inline const dem2d_pair_desc *dem2di_law_of(const dem2d_world *world, int contact) {
+    return dem2di_law_with(world, contact, contact >= world->list.pairs);
 }
 
 /* Room for the laws of one material more; those that are there keep their places. */
@@ -18024,9 +18135,9 @@ static dem2d_result dem2di_prepare(dem2d_world *world, bool *listed) {
 
 /* How the two of a contact moved against each other in the step that was made: those who have been
    given other velocities since, by what they had then. */
-static inline dem2di_relative_motion dem2di_motion_of(const dem2d_world *world, int contact) {
+static DEM2DI_INLINE dem2di_relative_motion dem2di_motion_with(const dem2d_world *world,
+                                                               int contact, bool wall) {
     const dem2di_key *key = &world->list.keys[contact];
-    const bool wall = contact >= world->list.pairs;
     dem2d_vec a = world->now[key->a].v, b;
     dem2di_relative_motion motion;
     motion.wa = world->now[key->a].w;
@@ -18052,6 +18163,10 @@ static inline dem2di_relative_motion dem2di_motion_of(const dem2d_world *world, 
     }
     motion.v = dem2di_sub(b, a);
     return motion;
+}
+
+static inline dem2di_relative_motion dem2di_motion_of(const dem2d_world *world, int contact) {
+    return dem2di_motion_with(world, contact, contact >= world->list.pairs);
 }
 
 /* What the dashpots of a contact take in the step between the last force pass and this, by their
@@ -18205,8 +18320,8 @@ static double dem2di_ledger_turnover(const dem2di_ledger *ledger, const dem2di_l
 
 /* ============================================================================================
    >>step  Contacts, their sums, walls, motion; the stable time step
-   uses: config, math, memory, fields, support, shapes, gjk, faces, contact, broad, law, motion,
-         world, cell, objects, walls, joints, list, ledger
+   uses: config, math, memory, fields, support, shapes, gjk, minimum, faces, contact, broad, law,
+         motion, world, cell, objects, walls, joints, list, ledger
    ============================================================================================ */
 
 /* Contacts of circles are taken in batches: what they need is fetched, all are computed by a loop
@@ -18519,10 +18634,11 @@ static DEM2DI_INLINE void dem2di_pair_search(const dem2d_world *world, dem2di_pa
 
 /* A look at two shapes from the contact's normal and history on: its normal, depth and points, or
    their gap. Returns the number of points that carry the contact. */
-static int dem2di_collide_shapes(const dem2d_world *world, dem2di_pair *pair,
-                                 const dem2di_contact *last, dem2di_history *history,
-                                 dem2di_contact *contact, dem2d_contact_point points[2],
-                                 double *gap, dem2di_count *count) {
+static DEM2DI_INLINE int dem2di_collide_shapes(const dem2d_world *world, dem2di_pair *pair,
+                                               const dem2di_contact *last, dem2di_history *history,
+                                               dem2di_contact *contact,
+                                               dem2d_contact_point points[2], double *gap,
+                                               dem2di_count *count) {
     dem2di_search search;
     count->collisions++;
     dem2di_pair_search(world, pair, last, &history->feature, &search);
@@ -18546,31 +18662,29 @@ static int dem2di_collide_shapes(const dem2d_world *world, dem2di_pair *pair,
 
 /* Geometry of one pair at the present positions. Returns the number of points that carry the
    contact, 0 when it is apart. */
-static int dem2di_collide_pair(const dem2d_world *world, int a, int b, const dem2di_contact *last,
-                               dem2di_history *history, dem2di_contact *contact,
-                               dem2d_contact_point points[2], dem2di_count *count) {
+static DEM2DI_INLINE int dem2di_collide_pair(const dem2d_world *world, int a, int b,
+                                             const dem2di_contact *last, dem2di_history *history,
+                                             dem2di_pair *pair, dem2di_contact *contact,
+                                             dem2d_contact_point points[2], dem2di_count *count) {
     const dem2di_body *body_a = &world->bodies[a], *body_b = &world->bodies[b];
     const dem2di_state *state_a = &world->now[a], *state_b = &world->now[b];
-    dem2d_vec d = dem2di_centre_line(state_a->x, state_b->x);
-    double reach = state_a->radius + state_b->radius, distance = dem2di_length(d);
+    pair->d = dem2di_centre_line(state_a->x, state_b->x);
+    double reach = state_a->radius + state_b->radius, distance = dem2di_length(pair->d), gap = 0;
     history->bound = 0;
     if (distance >= reach) {
         history->bound = dem2di_separation_bound(world, a, b, distance - reach, distance + reach);
         return 0;
     }
-    dem2di_pair pair;
-    pair.a = dem2di_shape_of(world, body_a);
-    pair.b = dem2di_shape_of(world, body_b);
-    pair.ra = state_a->q;
-    pair.rb = state_b->q;
-    pair.scale_a = body_a->scale;
-    pair.scale_b = body_b->scale;
-    pair.d = d;
-    pair.distance = distance;
-    pair.size = reach + distance;
-    double gap;
-    int found = dem2di_collide_shapes(world, &pair, last, history, contact, points, &gap, count);
-    if (found == 0) history->bound = dem2di_separation_bound(world, a, b, gap, pair.size);
+    pair->a = dem2di_shape_of(world, body_a);
+    pair->b = dem2di_shape_of(world, body_b);
+    pair->ra = state_a->q;
+    pair->rb = state_b->q;
+    pair->scale_a = body_a->scale;
+    pair->scale_b = body_b->scale;
+    pair->distance = distance;
+    pair->size = reach + distance;
+    int found = dem2di_collide_shapes(world, pair, last, history, contact, points, &gap, count);
+    if (found == 0) history->bound = dem2di_separation_bound(world, a, b, gap, pair->size);
     return found;
 }
 
@@ -18581,7 +18695,7 @@ typedef struct dem2di_last {
     const dem2di_contacts *from; /* columns with the forces of the last force pass, */
     int at;                      /* and the contact there */
     dem2di_contact contact;
-    dem2di_point_pair pair; /* where contacts may have two points */
+    dem2di_point_pair pair; /* if it had two points, else without weights */
 } dem2di_last;
 
 static inline void dem2di_last_get(const dem2d_world *world, const dem2di_contacts *from, int i,
@@ -18594,7 +18708,9 @@ static inline void dem2di_last_get(const dem2d_world *world, const dem2di_contac
     last->contact.depth = from->depth[i];
     last->contact.shear = from->shear[i];
     last->contact.arms = from->arms[at];
-    if (world->plan.faces) last->pair = from->point_pairs[at];
+    last->pair.weight[0] = last->pair.weight[1] = 0;
+    if (world->plan.faces && dem2di_has_two_points(&from->point_pairs[at]))
+        last->pair = from->point_pairs[at];
     if (!(world->plan.terms & DEM2DI_TANGENTIAL_DASHPOT)) return;
     last->contact.shear -= from->viscous_shear[i];
     for (int k = 0; k < 2 && world->plan.faces; k++)
@@ -18897,6 +19013,26 @@ static void dem2di_law_apply(dem2d_world *world, dem2di_law_rows *rows, dem2di_c
     rows->count = 0;
 }
 
+/* The law of a contact whose geometry is known: springs and friction of one point at once, all else
+   by rows. */
+static DEM2DI_INLINE void dem2di_contact_load(dem2d_world *world, int i, bool wall,
+                                              const dem2di_last *last, bool two,
+                                              dem2di_contact *contact, dem2di_law_rows *rows,
+                                              dem2di_count *count) {
+    if (two || world->plan.terms != 0) {
+        dem2di_law_add(world, i, last, two, contact, rows);
+        return;
+    }
+    const dem2d_pair_desc *law = dem2di_law_with(world, i, wall);
+    double slip = 0;
+    if (law->friction > 0) {
+        const dem2di_relative_motion motion = dem2di_motion_with(world, i, wall);
+        slip = dem2di_slip(&last->contact, contact, &motion);
+    }
+    dem2di_law_one(law, slip, last->contact.shear, world->made_step, contact);
+    dem2di_force_put(world, i, contact, 0, count);
+}
+
 /* Makes room in the rows for one more contact. */
 static inline void dem2di_law_room(dem2d_world *world, dem2di_law_rows *rows, dem2di_count *count) {
     if (rows->count > DEM2DI_BATCH - 2) dem2di_law_apply(world, rows, count);
@@ -18906,12 +19042,12 @@ static inline void dem2di_law_room(dem2d_world *world, dem2di_law_rows *rows, de
    its point on the line of the normal: at the middle of an overlap, and on a wall at the foot. Both
    arms are of one point, so that the two torques and the forces' moment add up to nothing. The
    centre of a wall that turns is its pivot; that of others is not asked for. */
-static DEM2DI_INLINE void dem2di_contact_place(dem2d_world *world, int i, int count,
+static DEM2DI_INLINE void dem2di_contact_place(dem2d_world *world, int i, bool wall, int count,
                                                const dem2d_contact_point points[2], dem2d_vec d,
                                                dem2di_contact *contact) {
     const dem2di_list *list = &world->list;
     const dem2di_key *key = &list->keys[i];
-    const bool wall = i >= list->pairs, turns = world->plan.turns; /* circles have a lever of 0 */
+    const bool turns = world->plan.turns; /* circles have a lever of 0 */
     const bool pinned = wall && !world->walls[dem2di_wall_of(world, i)].turns;
     const bool circle_a = !turns || world->lever[key->a] == 0;
     const bool circle_b = !wall && (!turns || world->lever[key->b] == 0);
@@ -18950,32 +19086,34 @@ static void dem2di_contact_apart(dem2d_world *world, int i, dem2d_vec normal) {
     dem2di_no_load(world, i);
 }
 
-/* A contact whose points are to be found has none yet. */
+/* A contact whose points are to be found has none yet. If it had two, both had a depth. */
 static inline void dem2di_points_clear(const dem2d_world *world, int i) {
-    dem2di_point_pair *pairs = world->list.contacts.point_pairs;
-    if (world->plan.faces) memset(&pairs[i - world->list.discs], 0, sizeof *pairs);
+    if (!world->plan.faces) return;
+    dem2di_point_pair *pair = &world->list.contacts.point_pairs[i - world->list.discs];
+    if (pair->depth[0] != 0 || dem2di_has_two_points(pair)) memset(pair, 0, sizeof *pair);
 }
 
 /* Geometry of one listed pair that is not of two circles, and its rows for the law. */
-static void dem2di_update_pair(dem2d_world *world, int i, dem2di_law_rows *rows,
-                               dem2di_count *count) {
+static DEM2DI_INLINE void dem2di_update_pair(dem2d_world *world, int i, dem2di_law_rows *rows,
+                                             dem2di_count *count) {
     dem2di_list *list = &world->list;
     int a = list->keys[i].a, b = list->keys[i].b;
     dem2di_history *history = &list->contacts.history[i - list->discs];
     dem2di_last last;
+    dem2di_pair pair;
     dem2di_contact contact;
     dem2d_contact_point points[2];
     dem2di_last_get(world, &list->contacts, i, &last);
     contact.normal = last.contact.normal;
     dem2di_points_clear(world, i);
-    int found = dem2di_collide_pair(world, a, b, &last.contact, history, &contact, points, count);
+    int found =
+        dem2di_collide_pair(world, a, b, &last.contact, history, &pair, &contact, points, count);
     if (found == 0) {
         dem2di_contact_apart(world, i, contact.normal);
         return;
     }
-    dem2d_vec d = dem2di_centre_line(world->now[a].x, world->now[b].x);
-    dem2di_contact_place(world, i, found, points, d, &contact);
-    dem2di_law_add(world, i, &last, found == 2, &contact, rows);
+    dem2di_contact_place(world, i, false, found, points, pair.d, &contact);
+    dem2di_contact_load(world, i, false, &last, found == 2, &contact, rows, count);
     dem2di_geometry_put(list, i, &contact);
 }
 
@@ -19097,13 +19235,19 @@ static void dem2di_arms_deepen(dem2di_arms *arms, double by, bool turns) {
     if (turns) arms->b_n += by;
 }
 
+/* The point of a contact with a wall where contacts have one: [P] fig. 4b, from the foot point to
+   the middle. */
+static inline void dem2di_wall_deepen(const dem2d_world *world, int i, dem2di_contact *contact) {
+    if (world->faces == DEM2D_ONE_POINT)
+        dem2di_arms_deepen(&contact->arms, contact->depth / 2,
+                           world->walls[dem2di_wall_of(world, i)].turns);
+}
+
 /* The rows of a contact with a wall whose geometry is known. */
 static DEM2DI_INLINE void dem2di_wall_add(dem2d_world *world, int i, const dem2di_last *last,
                                           dem2di_contact *contact, dem2di_law_rows *rows) {
     bool two = dem2di_point_pair_of(world, &world->list.contacts, i) != NULL;
-    if (world->faces == DEM2D_ONE_POINT) /* [P] fig. 4b: from the foot point to the middle */
-        dem2di_arms_deepen(&contact->arms, contact->depth / 2,
-                           world->walls[dem2di_wall_of(world, i)].turns);
+    dem2di_wall_deepen(world, i, contact);
     dem2di_law_add(world, i, last, two, contact, rows);
     dem2di_geometry_put(&world->list, i, contact);
 }
@@ -19160,11 +19304,14 @@ static void dem2di_update_wall_contact(dem2d_world *world, int i, dem2di_law_row
         return;
     }
     dem2d_vec pivot = world->wall_now[dem2di_wall_of(world, i)].point;
-    dem2di_contact_place(world, i, found, points, dem2di_sub(pivot, world->now[a].x), &contact);
-    if (joined)
-        dem2di_geometry_put(list, i, &contact);
-    else
-        dem2di_wall_add(world, i, &last, &contact, rows);
+    dem2di_contact_place(world, i, true, found, points, dem2di_sub(pivot, world->now[a].x),
+                         &contact);
+    if (!joined) {
+        bool two = dem2di_point_pair_of(world, &list->contacts, i) != NULL;
+        dem2di_wall_deepen(world, i, &contact);
+        dem2di_contact_load(world, i, true, &last, two, &contact, rows, count);
+    }
+    dem2di_geometry_put(list, i, &contact);
 }
 
 /* --- joints: of the contacts at joined segments, which count, and how
@@ -19329,7 +19476,8 @@ static bool dem2di_find_vertex(dem2d_world *world, int vertex, dem2di_count *cou
     memset(&contact, 0, sizeof contact);
     if (!dem2di_collide_vertex(world, a, number, &contact, points, count)) return false;
     dem2d_vec pivot = world->wall_now[dem2di_wall_of(world, vertex)].point;
-    dem2di_contact_place(world, vertex, 1, points, dem2di_sub(pivot, world->now[a].x), &contact);
+    dem2di_contact_place(world, vertex, true, 1, points, dem2di_sub(pivot, world->now[a].x),
+                         &contact);
     dem2di_geometry_put(&world->list, vertex, &contact);
     return true;
 }
@@ -19589,7 +19737,8 @@ static void dem2di_push_back(dem2d_world *world, int i, dem2di_count *count) {
         return;
     }
     dem2d_vec pivot = world->wall_now[dem2di_wall_of(world, i)].point;
-    dem2di_contact_place(world, i, number, points, dem2di_sub(pivot, world->now[a].x), &contact);
+    dem2di_contact_place(world, i, true, number, points, dem2di_sub(pivot, world->now[a].x),
+                         &contact);
     dem2di_geometry_put(&world->list, i, &contact);
 }
 
@@ -19723,15 +19872,272 @@ static inline void dem2di_collide(dem2d_world *world, int i, dem2di_law_rows *ro
     }
 }
 
+/* --- smooth contacts that go on ------------------------------------------------------------------
+   Most contacts of particles without edges are where they were in the last step, see
+   dem2di_smooth_last. They are taken in tiles: fetched with their support points along the last
+   normal, computed by loops that compilers turn into vector instructions, and put into the columns.
+   They get the same bits as from dem2di_update_pair, which takes those that do not go on. */
+typedef struct dem2di_tile {
+    int count;
+    bool round; /* some contact is of a circle */
+    int contact[DEM2DI_BATCH];
+    double held[DEM2DI_BATCH]; /* 1: goes on, 0: does not */
+    double dx[DEM2DI_BATCH], dy[DEM2DI_BATCH], reach[DEM2DI_BATCH];
+    double ax[DEM2DI_BATCH], ay[DEM2DI_BATCH]; /* support point of A along the last normal, */
+    double bx[DEM2DI_BATCH], by[DEM2DI_BATCH]; /* of B against it; each from its centre */
+    double rho_a[DEM2DI_BATCH], rho_b[DEM2DI_BATCH];
+    double least_a[DEM2DI_BATCH], least_b[DEM2DI_BATCH], most[DEM2DI_BATCH]; /* of rho */
+    double vx[DEM2DI_BATCH], vy[DEM2DI_BATCH], wa[DEM2DI_BATCH], wb[DEM2DI_BATCH];
+    double kn[DEM2DI_BATCH], kt[DEM2DI_BATCH], mu[DEM2DI_BATCH];
+    double last_x[DEM2DI_BATCH], last_y[DEM2DI_BATCH], last_shear[DEM2DI_BATCH];
+    double last_a_n[DEM2DI_BATCH], last_a_t[DEM2DI_BATCH];
+    double last_b_n[DEM2DI_BATCH], last_b_t[DEM2DI_BATCH];
+    double x[DEM2DI_BATCH], y[DEM2DI_BATCH], depth[DEM2DI_BATCH]; /* normal, and what follows */
+    double a_n[DEM2DI_BATCH], a_t[DEM2DI_BATCH], b_n[DEM2DI_BATCH], b_t[DEM2DI_BATCH];
+    double force[DEM2DI_BATCH], shear[DEM2DI_BATCH];
+    double load_x[DEM2DI_BATCH], load_y[DEM2DI_BATCH], load_a[DEM2DI_BATCH], load_b[DEM2DI_BATCH];
+    double sum[DEM2DI_BATCH]; /* of the loads, without signs */
+} dem2di_tile;
+
+/* Fetch the two of a contact. */
+static DEM2DI_INLINE void dem2di_tile_fetch(const dem2d_world *world, int i,
+                                            const dem2d_shape *shape_a, const dem2d_shape *shape_b,
+                                            dem2di_tile *tile) {
+    const dem2di_contacts *from = &world->list.contacts;
+    const int slot_a = world->list.keys[i].a, slot_b = world->list.keys[i].b, k = tile->count++;
+    const dem2di_state *a = &world->now[slot_a], *b = &world->now[slot_b];
+    const double scale_a = world->bodies[slot_a].scale, scale_b = world->bodies[slot_b].scale;
+    double rho;
+    dem2d_vec u = dem2di_vec(from->normal_x[i], from->normal_y[i]);
+    tile->contact[k] = i;
+    tile->round |= world->lever[slot_a] == 0 || world->lever[slot_b] == 0;
+    dem2d_vec s = dem2di_support(shape_a, dem2di_turn_back(a->q, u), &rho);
+    s = dem2di_scale(dem2di_turn(a->q, s), scale_a);
+    tile->ax[k] = s.x;
+    tile->ay[k] = s.y;
+    tile->rho_a[k] = rho * scale_a;
+    s = dem2di_support(shape_b, dem2di_turn_back(b->q, dem2di_negate(u)), &rho);
+    s = dem2di_scale(dem2di_turn(b->q, s), scale_b);
+    tile->bx[k] = s.x;
+    tile->by[k] = s.y;
+    tile->rho_b[k] = rho * scale_b;
+    tile->least_a[k] = shape_a->rho_min * scale_a;
+    tile->least_b[k] = shape_b->rho_min * scale_b;
+    tile->most[k] = shape_a->rho_max * scale_a + shape_b->rho_max * scale_b;
+    dem2d_vec d = dem2di_centre_line(a->x, b->x);
+    tile->dx[k] = d.x;
+    tile->dy[k] = d.y;
+    tile->reach[k] = a->radius + b->radius;
+    if (tile->mu[k] > 0) {
+        const dem2di_relative_motion motion = dem2di_motion_with(world, i, false);
+        tile->vx[k] = motion.v.x;
+        tile->vy[k] = motion.v.y;
+        tile->wa[k] = motion.wa;
+        tile->wb[k] = motion.wb;
+    } else { /* the sliding velocity does not count */
+        tile->vx[k] = tile->vy[k] = tile->wa[k] = tile->wb[k] = 0;
+    }
+}
+
+/* Fetch contact i, its last step and its law, if it may go on; else false. */
+static DEM2DI_INLINE bool dem2di_tile_add(const dem2d_world *world, int i, dem2di_tile *tile) {
+    const dem2di_contacts *from = &world->list.contacts;
+    const dem2di_body *a = &world->bodies[world->list.keys[i].a];
+    const dem2di_body *b = &world->bodies[world->list.keys[i].b];
+    if (!(from->depth[i] > 0)) return false;
+    const dem2d_shape *shape_a = dem2di_shape_of(world, a), *shape_b = dem2di_shape_of(world, b);
+    if (shape_a->flat || shape_b->flat || dem2di_edges_unknown(shape_a) ||
+        dem2di_edges_unknown(shape_b))
+        return false;
+    const int k = tile->count;
+    const dem2d_pair_desc *law = dem2di_law(world, a->material, b->material);
+    const dem2di_arms *arms = &from->arms[i - world->list.discs];
+    tile->kn[k] = law->normal_stiffness;
+    tile->kt[k] = law->tangential_stiffness;
+    tile->mu[k] = law->friction;
+    dem2di_tile_fetch(world, i, shape_a, shape_b, tile);
+    tile->last_x[k] = from->normal_x[i];
+    tile->last_y[k] = from->normal_y[i];
+    tile->last_shear[k] = from->shear[i];
+    tile->last_a_n[k] = arms->a_n;
+    tile->last_a_t[k] = arms->a_t;
+    tile->last_b_n[k] = arms->b_n;
+    tile->last_b_t[k] = arms->b_t;
+    return true;
+}
+
+DEM2DI_VECTORS_BEGIN
+/* Geometry of all, as dem2di_smooth_last and dem2di_contact_place. */
+static void dem2di_tile_place(dem2di_tile *t, double tolerance) {
+    dem2di_demand demand;
+    demand.detect = true;
+    demand.tolerance = 0;
+    demand.angle = dem2di_rest_angle(tolerance, true);
+    for (int k = 0; k < t->count; k++) {
+        const double dx = t->dx[k], dy = t->dy[k], ux = t->last_x[k], uy = t->last_y[k];
+        const double distance = sqrt(dx * dx + dy * dy), size = t->reach[k] + distance;
+        const double wx = (t->ax[k] - t->bx[k]) - dx, wy = (t->ay[k] - t->by[k]) - dy;
+        dem2di_eval eval;
+        dem2di_search search;
+        eval.u.x = ux;
+        eval.u.y = uy;
+        eval.v[0].a.x = t->ax[k];
+        eval.v[0].a.y = t->ay[k];
+        eval.v[0].b.x = t->bx[k];
+        eval.v[0].b.y = t->by[k];
+        eval.rho[0] = t->rho_a[k];
+        eval.rho[1] = t->rho_b[k];
+        eval.h = wx * ux + wy * uy;
+        eval.slope[0] = ux * wy - uy * wx;
+        bool rests = dem2di_rest_found(size, t->least_a[k], t->least_b[k], t->most[k], &eval,
+                                       &demand, &search);
+        const double nx = search.normal.x, ny = search.normal.y, depth = search.upper;
+        const double px = (search.a.x + (search.b.x + dx)) * 0.5;
+        const double py = (search.a.y + (search.b.y + dy)) * 0.5;
+        const double along = nx * dx + ny * dy, across = nx * dy - ny * dx;
+        const double a_n = nx * px + ny * py, a_t = nx * py - ny * px;
+        t->held[k] = (rests & (distance < t->reach[k]) & (depth > 0)) ? 1 : 0;
+        t->x[k] = nx;
+        t->y[k] = ny;
+        t->depth[k] = depth;
+        t->a_n[k] = a_n;
+        t->a_t[k] = a_t;
+        t->b_n[k] = a_n - along;
+        t->b_t[k] = a_t - across;
+    }
+}
+
+/* Springs and friction of all, as dem2di_contact_load. */
+static void dem2di_tile_springs(dem2di_tile *t, double time_step) {
+    for (int k = 0; k < t->count; k++) {
+        const double x = t->x[k], y = t->y[k], vx = t->vx[k], vy = t->vy[k];
+        const double wa = t->wa[k], wb = t->wb[k], a_n = t->a_n[k], b_n = t->b_n[k], none = 0;
+        const double now = x * vy - y * vx - (a_n * wa - b_n * wb) + none;
+        const double before = t->last_x[k] * vy - t->last_y[k] * vx -
+                              (t->last_a_n[k] * wa - t->last_b_n[k] * wb) + none;
+        const double slip = now + (before - now) / 2;
+        const double force = t->kn[k] * t->depth[k];
+        const double shear =
+            dem2di_held(t->mu[k] * force, t->last_shear[k] - t->kt[k] * slip * time_step);
+        t->force[k] = force;
+        t->shear[k] = shear;
+        const double load_x = x * force + shear * -y, load_y = y * force + shear * x;
+        const double load_a = -(a_n * shear - t->a_t[k] * force) - none;
+        const double load_b = b_n * shear - t->b_t[k] * force + none;
+        t->load_x[k] = load_x;
+        t->load_y[k] = load_y;
+        t->load_a[k] = load_a;
+        t->load_b[k] = load_b;
+        t->sum[k] = fabs(load_x) + fabs(load_y) + fabs(load_a) + fabs(load_b);
+    }
+}
+DEM2DI_VECTORS_END
+
+/* Geometry of contact k of a tile. */
+static inline void dem2di_tile_get(const dem2di_tile *tile, int k, dem2di_contact *contact) {
+    contact->normal.x = tile->x[k];
+    contact->normal.y = tile->y[k];
+    contact->depth = tile->depth[k];
+    contact->arms.a_n = tile->a_n[k];
+    contact->arms.a_t = tile->a_t[k];
+    contact->arms.b_n = tile->b_n[k];
+    contact->arms.b_t = tile->b_t[k];
+}
+
+/* The arms of circles, which dem2di_tile_place does not know. */
+static void dem2di_tile_round(dem2d_world *world, dem2di_tile *tile) {
+    for (int k = 0; k < tile->count; k++) {
+        const int i = tile->contact[k];
+        const dem2di_key *key = &world->list.keys[i];
+        if (world->lever[key->a] != 0 && world->lever[key->b] != 0) continue;
+        dem2di_contact contact;
+        dem2d_contact_point points[2];
+        points[0].position = dem2di_vec(0, 0); /* does not count */
+        dem2di_tile_get(tile, k, &contact);
+        dem2di_contact_place(world, i, false, 1, points, dem2di_vec(tile->dx[k], tile->dy[k]),
+                             &contact);
+        tile->a_n[k] = contact.arms.a_n;
+        tile->a_t[k] = contact.arms.a_t;
+        tile->b_n[k] = contact.arms.b_n;
+        tile->b_t[k] = contact.arms.b_t;
+    }
+}
+
+/* Forces and loads of contact k, without terms beside springs and friction. */
+static DEM2DI_INLINE void dem2di_tile_put(dem2d_world *world, const dem2di_tile *tile, int k,
+                                          dem2di_count *count) {
+    const int i = tile->contact[k];
+    world->list.contacts.force[i] = tile->force[k];
+    world->list.contacts.shear[i] = tile->shear[k];
+    world->load_x[i] = tile->load_x[k];
+    world->load_y[i] = tile->load_y[k];
+    world->load_a[i] = tile->load_a[k];
+    world->load_b[i] = tile->load_b[k];
+    count->unsound += !dem2di_finite(tile->sum[k]);
+    if (!world->bounded) count->load = dem2di_max(count->load, tile->sum[k]);
+}
+
+/* A contact that does not go on. Not inline: dem2di_others_range has the same for its own. */
+static void dem2di_tile_leave(dem2d_world *world, int i, dem2di_law_rows *rows,
+                              dem2di_count *count) {
+    dem2di_update_pair(world, i, rows, count);
+}
+
+/* All contacts of a tile: geometry, and forces or rows. */
+static void dem2di_tile_apply(dem2d_world *world, dem2di_tile *tile, dem2di_law_rows *rows,
+                              dem2di_count *count) {
+    const bool terms = world->plan.terms != 0;
+    const int discs = world->list.discs;
+    dem2di_contact contact;
+    dem2di_last last;
+    if (tile->count == 0) return;
+    dem2di_tile_place(tile, world->tolerance);
+    if (tile->round) dem2di_tile_round(world, tile);
+    if (!terms) dem2di_tile_springs(tile, world->made_step);
+    for (int k = 0; k < tile->count; k++) {
+        const int i = tile->contact[k];
+        dem2di_history *history = &world->list.contacts.history[i - discs];
+        dem2di_law_room(world, rows, count);
+        if (!(tile->held[k] > 0)) {
+            dem2di_tile_leave(world, i, rows, count);
+            continue;
+        }
+        count->collisions++;
+        count->calls++;
+        count->proofs[DEM2D_BY_RADIUS]++;
+        history->bound = 0;
+        history->feature.own = history->feature.corner[0] = history->feature.corner[1] = -1;
+        dem2di_tile_get(tile, k, &contact);
+        if (terms) {
+            dem2di_last_get(world, &world->list.contacts, i, &last);
+            dem2di_law_add(world, i, &last, false, &contact, rows);
+        } else {
+            dem2di_tile_put(world, tile, k, count);
+        }
+        dem2di_points_clear(world, i);
+        dem2di_geometry_put(&world->list, i, &contact);
+    }
+    tile->count = 0;
+    tile->round = false;
+}
+
 /* The contacts of a block that are not of two circles: first their geometry, then the law, whenever
    the rows are full. */
 static void dem2di_others_range(dem2d_world *world, int begin, int end, dem2di_count *count) {
+    const bool tiled = world->solver == DEM2D_CERTIFIED && world->plan.turns && !world->immovable;
     dem2di_law_rows rows;
-    rows.count = 0;
+    dem2di_tile tile;
+    rows.count = tile.count = 0;
+    tile.round = false;
     for (int i = begin; i < end; i++) {
-        dem2di_law_room(world, &rows, count);
-        dem2di_collide(world, i, &rows, count);
+        if (tiled && i < world->list.pairs && dem2di_tile_add(world, i, &tile)) {
+            if (tile.count == DEM2DI_BATCH) dem2di_tile_apply(world, &tile, &rows, count);
+        } else {
+            dem2di_law_room(world, &rows, count);
+            dem2di_collide(world, i, &rows, count);
+        }
     }
+    dem2di_tile_apply(world, &tile, &rows, count);
     dem2di_law_apply(world, &rows, count);
 }
 
