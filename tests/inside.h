@@ -7,6 +7,8 @@
 int inside_slot(const dem2d_world *world, int index);
 /* Sort the particles in space with the next list, or do not. */
 void inside_scatter(dem2d_world *world, bool scattered);
+/* In the next step, have contacts computed one by one, and none in tiles. */
+void inside_take_singly(dem2d_world *world);
 /* Renew the list of pairs in the next step. */
 void inside_renew_list(dem2d_world *world);
 /* Has a particle moved as far as its skin; will the next step renew the list? */
@@ -45,6 +47,10 @@ int inside_slot(const dem2d_world *world, int index) {
 
 void inside_scatter(dem2d_world *world, bool scattered) {
     world->scattered = scattered;
+}
+
+void inside_take_singly(dem2d_world *world) {
+    world->immovable = true; /* that some pair is: each is then asked for it */
 }
 
 void inside_renew_list(dem2d_world *world) {
