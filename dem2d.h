@@ -27452,17 +27452,17 @@ static void dem2di_draw_swatch(const dem2di_view *view, double x, double width, 
 /* The colour bar in the right half of the strip, in steps, with the numbers at its ends. */
 static void dem2di_draw_bar(const dem2di_view *view, const dem2di_colours *colours,
                             const char *label, dem2di_writer *writer) {
-    enum { STEPS = 32 };
+    const int steps = 32;
     char text[8];
     double left = 0.62 * view->width, width = 0.24 * view->width;
     double base = view->height + 0.78 * view->strip, gap = view->width / 100;
     const char *named = colours->by == DEM2D_COLOUR_SPEED      ? "speed, m/s"
                         : colours->by == DEM2D_COLOUR_PRESSURE ? "pressure, Pa"
                                                                : "";
-    for (int i = 0; i < STEPS; i++) { /* a little wider than a step: no seams */
-        dem2di_colour_text((double)i / (STEPS - 1), text);
-        dem2di_draw_swatch(view, left + width * i / STEPS,
-                           width / STEPS * (i + 1 < STEPS ? 1.2 : 1), text, writer);
+    for (int i = 0; i < steps; i++) { /* a little wider than a step: no seams */
+        dem2di_colour_text((double)i / (steps - 1), text);
+        dem2di_draw_swatch(view, left + width * i / steps,
+                           width / steps * (i + 1 < steps ? 1.2 : 1), text, writer);
     }
     dem2di_draw_text(view, left - gap, base, "end", NULL, colours->low, writer);
     dem2di_draw_text(view, left + width + gap, base, "start", NULL, colours->high, writer);
