@@ -1,7 +1,7 @@
 /* bench_rigid [--quick] [--only SWEEP,...] [--seeds N] [--data DIR] [--report] [OUTDIR] - the error
    that soft contacts and fast loading make in a biaxial test, beside the time of the run.
 
-   The test. N grains between four smooth walls, without gravity. They begin in rows, in random
+   The test. 160 grains between four smooth walls, without gravity. They begin in rows, in random
    motion, and servo walls press them together at P, without friction, until they are at rest. Then
    friction is 0.5: the top moves at a constant rate of logarithmic strain, to 10 %, while the side
    walls hold P. q/p comes from the Love-Weber stress, at 200 equal strains. `peak`: its greatest
@@ -12,7 +12,8 @@
    polygons and Fourier series drawn here. Circles of equal area have diameters uniform in 0.04 to
    0.06 m.
 
-   Sweeps, each from the base case with one number changed:
+   Sweeps, each from the base case (k_n/P 1000, inertial number 1e-3, half the safe time step,
+   tolerance 1e-8, damping ratio 0.3, no local damping) with one number changed:
        stiffness   k_n/P; k_n = k_t; the packing of 1000 comes to rest with the new one first
        rate        inertial number, as dem2d_world_inertial_number defines it (with the mass m of a
                    disc, rate sqrt(m/P) is 0.89 of it); with dashpots
@@ -34,8 +35,8 @@
 
    Each finished run is a line of OUTDIR/runs.txt. A run that is there is not made again: the same
    command goes on after a stop. --report makes no runs. Writes rigid.csv, limits.csv and, where
-   gnuplot is installed, rigid.svg to OUTDIR, build/bench_rigid by default. --quick: small samples,
-   two seeds, cheap cases. Exit status: 0, 2 if something failed. */
+   gnuplot is installed, rigid.svg to OUTDIR, build/bench_rigid by default. --quick: 64 grains,
+   two seeds, cheap cases, inertial number 3e-3 in the base case. Exit status: 0, 2 if something failed. */
 #define _POSIX_C_SOURCE 200809L
 #define DEM2D_IMPLEMENTATION
 #include "dem2d.h"
