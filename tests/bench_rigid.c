@@ -36,7 +36,8 @@
    Each finished run is a line of OUTDIR/runs.txt. A run that is there is not made again: the same
    command goes on after a stop. --report makes no runs. Writes rigid.csv, limits.csv and, where
    gnuplot is installed, rigid.svg to OUTDIR, build/bench_rigid by default. --quick: 64 grains,
-   two seeds, cheap cases, inertial number 3e-3 in the base case. Exit status: 0, 2 if something failed. */
+   two seeds, cheap cases, inertial number 3e-3 in the base case. Exit status: 0, 2 if something
+   failed. */
 #define _POSIX_C_SOURCE 200809L
 #define DEM2D_IMPLEMENTATION
 #include "dem2d.h"
