@@ -307,8 +307,9 @@ HOW TO
                          is in the ledger.
     leave out the walls  dem2d_world_desc.cell makes the world periodic. dem2d_world_stress with the
                          area of the cell is then the stress of a sample without any border.
-    deform a cell        dem2d_world_deform: shear, compression, both, at any time. Then
-                         dem2d_world_get_cell for the cell, its strain rates and its stress.
+    deform a cell        dem2d_world_deform: shear and compression at given rates, or at stresses
+                         that are held, changed at any time; from a gas to a packing: hold xx and
+                         yy. Then dem2d_world_get_cell for the cell, its rates and its stress.
     share a scene        Each world holds its own grains, and copies (ghosts) of the others' grains
       out to processes   within reach, with the same names. dem2d_world_desc.gather gives each ghost
                          the force that its owner has found: the worlds then move like one, to the
@@ -1422,10 +1423,28 @@ typedef struct dem2d_cell {
 /// taken off, and P is 0 from then on. When b leans by more than half of a, the cell of the vectors
 /// a and b + a, or b - a, takes its place: it has the same lattice, and particles keep their
 /// contacts. The steps are of second order (implicit midpoint rule).
+///
+/// Instead of a rate a stress can be held: xx, yx (in place of the rate xy) or yy. It is the sum of
+/// the stresses of contacts and fluctuations, compression positive. With moments in the contacts it
+/// is not symmetric: yx is the force along x across a face with normal y. The rates L that hold the
+/// stresses follow in each step from
+///     (K dt + E + 3 s dt) (L - D) = 0.8 (stress - target) + E (L- - D)
+/// with the stiffness K and the viscosity E of the contacts, the rates L- of the last step, the
+/// greatest target s and the drift D, a mean of L over some ten steps, so that the mean stress is
+/// right while the cell deforms steadily. |L| is at most max_rate: at this rate a cell without
+/// contacts shrinks. dem2d_cell_info.limited is true while a rate is at this limit, because its
+/// stress is not reached. The control takes energy out of the cell.
 typedef struct dem2d_deformation_desc {
-    double xx; ///< 1/s, rate of extension along x
-    double xy; ///< 1/s, simple shear: change of the velocity along x with y
-    double yy; ///< 1/s, rate of extension along y
+    double xx;        ///< 1/s, rate of extension along x; 0 where xx is held
+    double xy;        ///< 1/s, simple shear: change of the velocity along x with y; 0 if held
+    double yy;        ///< 1/s, rate of extension along y; 0 where yy is held
+    double stress_xx; ///< Pa, where it is held, else 0
+    double stress_yx; ///< Pa, likewise: force along x across a face with normal y
+    double stress_yy; ///< Pa, likewise
+    bool hold_xx;     ///< hold stress_xx
+    bool hold_yx;     ///< hold stress_yx by the rate xy
+    bool hold_yy;     ///< hold stress_yy
+    double max_rate;  ///< 1/s, >= 0; 0 for 0.1 sqrt(s/m), m the mean mass of the free particles
 } dem2d_deformation_desc;
 
 /// A world. Only time_step has no default.
@@ -1777,7 +1796,8 @@ DEM2D_API dem2d_result dem2d_world_set_gravity(dem2d_world *world, dem2d_vec gra
 /// Change local ([0, 1)) and global (1/s, >= 0) damping.
 DEM2D_API dem2d_result dem2d_world_set_damping(dem2d_world *world, double local, double global);
 /// Let the cell deform from the next step on. Errors: NOT_FINITE, OUT_OF_RANGE (a rate times the
-/// time step above 0.1; a world that is not periodic along a and b), OUT_OF_MEMORY.
+/// time step above 0.1; a rate or stress of a component of the other kind; all held stresses 0; a
+/// world that is not periodic along a and b), OUT_OF_MEMORY.
 DEM2D_API dem2d_result dem2d_world_deform(dem2d_world *world, const dem2d_deformation_desc *desc);
 /// Change the time step (s, > 0) from the next move on.
 DEM2D_API dem2d_result dem2d_world_set_time_step(dem2d_world *world, double time_step);
@@ -1901,7 +1921,9 @@ typedef struct dem2d_stress {
 /// A periodic cell and the stress in it.
 typedef struct dem2d_cell_info {
     dem2d_cell cell;                    ///< m, now
-    dem2d_deformation_desc deformation; ///< 1/s, in the last step
+    dem2d_deformation_desc deformation; ///< as it was set
+    double xx, xy, yy;                  ///< 1/s, rates in the last step
+    bool limited;                       ///< a held stress is not reached at the greatest rate
     double area;          ///< m2, of the cell at the last force pass; 0 where only one
                           ///< direction is periodic: then there is no stress
     dem2d_stress contact; ///< Pa, of the contacts at the last force pass
@@ -12641,6 +12663,11 @@ typedef struct dem2di_image {
     int row;      /* while the list is made: its place among those that some pair needs, or -1 */
 } dem2di_image;
 
+/* Velocity gradient of a cell, 1/s: of the velocity along the first by the second coordinate. */
+typedef struct dem2di_flow {
+    double xx, xy, yy;
+} dem2di_flow;
+
 /* Columns of one length. Those before the keys grow one by one; the others are renewed with the
    list, and in large scenes are most of the memory. */
 typedef enum dem2di_group {
@@ -12776,10 +12803,13 @@ struct dem2d_world {
     bool one_sided;                /* a wall with parts has */
     int wall_count, part_count;
 
-    dem2d_cell cell, cell_before;     /* now; at the last force pass */
-    dem2d_deformation_desc flow;      /* from the next step on, */
-    dem2d_deformation_desc flow_made; /* in the step that was made, */
-    dem2di_velocities *fluctuations;  /* while velocities are those of contacts, and `made` */
+    dem2d_cell cell, cell_before;    /* now; at the last force pass */
+    dem2d_deformation_desc control;  /* as it was set */
+    dem2di_flow flow;                /* from the next step on; of held stresses in the last one, */
+    dem2di_flow flow_made;           /* in the step that was made, */
+    dem2di_flow drift;               /* of held stresses: mean rate that holds them */
+    bool limited;                    /* a held stress needs a greater rate than the greatest */
+    dem2di_velocities *fluctuations; /* while velocities are those of contacts, and `made` */
     dem2di_velocities *made_fluctuations;
     bool periodic;                      /* there is a cell: one of its vectors is not zero */
     bool wrap_due;                      /* no memory was left to move particles into the cell */
@@ -12905,6 +12935,20 @@ static const dem2di_field dem2di_setting_fields[] = {
     DEM2DI_SAVED("cell_origin", dem2d_world, cell.origin, DEM2DI_VECTOR),
     DEM2DI_SAVED("last_cell_a", dem2d_world, cell_before.a, DEM2DI_VECTOR),
     DEM2DI_SAVED("last_cell_b", dem2d_world, cell_before.b, DEM2DI_VECTOR),
+    DEM2DI_SAVED("control_xx", dem2d_world, control.xx, DEM2DI_FINITE),
+    DEM2DI_SAVED("control_xy", dem2d_world, control.xy, DEM2DI_FINITE),
+    DEM2DI_SAVED("control_yy", dem2d_world, control.yy, DEM2DI_FINITE),
+    DEM2DI_SAVED("stress_xx", dem2d_world, control.stress_xx, DEM2DI_FINITE),
+    DEM2DI_SAVED("stress_yx", dem2d_world, control.stress_yx, DEM2DI_FINITE),
+    DEM2DI_SAVED("stress_yy", dem2d_world, control.stress_yy, DEM2DI_FINITE),
+    DEM2DI_SAVED("hold_xx", dem2d_world, control.hold_xx, DEM2DI_SWITCH),
+    DEM2DI_SAVED("hold_yx", dem2d_world, control.hold_yx, DEM2DI_SWITCH),
+    DEM2DI_SAVED("hold_yy", dem2d_world, control.hold_yy, DEM2DI_SWITCH),
+    DEM2DI_SAVED("max_rate", dem2d_world, control.max_rate, DEM2DI_FROM_0),
+    DEM2DI_SAVED("drift_xx", dem2d_world, drift.xx, DEM2DI_FINITE),
+    DEM2DI_SAVED("drift_xy", dem2d_world, drift.xy, DEM2DI_FINITE),
+    DEM2DI_SAVED("drift_yy", dem2d_world, drift.yy, DEM2DI_FINITE),
+    DEM2DI_SAVED("limited", dem2d_world, limited, DEM2DI_SWITCH),
     DEM2DI_SAVED("flow_xx", dem2d_world, flow.xx, DEM2DI_FINITE),
     DEM2DI_SAVED("flow_xy", dem2d_world, flow.xy, DEM2DI_FINITE),
     DEM2DI_SAVED("flow_yy", dem2d_world, flow.yy, DEM2DI_FINITE),
@@ -13646,23 +13690,29 @@ static const dem2di_field dem2di_deformation_fields[] = {
     DEM2DI_ROW(dem2d_deformation_desc, xx, DEM2DI_FINITE, "1/s 0"),
     DEM2DI_ROW(dem2d_deformation_desc, xy, DEM2DI_FINITE, "1/s 0"),
     DEM2DI_ROW(dem2d_deformation_desc, yy, DEM2DI_FINITE, "1/s 0"),
+    DEM2DI_ROW(dem2d_deformation_desc, stress_xx, DEM2DI_FINITE, "Pa 0"),
+    DEM2DI_ROW(dem2d_deformation_desc, stress_yx, DEM2DI_FINITE, "Pa 0"),
+    DEM2DI_ROW(dem2d_deformation_desc, stress_yy, DEM2DI_FINITE, "Pa 0"),
+    DEM2DI_ROW(dem2d_deformation_desc, hold_xx, DEM2DI_SWITCH, "- false"),
+    DEM2DI_ROW(dem2d_deformation_desc, hold_yx, DEM2DI_SWITCH, "- false"),
+    DEM2DI_ROW(dem2d_deformation_desc, hold_yy, DEM2DI_SWITCH, "- false"),
+    DEM2DI_ROW(dem2d_deformation_desc, max_rate, DEM2DI_FROM_0, "1/s 0.1 sqrt(s/m)"),
 };
 
 /* Greatest change of a length in a step, of the length. */
 #define DEM2DI_FLOW_MOST 0.1
 
-static inline bool dem2di_flows(const dem2d_deformation_desc *flow) {
+static inline bool dem2di_flows(const dem2di_flow *flow) {
     return flow->xx != 0 || flow->xy != 0 || flow->yy != 0;
 }
 
 /* At least the greatest change of a vector of length 1. */
-static double dem2di_flow_size(const dem2d_deformation_desc *flow) {
+static double dem2di_flow_size(const dem2di_flow *flow) {
     return sqrt(flow->xx * flow->xx + flow->xy * flow->xy + flow->yy * flow->yy);
 }
 
-static dem2d_deformation_desc dem2di_flow_mean(const dem2d_deformation_desc *one,
-                                               const dem2d_deformation_desc *other) {
-    dem2d_deformation_desc mean;
+static dem2di_flow dem2di_flow_mean(const dem2di_flow *one, const dem2di_flow *other) {
+    dem2di_flow mean;
     mean.xx = (one->xx + other->xx) / 2;
     mean.xy = (one->xy + other->xy) / 2;
     mean.yy = (one->yy + other->yy) / 2;
@@ -13670,13 +13720,12 @@ static dem2d_deformation_desc dem2di_flow_mean(const dem2d_deformation_desc *one
 }
 
 /* L v. */
-static inline dem2d_vec dem2di_flow_at(const dem2d_deformation_desc *flow, dem2d_vec v) {
+static inline dem2d_vec dem2di_flow_at(const dem2di_flow *flow, dem2d_vec v) {
     return dem2di_vec(flow->xx * v.x + flow->xy * v.y, flow->yy * v.y);
 }
 
 /* The w of (1 + h L) w = v. */
-static inline dem2d_vec dem2di_flow_solve(const dem2d_deformation_desc *flow, double h,
-                                          dem2d_vec v) {
+static inline dem2d_vec dem2di_flow_solve(const dem2di_flow *flow, double h, dem2d_vec v) {
     dem2d_vec w;
     w.y = v.y / (1 + h * flow->yy);
     w.x = (v.x - h * flow->xy * w.y) / (1 + h * flow->xx);
@@ -13684,24 +13733,70 @@ static inline dem2d_vec dem2di_flow_solve(const dem2d_deformation_desc *flow, do
 }
 
 /* A vector between two points that go with the flow, a step later. */
-static inline dem2d_vec dem2di_flow_map(const dem2d_deformation_desc *flow, double time_step,
-                                        dem2d_vec v) {
+static inline dem2d_vec dem2di_flow_map(const dem2di_flow *flow, double time_step, dem2d_vec v) {
     v = dem2di_along(v, time_step / 2, dem2di_flow_at(flow, v));
     return dem2di_flow_solve(flow, -time_step / 2, v);
 }
 
-static dem2d_result dem2di_check_flow(const dem2d_env *env, const dem2d_deformation_desc *flow,
-                                      double time_step) {
-    const double rates[3] = {flow->xx, flow->xy, flow->yy};
-    static const char *const names[3] = {"xx", "xy", "yy"};
-    dem2d_result result = dem2di_check_fields(env, DEM2DI_ALL(dem2di_deformation_fields), flow);
-    if (result != DEM2D_OK) return result;
+static bool dem2di_flow_fits(const dem2di_flow *flow, double time_step) {
+    return fabs(flow->xx) * time_step <= DEM2DI_FLOW_MOST &&
+           fabs(flow->xy) * time_step <= DEM2DI_FLOW_MOST &&
+           fabs(flow->yy) * time_step <= DEM2DI_FLOW_MOST;
+}
+
+/* The parts of a deformation: rates, stresses, which stresses are held. */
+typedef struct dem2di_control {
+    double rate[3], stress[3];
+    bool hold[3], holds; /* one of them */
+    double scale;        /* greatest stress that is held */
+} dem2di_control;
+
+static dem2di_control dem2di_control_make(const dem2d_deformation_desc *desc) {
+    dem2di_control control;
+    control.rate[0] = desc->xx;
+    control.rate[1] = desc->xy;
+    control.rate[2] = desc->yy;
+    control.stress[0] = desc->stress_xx;
+    control.stress[1] = desc->stress_yx;
+    control.stress[2] = desc->stress_yy;
+    control.hold[0] = desc->hold_xx;
+    control.hold[1] = desc->hold_yx;
+    control.hold[2] = desc->hold_yy;
+    control.holds = desc->hold_xx || desc->hold_yx || desc->hold_yy;
+    control.scale = 0;
     for (int k = 0; k < 3; k++)
-        if (!(fabs(rates[k]) * time_step <= DEM2DI_FLOW_MOST))
+        if (control.hold[k]) control.scale = dem2di_max(control.scale, fabs(control.stress[k]));
+    return control;
+}
+
+/* Does the cell deform in the next step, or did it in the last? */
+static bool dem2di_cell_flows(const dem2d_world *world) {
+    if (!world->periodic) return false;
+    return dem2di_flows(&world->flow) || dem2di_flows(&world->flow_made) ||
+           dem2di_control_make(&world->control).holds;
+}
+
+static dem2d_result dem2di_check_deformation(const dem2d_env *env,
+                                             const dem2d_deformation_desc *desc, double time_step) {
+    static const char *const names[3] = {"xx", "xy", "yy"}, *const stresses[3] = {"xx", "yx", "yy"};
+    dem2d_result result = dem2di_check_fields(env, DEM2DI_ALL(dem2di_deformation_fields), desc);
+    if (result != DEM2D_OK) return result;
+    const dem2di_control control = dem2di_control_make(desc);
+    for (int k = 0; k < 3; k++) {
+        if (!(fabs(control.rate[k]) * time_step <= DEM2DI_FLOW_MOST))
             return dem2di_fail(env, DEM2D_OUT_OF_RANGE, -1,
-                               "%s = %g times the time step %g is above 0.1", names[k], rates[k],
-                               time_step);
-    return DEM2D_OK;
+                               "%s = %g times the time step %g is above 0.1", names[k],
+                               control.rate[k], time_step);
+        if (control.hold[k] && control.rate[k] != 0)
+            return dem2di_fail(env, DEM2D_OUT_OF_RANGE, -1, "%s = %g where hold_%s is set",
+                               names[k], control.rate[k], stresses[k]);
+        if (!control.hold[k] && control.stress[k] != 0)
+            return dem2di_fail(env, DEM2D_OUT_OF_RANGE, -1, "stress_%s = %g where it is not held",
+                               stresses[k], control.stress[k]);
+    }
+    if (!control.holds || control.scale > 0) return DEM2D_OK;
+    return dem2di_fail(env, DEM2D_OUT_OF_RANGE, -1,
+                       "all stresses that are held are 0: a cell has none without contacts");
 }
 
 /* A position that is given, of a particle or of an object like it. */
@@ -15098,7 +15193,7 @@ DEM2D_API dem2d_result dem2d_world_set_time_step(dem2d_world *world, double time
     dem2d_result result = dem2di_check_one(&world->env, dem2di_world_fields,
                                            offsetof(dem2d_world_desc, time_step), &time_step);
     if (result != DEM2D_OK) return result;
-    result = dem2di_check_flow(&world->env, &world->flow, time_step);
+    result = dem2di_check_deformation(&world->env, &world->control, time_step);
     if (result != DEM2D_OK) return result;
     if (time_step == world->time_step) return DEM2D_OK;
     world->timed = dem2di_time(world);
@@ -15131,16 +15226,22 @@ static void dem2di_momentum_clear(dem2d_world *world) {
 
 DEM2D_API dem2d_result dem2d_world_deform(dem2d_world *world, const dem2d_deformation_desc *desc) {
     if (world == NULL || desc == NULL) return DEM2D_NULL_ARGUMENT;
-    dem2d_result result = dem2di_check_flow(&world->env, desc, world->time_step);
+    dem2d_result result = dem2di_check_deformation(&world->env, desc, world->time_step);
     if (result != DEM2D_OK) return result;
-    const bool starts = dem2di_flows(desc) && !dem2di_flows(&world->flow);
-    if (dem2di_flows(desc) && !(world->cell.a.x > 0 && world->cell.b.y > 0))
+    const dem2di_control control = dem2di_control_make(desc);
+    const bool still = control.rate[0] == 0 && control.rate[1] == 0 && control.rate[2] == 0;
+    const bool starts = (!still || control.holds) && !dem2di_cell_flows(world);
+    if ((!still || control.holds) && !(world->cell.a.x > 0 && world->cell.b.y > 0))
         return dem2di_fail(&world->env, DEM2D_OUT_OF_RANGE, -1,
                            "a world that is not periodic along a and b can't be deformed");
     if (starts && !dem2di_group_reserve(world, DEM2DI_MADE, dem2di_slots(world)))
         return dem2di_out_of_memory(world, "velocities");
     if (starts) dem2di_momentum_clear(world);
-    world->flow = *desc;
+    world->control = *desc;
+    if (!control.hold[0]) world->flow.xx = desc->xx, world->drift.xx = 0;
+    if (!control.hold[1]) world->flow.xy = desc->xy, world->drift.xy = 0;
+    if (!control.hold[2]) world->flow.yy = desc->yy, world->drift.yy = 0;
+    world->limited = false;
     dem2di_edited(world);
     return DEM2D_OK;
 }
@@ -17748,6 +17849,7 @@ static bool dem2di_bounded(const dem2d_world *world, const dem2di_plan *plan, in
     double speed = dem2di_max(DEM2DI_SPEED_SURE, most->speed);
     double spin = dem2di_max(DEM2DI_TURN_SURE / world->time_step, most->spin);
     double belt = 0, turn = 0, flow = dem2di_flow_size(&world->flow);
+    if (dem2di_control_make(&world->control).holds) flow = DEM2DI_FLOW_MOST / world->time_step;
     double load = world->loaded ? dem2di_max(DEM2DI_LOAD_SURE, most->load) : 0;
     for (int j = 0; j < world->wall_count; j++) {
         const dem2d_wall_desc *wall = &world->walls[j].desc;
@@ -18276,7 +18378,7 @@ static void dem2di_observe_particle(const dem2d_world *world, int slot, dem2di_l
     const dem2di_load external = dem2di_external(world, slot);
     drag = dem2di_sub(dem2di_sub(drag, dem2di_add(load.force, external.force)), weight);
     if (world->periodic) {
-        const dem2d_deformation_desc flow = dem2di_flow_mean(&world->flow_made, &world->flow);
+        const dem2di_flow flow = dem2di_flow_mean(&world->flow_made, &world->flow);
         const dem2d_vec both = dem2di_flow_at(&flow, dem2di_add(made->v, old->v));
         if (dem2di_flows(&flow)) drag = dem2di_along(drag, mass / 2, both);
     }
@@ -20686,7 +20788,7 @@ static double dem2di_integrate_pass(dem2d_world *world) {
 /* Velocities of contacts in place of fluctuations, of the particles from begin to end; these are
    kept. */
 static void dem2di_flow_range(dem2d_world *world, int begin, int end) {
-    const dem2d_deformation_desc flow = world->flow_made;
+    const dem2di_flow flow = world->flow_made;
     const double half = world->made_step / 2;
     for (int i = begin; i < end; i++) {
         dem2di_state *now = &world->now[i];
@@ -20728,7 +20830,7 @@ static void dem2di_flow_leave(dem2d_world *world) {
 /* The first half of the flow: fluctuations before the forces act on them, of free particles. */
 static void dem2di_flow_begin_task(void *context, int begin, int end) {
     dem2d_world *world = (dem2d_world *)context;
-    const dem2d_deformation_desc flow = dem2di_flow_mean(&world->flow_made, &world->flow);
+    const dem2di_flow flow = dem2di_flow_mean(&world->flow_made, &world->flow);
     int last = dem2di_block_end((end - 1) * DEM2DI_BLOCK, DEM2DI_BLOCK, world->body_count);
     for (int i = begin * DEM2DI_BLOCK; i < last; i++) {
         dem2di_state *now = &world->now[i];
@@ -20744,7 +20846,7 @@ static void dem2di_flow_begin_task(void *context, int begin, int end) {
    (1.5 + 2 skin) R. */
 static void dem2di_flow_end_task(void *context, int begin, int end) {
     dem2d_world *world = (dem2d_world *)context;
-    const dem2d_deformation_desc mean = dem2di_flow_mean(&world->flow_made, &world->flow);
+    const dem2di_flow mean = dem2di_flow_mean(&world->flow_made, &world->flow);
     const double dt = world->time_step, strain = dem2di_flow_size(&world->flow) * dt;
     const double far = 2 + 2 * world->skin;
     int last = dem2di_block_end((end - 1) * DEM2DI_BLOCK, DEM2DI_BLOCK, world->body_count);
@@ -20778,10 +20880,142 @@ static double dem2di_flow_pass(dem2d_world *world) {
     return used + 1.25 * (1 + strain) * path + dem2di_max(10, 1.06 / world->skin) * strain;
 }
 
+/* Stress, stiffness and viscosity of a cell by its velocity gradient (xx, xy, yy), times the area;
+   mean mass. Of component c and the rates of component k: sums over the contacts of
+       k_ip d_j d_q,   with (i, j) = (x, x), (x, y), (y, y) for c and (p, q) likewise for k
+   where k_ip = kn n n + kt t t is the stiffness of the contact, and its dashpots likewise. */
+typedef struct dem2di_cell_response {
+    double stress[3], stiffness[3][3], viscosity[3][3];
+    double mass;
+} dem2di_cell_response;
+
+static void dem2di_response_add(double matrix[3][3], double coefficient, dem2d_vec along,
+                                dem2d_vec d) {
+    const double part[3] = {along.x * d.x, along.x * d.y, along.y * d.y};
+    for (int c = 0; c < 3; c++)
+        for (int k = 0; k < 3; k++) matrix[c][k] += coefficient * part[c] * part[k];
+}
+
+/* Tangential springs count while they stick, dashpots while they push. */
+static void dem2di_response_contact(const dem2d_world *world, int i,
+                                    dem2di_cell_response *response) {
+    dem2di_contact contact;
+    if (!dem2di_contact_get(world, &world->list.contacts, i, &contact)) return;
+    const dem2d_pair_desc *law = dem2di_law_of(world, i);
+    const dem2di_point_pair *pair = dem2di_point_pair_of(world, &world->list.contacts, i);
+    const double weight = pair != NULL ? dem2di_point_pair_weight(pair) : 1;
+    const dem2d_vec f = dem2di_contact_force(&contact), d = dem2di_branch_of(&contact, false);
+    const dem2d_vec n = contact.normal, t = dem2di_perp(n);
+    response->stress[0] += d.x * f.x;
+    response->stress[1] += d.y * f.x;
+    response->stress[2] += d.y * f.y;
+    dem2di_response_add(response->stiffness, weight * dem2di_normal_stiffness(world, i), n, d);
+    if (world->law == NULL && fabs(contact.shear) < law->friction * contact.force) {
+        const double kt = weight * law->tangential_stiffness;
+        dem2di_response_add(response->stiffness, kt, t, d);
+        if (world->plan.terms & DEM2DI_TANGENTIAL_DASHPOT)
+            dem2di_response_add(response->viscosity,
+                                weight * dem2di_tangential_dashpot(world, i, &contact.arms), t, d);
+    }
+    if ((world->plan.terms & DEM2DI_DASHPOT) && contact.force > 0)
+        dem2di_response_add(response->viscosity, weight * dem2di_normal_dashpot(world, i), n, d);
+}
+
+/* Sums over the particles and their contacts in the order of ranks. */
+static dem2di_cell_response dem2di_response_make(const dem2d_world *world) {
+    const dem2di_list *list = &world->list;
+    dem2di_cell_response response;
+    int count = 0;
+    memset(&response, 0, sizeof response);
+    for (int place = 0; place < world->id_count; place++) {
+        const int slot = dem2di_slot_at(world, place);
+        if (slot < 0) continue;
+        for (int k = list->own[slot]; k < list->first[slot + 1]; k++)
+            dem2di_response_contact(world, list->adjacent[k], &response);
+        if (!(world->inverse[slot].mass > 0)) continue;
+        const double mass = dem2di_body_mass(world, &world->bodies[slot]);
+        const dem2d_vec c = world->now[slot].v;
+        response.stress[0] += mass * c.x * c.x;
+        response.stress[1] += mass * c.y * c.x;
+        response.stress[2] += mass * c.y * c.y;
+        response.mass += mass;
+        count++;
+    }
+    if (count > 0) response.mass /= count;
+    return response;
+}
+
+/* Constants of the control, found by trial (loose gases to packings, kn/P from 1e3 to 1e6, with and
+   without dashpots): part of the missing stress that a step makes up for, stable up to 2; stiffness
+   of a gas over the stress; greatest rate, of sqrt(P/m), at which grains that meet stay slow; part
+   of what it remembers that the drift forgets in a step. */
+#define DEM2DI_CELL_GAIN 0.8
+#define DEM2DI_CELL_GAS 3
+#define DEM2DI_CELL_RATE 0.1
+#define DEM2DI_CELL_FORGETS 0.1
+
+/* The x of A x = b, A symmetric and positive definite, for the components that are held; 0 of the
+   others: Gauss's elimination. */
+static void dem2di_held_solve(const bool hold[3], double a[3][3], double b[3]) {
+    for (int c = 0; c < 3; c++)
+        for (int k = 0; k < 3; k++)
+            if (!hold[c] || !hold[k]) a[c][k] = c == k ? 1 : 0;
+    for (int c = 0; c < 3; c++)
+        for (int k = c + 1; k < 3; k++) {
+            const double f = a[k][c] / a[c][c];
+            for (int m = c; m < 3; m++) a[k][m] -= f * a[c][m];
+            b[k] -= f * b[c];
+        }
+    for (int c = 2; c >= 0; c--) {
+        for (int k = c + 1; k < 3; k++) b[c] -= a[c][k] * b[k];
+        b[c] /= a[c][c];
+    }
+}
+
+/* The rates of the step: those that hold the stresses, see dem2d_deformation_desc. */
+static void dem2di_cell_control(dem2d_world *world) {
+    const dem2di_control control = dem2di_control_make(&world->control);
+    if (!control.holds) return;
+    const dem2di_cell_response response = dem2di_response_make(world);
+    const double area = world->cell.a.x * world->cell.b.y, dt = world->time_step;
+    const double last[3] = {world->flow_made.xx, world->flow_made.xy, world->flow_made.yy};
+    double rate[3] = {world->flow.xx, world->flow.xy, world->flow.yy}, a[3][3], b[3];
+    double drift[3] = {world->drift.xx, world->drift.xy, world->drift.yy};
+    double most = world->control.max_rate;
+    if (!(most > 0) && response.mass > 0)
+        most = DEM2DI_CELL_RATE * sqrt(control.scale / response.mass);
+    most = dem2di_min(most, DEM2DI_FLOW_MOST / dt);
+    for (int c = 0; c < 3; c++) {
+        b[c] = control.hold[c] ? DEM2DI_CELL_GAIN * (response.stress[c] / area - control.stress[c])
+                               : 0;
+        for (int k = 0; k < 3; k++) {
+            const double viscosity = response.viscosity[c][k] / area;
+            a[c][k] = response.stiffness[c][k] / area * dt + viscosity;
+            if (control.hold[c] && control.hold[k]) b[c] += viscosity * (last[k] - drift[k]);
+        }
+        a[c][c] += DEM2DI_CELL_GAS * control.scale * dt;
+    }
+    dem2di_held_solve(control.hold, a, b);
+    world->limited = false;
+    for (int c = 0; c < 3; c++) {
+        if (!control.hold[c]) continue;
+        rate[c] = dem2di_max(-most, dem2di_min(most, drift[c] + b[c]));
+        const bool limited = !(fabs(rate[c]) < most);
+        drift[c] = limited ? 0 : drift[c] + DEM2DI_CELL_FORGETS * (rate[c] - drift[c]);
+        world->limited = world->limited || limited;
+    }
+    world->flow.xx = rate[0];
+    world->flow.xy = rate[1];
+    world->flow.yy = rate[2];
+    world->drift.xx = drift[0];
+    world->drift.xy = drift[1];
+    world->drift.yy = drift[2];
+}
+
 /* The stress times the area: of the contacts, and of the fluctuations at the last force pass. */
 static void dem2di_cell_work(const dem2d_world *world, double power[2][DEM2DI_HALVES]) {
     const dem2di_list *list = &world->list;
-    const dem2d_deformation_desc *flow[2];
+    const dem2di_flow *flow[2];
     double xx = 0, yx = 0, yy = 0;
     flow[0] = &world->flow_made;
     flow[1] = &world->flow;
@@ -21390,7 +21624,7 @@ static dem2d_result dem2di_step_try(dem2d_world *world, dem2di_trial *trial) {
     if (world->wrap_due) dem2di_cell_wrap(world);
     if (world->wrap_due) return dem2di_out_of_memory(world, "images in the cell");
     if (!dem2di_sums_reserve(world)) return dem2di_out_of_memory(world, "sums of forces");
-    const bool flows = dem2di_flows(&world->flow) || dem2di_flows(&world->flow_made);
+    const bool flows = dem2di_cell_flows(world);
     if (!dem2di_group_reserve(world, DEM2DI_EVENTS, world->event_capacity))
         return dem2di_out_of_memory(world, "events");
     dem2d_result result = dem2di_prepare(world, &trial->listed);
@@ -21437,7 +21671,8 @@ static dem2d_result dem2di_step(dem2d_world *world) {
     if (ledger.kept) dem2di_observe_contacts(world);
     dem2di_observe_touches(world);
     if (ledger.kept || world->plan.events) dem2di_flow_leave(world);
-    const bool flows = dem2di_flows(&world->flow) || dem2di_flows(&world->flow_made);
+    const bool flows = dem2di_cell_flows(world);
+    if (flows) dem2di_cell_control(world);
     double path = flows ? dem2di_flow_pass(world) : dem2di_integrate_pass(world);
     if (ledger.kept) dem2di_observe_motion(world, &ledger);
     bool used_up = trial.used_up || path > 1 - DEM2DI_LIST_STEPS * DBL_EPSILON ||
@@ -21789,7 +22024,11 @@ DEM2D_API dem2d_result dem2d_world_get_cell(const dem2d_world *world, dem2d_cell
     if (world == NULL || info == NULL) return DEM2D_NULL_ARGUMENT;
     memset(info, 0, sizeof *info);
     info->cell = world->cell;
-    info->deformation = world->flow_made;
+    info->deformation = world->control;
+    info->xx = world->flow_made.xx;
+    info->xy = world->flow_made.xy;
+    info->yy = world->flow_made.yy;
+    info->limited = world->limited;
     info->area = world->cell_before.a.x * world->cell_before.b.y;
     if (!(info->area > 0)) return DEM2D_OK;
     dem2d_stress sum = {0, 0, 0, 0};
@@ -26744,14 +26983,15 @@ static void dem2di_finish_images(dem2di_loader *loader) {
     last.origin = w->cell.origin;
     dem2di_load_check(loader, dem2di_check_cell(loader->env, &w->cell));
     dem2di_load_check(loader, dem2di_check_cell(loader->env, &last));
-    dem2di_load_check(loader, dem2di_check_flow(loader->env, &w->flow, w->time_step));
-    dem2di_load_check(loader, dem2di_check_flow(loader->env, &w->flow_made, w->made_step));
+    dem2di_load_check(loader, dem2di_check_deformation(loader->env, &w->control, w->time_step));
+    dem2di_load_expect(loader, dem2di_flow_fits(&w->flow_made, w->made_step), "rates of a cell");
     dem2di_load_expect(loader,
                        (last.a.x > 0) == (w->cell.a.x > 0) && (last.b.y > 0) == (w->cell.b.y > 0),
                        "the last cell");
     dem2di_load_expect(loader,
                        (w->cell.a.x > 0 && w->cell.b.y > 0) ||
-                           !(dem2di_flows(&w->flow) || dem2di_flows(&w->flow_made)),
+                           !(dem2di_flows(&w->flow) || dem2di_flows(&w->flow_made) ||
+                             dem2di_control_make(&w->control).holds),
                        "a cell that deforms");
     if (!dem2di_load_good(loader)) return;
     dem2di_cell_set(w, &w->cell);

@@ -17,7 +17,7 @@ typedef struct cell {
 } cell;
 
 static dem2d_deformation_desc flow(double xx, double xy, double yy) {
-    return (dem2d_deformation_desc){xx, xy, yy};
+    return (dem2d_deformation_desc){.xx = xx, .xy = xy, .yy = yy};
 }
 
 static void deform(const cell *p, dem2d_deformation_desc by) {
@@ -81,7 +81,7 @@ static dem2d_vec momentum_of(const cell *p, double *size) {
 /* The work of the cell closes the ledger: the error falls by four when the time step is halved. */
 static void test_ledger(void **state) {
     (void)state;
-    static const dem2d_deformation_desc flows[5] = {
+    static const double flows[5][3] = {
         {0, 2, 0}, {-1, 0, 1}, {-1, 0, -1}, {0.5, -1, -1.5}, {0, 2, 0}};
     for (int k = 0; k < 10; k++) {
         double error[3], turnover = 0;
@@ -91,7 +91,8 @@ static void test_ledger(void **state) {
             dem2d_world_desc desc = {0};
             desc.ledger = true, desc.time_step = DT / (1 << half);
             fill(&p, &desc, &soft, 36, 1, 1.15, 0);
-            deform(&p, flows[k % 5]);
+            const double *rate_of = flows[k % 5];
+            deform(&p, flow(rate_of[0], rate_of[1], rate_of[2]));
             for (int i = 0; i < 40 << half; i++) { /* k = 4: of rates that change */
                 const double rate = 2 * cos(i * 0.1 / (1 << half));
                 if (k == 4) deform(&p, flow(-rate / 2, rate, rate / 3));
@@ -213,7 +214,7 @@ static void test_free_flight(void **state) {
 
 /* --- what must not matter --------------------------------------------------------------------- */
 
-static const dem2d_deformation_desc mixed = {-0.3, 3, 0.2};
+static const dem2d_deformation_desc mixed = {.xx = -0.3, .xy = 3, .yy = 0.2};
 
 /* Not the skin, not when the list is made, not threads; b leans over more than once. */
 static void test_independent(void **state) {
@@ -350,8 +351,8 @@ static void test_refused(void **state) {
     desc.env = &env.env;
     fill(&p, &desc, &soft, 4, 1, 0.5, 1);
     const uint64_t hash = dem2d_world_hash(p.s.world);
-    const dem2d_deformation_desc fast[4] = {
-        {0.11 / DT, 0, 0}, {0, -0.11 / DT, 0}, {0, 0, 0.11 / DT}, {0, (double)NAN, 0}};
+    const dem2d_deformation_desc fast[4] = {flow(0.11 / DT, 0, 0), flow(0, -0.11 / DT, 0),
+                                            flow(0, 0, 0.11 / DT), flow(0, (double)NAN, 0)};
     static const char *const names[4] = {"xx", "xy", "yy", "xy"};
     for (int k = 0; k < 4; k++) {
         const dem2d_result wrong = k == 3 ? DEM2D_NOT_FINITE : DEM2D_OUT_OF_RANGE;
