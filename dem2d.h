@@ -27446,9 +27446,19 @@ static dem2di_view dem2di_view_make(const dem2d_world *world, const dem2d_svg_de
     return view;
 }
 
-/* Is the bounding circle of a particle outside the view? */
-static bool dem2di_off_view(const dem2d_world *world, const dem2di_view *view, int slot) {
-    dem2d_vec c = world->before[slot].x;
+/* Shifts that put the centre of a particle into the view, or nearer to it than a length. */
+static dem2di_shifts dem2di_seen_start(const dem2d_world *world, const dem2di_view *view, int slot,
+                                       double near) {
+    dem2d_box box = view->box;
+    box.lower = dem2di_sub(box.lower, dem2di_vec(near, near));
+    box.upper = dem2di_add(box.upper, dem2di_vec(near, near));
+    return dem2di_shifts_start(&world->cell_before, world->before[slot].x, &box);
+}
+
+/* Is the bounding circle of a particle, or of its image, outside the view? */
+static bool dem2di_off_view(const dem2d_world *world, const dem2di_view *view, int slot,
+                            dem2d_vec way) {
+    dem2d_vec c = dem2di_add(world->before[slot].x, way);
     const dem2di_body *body = &world->bodies[slot];
     double r = dem2di_shape_of(world, body)->circumscribed * body->scale;
     return c.x + r < view->box.lower.x || c.x - r > view->box.upper.x ||
@@ -27496,7 +27506,7 @@ static void dem2di_colours_find(const dem2d_world *world, const dem2d_svg_desc *
     for (int index = 0; index < world->id_count; index++) {
         int slot = world->ids[index].slot;
         if (slot < 0) continue;
-        bool drawn = !dem2di_off_view(world, view, slot);
+        bool drawn = world->periodic || !dem2di_off_view(world, view, slot, dem2di_vec(0, 0));
         if (colours->values == NULL) {
             int of = dem2di_class_of(world, colours->by, slot);
             if (drawn && of >= 0) colours->seen[of] = true;
@@ -27570,11 +27580,12 @@ static const char *dem2di_fill_of(const dem2d_world *world, const dem2di_colours
     return colour[dem2di_shape_of(world, body)->type];
 }
 
-/* Draw one particle: a circle, or a path through its outline points. */
+/* Draw one particle, or its image: a circle, or a path through its outline points. */
 static void dem2di_draw_particle(const dem2d_world *world, const dem2di_view *view, int points,
-                                 int i, const char *fill, dem2di_writer *writer) {
+                                 int i, dem2d_vec way, const char *fill, dem2di_writer *writer) {
     const dem2d_shape *shape = dem2di_shape_of(world, &world->bodies[i]);
     dem2d_pose pose = dem2di_pose_of(world, world->before, i);
+    pose.position = dem2di_add(pose.position, way);
     if (shape->type == DEM2D_CIRCLE) {
         dem2d_vec c = dem2di_pixel(view, pose.position);
         dem2di_print(writer, "<circle cx=\"%.2f\" cy=\"%.2f\" r=\"%.2f\" fill=\"%s\"/>\n", c.x, c.y,
@@ -27610,6 +27621,23 @@ static void dem2di_draw_walls(const dem2d_world *world, const dem2di_view *view,
     dem2di_print(writer, "</g>\n");
 }
 
+/* The border of a cell that is periodic along a and b. */
+static void dem2di_draw_cell(const dem2d_world *world, const dem2di_view *view,
+                             dem2di_writer *writer) {
+    const dem2d_cell *cell = &world->cell_before;
+    dem2d_vec corner[4];
+    if (!(cell->a.x > 0 && cell->b.y > 0)) return;
+    corner[0] = cell->origin;
+    corner[1] = dem2di_add(corner[0], cell->a);
+    corner[2] = dem2di_add(corner[1], cell->b);
+    corner[3] = dem2di_add(corner[0], cell->b);
+    dem2di_print(writer, "<g stroke=\"#1f5fa8\">\n");
+    for (int k = 0; k < 4; k++)
+        dem2di_draw_line(dem2di_pixel(view, corner[k]), dem2di_pixel(view, corner[(k + 1) % 4]),
+                         view->width / 400, writer);
+    dem2di_print(writer, "</g>\n");
+}
+
 /* Force chains: lines from centre to centre, or to the contact point at a wall. The line of the
    mean force is as wide as a quarter of the mean radius, so that grains stay visible, or 1/400 of
    the picture if that is less. No line is wider than the radius of the smaller grain. */
@@ -27629,13 +27657,20 @@ static void dem2di_draw_chains(const dem2d_world *world, const dem2di_view *view
     iterator = dem2di_contacts_start(false);
     while (dem2di_next_contact(world, &iterator)) {
         const dem2di_key *key = &world->list.keys[iterator.number];
-        dem2d_vec start = world->before[key->a].x, end = dem2di_add(start, iterator.branch);
+        const dem2d_vec none = dem2di_vec(0, 0);
         double most = dem2di_smaller_radius(world, &iterator) * view->factor;
-        if (dem2di_off_view(world, view, key->a) &&
-            (iterator.walls || dem2di_off_view(world, view, dem2di_owner(world, key->b))))
+        if (!world->periodic && dem2di_off_view(world, view, key->a, none) &&
+            (iterator.walls || dem2di_off_view(world, view, key->b, none)))
             continue;
-        dem2di_draw_line(dem2di_pixel(view, start), dem2di_pixel(view, end),
-                         dem2di_min(iterator.contact.force * unit, most), writer);
+        double far = dem2di_length(iterator.branch) + world->now[key->a].radius;
+        dem2di_shifts at = dem2di_seen_start(world, view, key->a, far);
+        while (dem2di_shifts_next(&at)) {
+            dem2d_vec way = dem2di_cell_shift(&world->cell_before, at.along_a, at.along_b);
+            dem2d_vec start = dem2di_add(world->before[key->a].x, way);
+            dem2d_vec end = dem2di_add(start, iterator.branch);
+            dem2di_draw_line(dem2di_pixel(view, start), dem2di_pixel(view, end),
+                             dem2di_min(iterator.contact.force * unit, most), writer);
+        }
     }
     dem2di_print(writer, "</g>\n");
 }
@@ -27747,14 +27782,19 @@ static void dem2di_draw(const dem2d_world *world, const dem2d_svg_desc *desc,
                  "<svg width=\"%.2f\" height=\"%.2f\">\n"
                  "<g stroke=\"#333\" stroke-width=\"%.3f\">\n",
                  view->width, view->height, view->width / 1600);
-    for (int place = 0, slot; (slot = dem2di_next_particle(world, &place)) >= 0 && writer->good;)
-        if (!dem2di_off_view(world, view, slot)) {
-            char text[8];
-            const char *fill = dem2di_fill_of(world, colours, slot, text);
-            dem2di_draw_particle(world, view, desc->outline_points, slot, fill, writer);
+    for (int place = 0, slot; (slot = dem2di_next_particle(world, &place)) >= 0 && writer->good;) {
+        char text[8];
+        const char *fill = dem2di_fill_of(world, colours, slot, text);
+        dem2di_shifts at = dem2di_seen_start(world, view, slot, world->before[slot].radius);
+        while (dem2di_shifts_next(&at)) {
+            dem2d_vec way = dem2di_cell_shift(&world->cell_before, at.along_a, at.along_b);
+            if (!dem2di_off_view(world, view, slot, way))
+                dem2di_draw_particle(world, view, desc->outline_points, slot, way, fill, writer);
         }
+    }
     dem2di_print(writer, "</g>\n");
     dem2di_draw_walls(world, view, writer);
+    dem2di_draw_cell(world, view, writer);
     if (desc->force_chains) dem2di_draw_chains(world, view, writer);
     dem2di_print(writer, "</svg>\n");
     dem2di_draw_scale(view, writer);

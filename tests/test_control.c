@@ -97,9 +97,9 @@ static void test_packing(void **state) {
     static const struct {
         double kn, friction, damping;
         bool round;
-    } cases[] = {{1e2, 0.4, 0.2, true}, {1e3, 0.4, 0.591, true}, {1e3, 0.4, 0, true},
-                 {1e3, 0, 0.1, true},   {1e3, 0.4, 0.2, false},  {1e4, 0.4, 0.2, true}};
-    for (int k = 0; k < (test_long() ? COUNT_OF(cases) : 5); k++) {
+    } cases[] = {{1e2, 0.4, 0.2, true}, {1e3, 0.4, 0, true},   {1e3, 0.4, 0.2, false},
+                 {1e3, 0, 0.1, true},   {1e3, 0.4, 0.6, true}, {1e4, 0.4, 0.2, true}};
+    for (int k = 0; k < (test_long() ? COUNT_OF(cases) : 3); k++) {
         static cell p;
         const dem2d_world_desc plain = {0};
         const dem2d_deformation_desc press = pressed(P, P);
