@@ -21209,12 +21209,14 @@ static void dem2di_damping_add(const dem2d_world *world, int i, const dem2di_con
                                bool side, double f, dem2di_stiffness *damping) {
     const dem2di_point_pair *pair = dem2di_point_pair_of(world, &world->list.contacts, i);
     const dem2di_arms *arms = &contact->arms;
+    const int terms =
+        world->law != NULL ? DEM2DI_TERMS - 1 : dem2di_terms_of(dem2di_law_of(world, i));
+    if ((terms & ~DEM2DI_ROLLING) == 0) return;
     const double normal = dem2di_normal_dashpot(world, i);
-    const bool rubs = (world->plan.terms & DEM2DI_TANGENTIAL_DASHPOT) != 0;
+    const bool rubs = (terms & DEM2DI_TANGENTIAL_DASHPOT) != 0;
     const double sliding = rubs ? dem2di_tangential_dashpot(world, i, arms) : 0;
     double arm_n = side ? arms->b_n : arms->a_n, arm_t = side ? arms->b_t : arms->a_t;
-    if (world->plan.terms & DEM2DI_ROLLING_DASHPOT)
-        damping->rr += f * dem2di_rolling_dashpot(world, i);
+    if (terms & DEM2DI_ROLLING_DASHPOT) damping->rr += f * dem2di_rolling_dashpot(world, i);
     for (int p = 0; p < (pair != NULL ? 2 : 1); p++) {
         double w = pair != NULL ? f * pair->weight[p] : f, at = pair != NULL ? pair->offset[p] : 0;
         dem2di_stiffness_point(w * normal, w * sliding, contact->normal, arm_n, arm_t + at,
@@ -21229,7 +21231,6 @@ static dem2di_stiffness dem2di_stiffness_sum(const dem2d_world *world, const dem
                                              int slot, int bound, dem2di_stiffness *damping) {
     const dem2di_list *list = &world->list;
     dem2di_stiffness sum = {0, 0, 0, 0, 0, 0};
-    const int damped = world->plan.terms & ~DEM2DI_ROLLING;
     memset(damping, 0, sizeof *damping);
     for (int k = list->first[slot]; k < list->first[slot + 1]; k++) {
         int i = list->adjacent[k], side = k < list->own[slot];
@@ -21249,7 +21250,7 @@ static dem2di_stiffness dem2di_stiffness_sum(const dem2d_world *world, const dem
         double slide = sticks || (bound == 1 && rubs) ? f * law->tangential_stiffness : 0;
         double arm_n = side ? contact.arms.b_n : contact.arms.a_n;
         double arm_t = side ? contact.arms.b_t : contact.arms.a_t;
-        if (bound == 1 && damped) dem2di_damping_add(world, i, &contact, side, f, damping);
+        if (bound == 1) dem2di_damping_add(world, i, &contact, side, f, damping);
         if (bound == 1 && law->rolling_friction > 0)
             sum.rr += f * dem2di_rolling_stiffness(law, dem2di_reduced_radius(world, i));
         if (pair == NULL || bound == 1)

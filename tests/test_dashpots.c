@@ -216,6 +216,32 @@ static void test_bounds(void **state) {
         }
 }
 
+/* Dashpots that a pair of materials gets late, while no others have them: the bound before the next
+   step is that after it. */
+static void test_bounds_at_once(void **state) {
+    static const impact none = {"", 0, 0, 0, 0.5, 0.5, 0, 0};
+    (void)state;
+    for (int k = 0; k < 3; k++) {
+        dem2d_particle_id id;
+        scene s = impact_scene(&none, 1e-9, -1e-5, &id);
+        dem2d_pair_desc pair;
+        double before, at_once, later, limit;
+        assert_ok(dem2d_world_step(s.world, 1, NULL));
+        assert_ok(dem2d_world_time_step_bounds(s.world, &before, &limit, NULL));
+        assert_ok(dem2d_world_get_pair(s.world, s.material, s.material, &pair));
+        *(k == 0   ? &pair.damping_ratio
+          : k == 1 ? &pair.tangential_damping_ratio
+                   : &pair.rolling_damping_ratio) = 3;
+        assert_ok(dem2d_world_set_pair(s.world, s.material, s.material, &pair));
+        assert_ok(dem2d_world_time_step_bounds(s.world, &at_once, &limit, NULL));
+        assert_ok(dem2d_world_step(s.world, 1, NULL));
+        assert_ok(dem2d_world_time_step_bounds(s.world, &later, &limit, NULL));
+        assert_true(at_once < 0.9 * before);
+        assert_near(at_once, later, 1e-6);
+        close_scene(&s);
+    }
+}
+
 /* A strong dashpot at the safe step: the vibration dies down. */
 static void test_safe_step(void **state) {
     (void)state;
@@ -342,10 +368,10 @@ static void test_refused(void **state) {
 
 int main(void) {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(test_impacts),         cmocka_unit_test(test_energies),
-        cmocka_unit_test(test_bounds),          cmocka_unit_test(test_safe_step),
-        cmocka_unit_test(test_nothing_to_damp), cmocka_unit_test(test_snapshots),
-        cmocka_unit_test(test_refused),
+        cmocka_unit_test(test_impacts),   cmocka_unit_test(test_energies),
+        cmocka_unit_test(test_bounds),    cmocka_unit_test(test_bounds_at_once),
+        cmocka_unit_test(test_safe_step), cmocka_unit_test(test_nothing_to_damp),
+        cmocka_unit_test(test_snapshots), cmocka_unit_test(test_refused),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }
