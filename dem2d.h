@@ -2793,6 +2793,43 @@ DEM2D_API dem2d_result dem2d_world_write_csv(const dem2d_world *world, const dem
 #define DEM2DI_VECTORS_END
 #endif
 
+/* Arrays of a function that have nothing in common. gcc forgets it where it inlines: before a loop
+   over them, whose iterations then do not depend on each other. */
+#if defined(__clang__)
+#define DEM2DI_APART __restrict
+#define DEM2DI_INDEPENDENT
+#elif defined(__GNUC__)
+#define DEM2DI_APART __restrict
+#define DEM2DI_INDEPENDENT _Pragma("GCC ivdep")
+#else
+#define DEM2DI_APART
+#define DEM2DI_INDEPENDENT
+#endif
+
+/* The passes over circles are compiled twice: in plain C99, and for processors with AVX2, where
+   compiler and machine are known to have it. Vectors of four doubles are used in functions with
+   DEM2DI_AVX2 only; without FMA every result has the bits of the plain path. */
+#if defined(__x86_64__) && !defined(DEM2DI_NO_FOURS) && \
+    (defined(__clang__) || (defined(__GNUC__) && __GNUC__ >= 12))
+#define DEM2DI_FOURS 1
+#define DEM2DI_AVX2 __attribute__((target("avx2")))
+#define DEM2DI_AVX2_INLINE static inline __attribute__((always_inline, target("avx2")))
+typedef double dem2di_four __attribute__((vector_size(32)));
+typedef long long dem2di_four_bits __attribute__((vector_size(32)));
+#define DEM2DI_SHUFFLE __builtin_shufflevector
+#else
+#define DEM2DI_FOURS 0
+#endif
+
+/* Does the processor have what the second way is compiled for? */
+static bool dem2di_has_fours(void) {
+#if DEM2DI_FOURS
+    return __builtin_cpu_supports("avx2") != 0;
+#else
+    return false;
+#endif
+}
+
 /* Load memory into the cache that is needed soon; an
  * address past the array's end does no harm. */
 #if defined(__GNUC__)
@@ -12509,6 +12546,12 @@ typedef struct dem2di_contacts {
                        contacts of sign -1 take away */
 } dem2di_contacts;
 
+/* What a contact does to its two: the force on B, on A against it; torques on A and on B. All that
+   the sum of a particle reads of a contact is in half a line of a cache. */
+typedef struct dem2di_action {
+    double x, y, a, b;
+} dem2di_action;
+
 /* What events tell of a contact while it is closed. */
 typedef struct dem2di_touch {
     int64_t since; /* steps done when it closed; 0: it is apart */
@@ -12586,6 +12629,9 @@ typedef struct dem2di_block_result {
     int fast;               /* slot of the one of least rank that may pass through others, or -1 */
     int64_t spread;         /* sum of the distances in memory of the partners found */
     int changes;            /* contacts that close or open */
+    /* Of a block of contacts of circles: the first block of particles that has no contacts of
+       circles behind it; of a block of particles: the next one of the same. -1: none. */
+    int complete, next;
 } dem2di_block_result;
 
 /* The features in use: decided after an edit, not per contact. See dem2di_prepare. */
@@ -12731,6 +12777,9 @@ struct dem2d_world {
     dem2d_loads_fn *set_loads;
     void *loads_user;
     bool stepping; /* a step is on its way: callbacks can't start another */
+    bool fours;    /* circles take the path with vectors: see dem2di_has_fours */
+    bool in_two;   /* steps never move particles during the force pass: for tests */
+    bool foreseen; /* this step has: their next states are there before the walls move */
     double time_step, local_damping, global_damping, tolerance;
     double made_step; /* time step of the step that was made; before the first as time_step */
     dem2d_vec gravity;
@@ -12823,8 +12872,7 @@ struct dem2d_world {
     dem2d_contact_event *events;           /* that nobody has taken yet, the oldest first */
     int event_count, event_capacity;
     int64_t events_lost;
-    double *load_x, *load_y; /* force on the B of each contact, on A against it; in scratch, as: */
-    double *load_a, *load_b; /* torques on A and on B */
+    dem2di_action *actions; /* of contacts; in scratch, as: */
     int *pools; /* of contacts with walls: another one, with whose springs these are shared */
     bool loaded, twisted; /* a particle has had an external load; one that is a torque: */
     dem2di_load *loads;   /* of all */
@@ -14113,6 +14161,7 @@ DEM2D_API dem2d_result dem2d_world_create(const dem2d_world_desc *desc, dem2d_wo
     made->faces = desc->faces;
     made->check_time_step = !desc->skip_time_step_check;
     dem2di_cell_set(made, &desc->cell);
+    made->fours = dem2di_has_fours();
     if (!dem2di_reserve_bodies(made, desc->particle_capacity) ||
         !dem2di_list_reserve(made, &made->plan, desc->pair_capacity, desc->pair_capacity)) {
         result = dem2di_out_of_memory(made, "the capacities asked for");
@@ -16882,11 +16931,29 @@ static void dem2di_adjacency_fill_task(void *context, int begin, int end) {
     }
 }
 
+/* Which blocks of particles have all of their contacts of circles once a block of these is done: in
+   the order of space it is soon after their first. See dem2di_joint_pass. */
+static void dem2di_completions_find(dem2d_world *world) {
+    const dem2di_list *list = &world->list;
+    dem2di_block_result *results = world->block_results;
+    const int discs = dem2di_blocks(list->discs, DEM2DI_BLOCK);
+    for (int k = 0; k < discs; k++) results[k].complete = -1;
+    for (int k = dem2di_blocks(world->body_count, DEM2DI_BLOCK) - 1; k >= 0 && discs > 0; k--) {
+        int end = dem2di_block_end(k * DEM2DI_BLOCK, DEM2DI_BLOCK, world->body_count), last = 0;
+        for (int i = list->first[k * DEM2DI_BLOCK]; i < list->first[end]; i++)
+            if (list->adjacent[i] < list->discs && list->adjacent[i] > last)
+                last = list->adjacent[i];
+        results[k].next = results[last / DEM2DI_BLOCK].complete;
+        results[last / DEM2DI_BLOCK].complete = k;
+    }
+}
+
 /* The contacts of each particle, for which there is room. */
 static void dem2di_adjacency_make(dem2d_world *world) {
     dem2di_run(world, DEM2D_PHASE_LIST, 1, dem2di_adjacency_fill_task, world);
     dem2di_run(world, DEM2D_PHASE_LIST, dem2di_blocks(world->body_count, DEM2DI_BLOCK),
                dem2di_adjacency_sort_task, world);
+    dem2di_completions_find(world);
 }
 
 /* Room for two entries of each pair and one of each contact with a wall. */
@@ -17938,13 +18005,7 @@ static double dem2di_build_softness(const dem2di_build *build) {
 static size_t dem2di_step_cut(dem2d_world *world, char *memory, int discs, int pairs, int count,
                               const dem2di_plan *plan, bool back) {
     dem2di_cutter cutter = {memory, 0};
-    double **loads[4];
-    loads[0] = &world->load_x;
-    loads[1] = &world->load_y;
-    loads[2] = &world->load_a;
-    loads[3] = &world->load_b;
-    for (int k = 0; k < 4; k++)
-        *loads[k] = (double *)dem2di_cut(&cutter, (size_t)count, sizeof(double));
+    world->actions = (dem2di_action *)dem2di_cut(&cutter, (size_t)count, sizeof *world->actions);
     world->pushes =
         (dem2di_push *)dem2di_cut(&cutter, (size_t)(count - pairs), sizeof *world->pushes);
     if (plan->joints)
@@ -17967,8 +18028,7 @@ static void dem2di_loads_clear(dem2d_world *world) {
     const dem2di_list *list = &world->list;
     (void)dem2di_step_cut(world, world->scratch, list->discs, list->pairs, list->count,
                           &world->plan, false);
-    if (list->count > 0)
-        memset(world->load_x, 0, (size_t)((char *)world->pushes - (char *)world->load_x));
+    if (list->count > 0) memset(world->actions, 0, (size_t)list->count * sizeof *world->actions);
 }
 
 /* Room for the contacts of the last force pass, which keeps them where it writes over them. */
@@ -18426,11 +18486,22 @@ static double dem2di_ledger_turnover(const dem2di_ledger *ledger, const dem2di_l
          motion, world, cell, objects, walls, joints, list, ledger
    ============================================================================================ */
 
-/* Contacts of circles are taken in batches: what they need is fetched, all are computed by a loop
-   that compilers turn into vector instructions, and the forces are put where they belong. There is
-   no branch but for what the scene has: the force is 0 where two are apart, and with it the limit
-   of the tangential spring. */
+/* Bound of the force and the torques of a contact. */
+static DEM2DI_INLINE double dem2di_action_size(const dem2di_action *action) {
+    return fabs(action->x) + fabs(action->y) + (fabs(action->a) + fabs(action->b));
+}
+
+/* CONTACTS OF CIRCLES
+
+   They are taken in batches: what the law needs of the particles is fetched into arrays, one loop
+   that compilers turn into vector instructions computes all, and writes the next contacts over the
+   last, in their columns. There is no branch but for what the scene has: the force is 0 where two
+   are apart, and with it the limit of the tangential spring. All of it is compiled twice, see
+   DEM2DI_AVX2: the loops are the same, only the fetch is written for vectors of four.
+   Where the line of centres is taken: dem2di_batch_fetch and dem2di_fours_fetch. Where the relative
+   velocity is: there, and in dem2di_batch_made. */
 typedef struct dem2di_batch {
+    int count;
     double dx[DEM2DI_BATCH], dy[DEM2DI_BATCH]; /* from A to B */
     double radius_a[DEM2DI_BATCH], radius_b[DEM2DI_BATCH];
     double vx[DEM2DI_BATCH], vy[DEM2DI_BATCH]; /* of B against A */
@@ -18439,41 +18510,43 @@ typedef struct dem2di_batch {
     double inverse[DEM2DI_BATCH];                            /* 1/m, reduced */
     double inverse_a[DEM2DI_BATCH], inverse_b[DEM2DI_BATCH]; /* 1/I */
     double zeta[DEM2DI_BATCH], mu_r[DEM2DI_BATCH], zeta_t[DEM2DI_BATCH], zeta_r[DEM2DI_BATCH];
-    double normal_x[DEM2DI_BATCH], normal_y[DEM2DI_BATCH]; /* the last contact, then the next */
-    double depth[DEM2DI_BATCH], force[DEM2DI_BATCH], shear[DEM2DI_BATCH], moment[DEM2DI_BATCH];
-    double viscous_shear[DEM2DI_BATCH], viscous_moment[DEM2DI_BATCH];
-    double load_x[DEM2DI_BATCH], load_y[DEM2DI_BATCH], load_a[DEM2DI_BATCH], load_b[DEM2DI_BATCH];
+    /* in the columns: the last contacts, then the next; of terms that are not in use in `unused` */
+    double *normal_x, *normal_y, *depth, *force, *shear, *moment, *viscous_shear, *viscous_moment;
+    dem2di_action *actions;
+    double unused[3][DEM2DI_BATCH];
 } dem2di_batch;
 
-static DEM2DI_INLINE void dem2di_batch_fetch(const dem2d_world *world, int first, int count,
-                                             bool friction, int terms, bool one_law,
-                                             dem2di_batch *batch) {
-    const dem2di_key *keys = world->list.keys + first;
-    for (int k = 0; k < count; k++) {
-        const dem2di_state *a = &world->now[keys[k].a], *b = &world->now[keys[k].b];
+/* A batch of contacts from `first` on: where its columns are. */
+static void dem2di_batch_begin(const dem2d_world *world, int first, int count,
+                               dem2di_batch *batch) {
+    const dem2di_contacts *to = &world->list.contacts;
+    const int terms = world->plan.terms;
+    batch->count = count;
+    batch->normal_x = to->normal_x + first;
+    batch->normal_y = to->normal_y + first;
+    batch->depth = to->depth + first;
+    batch->force = to->force + first;
+    batch->shear = to->shear + first;
+    batch->actions = world->actions + first;
+    batch->moment = batch->unused[0];
+    batch->viscous_shear = batch->unused[1];
+    batch->viscous_moment = batch->unused[2];
+    if ((terms & ~DEM2DI_DASHPOT) != 0) memset(batch->unused, 0, sizeof batch->unused);
+    if (terms & DEM2DI_ROLLING) batch->moment = to->moment + first;
+    if (terms & DEM2DI_TANGENTIAL_DASHPOT) batch->viscous_shear = to->viscous_shear + first;
+    if (terms & DEM2DI_ROLLING_DASHPOT) batch->viscous_moment = to->viscous_moment + first;
+}
+
+/* Contacts from `first` on of a batch whose contact 0 has these keys: places and motions. */
+static DEM2DI_INLINE void dem2di_batch_fetch(const dem2di_state *now, const dem2di_key *keys,
+                                             int first, bool friction, dem2di_batch *batch) {
+    for (int k = first; k < batch->count; k++) {
+        const dem2di_state *a = &now[keys[k].a], *b = &now[keys[k].b];
         dem2d_vec d = dem2di_disc_line(a, b);
-        DEM2DI_PREFETCH(a, DEM2DI_BATCH);
-        DEM2DI_PREFETCH(b, DEM2DI_BATCH);
         batch->dx[k] = d.x;
         batch->dy[k] = d.y;
         batch->radius_a[k] = a->radius;
         batch->radius_b[k] = b->radius;
-        if (terms)
-            batch->inverse[k] = world->inverse[keys[k].a].mass + world->inverse[keys[k].b].mass;
-        if (terms & DEM2DI_TANGENTIAL_DASHPOT) {
-            batch->inverse_a[k] = world->inverse[keys[k].a].inertia;
-            batch->inverse_b[k] = world->inverse[keys[k].b].inertia;
-        }
-        if (!one_law) {
-            const dem2d_pair_desc *law = dem2di_law_of(world, first + k);
-            batch->kn[k] = law->normal_stiffness;
-            batch->kt[k] = law->tangential_stiffness;
-            batch->mu[k] = law->friction;
-            batch->zeta[k] = law->damping_ratio;
-            batch->mu_r[k] = law->rolling_friction;
-            batch->zeta_t[k] = law->tangential_damping_ratio;
-            batch->zeta_r[k] = law->rolling_damping_ratio;
-        }
         if (!friction) continue;
         batch->vx[k] = b->v.x - a->v.x;
         batch->vy[k] = b->v.y - a->v.y;
@@ -18482,9 +18555,101 @@ static DEM2DI_INLINE void dem2di_batch_fetch(const dem2d_world *world, int first
     }
 }
 
+#if DEM2DI_FOURS
+DEM2DI_AVX2_INLINE dem2di_four dem2di_four_at(const double *from) {
+    dem2di_four four;
+    memcpy(&four, from, sizeof four);
+    return four;
+}
+
+DEM2DI_AVX2_INLINE void dem2di_four_put(double *to, dem2di_four four) {
+    memcpy(to, &four, sizeof four);
+}
+
+DEM2DI_AVX2_INLINE dem2di_four dem2di_four_of(double a, double b, double c, double d) {
+    dem2di_four four = {a, b, c, d};
+    return four;
+}
+
+/* Rows become columns. */
+DEM2DI_AVX2_INLINE void dem2di_four_turn(dem2di_four rows[4]) {
+    dem2di_four a = DEM2DI_SHUFFLE(rows[0], rows[1], 0, 4, 2, 6);
+    dem2di_four b = DEM2DI_SHUFFLE(rows[0], rows[1], 1, 5, 3, 7);
+    dem2di_four c = DEM2DI_SHUFFLE(rows[2], rows[3], 0, 4, 2, 6);
+    dem2di_four d = DEM2DI_SHUFFLE(rows[2], rows[3], 1, 5, 3, 7);
+    rows[0] = DEM2DI_SHUFFLE(a, c, 0, 1, 4, 5);
+    rows[1] = DEM2DI_SHUFFLE(b, d, 0, 1, 4, 5);
+    rows[2] = DEM2DI_SHUFFLE(a, c, 2, 3, 6, 7);
+    rows[3] = DEM2DI_SHUFFLE(b, d, 2, 3, 6, 7);
+}
+
+/* dem2di_batch_fetch for all contacts, four at a time: the two halves of a state are a vector each,
+   x, y and rotation, then v, w and radius. */
+DEM2DI_AVX2_INLINE void dem2di_fours_fetch(const dem2di_state *now, const dem2di_key *keys,
+                                           dem2di_batch *batch) {
+    const double *states = &now->x.x;
+    int k = 0;
+    for (; k + 4 <= batch->count; k += 4) {
+        dem2di_four p[4], s[4];
+        for (int j = 0; j < 4; j++) {
+            const double *a = states + 8 * (size_t)keys[k + j].a;
+            const double *b = states + 8 * (size_t)keys[k + j].b;
+            dem2di_four d = dem2di_four_at(b) - dem2di_four_at(a);
+            dem2di_four va = dem2di_four_at(a + 4), vb = dem2di_four_at(b + 4), v = vb - va;
+            p[j] = DEM2DI_SHUFFLE(d, vb, 0, 1, 6, 7);
+            s[j] = DEM2DI_SHUFFLE(v, va, 0, 1, 6, 7);
+        }
+        dem2di_four_turn(p);
+        dem2di_four_turn(s);
+        dem2di_four_put(batch->dx + k, p[0]);
+        dem2di_four_put(batch->dy + k, p[1]);
+        dem2di_four_put(batch->wb + k, p[2]);
+        dem2di_four_put(batch->radius_b + k, p[3]);
+        dem2di_four_put(batch->vx + k, s[0]);
+        dem2di_four_put(batch->vy + k, s[1]);
+        dem2di_four_put(batch->wa + k, s[2]);
+        dem2di_four_put(batch->radius_a + k, s[3]);
+        dem2di_four square = p[0] * p[0] + p[1] * p[1], least = square - square + 1e-280;
+        dem2di_four_bits far = (dem2di_four_bits)(square > least);
+        if ((far[0] & far[1] & far[2] & far[3]) != 0) continue;
+        for (int j = k; j < k + 4; j++) { /* as in dem2di_disc_line: nearly never */
+            dem2d_vec line = dem2di_disc_line(&now[keys[j].a], &now[keys[j].b]);
+            batch->dx[j] = line.x;
+            batch->dy[j] = line.y;
+        }
+    }
+    dem2di_batch_fetch(now, keys, k, true, batch);
+}
+#endif
+
+/* What the terms of the law need of the two of each contact, and the laws where there are several.
+ */
+static DEM2DI_INLINE void dem2di_batch_laws(const dem2d_world *world, int first,
+                                            dem2di_batch *batch) {
+    const dem2di_key *keys = world->list.keys + first;
+    const int terms = world->plan.terms;
+    for (int k = 0; k < batch->count && terms; k++) {
+        const dem2di_inverse *a = &world->inverse[keys[k].a], *b = &world->inverse[keys[k].b];
+        batch->inverse[k] = a->mass + b->mass;
+        if (!(terms & ~(DEM2DI_DASHPOT | DEM2DI_ROLLING))) continue;
+        batch->inverse_a[k] = a->inertia;
+        batch->inverse_b[k] = b->inertia;
+    }
+    for (int k = 0; k < batch->count && !world->plan.one_law; k++) {
+        const dem2d_pair_desc *law = dem2di_law_of(world, first + k);
+        batch->kn[k] = law->normal_stiffness;
+        batch->kt[k] = law->tangential_stiffness;
+        batch->mu[k] = law->friction;
+        batch->zeta[k] = law->damping_ratio;
+        batch->mu_r[k] = law->rolling_friction;
+        batch->zeta_t[k] = law->tangential_damping_ratio;
+        batch->zeta_r[k] = law->rolling_damping_ratio;
+    }
+}
+
 /* Where somebody has been given other velocities since the step that was made: those of that. */
-static void dem2di_batch_made(const dem2d_world *world, int first, int count, dem2di_batch *batch) {
-    for (int k = 0; k < count; k++) {
+static void dem2di_batch_made(const dem2d_world *world, int first, dem2di_batch *batch) {
+    for (int k = 0; k < batch->count; k++) {
         dem2di_relative_motion motion = dem2di_motion_of(world, first + k);
         batch->vx[k] = motion.v.x;
         batch->vy[k] = motion.v.y;
@@ -18494,205 +18659,277 @@ static void dem2di_batch_made(const dem2d_world *world, int first, int count, de
 }
 
 /* Circles that no force moves against each other are apart: with radii of 0. */
-static void dem2di_batch_hold(const dem2d_world *world, int first, int count, dem2di_batch *batch) {
-    for (int k = 0; k < count; k++)
+static void dem2di_batch_hold(const dem2d_world *world, int first, dem2di_batch *batch) {
+    for (int k = 0; k < batch->count; k++)
         if (dem2di_immovable(world, first + k)) batch->radius_a[k] = batch->radius_b[k] = 0;
 }
 
 DEM2DI_VECTORS_BEGIN
+/* Numbers of one contact of a batch on their way through the law: those of the last force pass, of
+   the springs alone, then those of this one. */
+typedef struct dem2di_batch_item {
+    dem2d_vec last_normal;
+    double last_depth, shear, viscous_shear;
+} dem2di_batch_item;
+
 /* dem2di_slip for two circles. */
 static DEM2DI_INLINE double dem2di_batch_slip(const dem2di_batch *batch, int k,
+                                              const dem2di_batch_item *item,
                                               const dem2di_round *now) {
     double vx = batch->vx[k], vy = batch->vy[k], wa = batch->wa[k], wb = batch->wb[k];
-    double depth = batch->depth[k], closed = depth > 0 ? 1 : 0; /* no branch: for vectors */
+    double depth = item->last_depth, closed = depth > 0 ? 1 : 0; /* no branch: for vectors */
     double arm_a = batch->radius_a[k] - depth / 2, arm_b = batch->radius_b[k] - depth / 2;
     double slip = now->normal.x * vy - now->normal.y * vx - (now->arm_a * wa + now->arm_b * wb);
-    double before = batch->normal_x[k] * vy - batch->normal_y[k] * vx - (arm_a * wa + arm_b * wb);
+    double before = item->last_normal.x * vy - item->last_normal.y * vx - (arm_a * wa + arm_b * wb);
     return slip + (before - slip) * (closed / 2);
 }
 
 /* Tangential force of two circles at a normal force. */
-static DEM2DI_INLINE double dem2di_batch_shear(dem2di_batch *batch, int k, double time_step,
-                                               const dem2d_pair_desc *law, bool one_law, int terms,
-                                               const dem2di_round *r) {
+static DEM2DI_INLINE void dem2di_batch_shear(const dem2di_batch *batch, int k, double time_step,
+                                             const dem2d_pair_desc *law, bool one_law, int terms,
+                                             const dem2di_round *r, dem2di_batch_item *item) {
     const double kt = one_law ? law->tangential_stiffness : batch->kt[k];
     const double limit = (one_law ? law->friction : batch->mu[k]) * r->force;
-    const double slip = dem2di_batch_slip(batch, k, r);
-    if (!(terms & DEM2DI_TANGENTIAL_DASHPOT))
-        return dem2di_held(limit, batch->shear[k] - kt * slip * time_step);
+    const double slip = dem2di_batch_slip(batch, k, item, r);
+    if (!(terms & DEM2DI_TANGENTIAL_DASHPOT)) {
+        item->shear = dem2di_held(limit, item->shear - kt * slip * time_step);
+        return;
+    }
     double ratio = one_law ? law->tangential_damping_ratio : batch->zeta_t[k];
     double inverse = batch->inverse[k] + r->arm_a * r->arm_a * batch->inverse_a[k] +
                      r->arm_b * r->arm_b * batch->inverse_b[k];
     double viscous, dashpot = 2 * ratio * sqrt(1 / inverse * kt);
-    double shear = dem2di_slider(kt, dashpot, slip, time_step, limit, batch->shear[k], &viscous);
-    batch->viscous_shear[k] = r->depth > 0 ? viscous : 0;
-    return r->depth > 0 ? shear : 0;
+    double shear = dem2di_slider(kt, dashpot, slip, time_step, limit, item->shear, &viscous);
+    item->viscous_shear = r->depth > 0 ? viscous : 0;
+    item->shear = r->depth > 0 ? shear : 0;
 }
 
-/* Moment of two circles against rolling. */
-static DEM2DI_INLINE double dem2di_batch_moment(dem2di_batch *batch, int k, double time_step,
-                                                const dem2d_pair_desc *law, bool one_law, int terms,
-                                                const dem2di_round *r) {
-    const double kt = one_law ? law->tangential_stiffness : batch->kt[k];
-    const double radius_a = batch->radius_a[k], radius_b = batch->radius_b[k];
-    const double radius = radius_a * (radius_b / (radius_a + radius_b));
-    const double limit = (one_law ? law->rolling_friction : batch->mu_r[k]) * radius * r->force;
-    const double spin = batch->wb[k] - batch->wa[k], stiffness = kt * radius * radius;
-    double moment, viscous, dashpot = 0;
-    if (!(terms & DEM2DI_ROLLING_DASHPOT)) {
-        moment = dem2di_held(limit, batch->moment[k] - stiffness * spin * time_step);
-        return r->depth > 0 ? moment : 0;
+/* The law of two circles, as dem2di_law_points, of contact k of a batch. */
+static DEM2DI_INLINE dem2di_round dem2di_batch_law(const dem2di_batch *batch, int k,
+                                                   double time_step, const dem2d_pair_desc *law,
+                                                   bool friction, int terms, bool one_law,
+                                                   dem2di_batch_item *item, dem2di_action *action) {
+    const double kn = one_law ? law->normal_stiffness : batch->kn[k];
+    dem2d_vec d;
+    d.x = batch->dx[k];
+    d.y = batch->dy[k];
+    dem2di_round r = dem2di_round_make(d, batch->radius_a[k], batch->radius_b[k], kn);
+    if (terms & DEM2DI_DASHPOT) {
+        double zeta = one_law ? law->damping_ratio : batch->zeta[k];
+        double approach = -(r.normal.x * batch->vx[k] + r.normal.y * batch->vy[k]);
+        double dashpot = 2 * zeta * sqrt(1 / batch->inverse[k] * kn);
+        double damped = dem2di_damped(r.force, dashpot, approach);
+        r.force = r.depth > 0 ? damped : 0;
     }
-    double ratio = one_law ? law->rolling_damping_ratio : batch->zeta_r[k];
-    dashpot = 2 * ratio * sqrt(1 / (batch->inverse_a[k] + batch->inverse_b[k]) * stiffness);
-    moment = dem2di_slider(stiffness, dashpot, spin, time_step, limit, batch->moment[k], &viscous);
-    batch->viscous_moment[k] = r->depth > 0 ? viscous : 0;
-    return r->depth > 0 ? moment : 0;
+    action->x = r.normal.x * r.force;
+    action->y = r.normal.y * r.force;
+    action->a = action->b = 0;
+    if (friction) {
+        dem2di_batch_shear(batch, k, time_step, law, one_law, terms, &r, item);
+        action->x -= r.normal.y * item->shear;
+        action->y += r.normal.x * item->shear;
+        action->a = -(r.arm_a * item->shear);
+        action->b = -(r.arm_b * item->shear);
+    }
+    return r;
 }
 
-/* The law of two circles, as dem2di_law_points and dem2di_law_rolling, for all of a batch: the next
-   contacts over the last. Where two are apart the force is 0, and with it all that it limits. */
-static DEM2DI_INLINE void dem2di_batch_loop(dem2di_batch *batch, int count, double time_step,
-                                            const dem2d_pair_desc *law, bool friction, int terms,
-                                            bool one_law) {
+/* All of a batch. Where two are apart the force is 0, and with it all that it limits. */
+static DEM2DI_INLINE void
+dem2di_batch_points(const dem2di_batch *batch, double time_step, const dem2d_pair_desc *law,
+                    bool friction, int terms, bool one_law, double *DEM2DI_APART normal_x,
+                    double *DEM2DI_APART normal_y, double *DEM2DI_APART depth,
+                    double *DEM2DI_APART force, double *DEM2DI_APART shear,
+                    double *DEM2DI_APART viscous_shear, dem2di_action *DEM2DI_APART actions) {
+    const int count = batch->count;
+    DEM2DI_INDEPENDENT
     for (int k = 0; k < count; k++) {
-        const double kn = one_law ? law->normal_stiffness : batch->kn[k];
-        dem2d_vec d;
-        d.x = batch->dx[k];
-        d.y = batch->dy[k];
-        dem2di_round r = dem2di_round_make(d, batch->radius_a[k], batch->radius_b[k], kn);
-        if (terms & DEM2DI_DASHPOT) {
-            double zeta = one_law ? law->damping_ratio : batch->zeta[k];
-            double approach = -(r.normal.x * batch->vx[k] + r.normal.y * batch->vy[k]);
-            double dashpot = 2 * zeta * sqrt(1 / batch->inverse[k] * kn);
-            double damped = dem2di_damped(r.force, dashpot, approach);
-            r.force = r.depth > 0 ? damped : 0;
-        }
-        double x = r.normal.x * r.force, y = r.normal.y * r.force;
-        if (friction) {
-            double shear = dem2di_batch_shear(batch, k, time_step, law, one_law, terms, &r);
-            x -= r.normal.y * shear;
-            y += r.normal.x * shear;
-            batch->shear[k] = shear;
-            batch->load_a[k] = -(r.arm_a * shear);
-            batch->load_b[k] = -(r.arm_b * shear);
-        }
-        if (terms & DEM2DI_ROLLING) {
-            double moment = dem2di_batch_moment(batch, k, time_step, law, one_law, terms, &r);
-            batch->moment[k] = moment;
-            batch->load_a[k] -= moment;
-            batch->load_b[k] += moment;
-        }
-        batch->normal_x[k] = r.normal.x;
-        batch->normal_y[k] = r.normal.y;
-        batch->depth[k] = r.depth;
-        batch->force[k] = r.force;
-        batch->load_x[k] = x;
-        batch->load_y[k] = y;
+        dem2di_batch_item item = {{normal_x[k], normal_y[k]}, depth[k], 0, 0};
+        dem2di_action action;
+        if (friction) item.shear = shear[k];
+        if (terms & DEM2DI_TANGENTIAL_DASHPOT) item.shear -= viscous_shear[k];
+        dem2di_round r =
+            dem2di_batch_law(batch, k, time_step, law, friction, terms, one_law, &item, &action);
+        normal_x[k] = r.normal.x;
+        normal_y[k] = r.normal.y;
+        depth[k] = r.depth;
+        force[k] = r.force;
+        shear[k] = item.shear;
+        if (terms & DEM2DI_TANGENTIAL_DASHPOT) viscous_shear[k] = item.viscous_shear;
+        actions[k].x = action.x;
+        actions[k].y = action.y;
+        actions[k].a = action.a;
+        actions[k].b = action.b;
     }
 }
 
-/* What the scene has, as constants: to(friction, terms) for pairs of circles. Terms are taken with
-   friction, and with those before them, which may be 0. */
-#define DEM2DI_DASHPOT_ROLLING (DEM2DI_DASHPOT | DEM2DI_ROLLING)
-#define DEM2DI_BATCH_CASES(plan, to)                                                     \
-    ((plan)->terms == 0                ? (plan)->friction ? to(true, 0) : to(false, 0)   \
-                    : (plan)->terms == DEM2DI_DASHPOT ? to(true, DEM2DI_DASHPOT)         \
-     : ((plan)->terms & ~DEM2DI_DASHPOT_ROLLING) == 0 ? to(true, DEM2DI_DASHPOT_ROLLING) \
-                                                      : to(true, DEM2DI_CALLERS_LAW - 1))
-
-/* The loop for what the scene has. */
-static void dem2di_batch_solve(dem2di_batch *batch, int count, double time_step,
-                               const dem2d_pair_desc *law, const dem2di_plan *plan) {
-#define DEM2DI_SOLVE(friction, terms)                                                       \
-    (plan->one_law ? dem2di_batch_loop(batch, count, time_step, law, friction, terms, true) \
-                   : dem2di_batch_loop(batch, count, time_step, law, friction, terms, false))
-    DEM2DI_BATCH_CASES(plan, DEM2DI_SOLVE);
-#undef DEM2DI_SOLVE
+/* The same against rolling, as dem2di_law_rolling. */
+static DEM2DI_INLINE void
+dem2di_batch_rolling(const dem2di_batch *batch, double time_step, const dem2d_pair_desc *law,
+                     bool dashpots, bool one_law, const double *DEM2DI_APART depth,
+                     const double *DEM2DI_APART force, double *DEM2DI_APART moment,
+                     double *DEM2DI_APART viscous_moment, dem2di_action *DEM2DI_APART actions) {
+    const int count = batch->count;
+    DEM2DI_INDEPENDENT
+    for (int k = 0; k < count; k++) {
+        const double kt = one_law ? law->tangential_stiffness : batch->kt[k];
+        const double radius_a = batch->radius_a[k], radius_b = batch->radius_b[k];
+        const double radius = radius_a * (radius_b / (radius_a + radius_b));
+        const double limit = (one_law ? law->rolling_friction : batch->mu_r[k]) * radius * force[k];
+        const double spin = batch->wb[k] - batch->wa[k], stiffness = kt * radius * radius;
+        double next, viscous;
+        if (dashpots) {
+            double ratio = one_law ? law->rolling_damping_ratio : batch->zeta_r[k];
+            double inverse = batch->inverse_a[k] + batch->inverse_b[k];
+            double dashpot = 2 * ratio * sqrt(1 / inverse * stiffness);
+            next = dem2di_slider(stiffness, dashpot, spin, time_step, limit,
+                                 moment[k] - viscous_moment[k], &viscous);
+            viscous_moment[k] = depth[k] > 0 ? viscous : 0;
+        } else {
+            next = dem2di_held(limit, moment[k] - stiffness * spin * time_step);
+        }
+        next = depth[k] > 0 ? next : 0;
+        moment[k] = next;
+        actions[k].a -= next;
+        actions[k].b += next;
+    }
 }
+
+/* The loops for what the scene has, as constants. Terms are taken with friction, and with those
+   before them, which may be 0. */
+static DEM2DI_INLINE void dem2di_batch_solve(const dem2di_batch *b, double time_step,
+                                             const dem2d_pair_desc *law, const dem2di_plan *plan) {
+    const int terms = plan->terms, both = DEM2DI_DASHPOT | DEM2DI_TANGENTIAL_DASHPOT;
+    const bool sliders = (terms & ~(DEM2DI_DASHPOT | DEM2DI_ROLLING)) != 0;
+#define DEM2DI_POINTS(friction, terms, one_law)                                                \
+    dem2di_batch_points(b, time_step, law, friction, terms, one_law, b->normal_x, b->normal_y, \
+                        b->depth, b->force, b->shear, b->viscous_shear, b->actions)
+#define DEM2DI_ROLLS(dashpots, one_law)                                                       \
+    dem2di_batch_rolling(b, time_step, law, dashpots, one_law, b->depth, b->force, b->moment, \
+                         b->viscous_moment, b->actions)
+    if (plan->one_law) {
+        if (sliders)
+            DEM2DI_POINTS(true, both, true);
+        else if (terms != 0)
+            DEM2DI_POINTS(true, DEM2DI_DASHPOT, true);
+        else if (plan->friction)
+            DEM2DI_POINTS(true, 0, true);
+        else
+            DEM2DI_POINTS(false, 0, true);
+    } else {
+        if (sliders)
+            DEM2DI_POINTS(true, both, false);
+        else if (terms != 0)
+            DEM2DI_POINTS(true, DEM2DI_DASHPOT, false);
+        else if (plan->friction)
+            DEM2DI_POINTS(true, 0, false);
+        else
+            DEM2DI_POINTS(false, 0, false);
+    }
+    if (!(terms & (DEM2DI_ROLLING | DEM2DI_ROLLING_DASHPOT))) return;
+    if (sliders && plan->one_law)
+        DEM2DI_ROLLS(true, true);
+    else if (sliders)
+        DEM2DI_ROLLS(true, false);
+    else if (plan->one_law)
+        DEM2DI_ROLLS(false, true);
+    else
+        DEM2DI_ROLLS(false, false);
+#undef DEM2DI_POINTS
+#undef DEM2DI_ROLLS
+}
+
+/* How many contacts of a batch are closed. */
+static DEM2DI_INLINE int64_t dem2di_batch_count(const dem2di_batch *batch) {
+    int64_t closed = 0;
+    for (int k = 0; k < batch->count; k++) closed += batch->depth[k] > 0 ? 1 : 0;
+    return closed;
+}
+
+static int64_t dem2di_batch_solve_plain(const dem2di_batch *batch, double time_step,
+                                        const dem2d_pair_desc *law, const dem2di_plan *plan) {
+    dem2di_batch_solve(batch, time_step, law, plan);
+    return dem2di_batch_count(batch);
+}
+
+#if DEM2DI_FOURS
+static DEM2DI_AVX2 int64_t dem2di_batch_solve_fours(const dem2di_batch *batch, double time_step,
+                                                    const dem2d_pair_desc *law,
+                                                    const dem2di_plan *plan) {
+    dem2di_batch_solve(batch, time_step, law, plan);
+    return dem2di_batch_count(batch);
+}
+#endif
 DEM2DI_VECTORS_END
 
-/* The last contacts of a batch from the columns, their forces without dashpots. */
-static DEM2DI_INLINE void dem2di_batch_get(const dem2d_world *world, int first, int count,
-                                           int terms, dem2di_batch *batch) {
-    const dem2di_contacts *from = &world->list.contacts;
-    const size_t bytes = (size_t)count * sizeof(double);
-    memcpy(batch->normal_x, from->normal_x + first, bytes);
-    memcpy(batch->normal_y, from->normal_y + first, bytes);
-    memcpy(batch->depth, from->depth + first, bytes);
-    memcpy(batch->shear, from->shear + first, bytes);
-    if (terms & DEM2DI_ROLLING) memcpy(batch->moment, from->moment + first, bytes);
-    if (terms & DEM2DI_TANGENTIAL_DASHPOT)
-        for (int k = 0; k < count; k++) batch->shear[k] -= from->viscous_shear[first + k];
-    if (terms & DEM2DI_ROLLING_DASHPOT)
-        for (int k = 0; k < count; k++) batch->moment[k] -= from->viscous_moment[first + k];
-}
-
-/* The next contacts and their loads into the columns. */
-static DEM2DI_INLINE void dem2di_batch_put(dem2d_world *world, int first, int count, bool friction,
-                                           int terms, const dem2di_batch *batch) {
-    const dem2di_contacts *to = &world->list.contacts;
-    const size_t bytes = (size_t)count * sizeof(double);
-    memcpy(to->normal_x + first, batch->normal_x, bytes);
-    memcpy(to->normal_y + first, batch->normal_y, bytes);
-    memcpy(to->depth + first, batch->depth, bytes);
-    memcpy(to->force + first, batch->force, bytes);
-    memcpy(world->load_x + first, batch->load_x, bytes);
-    memcpy(world->load_y + first, batch->load_y, bytes);
-    if (!friction) {
-        memset(to->shear + first, 0, bytes);
-        return;
-    }
-    memcpy(to->shear + first, batch->shear, bytes);
-    memcpy(world->load_a + first, batch->load_a, bytes);
-    memcpy(world->load_b + first, batch->load_b, bytes);
-    if (terms & DEM2DI_ROLLING) memcpy(to->moment + first, batch->moment, bytes);
-    if (terms & DEM2DI_TANGENTIAL_DASHPOT)
-        memcpy(to->viscous_shear + first, batch->viscous_shear, bytes);
-    if (terms & DEM2DI_ROLLING_DASHPOT)
-        memcpy(to->viscous_moment + first, batch->viscous_moment, bytes);
-}
-
-/* Loads that are not finite, and the greatest. */
-static void dem2di_batch_check(const dem2di_batch *batch, int n, bool friction,
-                               dem2di_count *count) {
-    for (int k = 0; k < n; k++) {
-        double sum = fabs(batch->load_x[k]) + fabs(batch->load_y[k]);
-        if (friction) sum += fabs(batch->load_a[k]) + fabs(batch->load_b[k]);
+/* Actions that are not finite, and the greatest. */
+static void dem2di_batch_check(const dem2di_batch *batch, dem2di_count *count) {
+    for (int k = 0; k < batch->count; k++) {
+        double sum = dem2di_action_size(&batch->actions[k]);
         count->unsound += !dem2di_finite(sum);
         count->load = dem2di_max(count->load, sum);
     }
 }
 
-static DEM2DI_INLINE void dem2di_disc_batch(dem2d_world *world, int first, int n, bool friction,
-                                            int terms, bool one_law, dem2di_count *count) {
-    const dem2di_plan *plan = &world->plan;
-    dem2di_batch batch;
-    int closed = 0;
-    if ((terms & ~plan->terms) & DEM2DI_ROLLING) memset(batch.moment, 0, sizeof batch.moment);
-    if (friction) dem2di_batch_get(world, first, n, terms & plan->terms, &batch);
-    dem2di_batch_fetch(world, first, n, friction, terms, one_law, &batch);
-    if (friction && world->redirected) dem2di_batch_made(world, first, n, &batch);
-    if (world->immovable) dem2di_batch_hold(world, first, n, &batch);
-    dem2di_batch_solve(&batch, n, world->made_step,
-                       dem2di_law(world, plan->material, plan->material), plan);
-    dem2di_batch_put(world, first, n, friction, terms & plan->terms, &batch);
-    if (!world->bounded) dem2di_batch_check(&batch, n, friction, count);
-    for (int k = 0; k < n; k++) closed += batch.depth[k] > 0;
+/* Beside the fetch: what few scenes have, between it and the law, and behind. */
+static void dem2di_batch_amend(const dem2d_world *world, int first, dem2di_batch *batch) {
+    dem2di_batch_laws(world, first, batch);
+    if (world->redirected) dem2di_batch_made(world, first, batch);
+    if (world->immovable) dem2di_batch_hold(world, first, batch);
+}
+
+static inline void dem2di_batch_end(const dem2d_world *world, const dem2di_batch *batch,
+                                    int64_t closed, dem2di_count *count) {
+    if (!world->bounded) dem2di_batch_check(batch, count);
     count->collisions += closed;
     count->proofs[DEM2D_BY_FORM] += closed;
 }
 
-static void dem2di_disc_range(dem2d_world *world, int begin, int end, dem2di_count *count) {
+/* Contacts of circles from begin to end. */
+static void dem2di_disc_range_plain(const dem2d_world *world, int begin, int end,
+                                    dem2di_count *count) {
     const dem2di_plan *plan = &world->plan;
+    const dem2d_pair_desc *law = dem2di_law(world, plan->material, plan->material);
+    dem2di_batch batch;
     for (int first = begin; first < end; first += DEM2DI_BATCH) {
-        int n = dem2di_block_end(first, DEM2DI_BATCH, end) - first;
-#define DEM2DI_DISCS_OF(friction, terms)                                              \
-    (plan->one_law ? dem2di_disc_batch(world, first, n, friction, terms, true, count) \
-                   : dem2di_disc_batch(world, first, n, friction, terms, false, count))
-        DEM2DI_BATCH_CASES(plan, DEM2DI_DISCS_OF);
-#undef DEM2DI_DISCS_OF
+        const dem2di_key *keys = world->list.keys + first;
+        dem2di_batch_begin(world, first, dem2di_block_end(first, DEM2DI_BATCH, end) - first,
+                           &batch);
+        if (plan->friction || plan->terms != 0)
+            dem2di_batch_fetch(world->now, keys, 0, true, &batch);
+        else
+            dem2di_batch_fetch(world->now, keys, 0, false, &batch);
+        dem2di_batch_amend(world, first, &batch);
+        dem2di_batch_end(world, &batch,
+                         dem2di_batch_solve_plain(&batch, world->made_step, law, plan), count);
     }
+}
+
+#if DEM2DI_FOURS
+static DEM2DI_AVX2 void dem2di_disc_range_fours(const dem2d_world *world, int begin, int end,
+                                                dem2di_count *count) {
+    const dem2di_plan *plan = &world->plan;
+    const dem2d_pair_desc *law = dem2di_law(world, plan->material, plan->material);
+    dem2di_batch batch;
+    for (int first = begin; first < end; first += DEM2DI_BATCH) {
+        dem2di_batch_begin(world, first, dem2di_block_end(first, DEM2DI_BATCH, end) - first,
+                           &batch);
+        dem2di_fours_fetch(world->now, world->list.keys + first, &batch);
+        dem2di_batch_amend(world, first, &batch);
+        dem2di_batch_end(world, &batch,
+                         dem2di_batch_solve_fours(&batch, world->made_step, law, plan), count);
+    }
+}
+#endif
+
+static void dem2di_disc_range(const dem2d_world *world, int begin, int end, dem2di_count *count) {
+#if DEM2DI_FOURS
+    if (world->fours) {
+        dem2di_disc_range_fours(world, begin, end, count);
+        return;
+    }
+#endif
+    dem2di_disc_range_plain(world, begin, end, count);
 }
 
 /* Part of a gap that proves nothing: nearer to each other than this (m), two shapes may be found in
@@ -18993,11 +19230,12 @@ static DEM2DI_INLINE void dem2di_force_put(dem2d_world *world, int i, const dem2
     world->list.contacts.force[i] = contact->force;
     world->list.contacts.shear[i] = contact->shear;
     dem2d_vec force = dem2di_contact_force(contact);
-    world->load_x[i] = force.x;
-    world->load_y[i] = force.y;
-    world->load_a[i] = dem2di_torque_a(contact, moment);
-    world->load_b[i] = dem2di_torque_b(contact, moment);
-    double sum = fabs(force.x) + fabs(force.y) + fabs(world->load_a[i]) + fabs(world->load_b[i]);
+    dem2di_action *action = &world->actions[i];
+    action->x = force.x;
+    action->y = force.y;
+    action->a = dem2di_torque_a(contact, moment);
+    action->b = dem2di_torque_b(contact, moment);
+    double sum = dem2di_action_size(action);
     count->unsound += !dem2di_finite(sum);
     if (!world->bounded) count->load = dem2di_max(count->load, sum);
 }
@@ -19174,7 +19412,7 @@ static DEM2DI_INLINE void dem2di_contact_place(dem2d_world *world, int i, bool w
 }
 
 static inline void dem2di_no_load(dem2d_world *world, int i) {
-    world->load_x[i] = world->load_y[i] = world->load_a[i] = world->load_b[i] = 0;
+    memset(&world->actions[i], 0, sizeof *world->actions);
 }
 
 /* Contact i is apart: nothing acts. The normal is that of the search. */
@@ -20171,10 +20409,10 @@ static DEM2DI_INLINE void dem2di_tile_put(dem2d_world *world, const dem2di_tile 
     const int i = tile->contact[k];
     world->list.contacts.force[i] = tile->force[k];
     world->list.contacts.shear[i] = tile->shear[k];
-    world->load_x[i] = tile->load_x[k];
-    world->load_y[i] = tile->load_y[k];
-    world->load_a[i] = tile->load_a[k];
-    world->load_b[i] = tile->load_b[k];
+    world->actions[i].x = tile->load_x[k];
+    world->actions[i].y = tile->load_y[k];
+    world->actions[i].a = tile->load_a[k];
+    world->actions[i].b = tile->load_b[k];
     count->unsound += !dem2di_finite(tile->sum[k]);
     if (!world->bounded) count->load = dem2di_max(count->load, tile->sum[k]);
 }
@@ -20385,17 +20623,18 @@ static DEM2DI_INLINE dem2di_load dem2di_gather(const dem2d_world *world, int slo
     const dem2di_list *list = &world->list;
     const int *entry = list->adjacent + list->first[slot], *own = list->adjacent + list->own[slot];
     const int *end = list->adjacent + list->first[slot + 1];
-    const double *x = world->load_x, *y = world->load_y;
     dem2di_load sum = {{0, 0}, 0};
     for (; entry < own; entry++) { /* of which it is B */
-        sum.force.x += x[*entry];
-        sum.force.y += y[*entry];
-        if (spin) sum.torque += world->load_b[*entry];
+        const dem2di_action *action = &world->actions[*entry];
+        sum.force.x += action->x;
+        sum.force.y += action->y;
+        if (spin) sum.torque += action->b;
     }
     for (; entry < end; entry++) {
-        sum.force.x -= x[*entry];
-        sum.force.y -= y[*entry];
-        if (spin) sum.torque += world->load_a[*entry];
+        const dem2di_action *action = &world->actions[*entry];
+        sum.force.x -= action->x;
+        sum.force.y -= action->y;
+        if (spin) sum.torque += action->a;
     }
     return sum;
 }
@@ -20498,6 +20737,7 @@ static DEM2DI_INLINE dem2di_state dem2di_integrate(const dem2d_world *world, int
 static dem2di_state dem2di_foresee(const dem2d_world *world, int slot) {
     dem2di_damping damping =
         dem2di_damping_make(world->local_damping, world->global_damping, world->time_step);
+    if (world->foreseen) return world->before[slot];
     return dem2di_integrate(world, slot, &damping, true, true, true, world->plan.turns, true);
 }
 
@@ -20739,9 +20979,84 @@ static DEM2DI_INLINE double dem2di_integrate_range(dem2d_world *world, int begin
     return most;
 }
 
+#if DEM2DI_FOURS
+/* dem2di_gather, in the lanes x, y and torque; in the last one is nothing of use. */
+DEM2DI_AVX2_INLINE dem2di_four dem2di_fours_gather(const dem2di_list *list, const double *actions,
+                                                   int slot) {
+    const dem2di_four_bits flips = (dem2di_four_bits)dem2di_four_of(-0.0, -0.0, 0, 0);
+    const int *entry = list->adjacent + list->first[slot], *own = list->adjacent + list->own[slot];
+    const int *end = list->adjacent + list->first[slot + 1];
+    dem2di_four sum = dem2di_four_of(0, 0, 0, 0);
+    for (; entry < own; entry++) { /* of which it is B */
+        dem2di_four action = dem2di_four_at(actions + 4 * (size_t)*entry);
+        sum += DEM2DI_SHUFFLE(action, action, 0, 1, 3, 3);
+    }
+    for (; entry < end; entry++) {
+        dem2di_four action = dem2di_four_at(actions + 4 * (size_t)*entry);
+        sum += (dem2di_four)((dem2di_four_bits)action ^ flips);
+    }
+    return sum;
+}
+
+/* dem2di_integrate_range for circles without external loads: the two halves of a state are a vector
+   each, as in dem2di_fours_fetch. A lane that does not change is put back. */
+DEM2DI_AVX2_INLINE double dem2di_fours_integrate(const dem2d_world *world, int begin, int end,
+                                                 bool damped, bool spin) {
+    const dem2di_damping damping =
+        dem2di_damping_make(world->local_damping, world->global_damping, world->time_step);
+    const double dt = world->time_step, *actions = (const double *)(const void *)world->actions;
+    const bool heavy = world->plan.heavy; /* -0 + a is a, also of a zero with a sign */
+    const dem2di_four gravity = dem2di_four_of(heavy ? world->gravity.x : -0.0,
+                                               heavy ? world->gravity.y : -0.0, -0.0, -0.0);
+    const dem2di_four zero = dem2di_four_of(0, 0, 0, 0);
+    const dem2di_four_bits sign = (dem2di_four_bits)dem2di_four_of(-0.0, -0.0, -0.0, -0.0);
+    double most = 0;
+    for (int i = begin; i < end; i++) {
+        const double *now = &world->now[i].x.x;
+        double *next = &world->before[i].x.x;
+        dem2di_four x = dem2di_four_at(now), v = dem2di_four_at(now + 4);
+        const double inverse = world->inverse[i].mass, slender = world->inverse[i].inertia;
+        if (inverse > 0) {
+            dem2di_four sum = dem2di_fours_gather(&world->list, actions, i), made;
+            sum = gravity + sum * dem2di_four_of(inverse, inverse, slender, slender);
+            if (damped) {
+                dem2di_four drag = damping.local * (dem2di_four)((dem2di_four_bits)sum & ~sign);
+                drag = (dem2di_four)((dem2di_four_bits)drag & (dem2di_four_bits)(v != zero));
+                drag = (dem2di_four)((dem2di_four_bits)drag | ((dem2di_four_bits)v & sign));
+                made = damping.keep * v + damping.receive * (sum - drag);
+            } else {
+                made = v + dt * sum;
+            }
+            v = spin ? DEM2DI_SHUFFLE(made, v, 0, 1, 2, 7) : DEM2DI_SHUFFLE(made, v, 0, 1, 6, 7);
+        }
+        dem2di_four moved = x + dt * v;
+        x = spin ? DEM2DI_SHUFFLE(moved, x, 0, 1, 2, 7) : DEM2DI_SHUFFLE(moved, x, 0, 1, 6, 7);
+        dem2di_four_put(next, x);
+        dem2di_four_put(next + 4, v);
+        if (spin && fabs(x[2]) > DEM2DI_PI) next[2] = fmod(x[2], 2 * DEM2DI_PI);
+        dem2di_four square = v * v;
+        most = dem2di_max(most, (square[0] + square[1]) * world->inverse_skin_squared[i]);
+    }
+    return most;
+}
+
+static DEM2DI_AVX2 double dem2di_integrate_block_fours(const dem2d_world *world, int begin,
+                                                       int end) {
+    const dem2di_plan *plan = &world->plan;
+    if (plan->damped && plan->spin) return dem2di_fours_integrate(world, begin, end, true, true);
+    if (plan->damped) return dem2di_fours_integrate(world, begin, end, true, false);
+    if (plan->spin) return dem2di_fours_integrate(world, begin, end, false, true);
+    return dem2di_fours_integrate(world, begin, end, false, false);
+}
+#endif
+
 /* The loop for what the scene has. */
 static double dem2di_integrate_block(dem2d_world *w, int b, int e) {
     const dem2di_plan *p = &w->plan;
+#if DEM2DI_FOURS
+    if (w->fours && !p->turns && !w->loaded && !w->keeps_sums)
+        return dem2di_integrate_block_fours(w, b, e);
+#endif
 #define DEM2DI_INTEGRATE(spin, turns)                                                           \
     (p->heavy    ? p->damped ? dem2di_integrate_range(w, b, e, true, true, spin, turns, false)  \
                              : dem2di_integrate_range(w, b, e, true, false, spin, turns, false) \
@@ -20770,14 +21085,13 @@ static void dem2di_integrate_task(void *context, int begin, int end) {
     }
 }
 
-/* Sums of forces, velocities and positions. Returns the part of a skin used up so far: path lengths
-   are sums of speeds, here of the greatest for its skin in each step. */
+/* Sums of forces, velocities and positions, unless they are there. Returns the part of a skin used
+   up so far: path lengths are sums of speeds, here of the greatest for its skin in each step. */
 static double dem2di_integrate_pass(dem2d_world *world) {
     int blocks = dem2di_blocks(world->body_count, DEM2DI_BLOCK);
     double most = 0;
-    world->plan.heavy = world->gravity.x != 0 || world->gravity.y != 0;
-    world->plan.damped = world->local_damping > 0 || world->global_damping > 0;
-    dem2di_run(world, DEM2D_PHASE_MOTION, blocks, dem2di_integrate_task, world);
+    if (!world->foreseen)
+        dem2di_run(world, DEM2D_PHASE_MOTION, blocks, dem2di_integrate_task, world);
     for (int k = 0; k < blocks; k++) most = dem2di_max(most, world->block_results[k].most);
     return world->list_displacement + sqrt(most) * world->time_step + world->roundoff_displacement;
 }
@@ -21041,6 +21355,26 @@ static void dem2di_cell_work(const dem2d_world *world, double power[2][DEM2DI_HA
     }
     for (int k = 0; k < 2; k++)
         power[k][DEM2DI_BY_CELL] -= xx * flow[k]->xx + yx * flow[k]->xy + yy * flow[k]->yy;
+}
+
+/* Force pass and motion in turns, in a step that nothing can refuse: each block of particles moves
+   as soon as its contacts are done, while these and its own states are in the cache. The next
+   states come over those before, which the force pass does not read where no segments are joined.
+   With threads the two passes are one after the other: a block may have contacts of several
+   threads. */
+static void dem2di_joint_pass(dem2d_world *world, dem2di_count *count) {
+    const dem2di_list *list = &world->list;
+    const int discs = dem2di_blocks(list->discs, DEM2DI_BLOCK);
+    const int blocks = dem2di_force_blocks(list->discs, list->count);
+    dem2di_force_task(world, discs, blocks);
+    for (int k = 0; k < discs; k++) {
+        dem2di_force_task(world, k, k + 1);
+        for (int b = world->block_results[k].complete; b >= 0; b = world->block_results[b].next)
+            dem2di_integrate_task(world, b, b + 1);
+    }
+    count->load = 0;
+    for (int k = 0; k < blocks; k++) dem2di_count_add(count, &world->block_results[k].count);
+    world->foreseen = true;
 }
 
 /* The rest of the ledger, after the motion: work at the velocities before and behind. */
@@ -21640,9 +21974,17 @@ static dem2d_result dem2di_step_try(dem2d_world *world, dem2di_trial *trial) {
         return dem2di_out_of_memory(world, "contacts");
     world->keeps_last = trial->back = back;
     world->keeps_walls = world->plan.joints;
-    dem2di_flow_enter(world);
-    dem2di_force_pass(world, &trial->count);
-    dem2di_flow_leave(world);
+    world->plan.heavy = world->gravity.x != 0 || world->gravity.y != 0;
+    world->plan.damped = world->local_damping > 0 || world->global_damping > 0;
+    world->foreseen = false;
+    if (back || due || flows || world->in_two || world->plan.joints || world->keeps_sums ||
+        world->parallel_for != NULL || world->list.discs == 0) {
+        dem2di_flow_enter(world);
+        dem2di_force_pass(world, &trial->count);
+        dem2di_flow_leave(world);
+    } else {
+        dem2di_joint_pass(world, &trial->count);
+    }
     if (due) result = dem2di_check_step(world, &trial->slow, &trial->fast);
     if (result != DEM2D_OK) return result;
     dem2di_wall_sums(world);
@@ -24323,8 +24665,8 @@ static void dem2di_read_contact_forces(dem2d_world *world) {
     const dem2di_contacts *from = &list->contacts;
     for (int i = 0; i < list->count; i++) {
         double force = from->force[i], shear = from->shear[i];
-        world->load_x[i] = from->normal_x[i] * force - from->normal_y[i] * shear;
-        world->load_y[i] = from->normal_y[i] * force + from->normal_x[i] * shear;
+        world->actions[i].x = from->normal_x[i] * force - from->normal_y[i] * shear;
+        world->actions[i].y = from->normal_y[i] * force + from->normal_x[i] * shear;
     }
 }
 

@@ -34,6 +34,10 @@ bool inside_is_setting(const char *column);
 bool inside_is_of_shapes(const char *column);
 /* Bytes that a writer passes on at once. */
 size_t inside_chunk(void);
+/* Circles by vectors of four, where the machine has them, or in plain C99. */
+void inside_choose_fours(dem2d_world *world, bool fours);
+/* Force pass and motion one after the other, or in turns where nothing hinders that. */
+void inside_choose_two_passes(dem2d_world *world, bool in_two);
 /* Do the invariants at the head of the world's section hold? Prints the first that does not. */
 bool inside_holds(const dem2d_world *world);
 /* Write to a file that is open for reading only; the result of closing it. */
@@ -95,6 +99,14 @@ double inside_wall_drift(const dem2d_world *world, int wall) {
 
 dem2d_vec inside_position(const dem2d_world *world, int slot) {
     return world->now[slot].x;
+}
+
+void inside_choose_fours(dem2d_world *world, bool fours) {
+    world->fours = fours && dem2di_has_fours();
+}
+
+void inside_choose_two_passes(dem2d_world *world, bool in_two) {
+    world->in_two = in_two;
 }
 
 static bool inside_fail(const char *what, int at) {
