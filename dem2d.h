@@ -542,12 +542,13 @@ SNAPSHOTS
 
 DETERMINISM
     Same input, same bits: on gcc and clang, C and C++, -O0 to -O3, with or without FMA hardware
-    (contraction is off inside this header). Steps use only + - * / and sqrt; sine, cosine and
-    arctangent are the header's own. A pair is (lower id, higher id) and forces are summed in the
-    order of the partner's id, so neither addresses nor storage order can change a bit. With names
-    of your own (see Name in CONCEPTS) the bits do not depend on ids, either. Not
-    covered: clang -ffp-contract=fast on the command line, and 80-bit x87 arithmetic. Compare two
-    runs by dem2d_world_hash.
+    (contraction is off inside this header), with or without AVX2 (gcc from 12 on and clang compile
+    the passes over circles twice on x86-64; a world takes the AVX2 ones where the processor has
+    it). Steps use only + - * / and sqrt; sine, cosine and arctangent are the header's own. A pair
+    is (lower id, higher id) and forces are summed in the order of the partner's id, so neither
+    addresses nor storage order can change a bit. With names of your own (see Name in CONCEPTS) the
+    bits do not depend on ids, either. Not covered: clang -ffp-contract=fast on the command line,
+    and 80-bit x87 arithmetic. Compare two runs by dem2d_world_hash.
     Your own arithmetic (positions and velocities you compute, support functions, contact laws) is
     compiled with your flags: give -ffp-contract=off if its bits have to be the same as well. The
     implementation ends by setting clang's contraction to the mode of the command line: put a
@@ -12087,15 +12088,34 @@ static DEM2DI_INLINE double dem2di_damped(double spring, double dashpot, double 
 
 /* Spring and dashpot side by side, and in series with both a slider that yields at the limit of
    their sum: the whole slides at a rate, spring and dashpot at that of which the slider has no
-   part. So what the dashpot and the slider take is never below 0. Of sum and dashpot the forces. */
+   part. So what the dashpot and the slider take is never below 0. */
+typedef struct dem2di_slid {
+    double sum, held; /* force of both without a limit, and within it */
+    double own;       /* rate of both while the slider yields */
+} dem2di_slid;
+
+static DEM2DI_INLINE dem2di_slid dem2di_slider_sum(double stiffness, double dashpot, double rate,
+                                                   double time_step, double limit, double last) {
+    dem2di_slid slid;
+    slid.sum = last - stiffness * rate * time_step - dashpot * rate;
+    slid.held = dem2di_held(limit, slid.sum);
+    slid.own = (last - slid.held) / (stiffness * time_step + dashpot);
+    return slid;
+}
+
+/* The part of the dashpot. */
+static DEM2DI_INLINE double dem2di_slider_viscous(const dem2di_slid *slid, double dashpot,
+                                                  double rate) {
+    return -(dashpot * (slid->held == slid->sum ? rate : slid->own));
+}
+
+/* Of sum and dashpot the forces. */
 static DEM2DI_INLINE double dem2di_slider(double stiffness, double dashpot, double rate,
                                           double time_step, double limit, double last,
                                           double *viscous) {
-    double force = last - stiffness * rate * time_step - dashpot * rate;
-    double held = dem2di_held(limit, force);
-    double own = (last - held) / (stiffness * time_step + dashpot);
-    *viscous = -(dashpot * (held == force ? rate : own));
-    return held;
+    dem2di_slid slid = dem2di_slider_sum(stiffness, dashpot, rate, time_step, limit, last);
+    *viscous = dem2di_slider_viscous(&slid, dashpot, rate);
+    return slid.held;
 }
 
 /* Normal force and friction of one point, [F] eq. 8-10. The tangential spring is a scalar along
@@ -12359,16 +12379,18 @@ static bool dem2di_state_finite(const dem2di_state *state) {
 
    Passes of a step, each in a function that changes only what it is named for:
      list       positions -> keys, contacts carried over, adjacency; only when the list is used up
-     force      positions, velocities, last contacts, laws -> next contacts over the last, loads.
+     force      positions, velocities, last contacts, laws -> next contacts over the last, actions.
                 Of each pair first the geometry (collide), then the law; kernels of circles do both.
                 Where segments are joined, it is decided in between which contacts count (resolve)
-     gather     loads -> force and torque of each particle, in the order of its partners' ranks:
+     gather     actions -> force and torque of each particle, in the order of its partners' ranks:
                part of integrate, unless the sums are kept; external loads are added
      control    forces on servo walls, next states of their particles -> velocities of walls
-     check      contacts, loads -> may the step be taken? The last pass that may refuse it
+     check      contacts, actions -> may the step be taken? The last pass that may refuse it
      integrate  states, forces -> next states
      observe    last and next contacts, states -> ledger: only reads the others' results
      commit     the next states become those of now
+   Where nothing can refuse a step, and it has no threads, force and integrate take turns: a block
+   of particles moves once its contacts are done, and its data are read once (dem2di_joint_pass).
 
    In a periodic cell B of a pair may be an image: a slot behind those of the particles whose row in
    each column of particles is a copy of the owner's, moved by whole cell vectors (section cell). No
@@ -12386,8 +12408,8 @@ static bool dem2di_state_finite(const dem2di_state *state) {
         writers and the hash read these and compute nothing anew.
      6. The parts of walls are in the order of the walls' ranks, free slots have none; surfaces
         are where the walls' states of now put them, also of faces once they are joined.
-     7. Loads, list.last, and all else in scratch are valid during a step only, but for the zeros of
-        contacts that are apart.
+     7. Actions, list.last, and all else in scratch are valid during a step only, but for the zeros
+        of contacts that are apart.
    Results depend on positions, velocities, laws, and the history of each contact since it closed;
    not on which pairs are listed, the order in memory, or how work is shared out. */
 
@@ -18514,6 +18536,7 @@ typedef struct dem2di_batch {
     double *normal_x, *normal_y, *depth, *force, *shear, *moment, *viscous_shear, *viscous_moment;
     dem2di_action *actions;
     double unused[3][DEM2DI_BATCH];
+    double own[DEM2DI_BATCH]; /* see dem2di_batch_slider */
 } dem2di_batch;
 
 /* A batch of contacts from `first` on: where its columns are. */
@@ -18665,78 +18688,68 @@ static void dem2di_batch_hold(const dem2d_world *world, int first, dem2di_batch 
 }
 
 DEM2DI_VECTORS_BEGIN
-/* Numbers of one contact of a batch on their way through the law: those of the last force pass, of
-   the springs alone, then those of this one. */
-typedef struct dem2di_batch_item {
-    dem2d_vec last_normal;
-    double last_depth, shear, viscous_shear;
-} dem2di_batch_item;
-
-/* dem2di_slip for two circles. */
+/* dem2di_slip for two circles, whose last normal and depth are given. */
 static DEM2DI_INLINE double dem2di_batch_slip(const dem2di_batch *batch, int k,
-                                              const dem2di_batch_item *item,
-                                              const dem2di_round *now) {
+                                              const dem2di_round *now, dem2d_vec last_normal,
+                                              double last_depth) {
     double vx = batch->vx[k], vy = batch->vy[k], wa = batch->wa[k], wb = batch->wb[k];
-    double depth = item->last_depth, closed = depth > 0 ? 1 : 0; /* no branch: for vectors */
-    double arm_a = batch->radius_a[k] - depth / 2, arm_b = batch->radius_b[k] - depth / 2;
+    double closed = last_depth > 0 ? 1 : 0; /* no branch: for vectors */
+    double arm_a = batch->radius_a[k] - last_depth / 2;
+    double arm_b = batch->radius_b[k] - last_depth / 2;
     double slip = now->normal.x * vy - now->normal.y * vx - (now->arm_a * wa + now->arm_b * wb);
-    double before = item->last_normal.x * vy - item->last_normal.y * vx - (arm_a * wa + arm_b * wb);
+    double before = last_normal.x * vy - last_normal.y * vx - (arm_a * wa + arm_b * wb);
     return slip + (before - slip) * (closed / 2);
 }
 
-/* Tangential force of two circles at a normal force. */
-static DEM2DI_INLINE void dem2di_batch_shear(const dem2di_batch *batch, int k, double time_step,
-                                             const dem2d_pair_desc *law, bool one_law, int terms,
-                                             const dem2di_round *r, dem2di_batch_item *item) {
-    const double kt = one_law ? law->tangential_stiffness : batch->kt[k];
-    const double limit = (one_law ? law->friction : batch->mu[k]) * r->force;
-    const double slip = dem2di_batch_slip(batch, k, item, r);
-    if (!(terms & DEM2DI_TANGENTIAL_DASHPOT)) {
-        item->shear = dem2di_held(limit, item->shear - kt * slip * time_step);
-        return;
-    }
-    double ratio = one_law ? law->tangential_damping_ratio : batch->zeta_t[k];
-    double inverse = batch->inverse[k] + r->arm_a * r->arm_a * batch->inverse_a[k] +
-                     r->arm_b * r->arm_b * batch->inverse_b[k];
-    double viscous, dashpot = 2 * ratio * sqrt(1 / inverse * kt);
-    double shear = dem2di_slider(kt, dashpot, slip, time_step, limit, item->shear, &viscous);
-    item->viscous_shear = r->depth > 0 ? viscous : 0;
-    item->shear = r->depth > 0 ? shear : 0;
-}
-
-/* The law of two circles, as dem2di_law_points, of contact k of a batch. */
-static DEM2DI_INLINE dem2di_round dem2di_batch_law(const dem2di_batch *batch, int k,
-                                                   double time_step, const dem2d_pair_desc *law,
-                                                   bool friction, int terms, bool one_law,
-                                                   dem2di_batch_item *item, dem2di_action *action) {
+/* Two circles, and their normal force. */
+static DEM2DI_INLINE dem2di_round dem2di_batch_normal(const dem2di_batch *batch, int k,
+                                                      const dem2d_pair_desc *law, bool one_law,
+                                                      int terms) {
     const double kn = one_law ? law->normal_stiffness : batch->kn[k];
     dem2d_vec d;
     d.x = batch->dx[k];
     d.y = batch->dy[k];
     dem2di_round r = dem2di_round_make(d, batch->radius_a[k], batch->radius_b[k], kn);
-    if (terms & DEM2DI_DASHPOT) {
-        double zeta = one_law ? law->damping_ratio : batch->zeta[k];
-        double approach = -(r.normal.x * batch->vx[k] + r.normal.y * batch->vy[k]);
-        double dashpot = 2 * zeta * sqrt(1 / batch->inverse[k] * kn);
-        double damped = dem2di_damped(r.force, dashpot, approach);
-        r.force = r.depth > 0 ? damped : 0;
-    }
-    action->x = r.normal.x * r.force;
-    action->y = r.normal.y * r.force;
-    action->a = action->b = 0;
-    if (friction) {
-        dem2di_batch_shear(batch, k, time_step, law, one_law, terms, &r, item);
-        action->x -= r.normal.y * item->shear;
-        action->y += r.normal.x * item->shear;
-        action->a = -(r.arm_a * item->shear);
-        action->b = -(r.arm_b * item->shear);
-    }
+    if (!(terms & DEM2DI_DASHPOT)) return r;
+    double zeta = one_law ? law->damping_ratio : batch->zeta[k];
+    double approach = -(r.normal.x * batch->vx[k] + r.normal.y * batch->vy[k]);
+    double dashpot = 2 * zeta * sqrt(1 / batch->inverse[k] * kn);
+    double damped = dem2di_damped(r.force, dashpot, approach);
+    r.force = r.depth > 0 ? damped : 0;
     return r;
 }
 
-/* All of a batch. Where two are apart the force is 0, and with it all that it limits. */
+static DEM2DI_INLINE void dem2di_batch_act(dem2di_action *action, dem2d_vec normal, double force,
+                                           double shear, double arm_a, double arm_b) {
+    action->x = normal.x * force - normal.y * shear;
+    action->y = normal.y * force + normal.x * shear;
+    action->a = -(arm_a * shear);
+    action->b = -(arm_b * shear);
+}
+
+/* dem2di_slider. The own rate is stored: gcc makes a branch of a quotient that one choice alone
+   needs, and then no vectors. */
+static DEM2DI_INLINE double dem2di_batch_slider(dem2di_batch *batch, int k, double stiffness,
+                                                double dashpot, double rate, double time_step,
+                                                double limit, double last, double *viscous) {
+    dem2di_slid slid = dem2di_slider_sum(stiffness, dashpot, rate, time_step, limit, last);
+    batch->own[k] = slid.own;
+    *viscous = dem2di_slider_viscous(&slid, dashpot, rate);
+    return slid.held;
+}
+
+/* Coefficient of the tangential dashpot. */
+static DEM2DI_INLINE double dem2di_batch_dashpot(const dem2di_batch *batch, int k, double kt,
+                                                 double ratio, const dem2di_round *r) {
+    double inverse = batch->inverse[k] + r->arm_a * r->arm_a * batch->inverse_a[k] +
+                     r->arm_b * r->arm_b * batch->inverse_b[k];
+    return 2 * ratio * sqrt(1 / inverse * kt);
+}
+
+/* Two circles by the law of dem2di_law_points, for all of a batch. Where they are apart the force
+   is 0, and with it all that it limits. */
 static DEM2DI_INLINE void
-dem2di_batch_points(const dem2di_batch *batch, double time_step, const dem2d_pair_desc *law,
+dem2di_batch_points(dem2di_batch *batch, double time_step, const dem2d_pair_desc *law,
                     bool friction, int terms, bool one_law, double *DEM2DI_APART normal_x,
                     double *DEM2DI_APART normal_y, double *DEM2DI_APART depth,
                     double *DEM2DI_APART force, double *DEM2DI_APART shear,
@@ -18744,18 +18757,32 @@ dem2di_batch_points(const dem2di_batch *batch, double time_step, const dem2d_pai
     const int count = batch->count;
     DEM2DI_INDEPENDENT
     for (int k = 0; k < count; k++) {
-        dem2di_batch_item item = {{normal_x[k], normal_y[k]}, depth[k], 0, 0};
-        dem2di_action action;
-        if (friction) item.shear = shear[k];
-        if (terms & DEM2DI_TANGENTIAL_DASHPOT) item.shear -= viscous_shear[k];
-        dem2di_round r =
-            dem2di_batch_law(batch, k, time_step, law, friction, terms, one_law, &item, &action);
+        dem2di_round r = dem2di_batch_normal(batch, k, law, one_law, terms);
+        double next = 0;
+        if (friction) {
+            const double kt = one_law ? law->tangential_stiffness : batch->kt[k];
+            const double limit = (one_law ? law->friction : batch->mu[k]) * r.force;
+            const dem2d_vec last = {normal_x[k], normal_y[k]};
+            const double slip = dem2di_batch_slip(batch, k, &r, last, depth[k]);
+            if (terms & DEM2DI_TANGENTIAL_DASHPOT) {
+                double ratio = one_law ? law->tangential_damping_ratio : batch->zeta_t[k];
+                double viscous, last_shear = shear[k] - viscous_shear[k];
+                next =
+                    dem2di_batch_slider(batch, k, kt, dem2di_batch_dashpot(batch, k, kt, ratio, &r),
+                                        slip, time_step, limit, last_shear, &viscous);
+                viscous_shear[k] = viscous;
+            } else {
+                next = dem2di_held(limit, shear[k] - kt * slip * time_step);
+            }
+        }
         normal_x[k] = r.normal.x;
         normal_y[k] = r.normal.y;
         depth[k] = r.depth;
         force[k] = r.force;
-        shear[k] = item.shear;
-        if (terms & DEM2DI_TANGENTIAL_DASHPOT) viscous_shear[k] = item.viscous_shear;
+        shear[k] = next;
+        if (terms & DEM2DI_TANGENTIAL_DASHPOT) continue;
+        dem2di_action action = {r.normal.x * r.force, r.normal.y * r.force, 0, 0};
+        if (friction) dem2di_batch_act(&action, r.normal, r.force, next, r.arm_a, r.arm_b);
         actions[k].x = action.x;
         actions[k].y = action.y;
         actions[k].a = action.a;
@@ -18763,12 +18790,36 @@ dem2di_batch_points(const dem2di_batch *batch, double time_step, const dem2d_pai
     }
 }
 
-/* The same against rolling, as dem2di_law_rolling. */
+/* The rest where dashpots are beside the tangential springs: these pull where two are apart. */
 static DEM2DI_INLINE void
-dem2di_batch_rolling(const dem2di_batch *batch, double time_step, const dem2d_pair_desc *law,
-                     bool dashpots, bool one_law, const double *DEM2DI_APART depth,
-                     const double *DEM2DI_APART force, double *DEM2DI_APART moment,
-                     double *DEM2DI_APART viscous_moment, dem2di_action *DEM2DI_APART actions) {
+dem2di_batch_part(const dem2di_batch *batch, const double *DEM2DI_APART normal_x,
+                  const double *DEM2DI_APART normal_y, const double *DEM2DI_APART depth,
+                  const double *DEM2DI_APART force, double *DEM2DI_APART shear,
+                  double *DEM2DI_APART viscous_shear, dem2di_action *DEM2DI_APART actions) {
+    const int count = batch->count;
+    DEM2DI_INDEPENDENT
+    for (int k = 0; k < count; k++) {
+        const dem2d_vec normal = {normal_x[k], normal_y[k]};
+        double next = shear[k], viscous = viscous_shear[k];
+        dem2di_action action;
+        viscous_shear[k] = depth[k] > 0 ? viscous : 0;
+        next = depth[k] > 0 ? next : 0;
+        shear[k] = next;
+        dem2di_batch_act(&action, normal, force[k], next, batch->radius_a[k] - depth[k] / 2,
+                         batch->radius_b[k] - depth[k] / 2);
+        actions[k].x = action.x;
+        actions[k].y = action.y;
+        actions[k].a = action.a;
+        actions[k].b = action.b;
+    }
+}
+
+/* Against rolling, as dem2di_law_rolling, as if all were closed. */
+static DEM2DI_INLINE void dem2di_batch_rolling(dem2di_batch *batch, double time_step,
+                                               const dem2d_pair_desc *law, bool dashpots,
+                                               bool one_law, const double *DEM2DI_APART force,
+                                               double *DEM2DI_APART moment,
+                                               double *DEM2DI_APART viscous_moment) {
     const int count = batch->count;
     DEM2DI_INDEPENDENT
     for (int k = 0; k < count; k++) {
@@ -18777,18 +18828,34 @@ dem2di_batch_rolling(const dem2di_batch *batch, double time_step, const dem2d_pa
         const double radius = radius_a * (radius_b / (radius_a + radius_b));
         const double limit = (one_law ? law->rolling_friction : batch->mu_r[k]) * radius * force[k];
         const double spin = batch->wb[k] - batch->wa[k], stiffness = kt * radius * radius;
-        double next, viscous;
-        if (dashpots) {
-            double ratio = one_law ? law->rolling_damping_ratio : batch->zeta_r[k];
-            double inverse = batch->inverse_a[k] + batch->inverse_b[k];
-            double dashpot = 2 * ratio * sqrt(1 / inverse * stiffness);
-            next = dem2di_slider(stiffness, dashpot, spin, time_step, limit,
-                                 moment[k] - viscous_moment[k], &viscous);
-            viscous_moment[k] = depth[k] > 0 ? viscous : 0;
-        } else {
-            next = dem2di_held(limit, moment[k] - stiffness * spin * time_step);
+        if (!dashpots) {
+            moment[k] = dem2di_held(limit, moment[k] - stiffness * spin * time_step);
+            continue;
         }
-        next = depth[k] > 0 ? next : 0;
+        double ratio = one_law ? law->rolling_damping_ratio : batch->zeta_r[k];
+        double inverse = batch->inverse_a[k] + batch->inverse_b[k];
+        double dashpot = 2 * ratio * sqrt(1 / inverse * stiffness);
+        double viscous, last = moment[k] - viscous_moment[k];
+        moment[k] = dem2di_batch_slider(batch, k, stiffness, dashpot, spin, time_step, limit, last,
+                                        &viscous);
+        viscous_moment[k] = viscous;
+    }
+}
+
+/* The rest of it. */
+static DEM2DI_INLINE void dem2di_batch_rolled(const dem2di_batch *batch, bool dashpots,
+                                              const double *DEM2DI_APART depth,
+                                              double *DEM2DI_APART moment,
+                                              double *DEM2DI_APART viscous_moment,
+                                              dem2di_action *DEM2DI_APART actions) {
+    const int count = batch->count;
+    DEM2DI_INDEPENDENT
+    for (int k = 0; k < count; k++) {
+        if (dashpots) {
+            double viscous = viscous_moment[k];
+            viscous_moment[k] = depth[k] > 0 ? viscous : 0;
+        }
+        double next = depth[k] > 0 ? moment[k] : 0;
         moment[k] = next;
         actions[k].a -= next;
         actions[k].b += next;
@@ -18797,46 +18864,43 @@ dem2di_batch_rolling(const dem2di_batch *batch, double time_step, const dem2d_pa
 
 /* The loops for what the scene has, as constants. Terms are taken with friction, and with those
    before them, which may be 0. */
-static DEM2DI_INLINE void dem2di_batch_solve(const dem2di_batch *b, double time_step,
+static DEM2DI_INLINE void dem2di_batch_solve(dem2di_batch *b, double time_step,
                                              const dem2d_pair_desc *law, const dem2di_plan *plan) {
     const int terms = plan->terms, both = DEM2DI_DASHPOT | DEM2DI_TANGENTIAL_DASHPOT;
     const bool sliders = (terms & ~(DEM2DI_DASHPOT | DEM2DI_ROLLING)) != 0;
-#define DEM2DI_POINTS(friction, terms, one_law)                                                \
-    dem2di_batch_points(b, time_step, law, friction, terms, one_law, b->normal_x, b->normal_y, \
-                        b->depth, b->force, b->shear, b->viscous_shear, b->actions)
-#define DEM2DI_ROLLS(dashpots, one_law)                                                       \
-    dem2di_batch_rolling(b, time_step, law, dashpots, one_law, b->depth, b->force, b->moment, \
-                         b->viscous_moment, b->actions)
-    if (plan->one_law) {
-        if (sliders)
-            DEM2DI_POINTS(true, both, true);
-        else if (terms != 0)
-            DEM2DI_POINTS(true, DEM2DI_DASHPOT, true);
-        else if (plan->friction)
-            DEM2DI_POINTS(true, 0, true);
-        else
-            DEM2DI_POINTS(false, 0, true);
-    } else {
-        if (sliders)
-            DEM2DI_POINTS(true, both, false);
-        else if (terms != 0)
-            DEM2DI_POINTS(true, DEM2DI_DASHPOT, false);
-        else if (plan->friction)
-            DEM2DI_POINTS(true, 0, false);
-        else
-            DEM2DI_POINTS(false, 0, false);
-    }
-    if (!(terms & (DEM2DI_ROLLING | DEM2DI_ROLLING_DASHPOT))) return;
-    if (sliders && plan->one_law)
-        DEM2DI_ROLLS(true, true);
-    else if (sliders)
-        DEM2DI_ROLLS(true, false);
-    else if (plan->one_law)
-        DEM2DI_ROLLS(false, true);
+#define DEM2DI_POINTS(friction, terms)                                                             \
+    (plan->one_law                                                                                 \
+         ? dem2di_batch_points(b, time_step, law, friction, terms, true, b->normal_x, b->normal_y, \
+                               b->depth, b->force, b->shear, b->viscous_shear, b->actions)         \
+         : dem2di_batch_points(b, time_step, law, friction, terms, false, b->normal_x,             \
+                               b->normal_y, b->depth, b->force, b->shear, b->viscous_shear,        \
+                               b->actions))
+#define DEM2DI_ROLLING_OF(dashpots)                                                                \
+    (plan->one_law ? dem2di_batch_rolling(b, time_step, law, dashpots, true, b->force, b->moment,  \
+                                          b->viscous_moment)                                       \
+                   : dem2di_batch_rolling(b, time_step, law, dashpots, false, b->force, b->moment, \
+                                          b->viscous_moment))
+    if (sliders)
+        DEM2DI_POINTS(true, both);
+    else if (terms != 0)
+        DEM2DI_POINTS(true, DEM2DI_DASHPOT);
+    else if (plan->friction)
+        DEM2DI_POINTS(true, 0);
     else
-        DEM2DI_ROLLS(false, false);
+        DEM2DI_POINTS(false, 0);
+    if (sliders)
+        dem2di_batch_part(b, b->normal_x, b->normal_y, b->depth, b->force, b->shear,
+                          b->viscous_shear, b->actions);
+    if (!(terms & (DEM2DI_ROLLING | DEM2DI_ROLLING_DASHPOT))) return;
+    if (sliders) {
+        DEM2DI_ROLLING_OF(true);
+        dem2di_batch_rolled(b, true, b->depth, b->moment, b->viscous_moment, b->actions);
+    } else {
+        DEM2DI_ROLLING_OF(false);
+        dem2di_batch_rolled(b, false, b->depth, b->moment, b->viscous_moment, b->actions);
+    }
 #undef DEM2DI_POINTS
-#undef DEM2DI_ROLLS
+#undef DEM2DI_ROLLING_OF
 }
 
 /* How many contacts of a batch are closed. */
@@ -18846,14 +18910,14 @@ static DEM2DI_INLINE int64_t dem2di_batch_count(const dem2di_batch *batch) {
     return closed;
 }
 
-static int64_t dem2di_batch_solve_plain(const dem2di_batch *batch, double time_step,
+static int64_t dem2di_batch_solve_plain(dem2di_batch *batch, double time_step,
                                         const dem2d_pair_desc *law, const dem2di_plan *plan) {
     dem2di_batch_solve(batch, time_step, law, plan);
     return dem2di_batch_count(batch);
 }
 
 #if DEM2DI_FOURS
-static DEM2DI_AVX2 int64_t dem2di_batch_solve_fours(const dem2di_batch *batch, double time_step,
+static DEM2DI_AVX2 int64_t dem2di_batch_solve_fours(dem2di_batch *batch, double time_step,
                                                     const dem2d_pair_desc *law,
                                                     const dem2di_plan *plan) {
     dem2di_batch_solve(batch, time_step, law, plan);

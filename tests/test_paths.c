@@ -44,14 +44,25 @@ static void add_material(dem2d_world *world, const feature *f, double stiffness,
     assert_ok(dem2d_world_add_material(world, &desc, id));
 }
 
+/* Still ones; with two laws a belt, and one that moves and turns; with fixed discs a servo wall. */
 static void add_walls(dem2d_world *world, const feature *f, dem2d_material_id material) {
-    static const double normals[3][2] = {{0, 1}, {1, 0}, {-1, 0}};
+    static const double normals[4][2] = {{0, 1}, {1, 0}, {-1, 0}, {0, -1}};
+    const double height = 0.095 * (GRAINS / COLUMNS + 1);
     dem2d_wall_id id;
-    for (int i = 0; i < 3; i++) {
+    for (int i = 0; i < 4; i++) {
         dem2d_wall_desc wall;
         memset(&wall, 0, sizeof wall);
         wall.material = material, wall.normal = vec(normals[i][0], normals[i][1]);
-        wall.point.x = i == 2 ? 0.1 * COLUMNS : 0;
+        wall.point.x = i == 2 ? 0.1 * COLUMNS : 0, wall.point.y = i == 3 ? height : 0;
+        if (i == 0 && f->two_laws) wall.surface_speed = 0.5;
+        if (i == 2 && f->two_laws) {
+            wall.mode = DEM2D_WALL_MOVING, wall.velocity = vec(-0.3, 0);
+            wall.pivot = vec(0.1 * COLUMNS, height / 2), wall.angular_velocity = 0.2;
+        }
+        if (i == 3 && f->fixed) {
+            wall.mode = DEM2D_WALL_SERVO, wall.stress = 1e4, wall.max_speed = 1;
+            wall.length = 0.1 * COLUMNS;
+        }
         assert_ok(dem2d_world_add_wall(world, &wall, &id));
     }
     if (!f->segment) return;
@@ -73,6 +84,7 @@ static dem2d_world *make_world(const feature *f, uint64_t *random, int *threads)
     memset(&desc, 0, sizeof desc);
     desc.time_step = 1e-4, desc.gravity.y = f->gravity;
     desc.local_damping = f->local, desc.global_damping = f->global;
+    desc.faces = f->segment ? DEM2D_ONE_POINT : DEM2D_TWO_POINTS;
     desc.parallel_for = f->threads ? run_parts : NULL, desc.parallel_user = threads;
     assert_ok(dem2d_world_create(&desc, &world));
     add_material(world, f, 1e6, &materials[0]);
@@ -132,11 +144,11 @@ static void run(const feature *f, const path *p, uint64_t hashes[ROUNDS]) {
         if (round == 2) push_some(world, &random);
     }
     assert_ok(dem2d_world_stats(world, &stats));
-    assert_true(stats.contacts > GRAINS / 2);
+    assert_true(stats.contacts > GRAINS / 2 && stats.wall_contacts > COLUMNS / 2);
     dem2d_world_destroy(world);
 }
 
-/* Returns whether it differs from the path in plain C99, pass by pass. */
+/* Returns whether it differs from the path in plain C99 pass by pass. */
 static bool differs(const feature *f, const path *p, const uint64_t expected[ROUNDS]) {
     uint64_t hashes[ROUNDS];
     run(f, p, hashes);
