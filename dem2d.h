@@ -17674,16 +17674,16 @@ static void dem2di_build_images_keep(dem2di_build *build, int pairs) {
     world->image_count = used;
 }
 
-/* Contacts of the last force pass whose partners are out of reach by now stay listed for the
-   queries and the ledger. Particles only get there when some have strayed or have been fixed since
-   (then the features in use are due). */
+/* Contacts of the last force pass, and passages of one-sided walls, whose partners are out of reach
+   by now stay listed for the queries, the hash and the ledger. Particles only get there when some
+   have strayed or have been fixed since (then the features in use are due). */
 static void dem2di_find_lost(const dem2di_build *build, dem2di_finds *finds) {
     const dem2d_world *world = build->world;
     const dem2di_list *list = &world->list;
     int image = build->image_base + build->images;
     for (int i = build->all.strayed ? 0 : list->pairs; i < list->count; i++) {
         int a = list->keys[i].a, b = list->keys[i].b;
-        if (!(list->contacts.depth[i] > 0)) continue;
+        if (!(list->contacts.depth[i] > 0 || list->contacts.depth[i] < -1)) continue;
         const dem2di_disc *one = dem2di_disc_at(build, a);
         if (i >= list->pairs) {
             if (!dem2di_number_is_near(world, one, b)) dem2di_find(finds, ~a, b);
