@@ -28814,7 +28814,30 @@ DEM2D_API dem2d_result dem2d_world_write_csv(const dem2d_world *world, const dem
    >>licence  Changes and licence
 
    CHANGES
-     0.8.0  Runs of scenes that 0.7.0 has are the same to the bit, and so are snapshots.
+     0.8.0  Scenes of 0.7.0 run to the same bits; its snapshots are read.
+            Periodic cell: dem2d_world_desc.cell; dem2d_world_deform gives its rates, or holds
+            stresses instead, each component alone; dem2d_world_get_cell. Contacts reach across the
+            border, also with several images of a particle and with its own;
+            dem2d_contact_info.shift tells with which. The work of the cell is an account of the
+            ledger. Relaxation, queries of space, fillings, flow over a line, and averages over a
+            box or circle are refused in a cell.
+            Samples: gradings (dem2d_world_draw, dem2d_world_grading), fillings of a region
+            (dem2d_world_fill), growth to a stress or a solid fraction (dem2d_world_grow), inlets
+            and outlets (dem2d_world_feed, dem2d_world_remove_in, dem2d_world_flow), random numbers
+            with the same bits everywhere (dem2d_random_uniform, dem2d_random_normal).
+            Fields: dem2d_grid averages density, velocity, contact and kinetic stress, forces of
+            walls and fabric over the cells of a grid and over time; dem2d_world_average_box and
+            _circle over one region; as CSV and as VTK image data. SVG pictures colour particles
+            (dem2d_svg_desc.colour), with a key or a colour bar.
+            Changed: dem2d_world_set_shape with the same template keeps contacts and their springs.
+            dem2d_world_overlap_at and dem2d_world_relax see one-sided walls as steps do.
+            dem2d_world_time_step_bounds counts dashpots that a pair has just got. The hash of a
+            world with one-sided walls no longer changes by a step that is refused.
+            New for callbacks of gather: dem2d_sums.wall_torque.
+            Faster, with the same bits: vectors of four numbers on x86-64 processors with AVX2,
+            chosen at run time; contacts of smooth particles in tiles; motion while the forces are
+            still in cache; the neighbour list; scenes with many segments; first hits of rays;
+            reading particles into arrays.
      0.7.0  Runs differ from those of 0.6.0 with segments that are joined, with dashpots at two
             contact points, and with a law of the caller. Snapshots stay of version 4: those of
             0.6.0 are read, unless they have dashpots, rolling friction, a law or joined segments:
