@@ -557,12 +557,13 @@ static void test_inlet(void **state) {
         else
             d.mass_rate = 400;
         d.velocity = vec(0.3, 8), d.gap = 1e-4, inlet.seed = 11;
+        assert_ok(dem2d_world_set_time_step(b.s.world, 5e-4));
         for (int call = 0; call < 250; call++) {
             const double part = 0.002 + 0.001 * (call % 5);
             assert_ok(dem2d_world_feed(b.s.world, &d, part, &inlet));
             seconds += part;
             assert_true(inlet.missed == 0);
-            step(&b.s, 400); /* 4 ms: 3 cm */
+            step(&b.s, 8); /* 4 ms: 3 cm */
         }
         dem2d_particle_id ids[4000];
         int count;
@@ -684,7 +685,8 @@ static void test_flow(void **state) {
         grain.velocity = vec(i % 2 ? -5 : 5, 0); /* over x = 0.5 after 0.1 s */
         ids[i] = add_grain(&b.s, &grain);
     }
-    for (int k = 0; k < 15000; k++) {
+    assert_ok(dem2d_world_set_time_step(b.s.world, 1e-4));
+    for (int k = 0; k < 1500; k++) {
         step(&b.s, 1);
         assert_ok(dem2d_world_flow(b.s.world, vec(0.5, 0.05), vec(0.5, 10), &right));
         assert_ok(dem2d_world_flow(b.s.world, vec(0.3, 10), vec(0.3, 1.95), &down));
