@@ -627,7 +627,7 @@ static void test_oblique(void **state) {
 static void test_sheared(void **state) {
     (void)state;
     const dem2d_material_desc stone = stone_desc(5e6, 0.4);
-    dem2d_deformation_desc shear = {0, 3, 0};
+    const dem2d_deformation_desc shear = {.xy = 3};
     dem2d_cell_info info;
     dem2d_world_desc desc;
     memset(&desc, 0, sizeof desc);
