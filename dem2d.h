@@ -2776,8 +2776,9 @@ DEM2D_API dem2d_result dem2d_world_write_csv(const dem2d_world *world, const dem
 #define DEM2DI_PRINTF(text, first)
 #endif
 
-/* For loops that are written once and compiled for several sets of features. */
-#if defined(__GNUC__)
+/* For loops that are written once and compiled for several sets of features. Not without
+   optimisation: g++ would then add tables for exceptions, which callbacks might throw. */
+#if defined(__GNUC__) && defined(__OPTIMIZE__)
 #define DEM2DI_INLINE inline __attribute__((always_inline))
 #else
 #define DEM2DI_INLINE inline
