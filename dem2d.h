@@ -19666,12 +19666,15 @@ static bool dem2di_over_part(const dem2d_world *world, int a, int number) {
     return foot >= joint->from && foot < joint->to;
 }
 
-/* Contact i is apart, as if it had never been searched. */
+/* Contact i is apart, as if it had never been searched. One that an edit has ended is so, but for
+   the load of the last step. */
 static void dem2di_contact_idle(dem2d_world *world, int i) {
     const dem2di_contacts *contacts = &world->list.contacts;
-    if (contacts->depth[i] < 0 && contacts->normal_x[i] == 0 && contacts->normal_y[i] == 0) return;
     if (world->plan.joints) contacts->relief[i - world->list.discs] = 0;
-    dem2di_contact_apart(world, i, dem2di_vec(0, 0));
+    if (contacts->depth[i] < 0 && contacts->normal_x[i] == 0 && contacts->normal_y[i] == 0)
+        dem2di_no_load(world, i);
+    else
+        dem2di_contact_apart(world, i, dem2di_vec(0, 0));
 }
 
 /* The same as for a pair, for a particle and a wall. Where segments are joined, the law comes after
@@ -27265,6 +27268,7 @@ static bool dem2di_ids_agree(const dem2d_world *w) {
 static void dem2di_finish_ranks(dem2di_loader *loader) {
     dem2d_world *w = loader->world;
     for (int slot = 0; slot < w->body_count; slot++) w->bodies[slot].rank = w->bodies[slot].index;
+    dem2di_load_expect(loader, w->named || !w->order_due, "an order of no names");
     if (!w->named) return;
     for (int i = 0; i < w->id_count; i++) w->order[i].rank = -1;
     for (int i = 0; i < w->id_count && dem2di_load_good(loader); i++) {
@@ -27454,7 +27458,8 @@ static bool dem2di_plan_holds(const dem2d_world *w) {
            (!plan->one_law || (need.one_law && plan->material == need.material));
 }
 
-/* The contacts of each particle, and what a step expects of the list. */
+/* The contacts of each particle, and what a step expects of the list. Particles that have come get
+   the ranks of the next step: one that failed may have listed pairs by these. */
 static void dem2di_finish_list(dem2di_loader *loader) {
     dem2d_world *w = loader->world;
     dem2di_list *list = &w->list;
@@ -27466,7 +27471,7 @@ static void dem2di_finish_list(dem2di_loader *loader) {
     size_t step = dem2di_step_cut(w, NULL, list->discs, list->pairs, list->count, &w->plan, false);
     dem2di_load_room(loader, dem2di_adjacency_reserve(w, list->pairs, list->count) &&
                                  dem2di_block_results_reserve(w, list->discs, list->count) &&
-                                 dem2di_scratch_reserve(w, step));
+                                 dem2di_scratch_reserve(w, step) && dem2di_order_names(w));
     if (!dem2di_load_good(loader)) return;
     dem2di_adjacency_make(w);
     dem2di_loads_clear(w);

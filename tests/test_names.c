@@ -336,6 +336,32 @@ static void test_snapshot(void **state) {
     close_scene(&p.s);
 }
 
+/* After a step that is refused when it has found the order and listed pairs by it. */
+static void test_snapshot_of_refused(void **state) {
+    (void)state;
+    pile p, q;
+    make_pile(&p, SHAPES, (order){7, true, 0});
+    step(&p.s, STEPS);
+    edit_pile(&p);
+    assert_ok(dem2d_world_set_time_step(p.s.world, 1));
+    assert_result(dem2d_world_step(p.s.world, 1, NULL), DEM2D_TIME_STEP);
+    assert_true(inside_holds(p.s.world));
+    scene_bytes bytes = scene_save(p.s.world);
+    q = p;
+    q.s = scene_load(&p.s, &bytes);
+    free(bytes.bytes);
+    assert_true(inside_holds(q.s.world));
+    assert_true(piles_agree(&p, &q));
+    for (int k = 0; k < 2; k++) {
+        scene *s = k ? &q.s : &p.s;
+        assert_ok(dem2d_world_set_time_step(s->world, 2e-4));
+        step(s, STEPS / 3);
+    }
+    assert_true(dem2d_world_hash(q.s.world) == dem2d_world_hash(p.s.world));
+    assert_true(piles_agree(&p, &q));
+    close_scene(&p.s), close_scene(&q.s);
+}
+
 /* A name is part of the state; a wall that is set again may get another one. */
 static void test_hash(void **state) {
     (void)state;
@@ -362,6 +388,7 @@ int main(void) {
                                        cmocka_unit_test(test_late_name),
                                        cmocka_unit_test(test_name_after_removals),
                                        cmocka_unit_test(test_snapshot),
+                                       cmocka_unit_test(test_snapshot_of_refused),
                                        cmocka_unit_test(test_hash)};
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

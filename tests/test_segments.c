@@ -284,11 +284,48 @@ static void test_cut_through(void **state) {
             }
 }
 
+/* A disc at the joint of two segments, in line or in a valley, is put elsewhere by less than its
+   skin, where it has another contact or none: only the contacts that are there push it. */
+static void test_moved_off_joint(void **state) {
+    static const dem2d_vec from[2] = {{-0.001, 0.049}, {0, 0.049}};
+    static const dem2d_vec to[2] = {{0.001, 0.049}, {0, 0.051}};
+    (void)state;
+    for (int valley = 0; valley < 2; valley++) {
+        const dem2d_material_desc material = stone_desc(0, 0);
+        dem2d_contact_info contacts[4];
+        dem2d_world_desc desc = {0};
+        dem2d_stats stats;
+        desc.time_step = 1e-5, desc.skin = 0.3;
+        scene s = open_scene(&desc, &material);
+        add_segment(&s, vec(-0.5, valley * 0.05), vec(0, 0));
+        add_segment(&s, vec(0, 0), vec(0.5, valley * 0.05));
+        const dem2d_particle_id id = add(&s, make_shape(DISC), from[valley], 0, vec(0, 0));
+        step(&s, 1);
+        assert_int_equal(contacts_of(&s, contacts, 4), valley ? 3 : 1);
+        const dem2d_particle_info before = grain_of(&s, id);
+        assert_true(before.velocity.y > 0);
+        assert_ok(dem2d_world_move_particle(s.world, id, to[valley], 0));
+        for (int i = 1; i <= 3; i++) {
+            const double last = grain_of(&s, id).velocity.y;
+            step(&s, 1);
+            const int count = contacts_of(&s, contacts, 4);
+            assert_int_equal(count, valley ? 0 : 1);
+            const double push = count > 0 ? desc.time_step * contacts[0].normal_force : 0;
+            assert_within(grain_of(&s, id).velocity.y - last, push / before.mass,
+                          1e-12 * before.velocity.y);
+        }
+        assert_ok(dem2d_world_stats(s.world, &stats));
+        assert_int_equal(stats.list_rebuilds, 1);
+        close_scene(&s);
+    }
+}
+
 int main(void) {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(test_depth),       cmocka_unit_test(test_flat_joints),
-        cmocka_unit_test(test_joint_kinds), cmocka_unit_test(test_hopper),
-        cmocka_unit_test(test_moves),       cmocka_unit_test(test_cut_through),
+        cmocka_unit_test(test_depth),           cmocka_unit_test(test_flat_joints),
+        cmocka_unit_test(test_joint_kinds),     cmocka_unit_test(test_hopper),
+        cmocka_unit_test(test_moves),           cmocka_unit_test(test_cut_through),
+        cmocka_unit_test(test_moved_off_joint),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }
