@@ -20077,9 +20077,10 @@ typedef struct dem2di_sidedness {
     int partner; /* reflex vertex: the part of the other face, else -1 */
 } dem2di_sidedness;
 
-/* A part of the other face at the vertex at an end of the face of a contact; or -1. */
+/* A part of the other face at the vertex at an end of the face of a contact, and which way that
+   face leaves the vertex; or -1. */
 static int dem2di_part_beyond(const dem2d_world *world, const dem2di_wall_rows *rows, int i,
-                              int end) {
+                              int end, int *away) {
     const int face = dem2di_face_of(world, i);
     for (int k = rows->parts; k < rows->count; k++) {
         const int number = world->list.keys[rows->contact[k]].b, at = dem2di_vertex_of(number);
@@ -20087,8 +20088,12 @@ static int dem2di_part_beyond(const dem2d_world *world, const dem2di_wall_rows *
         const dem2di_wall_joint *joint = &world->joints[part];
         const int other = joint->partner[at];
         if (other < 0) continue; /* in a damaged snapshot */
-        if (joint->first == face && joint->away[at][0] == 1 - 2 * end) return other;
-        if (world->joints[other].first == face && joint->away[at][1] == 1 - 2 * end) return part;
+        const int parts[2] = {part, other};
+        for (int own = 0; own < 2; own++)
+            if (world->joints[parts[own]].first == face && joint->away[at][own] == 1 - 2 * end) {
+                *away = joint->away[at][1 - own];
+                return parts[1 - own];
+            }
     }
     return -1;
 }
@@ -20115,12 +20120,15 @@ static dem2di_sidedness dem2di_side_of(const dem2d_world *world, const dem2di_wa
     const dem2di_surface *own = &world->surfaces[part];
     dem2d_vec left = dem2di_surface_normal(own);
     dem2di_sidedness side;
+    int away = 0;
     side.end = dem2di_end_touched(world, i);
-    side.partner = side.end >= 0 ? dem2di_part_beyond(world, rows, i, side.end) : -1;
-    if (side.partner >= 0) {
-        const dem2di_surface *other = &world->surfaces[side.partner];
-        double turn = own->along.c * other->along.s - own->along.s * other->along.c;
-        left = dem2di_add(left, dem2di_surface_normal(other));
+    side.partner = side.end >= 0 ? dem2di_part_beyond(world, rows, i, side.end, &away) : -1;
+    if (side.partner >= 0) { /* the other face as if it had the direction of this one */
+        dem2di_surface other = world->face_surfaces[side.partner];
+        if (away == 1 - 2 * side.end)
+            other.along.c = -other.along.c, other.along.s = -other.along.s;
+        double turn = own->along.c * other.along.s - own->along.s * other.along.c;
+        left = dem2di_add(left, dem2di_surface_normal(&other));
         if ((side.end == 1 ? turn : -turn) <= 0) side.partner = -1;
     }
     side.right = contacts->normal_x[i] * left.x + contacts->normal_y[i] * left.y > 0;

@@ -320,12 +320,39 @@ static void test_moved_off_joint(void **state) {
     }
 }
 
+/* A disc on a crest of two segments, one of them one-sided, the other drawn from either end: it has
+   one contact, with the nearest point of the two. */
+static void test_one_sided_neighbours(void **state) {
+    (void)state;
+    for (int which = 0; which < 2; which++)
+        for (int back = 0; back < 2; back++)
+            for (int i = -4; i <= 4; i++) {
+                const dem2d_vec ends[3] = {{-1, -0.1}, {0, 0}, {1, -0.1}};
+                const dem2d_vec at = vec(0.001 * i, 0.049);
+                dem2d_contact_info contacts[4];
+                scene s = make_scene(0, vec(0, 0), false);
+                for (int k = 0; k < 2; k++) {
+                    const bool turned = k != which && back;
+                    dem2d_wall_desc wall = plane_desc(&s, ends[k + turned], vec(0, 0));
+                    wall.segment = true, wall.end = ends[k + 1 - turned];
+                    wall.one_sided = k == which;
+                    add_wall(&s, &wall);
+                }
+                add(&s, make_shape(DISC), at, 0, vec(0, 0));
+                step(&s, 1);
+                assert_int_equal(contacts_of(&s, contacts, 4), 1);
+                assert_within(contacts[0].depth, 0.05 - hypot(at.x, at.y), 1e-14);
+                assert_true(contacts[0].normal_force > 0);
+                close_scene(&s);
+            }
+}
+
 int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(test_depth),           cmocka_unit_test(test_flat_joints),
         cmocka_unit_test(test_joint_kinds),     cmocka_unit_test(test_hopper),
         cmocka_unit_test(test_moves),           cmocka_unit_test(test_cut_through),
-        cmocka_unit_test(test_moved_off_joint),
+        cmocka_unit_test(test_moved_off_joint), cmocka_unit_test(test_one_sided_neighbours),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }
