@@ -12896,7 +12896,8 @@ struct dem2d_world {
     int event_count, event_capacity;
     int64_t events_lost;
     dem2di_action *actions; /* of contacts; in scratch, as: */
-    int *pools; /* of contacts with walls: another one, with whose springs these are shared */
+    int *pools;     /* of contacts with walls: another one, with whose springs these are shared, */
+    int *stand_ins; /* and the one that counts for one that is left out */
     bool loaded, twisted; /* a particle has had an external load; one that is a torque: */
     dem2di_load *loads;   /* of all */
     dem2di_load *sums;    /* of the contact forces on each particle, where they are kept */
@@ -18031,8 +18032,11 @@ static size_t dem2di_step_cut(dem2d_world *world, char *memory, int discs, int p
     world->actions = (dem2di_action *)dem2di_cut(&cutter, (size_t)count, sizeof *world->actions);
     world->pushes =
         (dem2di_push *)dem2di_cut(&cutter, (size_t)(count - pairs), sizeof *world->pushes);
-    if (plan->joints)
-        world->pools = (int *)dem2di_cut(&cutter, (size_t)(count - pairs), sizeof *world->pools);
+    if (plan->joints) {
+        const size_t walls = (size_t)(count - pairs);
+        world->pools = (int *)dem2di_cut(&cutter, walls, sizeof *world->pools);
+        world->stand_ins = (int *)dem2di_cut(&cutter, walls, sizeof *world->stand_ins);
+    }
     size_t changes = plan->events ? (size_t)count : 0;
     world->changes = (dem2di_order *)dem2di_cut(&cutter, changes, sizeof *world->changes);
     world->changes_spare = (dem2di_order *)dem2di_cut(&cutter, changes, sizeof *world->changes);
@@ -19836,11 +19840,22 @@ static double dem2di_whole_depth(const dem2d_world *world, int i) {
     return pair->weight[0] * pair->depth[0] + pair->weight[1] * pair->depth[1];
 }
 
-/* A vertex takes its normal force from the contacts with both faces: all from one whose overlap is
-   that of the vertex, as then its foot is there. */
-static void dem2di_relieve(dem2d_world *world, int vertex, const int row[2]) {
+/* The contact that counts for one with a face, which may have been left out. */
+static int dem2di_stand_in(const dem2d_world *world, const dem2di_wall_rows *rows, int row) {
+    for (int k = 0; k < rows->parts && world->list.contacts.depth[row] == 0; k++)
+        row = world->stand_ins[row - world->list.pairs];
+    return row;
+}
+
+/* A vertex takes its normal force from the contacts that count for both faces: all from one whose
+   overlap is that of the vertex, as then its foot is there. */
+static void dem2di_relieve(dem2d_world *world, const dem2di_wall_rows *rows, int vertex) {
     const dem2di_contacts *contacts = &world->list.contacts;
     double depth = contacts->depth[vertex], more[2];
+    int row[2];
+    dem2di_rows_of_vertex(world, rows, vertex, row);
+    for (int k = 0; k < 2; k++) row[k] = dem2di_stand_in(world, rows, row[k]);
+    if (!(contacts->depth[row[0]] > 0 && contacts->depth[row[1]] > 0)) return;
     for (int k = 0; k < 2; k++) more[k] = dem2di_max(0, contacts->depth[row[k]] - depth);
     double sum = more[0] + more[1];
     for (int k = 0; k < 2; k++) {
@@ -19852,6 +19867,12 @@ static void dem2di_relieve(dem2d_world *world, int vertex, const int row[2]) {
 
 static void dem2di_leave_out(dem2d_world *world, int i) {
     world->list.contacts.depth[i] = 0;
+}
+
+/* A contact with one face of a vertex is left out, that with the other one counts for both. */
+static void dem2di_leave_to(dem2d_world *world, int row, int other) {
+    world->stand_ins[row - world->list.pairs] = other;
+    dem2di_leave_out(world, row);
 }
 
 /* All in the pool of one contact are in that of another. */
@@ -19911,14 +19932,14 @@ static void dem2di_resolve_vertex(dem2d_world *world, const dem2di_wall_rows *ro
     for (int k = 0; k < 2; k++)
         if (dem2di_row_ends(world, row[k], part[k], joint->away[end][k])) {
             dem2di_pools_join(world, rows, row[0], row[1]);
-            dem2di_leave_out(world, row[k]);
+            dem2di_leave_to(world, row[k], row[1 - k]);
             return;
         }
     if (!dem2di_find_vertex(world, vertex, count)) return;
     dem2di_pools_join(world, rows, row[0], row[1]);
     for (int k = 0; k < 2; k++)
         if (dem2di_row_at_vertex(world, row[k], vertex)) {
-            dem2di_leave_out(world, row[k]);
+            dem2di_leave_to(world, row[k], row[1 - k]);
             dem2di_leave_out(world, vertex);
             return;
         }
@@ -20214,8 +20235,10 @@ static int dem2di_resolve_joined(dem2d_world *world, const dem2di_wall_rows *row
         closed += list->contacts.depth[i] > 0 && dem2di_is_segment(world, i);
     }
     if (closed == 0) return 0;
-    for (int k = 0; k < rows->parts; k++)
-        world->pools[rows->contact[k] - list->pairs] = rows->contact[k];
+    for (int k = 0; k < rows->parts; k++) {
+        const int i = rows->contact[k];
+        world->pools[i - list->pairs] = world->stand_ins[i - list->pairs] = i;
+    }
     if (closed == 1) {
         dem2di_pools_follow(world, rows);
         return rows->parts;
@@ -20225,10 +20248,8 @@ static int dem2di_resolve_joined(dem2d_world *world, const dem2di_wall_rows *row
         dem2di_resolve_vertex(world, &closed_rows, rows->contact[k], count);
     dem2di_pools_follow(world, rows);
     for (int k = rows->parts; k < rows->count; k++) {
-        int i = rows->contact[k], row[2];
-        if (!(list->contacts.depth[i] > 0)) continue;
-        dem2di_rows_of_vertex(world, &closed_rows, i, row);
-        dem2di_relieve(world, i, row);
+        const int i = rows->contact[k];
+        if (list->contacts.depth[i] > 0) dem2di_relieve(world, &closed_rows, i);
     }
     return rows->count;
 }

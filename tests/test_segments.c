@@ -347,12 +347,43 @@ static void test_one_sided_neighbours(void **state) {
             }
 }
 
+/* A disc spins at a crest and, beside it, in a valley. Segments are added in either order, so that
+   of the two at the crest either one counts. All contacts slide: friction is its coefficient times
+   the normal forces, less that of the vertex in the valley. */
+static void test_friction_beside_crest(void **state) {
+    (void)state;
+    for (int back = 0; back < 2; back++) {
+        const dem2d_vec ends[4] = {{-1, -0.3}, {0, 0}, {0.01, -0.003}, {1, 0.4425}};
+        dem2d_contact_info contacts[4];
+        double normal = 0, friction = 0;
+        scene s = make_scene(0.3, vec(0, 0), false);
+        for (int i = 0; i < 3; i++) {
+            const int k = back ? 2 - i : i;
+            add_segment(&s, ends[k], ends[k + 1]);
+        }
+        (void)add_shape(&s, make_shape(DISC), DEM2D_FREE, vec(0.004, 0.044), 0, vec(0, 0), 1e4);
+        step(&s, 1);
+        assert_int_equal(contacts_of(&s, contacts, 4), 3);
+        for (int k = 0; k < 3; k++) {
+            normal += contacts[k].sign * contacts[k].normal_force;
+            friction += fabs(contacts[k].tangential_force);
+        }
+        assert_near(friction, 0.3 * normal, 1e-12);
+        close_scene(&s);
+    }
+}
+
 int main(void) {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(test_depth),           cmocka_unit_test(test_flat_joints),
-        cmocka_unit_test(test_joint_kinds),     cmocka_unit_test(test_hopper),
-        cmocka_unit_test(test_moves),           cmocka_unit_test(test_cut_through),
-        cmocka_unit_test(test_moved_off_joint), cmocka_unit_test(test_one_sided_neighbours),
+        cmocka_unit_test(test_depth),
+        cmocka_unit_test(test_flat_joints),
+        cmocka_unit_test(test_joint_kinds),
+        cmocka_unit_test(test_hopper),
+        cmocka_unit_test(test_moves),
+        cmocka_unit_test(test_cut_through),
+        cmocka_unit_test(test_moved_off_joint),
+        cmocka_unit_test(test_one_sided_neighbours),
+        cmocka_unit_test(test_friction_beside_crest),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }
