@@ -526,7 +526,7 @@ in use is decided after an edit)
 MEMORY
     All memory comes through dem2d_env (malloc and free by default); release gets the size. A step
     allocates nothing once the neighbour list has stopped growing; dem2d_world_stats gives the bytes
-    in use. Capacities reserve memory at creation. A circle takes about 400 bytes with its contacts
+    in use. Capacities reserve memory at creation. A circle takes about 420 bytes with its contacts
     if particle_capacity is given, else up to a half more; another shape 300 bytes more for each
     listed pair. Particles are now and then sorted in memory by their place in space; this changes
     no id, no order and no result.
