@@ -16603,11 +16603,14 @@ static void dem2di_ring_done(const dem2d_world *world, dem2di_joining *joining, 
     } while (k != end);
 }
 
-/* The vertices of a ring of ends: of each face there and the next one, and of the last one and a
-   face inside of which the ring lies. */
+/* The vertices of a ring of ends: of each face there and the next one, from the first part on, and
+   of the last one and a face inside of which the ring lies. */
 static void dem2di_ring_join(dem2d_world *world, dem2di_joining *joining, int ring) {
     const dem2di_segment_end *ends = joining->ends;
-    int last = ring, inside = -1;
+    int inside = -1;
+    for (int k = ends[ring].next, i = ring; k != i; k = ends[k].next)
+        if (!ends[k].done && ends[k].part < ends[ring].part) ring = k;
+    int last = ring;
     for (int next = ring; next >= 0; next = dem2di_ring_next(world, joining, last)) {
         if (next != ring)
             dem2di_vertex_join(world, joining, last, ends[next].part,

@@ -373,6 +373,32 @@ static void test_friction_beside_crest(void **state) {
     }
 }
 
+/* Of two walls whose contacts with a disc at a crest are the same the later one has the contact,
+   whichever way the scene is turned and the walls are drawn: rounding does not decide it. */
+static void test_wall_at_crest(void **state) {
+    (void)state;
+    for (int k = 0; k < 64; k++)
+        for (int drawn = 0; drawn < 4; drawn++) {
+            const dem2d_vec u = direction(k * TEST_PI / 32), at = vec(1.5 * u.x, 1.5 * u.y);
+            const dem2d_vec ends[3] = {{at.x + u.x * -0.1 + u.y, at.y + u.y * -0.1 - u.x},
+                                       at,
+                                       {at.x + u.x * -0.2 - u.y, at.y + u.y * -0.2 + u.x}};
+            dem2d_contact_info contacts[4];
+            dem2d_wall_id later;
+            scene s = make_scene(0, vec(0, 0), false);
+            memset(&later, 0, sizeof later);
+            for (int i = 0; i < 2; i++) {
+                const int turned = drawn >> i & 1;
+                later = add_segment(&s, ends[i + turned], ends[i + 1 - turned]);
+            }
+            add(&s, make_shape(DISC), vec(at.x + 0.049 * u.x, at.y + 0.049 * u.y), 0, vec(0, 0));
+            step(&s, 1);
+            assert_int_equal(contacts_of(&s, contacts, 4), 1);
+            assert_int_equal(contacts[0].wall.index, later.index);
+            close_scene(&s);
+        }
+}
+
 int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(test_depth),
@@ -384,6 +410,7 @@ int main(void) {
         cmocka_unit_test(test_moved_off_joint),
         cmocka_unit_test(test_one_sided_neighbours),
         cmocka_unit_test(test_friction_beside_crest),
+        cmocka_unit_test(test_wall_at_crest),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }
