@@ -27462,7 +27462,7 @@ static void dem2di_finish_images(dem2di_loader *loader) {
 /* Is a key of two that exist, and listed with its kind? A forgotten key may be anything. */
 static bool dem2di_key_sound(const dem2d_world *w, int contact) {
     const dem2di_key *key = &w->list.keys[contact];
-    if (key->a < 0) return w->list_stale && !(w->list.contacts.depth[contact] > 0);
+    if (key->a < 0) return w->list_stale && w->list.contacts.depth[contact] == 0;
     if (key->a >= w->body_count || w->bodies[key->a].shape_index < 0) return false;
     if (contact >= w->list.pairs) {
         int end = dem2di_vertex_of(key->b), part = dem2di_part_of(key->b);
@@ -28871,6 +28871,11 @@ DEM2D_API dem2d_result dem2d_world_write_csv(const dem2d_world *world, const dem
             dem2d_world_overlap_at and dem2d_world_relax see one-sided walls as steps do.
             dem2d_world_time_step_bounds counts dashpots that a pair has just got. The hash of a
             world with one-sided walls no longer changes by a step that is refused.
+            Mended at joined segments: a particle that was moved by less than its skin went on with
+            the force of its last contact; one-sided segments that meet one drawn the other way took
+            the wrong side there; friction was too large where the contact with one of three faces
+            is left out; where two walls end in one point, their order decides which of the two has
+            the contact, not rounding. Snapshots after a refused step keep the order of late names.
             New for callbacks of gather: dem2d_sums.wall_torque.
             Faster, with the same bits: vectors of four numbers on x86-64 processors with AVX2,
             chosen at run time; contacts of smooth particles in tiles; motion while the forces are
