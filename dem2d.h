@@ -107,6 +107,11 @@ LIMITS
     * Where the support value hardly changes with the direction (bodies of constant width, one
       concentric with the other), a search may reach its limit of iterations. The state is then
       DEM2D_UNRESOLVED, and the bounds are a few 1e-4 of the size apart.
+    * A grain that leaves a valley of joined segments fast, against dashpots, may be pulled back for
+      some steps: the vertex takes its spring force off both faces, whose forces end at 0.
+    * When a sheared cell takes another vector b (see dem2d_deformation_desc), about half of the
+      particles move by a cell vector in one step, and each looks at all images: the cost of this
+      step grows with the square of the number of particles.
     * 32-bit x86 needs SSE2 (-msse2 -mfpmath=sse): x87 results depend on which values stay in
       registers.
     * -ffast-math and its parts change results: -ffinite-math-only, -fassociative-math,
@@ -497,9 +502,10 @@ THREADS
     thread system will do (examples/threads_posix.c, threads_openmp.c). A block writes only its own
     results, and sums are taken in the order of names and ids. So neither the number of threads nor
     the distribution of the blocks can change a bit. One thread does the short loops over all
-    particles when the list is rebuilt, the sums of the forces on walls, and the speeds of servo
-    walls. All threads call custom support functions and laws; only the thread that called the step
-    allocates and writes to the log.
+    particles when the list is rebuilt, the sums of the forces on walls, the speeds of servo
+    walls, wraps and held stresses of a periodic cell, and the sums of dem2d_grid_add. All threads
+    call custom support functions and laws; only the thread that called the step allocates and
+    writes to the log.
 
 COSTS (instructions per circle and step of a settled bed with 2.0 contacts each, gcc -O2, by
 `make -C tests bench-cost`; a feature that the scene does not use costs nothing: which features are
@@ -521,7 +527,7 @@ in use is decided after an edit)
     a pair of circles listed but apart                    64    same as in contact: no branch
     another pair listed but apart, known gap              62    colliding it costs 700 to 1500
     a region without particles, a pair of fixed ones       0
-    Vectors of four (AVX2) are in use here; without them circles take about 140 more.
+    Vectors of four (AVX2) are in use here; without them circles with friction take 126 more.
 
 MEMORY
     All memory comes through dem2d_env (malloc and free by default); release gets the size. A step
@@ -18097,7 +18103,7 @@ static bool dem2di_is_soft(const dem2d_world *world, double softness) {
     return dem2di_greatest_stiffness(world) * softness * square <= 4;
 }
 
-/* May the next step be refused for a time step that some particle does not stand? */
+/* May the check of the time step refuse the next step? */
 static bool dem2di_stiffness_matters(const dem2d_world *world, double softness) {
     return world->check_time_step && dem2di_check_is_due(world) && !dem2di_is_soft(world, softness);
 }
@@ -28621,7 +28627,7 @@ static void dem2di_grid_csv(const dem2d_grid *grid, dem2di_writer *writer) {
     }
 }
 
-/* The numbers of a column as VTK wants them: vectors of 3, tensors of 9. Returns how many. */
+/* The numbers of a column in the form of VTK: vectors of 3, tensors of 9. Returns how many. */
 static int dem2di_grid_vtk(const dem2d_average *average, const dem2di_grid_column *column,
                            double numbers[9]) {
     double own[4];
