@@ -109,9 +109,6 @@ LIMITS
       DEM2D_UNRESOLVED, and the bounds are a few 1e-4 of the size apart.
     * A grain that leaves a valley of joined segments fast, against dashpots, may be pulled back for
       some steps: the vertex takes its spring force off both faces, whose forces end at 0.
-    * When a sheared cell takes another vector b (see dem2d_deformation_desc), about half of the
-      particles move by a cell vector in one step, and each looks at all images: the cost of this
-      step grows with the square of the number of particles.
     * 32-bit x86 needs SSE2 (-msse2 -mfpmath=sse): x87 results depend on which values stay in
       registers.
     * -ffast-math and its parts change results: -ffinite-math-only, -fassociative-math,
@@ -12735,6 +12732,7 @@ typedef struct dem2di_ledger {
 typedef struct dem2di_image {
     int owner;    /* slot of the particle; -1 when that has been removed */
     int shift[2]; /* it is at as many cell vectors a and b from the owner */
+    int next;     /* 1 + the number of another image of the owner; 0: it is the last */
     int row;      /* while the list is made: its place among those that some pair needs, or -1 */
 } dem2di_image;
 
@@ -12758,6 +12756,7 @@ typedef enum dem2di_group {
     DEM2DI_SUMS,          /* of bodies, where they are kept */
     DEM2DI_GROUPED,       /* of bodies, where grouped */
     DEM2DI_DISPLACEMENTS, /* of bodies, where plan.turns */
+    DEM2DI_IMAGED,        /* of bodies, in a cell */
     DEM2DI_MADE,          /* of bodies, where some are redirected */
     DEM2DI_IMAGES,
     DEM2DI_FLOWING,   /* of slots, where the cell deforms */
@@ -12893,6 +12892,8 @@ struct dem2d_world {
     bool wrap_due;                      /* no memory was left to move particles into the cell */
     int image_first, image_count;       /* slots of images: from the first on, so many */
     dem2di_image *images, *images_next; /* those, and what the search for the next list finds */
+    int *images_of; /* of each particle: 1 + the number of one of its images, or 0; that has the
+                       number of the next */
 
     dem2di_list list;
     dem2di_touch *touches;                 /* of contacts */
@@ -13383,6 +13384,7 @@ static const dem2di_column dem2di_columns[] = {
     DEM2DI_COLUMN("last_velocities", MADE, made, DEM2DI_MOVES | DEM2DI_HASHED, velocity_fields),
     DEM2DI_COLUMN("images", IMAGES, images, DEM2DI_FIRST, image_fields),
     DEM2DI_UNSAVED(IMAGES, images_next, 0),
+    DEM2DI_UNSAVED(IMAGED, images_of, DEM2DI_MOVES),
     DEM2DI_UNSAVED(FLOWING, fluctuations, 0),
     DEM2DI_UNSAVED(FLOWING, made_fluctuations, 0),
     DEM2DI_UNSAVED(SUMS, sums, DEM2DI_MOVES),
@@ -13563,6 +13565,7 @@ static bool dem2di_reserve_bodies(dem2d_world *world, int count) {
            (!world->loaded || dem2di_group_reserve(world, DEM2DI_LOADS, count)) &&
            (!world->keeps_sums || dem2di_group_reserve(world, DEM2DI_SUMS, count)) &&
            (!world->grouped || dem2di_group_reserve(world, DEM2DI_GROUPED, slots)) &&
+           (!world->periodic || dem2di_group_reserve(world, DEM2DI_IMAGED, count)) &&
            (!world->plan.turns || dem2di_group_reserve(world, DEM2DI_DISPLACEMENTS, slots)) &&
            (!world->redirected || dem2di_group_reserve(world, DEM2DI_MADE, slots));
 }
@@ -13972,10 +13975,31 @@ static void dem2di_images_make(dem2d_world *world) {
     for (int k = 0; k < world->image_count; k++) dem2di_image_make(world, k);
 }
 
+/* An image becomes the first of its owner's. */
+static void dem2di_image_link(dem2d_world *world, int k) {
+    dem2di_image *image = &world->images[k];
+    if (image->owner < 0) return;
+    image->next = world->images_of[image->owner];
+    world->images_of[image->owner] = k + 1;
+}
+
+/* The images of each particle. */
+static void dem2di_images_link(dem2d_world *world) {
+    if (!world->periodic || world->body_count == 0) return;
+    memset(world->images_of, 0, (size_t)world->body_count * sizeof *world->images_of);
+    for (int k = 0; k < world->image_count; k++) dem2di_image_link(world, k);
+}
+
+/* An iterator over the images of a particle; first *k is -1. */
+static bool dem2di_image_next(const dem2d_world *world, int slot, int *k) {
+    if (world->image_count == 0) return false;
+    *k = (*k < 0 ? world->images_of[slot] : world->images[*k].next) - 1;
+    return *k >= 0;
+}
+
 /* The images of a particle after an edit of it. */
 static void dem2di_images_follow(dem2d_world *world, int slot) {
-    for (int k = 0; k < world->image_count; k++)
-        if (world->images[k].owner == slot) dem2di_image_make(world, k);
+    for (int k = -1; dem2di_image_next(world, slot, &k);) dem2di_image_make(world, k);
 }
 
 /* Room for so many more images. */
@@ -13985,7 +14009,9 @@ static bool dem2di_images_reserve(dem2d_world *world, int more) {
         !dem2di_group_reserve(world, DEM2DI_IMAGES, count + more))
         return false;
     if (count == 0) world->image_first = world->body_count;
-    return dem2di_reserve_bodies(world, world->image_first + count + more);
+    if (!dem2di_reserve_bodies(world, world->image_first + count + more)) return false;
+    if (count == 0) dem2di_images_link(world); /* no particle has any */
+    return true;
 }
 
 /* The slots of images go up when one more particle would take the first of them. */
@@ -14003,19 +14029,18 @@ static bool dem2di_images_make_way(dem2d_world *world) {
 
 /* The slot of an image of a particle, for which there is room. */
 static int dem2di_image_slot(dem2d_world *world, int owner, int along_a, int along_b) {
-    int k = 0;
     if (along_a == 0 && along_b == 0) return owner;
-    for (; k < world->image_count; k++) {
-        const dem2di_image *image = &world->images[k];
-        if (image->owner == owner && image->shift[0] == along_a && image->shift[1] == along_b)
-            return world->image_first + k;
+    for (int k = -1; dem2di_image_next(world, owner, &k);) {
+        const int *shift = world->images[k].shift;
+        if (shift[0] == along_a && shift[1] == along_b) return world->image_first + k;
     }
-    dem2di_image *made = &world->images[world->image_count++];
-    made->owner = owner;
-    made->shift[0] = along_a;
-    made->shift[1] = along_b;
-    dem2di_image_make(world, k);
-    return world->image_first + k;
+    const int made = world->image_count++;
+    world->images[made].owner = owner;
+    world->images[made].shift[0] = along_a;
+    world->images[made].shift[1] = along_b;
+    dem2di_image_link(world, made);
+    dem2di_image_make(world, made);
+    return world->image_first + made;
 }
 
 /* --- wraps -------------------------------------------------------------------------------------
@@ -14033,8 +14058,7 @@ static void dem2di_shift_of(const dem2d_world *world, int slot, int shift[2]) {
    its pairs see from there. */
 static void dem2di_wrap(dem2d_world *world, int slot, const int out[2]) {
     const dem2di_list *list = &world->list;
-    for (int k = 0; k < world->image_count; k++) {
-        if (world->images[k].owner != slot) continue;
+    for (int k = -1; dem2di_image_next(world, slot, &k);) {
         world->images[k].shift[0] += out[0];
         world->images[k].shift[1] += out[1];
     }
@@ -14696,8 +14720,7 @@ DEM2D_API dem2d_result dem2d_world_remove_particle(dem2d_world *world, dem2d_par
     world->holes++;
     world->tree.made = false;
     dem2di_forget(world, slot);
-    for (int k = 0; k < world->image_count; k++)
-        if (world->images[k].owner == slot) world->images[k].owner = -1;
+    for (int k = -1; dem2di_image_next(world, slot, &k);) world->images[k].owner = -1;
     dem2di_edited(world);
     dem2di_id_release(world, (int)id.index);
     return DEM2D_OK;
@@ -17683,6 +17706,7 @@ static void dem2di_build_images_keep(dem2di_build *build, int pairs) {
     world->images = images;
     world->image_first = base;
     world->image_count = used;
+    dem2di_images_link(world);
 }
 
 /* Contacts of the last force pass, and passages of one-sided walls, whose partners are out of reach
@@ -27462,7 +27486,9 @@ static void dem2di_finish_images(dem2di_loader *loader) {
                            "an image");
     }
     dem2di_load_room(loader, dem2di_reserve_bodies(w, w->body_count));
-    if (dem2di_load_good(loader)) dem2di_images_make(w);
+    if (!dem2di_load_good(loader)) return;
+    dem2di_images_link(w);
+    dem2di_images_make(w);
 }
 
 /* Is a key of two that exist, and listed with its kind? A forgotten key may be anything. */

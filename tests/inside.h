@@ -210,6 +210,17 @@ static bool inside_is_b(const dem2d_world *w, const dem2di_key *key) {
     return shift[1] > 0 || (shift[1] == 0 && shift[0] > 0);
 }
 
+/* Each particle leads to all of its images, and to no others. */
+static bool inside_images_are_owned(const dem2d_world *w) {
+    int owned = 0, found = 0;
+    for (int k = 0; k < w->image_count; k++) owned += w->images[k].owner >= 0;
+    for (int i = 0; i < w->body_count; i++)
+        for (int k = -1; inside_lives(w, i) && dem2di_image_next(w, i, &k);)
+            if (k >= w->image_count || w->images[k].owner != i || found++ == owned)
+                return inside_fail("a particle leads to the image of another, or twice", i);
+    return found == owned || inside_fail("no particle leads to some images", owned - found);
+}
+
 /* Images are copies of their owners but for the shift; particles are in the cell, to rounding. */
 static bool inside_images_hold(const dem2d_world *w) {
     const dem2di_fractions f = dem2di_fractions_make(&w->cell);
@@ -316,7 +327,8 @@ static bool inside_parts_hold(const dem2d_world *w) {
 bool inside_holds(const dem2d_world *world) {
     if (!inside_ids_hold(world) || !inside_ranks_hold(world) || !inside_adjacency_holds(world))
         return false;
-    if (!inside_parts_hold(world) || !inside_images_hold(world)) return false;
+    if (!inside_parts_hold(world)) return false;
+    if (!inside_images_are_owned(world) || !inside_images_hold(world)) return false;
     for (int i = 0; i < world->list.count; i++)
         if (!inside_contact_holds(world, i)) return false;
     return true;
