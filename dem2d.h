@@ -12095,22 +12095,22 @@ static DEM2DI_INLINE double dem2di_damped(double spring, double dashpot, double 
    part. So what the dashpot and the slider take is never below 0. */
 typedef struct dem2di_slid {
     double sum, held; /* force of both without a limit, and within it */
-    double own;       /* rate of both while the slider yields */
+    double own, all;  /* of the dashpot, without sign: while the slider yields, and while not */
 } dem2di_slid;
 
 static DEM2DI_INLINE dem2di_slid dem2di_slider_sum(double stiffness, double dashpot, double rate,
                                                    double time_step, double limit, double last) {
     dem2di_slid slid;
-    slid.sum = last - stiffness * rate * time_step - dashpot * rate;
+    slid.all = dashpot * rate;
+    slid.sum = last - stiffness * rate * time_step - slid.all;
     slid.held = dem2di_held(limit, slid.sum);
-    slid.own = (last - slid.held) / (stiffness * time_step + dashpot);
+    slid.own = dashpot * ((last - slid.held) / (stiffness * time_step + dashpot));
     return slid;
 }
 
 /* The part of the dashpot. */
-static DEM2DI_INLINE double dem2di_slider_viscous(const dem2di_slid *slid, double dashpot,
-                                                  double rate) {
-    return -(dashpot * (slid->held == slid->sum ? rate : slid->own));
+static DEM2DI_INLINE double dem2di_slider_viscous(const dem2di_slid *slid) {
+    return -(slid->held == slid->sum ? slid->all : slid->own);
 }
 
 /* Of sum and dashpot the forces. */
@@ -12118,7 +12118,7 @@ static DEM2DI_INLINE double dem2di_slider(double stiffness, double dashpot, doub
                                           double time_step, double limit, double last,
                                           double *viscous) {
     dem2di_slid slid = dem2di_slider_sum(stiffness, dashpot, rate, time_step, limit, last);
-    *viscous = dem2di_slider_viscous(&slid, dashpot, rate);
+    *viscous = dem2di_slider_viscous(&slid);
     return slid.held;
 }
 
@@ -18765,14 +18765,14 @@ static DEM2DI_INLINE void dem2di_batch_act(dem2di_action *action, dem2d_vec norm
     action->b = -(arm_b * shear);
 }
 
-/* dem2di_slider. The own rate is stored: gcc makes a branch of a quotient that one choice alone
-   needs, and then no vectors. */
+/* dem2di_slider. A dashpot's own force is stored: gcc makes a branch of a product that one choice
+   alone needs, and then no vectors. */
 static DEM2DI_INLINE double dem2di_batch_slider(dem2di_batch *batch, int k, double stiffness,
                                                 double dashpot, double rate, double time_step,
                                                 double limit, double last, double *viscous) {
     dem2di_slid slid = dem2di_slider_sum(stiffness, dashpot, rate, time_step, limit, last);
     batch->own[k] = slid.own;
-    *viscous = dem2di_slider_viscous(&slid, dashpot, rate);
+    *viscous = dem2di_slider_viscous(&slid);
     return slid.held;
 }
 

@@ -90,23 +90,25 @@ typedef struct scene {
     int grains; /* of bench_beds.h */
     place place;
     int count;
-    double friction, damping_ratio, rolling;
+    double friction, damping_ratio, tangential, rolling; /* ratios of dashpots */
     bool law;
 } scene;
 
 static const scene scenes[] = {
-    {"smooth discs", DISCS, SQUEEZED, 600, 0, 0, 0, false},
-    {"discs", DISCS, OPEN, 800, FRICTION, 0, 0, false},
-    {"discs, dashpot", DISCS, OPEN, 800, FRICTION, 0.2, 0, false},
-    {"discs, dashpot, rolling", DISCS, OPEN, 800, FRICTION, 0.2, 0.1, false},
-    {"discs, law", DISCS, OPEN, 800, FRICTION, 0, 0, true},
-    {"polygons", POLYGONS, OPEN, 800, FRICTION, 0, 0, false},
-    {"ellipses", ELLIPSES, OPEN, 800, FRICTION, 0, 0, false},
-    {"polybeziers", BEZIERS, OPEN, 800, FRICTION, 0, 0, false},
-    {"Fourier series", FOURIERS, OPEN, 800, FRICTION, 0, 0, false},
-    {"mixed", MIXED, OPEN, 800, FRICTION, 0, 0, false},
-    {"moving discs", DISCS, GAS, 1000, 0, 0, 0, false},
-    {"segments", MIXED, CHAIN, 200, FRICTION, 0, 0, false},
+    {"smooth discs", DISCS, SQUEEZED, 600, 0, 0, 0, 0, false},
+    {"discs", DISCS, OPEN, 800, FRICTION, 0, 0, 0, false},
+    {"discs, dashpot", DISCS, OPEN, 800, FRICTION, 0.2, 0, 0, false},
+    {"discs, dashpot, rolling", DISCS, OPEN, 800, FRICTION, 0.2, 0, 0.1, false},
+    {"discs, both dashpots", DISCS, OPEN, 800, FRICTION, 0.2, 0.2, 0, false},
+    {"discs, both dashpots, rolling", DISCS, OPEN, 800, FRICTION, 0.2, 0.2, 0.1, false},
+    {"discs, law", DISCS, OPEN, 800, FRICTION, 0, 0, 0, true},
+    {"polygons", POLYGONS, OPEN, 800, FRICTION, 0, 0, 0, false},
+    {"ellipses", ELLIPSES, OPEN, 800, FRICTION, 0, 0, 0, false},
+    {"polybeziers", BEZIERS, OPEN, 800, FRICTION, 0, 0, 0, false},
+    {"Fourier series", FOURIERS, OPEN, 800, FRICTION, 0, 0, 0, false},
+    {"mixed", MIXED, OPEN, 800, FRICTION, 0, 0, 0, false},
+    {"moving discs", DISCS, GAS, 1000, 0, 0, 0, 0, false},
+    {"segments", MIXED, CHAIN, 200, FRICTION, 0, 0, 0, false},
 };
 
 static const scene *find_scene(const char *name) {
@@ -187,7 +189,8 @@ static bench open_scene(const scene *s, uint64_t seed) {
     b.height = s->place == GAS ? grains.top : grains.grains[s->count - 1].y + 0.06;
     open_bench(&b, &desc, s->friction);
     dem2d_pair_desc pair = pair_desc(STIFFNESS, s->friction > 0 ? STIFFNESS : 0, s->friction);
-    pair.damping_ratio = s->damping_ratio, pair.rolling_friction = s->rolling;
+    pair.damping_ratio = s->damping_ratio, pair.tangential_damping_ratio = s->tangential;
+    pair.rolling_friction = s->rolling;
     expect_ok(dem2d_world_set_pair(b.world, b.material, b.material, &pair), "pair");
     get_arrays(&b, s->count);
     add_bed(b.world, &grains, b.material, b.ids);

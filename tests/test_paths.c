@@ -30,6 +30,8 @@ static const feature features[] = {
     {"dashpot, rolling, two laws", 0.4, 0.2, 0, 0.1, 0, true, true, false, true, false, 0, 0, 0},
     {"tangential dashpot", 0.4, 0.2, 0.3, 0, 0, false, false, false, false, true, -10, 0, 0},
     {"all dashpots", 0.4, 0.2, 0.3, 0.1, 0.2, true, false, true, true, false, -10, 0.2, 0},
+    {"all dashpots, one", 0.4, 0.2, 0.3, 0.1, 0.2, false, false, false, true, true, -10, 0, 0.5},
+    {"both dashpots, no friction", 0, 0.2, 0.3, 0, 0, false, false, false, false, false, -10, 0, 0},
     {"rolling dashpot alone", 0.4, 0, 0, 0, 0.2, false, false, false, false, false, -10, 0, 0},
     {"loads", 0.4, 0, 0, 0, 0, false, true, true, false, false, 0, 0, 0},
 };
