@@ -1405,8 +1405,8 @@ typedef void dem2d_loads_fn(void *user, dem2d_world *world);
 /// half-planes that are parallel to this vector and do not turn. Other walls are refused, and all
 /// walls where both directions are periodic (OUT_OF_RANGE). The cell may be small: a particle can
 /// touch several images of another one, and images of itself. Centroids are kept in the cell:
-/// positions that you give are moved by whole cell vectors. dem2d_world_relax and the queries of
-/// space (boxes, points, shapes, rays, the nearest) return OUT_OF_RANGE in a cell.
+/// positions that you give are moved by whole cell vectors. Queries of space see all images, and
+/// tell which one they have found.
 typedef struct dem2d_cell {
     dem2d_vec a;      ///< m, along x: a.x >= 0, a.y = 0; zero: not periodic along x
     dem2d_vec b;      ///< m, b.y > 0; zero: not periodic along b
@@ -2175,6 +2175,7 @@ typedef struct dem2d_found {
     dem2d_particle_id particle; ///< generation 0 when it is a wall
     dem2d_wall_id wall;         ///< generation 0 when it is a particle
     int part;                   ///< of the wall, by its number; 0 of a particle
+    int shift[2]; ///< in a periodic cell: its image at shift[0] a + shift[1] b from where it is
 } dem2d_found;
 
 /// A point on a particle or a wall that a query found.
@@ -2196,8 +2197,16 @@ typedef struct dem2d_hit {
 /// to it. The first query after something has moved makes a search tree over all particles and
 /// segments, for which it may allocate; the others take a time that grows with what they find and
 /// with the logarithm of the number of these. All half-planes are looked at. Results do not depend
-/// on the order in memory. Errors: NULL_ARGUMENT, NOT_FINITE, OUT_OF_RANGE (upper below lower,
-/// capacity below 0), OUT_OF_MEMORY.
+/// on the order in memory.
+///
+/// In a periodic cell the queries see all images, however far from the cell: each is a find of its
+/// own, whose shift says which it is. A box that is larger than the cell finds some particles
+/// several times, and a particle can overlap images of itself. Images of one particle are sorted by
+/// shift[1], then shift[0]. Half-planes have no images: dem2d_world_wall_overlaps finds a particle
+/// once at a half-plane. The time also grows with the number of cells that a region or ray crosses.
+/// A ray needs a length in a cell. Errors: NULL_ARGUMENT, NOT_FINITE, OUT_OF_RANGE (upper below
+/// lower, capacity below 0, a region that crosses 2^30 cells or is 2^30 cells away, a ray without a
+/// length in a cell), OUT_OF_MEMORY.
 DEM2D_API dem2d_result dem2d_world_query_box(dem2d_world *world, const dem2d_box *box,
                                              const dem2d_query_desc *desc, dem2d_found *found,
                                              int capacity, int *count);
@@ -2239,8 +2248,9 @@ DEM2D_API dem2d_result dem2d_world_cast_ray_all(dem2d_world *world, dem2d_vec or
 /// dem2d_world_query_box.
 DEM2D_API dem2d_result dem2d_world_nearest(dem2d_world *world, dem2d_vec point, double range,
                                            const dem2d_query_desc *desc, dem2d_hit *hit);
-/// Greatest overlap (m) that a new particle would have with particles and walls that it meets; 0 if
-/// it touches none. A one-sided wall counts if the shorter way out is to its left. Above a few
+/// Greatest overlap (m) that a new particle would have with particles and walls that it meets, in a
+/// periodic cell with their images and its own as well; 0 if it touches none. A one-sided wall
+/// counts if the shorter way out is to its left. Above a few
 /// percent of its radius, the particle would be thrown out at high speed: see dem2d_world_relax.
 /// Errors: those of dem2d_world_add_particle.
 DEM2D_API dem2d_result dem2d_world_overlap_at(dem2d_world *world, const dem2d_particle_desc *desc,
@@ -2260,6 +2270,7 @@ typedef struct dem2d_relaxation {
 /// both by half of that, or the one that is free by all of it; what has several overlaps moves by
 /// the mean of these moves times 1.5. Angles and velocities stay, so that no speed comes of it.
 /// Contacts of particles that have moved lose their history, smaller overlaps stay as they are.
+/// Overlaps across the border of a cell count as well; those of a particle with its images remain.
 /// Where there is no room, the last overlaps remain: relaxation->overlaps tells. The ledger counts
 /// the change as given.
 DEM2D_API dem2d_result dem2d_world_relax(dem2d_world *world, double tolerance, int sweeps,
@@ -11795,6 +11806,7 @@ static void dem2di_grid_partners(const dem2di_grid *grid, int place, dem2di_find
 typedef struct dem2di_order {
     uint64_t key;
     int value;
+    int image; /* of what queries find in a cell: which of its images */
 } dem2di_order;
 
 /* Radix sort, a byte at a time from the lowest; equal keys keep their order. */
@@ -12599,10 +12611,10 @@ typedef struct dem2di_list {
     int *own;      /* of a slot's as A */
 } dem2di_list;
 
-/* How overlaps move a particle: the sum of the moves of a sweep and their number, and of all sweeps
-   together. */
+/* How overlaps move a particle: where it was at first, the sum of the moves of a sweep and their
+   number. */
 typedef struct dem2di_apart {
-    dem2d_vec sum, way;
+    dem2d_vec start, sum;
     int count;
 } dem2di_apart;
 
@@ -14102,6 +14114,7 @@ static bool dem2di_wrap_all(dem2d_world *world) {
    again before the next step. */
 static void dem2di_cell_wrap(dem2d_world *world) {
     world->wrap_due = !dem2di_wrap_all(world);
+    world->tree.made = false;
     for (int k = 0; k < world->image_count; k++) dem2di_image_move(world, k);
 }
 
@@ -23567,7 +23580,7 @@ DEM2D_API dem2d_result dem2d_world_average_circle(const dem2d_world *world, dem2
 /* ============================================================================================
    >>queries  What is where: overlaps, rays, the nearest; contacts of one particle
    uses: config, math, memory, fields, support, shapes, gjk, contact, broad, law, motion, world,
-         objects, walls, measures
+         cell, objects, walls, measures
    ============================================================================================ */
 
 /* The search tree is in world->tree. Its items are the particles and the segments of walls: slots
@@ -23580,7 +23593,12 @@ DEM2D_API dem2d_result dem2d_world_average_circle(const dem2d_world *world, dem2
    A question visits the nodes that are within its limit, the nearer child first, and looks at each
    item of a leaf; then at each half-plane. For the first hit of a ray, an item whose shape needs a
    search waits: its circles, inscribed and bounding, say between which distances the hit is, and
-   lower the limit at once; the search is made for those few that are still within it at the end. */
+   lower the limit at once; the search is made for those few that are still within it at the end.
+
+   In a periodic cell the tree has the particles where they are. The question is moved instead: it
+   is asked once for each image of the tree's box that is within its limit, moved back by the shift
+   of this image. Images are numbered row by row within a rectangle of shifts, so that the number of
+   an image orders it by shift[1], then shift[0]. */
 
 /* Of a ray: distance of tangent and chord at a right angle to the surface, of the radius. A hundred
    times the rounding errors of support points. */
@@ -23606,12 +23624,18 @@ typedef struct dem2di_waiting {
     int item;
 } dem2di_waiting;
 
+/* Where a question is asked. */
+typedef struct dem2di_asked {
+    dem2d_box box;
+    dem2d_vec position, origin;
+} dem2di_asked;
+
 typedef struct dem2di_question {
     dem2d_world *world;
     dem2di_ask ask;
     dem2d_query_desc desc;
     dem2di_groups groups;     /* whom it meets */
-    int self;                 /* slot of the particle that asks, or -1 */
+    int self;                 /* slot of the particle that asks, or -1: it is no answer itself */
     int wall;                 /* the wall that is the region */
     dem2d_box box;            /* of the region */
     const dem2d_shape *shape; /* the region; NULL when it is the box */
@@ -23619,10 +23643,14 @@ typedef struct dem2di_question {
     dem2d_vec origin;         /* of the ray; the point */
     dem2d_vec direction;      /* of the ray, unit, */
     dem2d_vec inverse;        /* and 1 over its components */
+    dem2di_asked asked;       /* box, position of the shape and origin as they were asked */
+    int image;                /* these are moved back by the shift of this image; -1: by none */
+    int first[2], columns;    /* the shift of image 0; images in a row */
     double limit;             /* what is farther does not matter; beyond 0 for a region */
     bool all;                 /* items go into tree.found, else only the nearest is kept */
     int count;                /* of tree.found */
-    int item;                 /* the nearest, */
+    bool failed;              /* there was no memory for what was found */
+    int item, item_image;     /* the nearest, */
     dem2d_hit hit;            /* if there is one */
     int waits;                /* of the first hit of a ray: items that are not yet looked at */
     dem2di_waiting waiting[DEM2DI_WAITING];
@@ -23699,9 +23727,6 @@ static int dem2di_leaf_begin(const dem2di_tree *tree, int k) {
 /* Room for what a query may find, and a tree. */
 static dem2d_result dem2di_tree_make(dem2d_world *world) {
     dem2di_tree *tree = &world->tree;
-    if (world->periodic)
-        return dem2di_fail(&world->env, DEM2D_OUT_OF_RANGE, -1,
-                           "cell: queries of space and relax do not work in a periodic cell");
     int levels = 0, items = world->body_count + world->part_count;
     while (DEM2DI_LEAF << levels < items) levels++;
     int leaves = 1 << levels, nodes = 2 * leaves - 1;
@@ -24065,7 +24090,7 @@ static bool dem2di_hit_set(const dem2di_question *question, double distance, dem
                            bool inside, dem2d_hit *hit) {
     hit->distance = inside ? 0 : distance;
     hit->normal = inside ? dem2di_negate(question->direction) : normal;
-    hit->point = dem2di_along(question->origin, hit->distance, question->direction);
+    hit->point = dem2di_along(question->asked.origin, hit->distance, question->direction);
     return hit->distance >= 0 && hit->distance <= question->limit;
 }
 
@@ -24132,7 +24157,7 @@ static void dem2di_nearest_set(const dem2di_question *question, double distance,
                                dem2d_hit *hit) {
     hit->distance = distance > 0 ? distance : 0;
     hit->normal = distance > 0 ? normal : dem2di_vec(0, 0);
-    hit->point = dem2di_along(question->origin, -hit->distance, normal);
+    hit->point = dem2di_along(question->asked.origin, -hit->distance, normal);
 }
 
 static bool dem2di_nearest_particle(const dem2di_question *question, int slot, dem2d_hit *hit) {
@@ -24200,11 +24225,41 @@ static bool dem2di_wall_has(const dem2di_question *question, int slot) {
     return false;
 }
 
+/* The shift of an image by its number. */
+static void dem2di_image_shift(const dem2di_question *question, int image, int shift[2]) {
+    shift[0] = shift[1] = 0;
+    if (image < 0) return;
+    shift[0] = question->first[0] + image % question->columns;
+    shift[1] = question->first[1] + image / question->columns;
+}
+
+/* Is the question about images with a shift? */
+static bool dem2di_image_is_moved(const dem2di_question *question) {
+    int shift[2];
+    dem2di_image_shift(question, question->image, shift);
+    return shift[0] != 0 || shift[1] != 0;
+}
+
+/* From now on a question is about an image. */
+static void dem2di_question_to(dem2di_question *question, int image) {
+    const dem2di_asked *asked = &question->asked;
+    int shift[2];
+    if (image == question->image) return;
+    dem2di_image_shift(question, image, shift);
+    dem2d_vec way = dem2di_cell_shift(&question->world->cell, shift[0], shift[1]);
+    question->image = image;
+    question->box.lower = dem2di_sub(asked->box.lower, way);
+    question->box.upper = dem2di_sub(asked->box.upper, way);
+    question->pose.position = dem2di_sub(asked->position, way);
+    question->origin = dem2di_sub(asked->origin, way);
+}
+
 /* Is an item among what is looked for? */
 static bool dem2di_item_wanted(const dem2di_question *question, int item) {
     const dem2d_world *world = question->world;
     const dem2d_query_desc *desc = &question->desc;
-    if (item >= 0 ? desc->skip_particles || item == question->self : desc->skip_walls) return false;
+    if (item >= 0 ? desc->skip_particles : desc->skip_walls) return false;
+    if (item == question->self && item >= 0 && !dem2di_image_is_moved(question)) return false;
     const dem2di_groups groups =
         item >= 0 ? dem2di_groups_at(world, item)
                   : dem2di_wall_groups(&world->walls[world->parts[-1 - item].wall]);
@@ -24240,6 +24295,13 @@ static uint64_t dem2di_item_rank(const dem2d_world *world, int item) {
     return (uint64_t)(wall + 1) << 32 | (uint64_t)(-1 - item - world->walls[wall].first);
 }
 
+/* Does an item come behind the nearest in the order of results? */
+static bool dem2di_item_is_later(const dem2di_question *question, int item) {
+    uint64_t own = dem2di_item_rank(question->world, item);
+    uint64_t other = dem2di_item_rank(question->world, question->item);
+    return own > other || (own == other && question->image > question->item_image);
+}
+
 /* One item is looked at: it goes to the others, or is kept if it is the nearest so far. */
 static void dem2di_item_ask(dem2di_question *question, int item) {
     dem2d_world *world = question->world;
@@ -24247,16 +24309,22 @@ static void dem2di_item_ask(dem2di_question *question, int item) {
     memset(&hit, 0, sizeof hit);
     if (!dem2di_item_find(question, item, &hit)) return;
     if (question->all) {
+        if (question->count == world->capacity[DEM2DI_TREE]) /* of images there may be more */
+            question->failed = question->failed || question->count == INT_MAX ||
+                               !dem2di_group_reserve(world, DEM2DI_TREE, question->count + 1);
+        if (question->failed) return;
         dem2di_order *found = &world->tree.found[question->count++];
         found->key = dem2di_item_rank(world, item);
         found->value = item;
+        found->image = question->image;
         return;
     }
-    bool later = question->count > 0 && hit.distance == question->hit.distance &&
-                 dem2di_item_rank(world, item) > dem2di_item_rank(world, question->item);
-    if (later) return;
+    if (question->count > 0 && hit.distance == question->hit.distance &&
+        dem2di_item_is_later(question, item))
+        return;
     question->count = 1;
     question->item = item;
+    question->item_image = question->image;
     question->hit = hit;
     question->limit = hit.distance;
 }
@@ -24352,15 +24420,152 @@ static void dem2di_tree_ask(dem2di_question *question) {
     dem2di_waiting_ask(question);
 }
 
+/* --- images in a periodic cell -----------------------------------------------------------------
+ */
+
+/* What a question in a cell can reach. */
+static dem2d_box dem2di_question_reach(const dem2di_question *question) {
+    const dem2d_vec start = question->asked.origin,
+                    reach = dem2di_vec(question->limit, question->limit);
+    dem2d_box box = question->asked.box, far;
+    if (question->ask == DEM2DI_ASK_REGION || question->ask == DEM2DI_ASK_WALL) return box;
+    box.lower = dem2di_sub(start, reach);
+    box.upper = dem2di_add(start, reach);
+    if (question->ask == DEM2DI_ASK_NEAREST) return box;
+    box.lower = box.upper = start;
+    far.lower = far.upper = dem2di_along(start, question->limit, question->direction);
+    return dem2di_box_join(&box, &far);
+}
+
+/* Numbers along a of the images of the tree's box within reach in row `along_b`: of a ray those
+   where it crosses the row, up to its limit. last below first: none. */
+static void dem2di_images_row(const dem2di_question *question, const dem2d_box *reach, int along_b,
+                              int *first, int *last) {
+    const dem2d_cell *cell = &question->world->cell;
+    const dem2d_box *tree = &question->world->tree.boxes[0];
+    const dem2d_vec start = question->asked.origin, way = dem2di_cell_shift(cell, 0, along_b);
+    double low = reach->lower.x, high = reach->upper.x, in[2];
+    if (question->ask == DEM2DI_ASK_RAY) {
+        dem2d_box row = {{-DBL_MAX, -DBL_MAX}, {DBL_MAX, DBL_MAX}};
+        if (cell->b.y > 0) {
+            row.lower.y = tree->lower.y + way.y;
+            row.upper.y = tree->upper.y + way.y;
+        }
+        dem2di_ray_box(start, question->inverse, &row, in);
+        in[1] = dem2di_min(in[1], question->limit);
+        *first = 0;
+        *last = -1;
+        if (in[0] > in[1]) return;
+        low = start.x + dem2di_min(in[0] * question->direction.x, in[1] * question->direction.x);
+        high = start.x + dem2di_max(in[0] * question->direction.x, in[1] * question->direction.x);
+    }
+    dem2di_shift_range(tree->lower.x + way.x, cell->a.x, low - (tree->upper.x - tree->lower.x),
+                       high, first, last);
+}
+
+/* The rectangle of shifts within reach: rows from first[1] to `last`. */
+static dem2d_result dem2di_images_count(dem2di_question *question, const dem2d_box *reach,
+                                        int *last) {
+    const dem2d_world *world = question->world;
+    const dem2d_cell *cell = &world->cell;
+    const dem2d_box *tree = &world->tree.boxes[0];
+    int ends[2][2];
+    dem2di_shift_range(tree->lower.y, cell->b.y, reach->lower.y - (tree->upper.y - tree->lower.y),
+                       reach->upper.y, &question->first[1], last);
+    for (int k = 0; k < 2; k++) { /* b leans: the ends of the rows move steadily */
+        double x = tree->lower.x + (k == 0 ? question->first[1] : *last) * cell->b.x;
+        dem2di_shift_range(x, cell->a.x, reach->lower.x - (tree->upper.x - tree->lower.x),
+                           reach->upper.x, &ends[k][0], &ends[k][1]);
+    }
+    question->first[0] = ends[0][0] < ends[1][0] ? ends[0][0] : ends[1][0];
+    int most = ends[0][1] > ends[1][1] ? ends[0][1] : ends[1][1];
+    double columns = (double)most - question->first[0] + 1;
+    double rows = (double)*last - question->first[1] + 1;
+    bool far = question->first[0] <= -DEM2DI_CELLS_MOST || most >= DEM2DI_CELLS_MOST ||
+               question->first[1] <= -DEM2DI_CELLS_MOST || *last >= DEM2DI_CELLS_MOST;
+    if (far || !(columns * rows <= DEM2DI_CELLS_MOST))
+        return dem2di_fail(&world->env, DEM2D_OUT_OF_RANGE, -1,
+                           "a query crosses more than 2^30 cells, or is as far from the cell");
+    question->columns = (int)columns;
+    return DEM2D_OK;
+}
+
+/* Ask for each image within reach. For the first hit of a ray, rows and images come in the order in
+   which the ray crosses them, and it has an end where the limit has got nearer. */
+static dem2d_result dem2di_images_ask(dem2di_question *question) {
+    const dem2d_box reach = dem2di_question_reach(question);
+    const bool ordered = question->ask == DEM2DI_ASK_RAY && !question->all;
+    const bool west = ordered && question->direction.x < 0;
+    const bool south = ordered && question->direction.y < 0;
+    int last_b;
+    dem2d_result result = dem2di_images_count(question, &reach, &last_b);
+    if (result != DEM2D_OK) return result;
+    for (int k = 0, rows = last_b - question->first[1]; k <= rows; k++) {
+        const int row = south ? rows - k : k;
+        for (int n = 0;; n++) {
+            int first, last;
+            dem2di_images_row(question, &reach, question->first[1] + row, &first, &last);
+            const int along_a = west ? last - n : first + n;
+            if (n == 0 && first > last && ordered && question->count > 0) return DEM2D_OK;
+            if (along_a < first || along_a > last) break;
+            const int column = along_a - question->first[0];
+            dem2di_question_to(question, row * question->columns + column);
+            dem2di_tree_ask(question);
+        }
+    }
+    return DEM2D_OK;
+}
+
+/* The nearest image: that of the cell around the point says how far others matter. */
+static dem2d_result dem2di_images_nearest(dem2di_question *question) {
+    const dem2di_fractions f = dem2di_fractions_make(&question->world->cell);
+    const double range = question->limit;
+    dem2d_result result = dem2di_check_place(question->world, question->origin);
+    if (result != DEM2D_OK) return result;
+    if (!dem2di_cells_out(&f, question->origin, question->first))
+        question->first[0] = question->first[1] = 0;
+    question->columns = 1;
+    question->limit = DBL_MAX;
+    dem2di_question_to(question, 0);
+    dem2di_tree_ask(question);
+    bool none = question->count == 0; /* of the images of no cell */
+    question->count = 0;
+    question->limit = dem2di_min(range, question->limit);
+    question->image = -1;
+    return none ? DEM2D_OK : dem2di_images_ask(question);
+}
+
+static bool dem2di_is_plane(const dem2d_world *world, const dem2di_wall *wall) {
+    return wall->count > 0 && !(world->parts[wall->first].extent > 0);
+}
+
+/* Particles and segments: in a cell their images, but of half-planes, which have none. */
+static dem2d_result dem2di_items_ask(dem2di_question *question) {
+    const dem2d_world *world = question->world;
+    dem2d_result result = DEM2D_OK;
+    question->asked.box = question->box;
+    question->asked.position = question->pose.position;
+    question->asked.origin = question->origin;
+    if (world->tree.count == 0) return DEM2D_OK;
+    if (!world->periodic ||
+        (question->ask == DEM2DI_ASK_WALL && dem2di_is_plane(world, &world->walls[question->wall])))
+        dem2di_tree_ask(question);
+    else if (question->ask == DEM2DI_ASK_NEAREST)
+        result = dem2di_images_nearest(question);
+    else
+        result = dem2di_images_ask(question);
+    dem2di_question_to(question, -1);
+    return question->failed ? dem2di_out_of_memory(world, "what a query finds") : result;
+}
+
 static dem2d_result dem2di_question_ask(dem2di_question *question) {
     dem2d_world *world = question->world;
     dem2d_result result = dem2di_tree_make(world);
+    if (result == DEM2D_OK) result = dem2di_items_ask(question);
     if (result != DEM2D_OK) return result;
-    if (world->tree.count > 0) dem2di_tree_ask(question);
     for (int j = 0; j < world->wall_count; j++) {
         const dem2di_wall *wall = &world->walls[j];
-        if (wall->count > 0 && !(world->parts[wall->first].extent > 0))
-            dem2di_item_ask(question, -1 - wall->first);
+        if (dem2di_is_plane(world, wall)) dem2di_item_ask(question, -1 - wall->first);
     }
     return DEM2D_OK;
 }
@@ -24372,14 +24577,16 @@ static dem2di_question dem2di_question_make(dem2d_world *world, dem2di_ask ask,
     question.world = world;
     question.ask = ask;
     if (desc != NULL) question.desc = *desc;
-    question.self = -1;
+    question.self = question.image = -1;
     question.limit = DBL_MAX; /* below HUGE_VAL, which is out of reach */
     return question;
 }
 
-static dem2d_found dem2di_found_of(const dem2d_world *world, int item) {
+static dem2d_found dem2di_found_of(const dem2di_question *question, int item, int image) {
+    const dem2d_world *world = question->world;
     dem2d_found found;
     memset(&found, 0, sizeof found);
+    dem2di_image_shift(question, image, found.shift);
     if (item >= 0) {
         found.particle = dem2di_particle_id(world, item);
         return found;
@@ -24414,7 +24621,8 @@ static dem2d_result dem2di_region_ask(dem2di_question *question, dem2d_found *fo
     if (result != DEM2D_OK) return result;
     dem2di_found_sort(&world->tree, question->count);
     for (int i = 0; i < question->count && i < capacity; i++)
-        found[i] = dem2di_found_of(world, world->tree.found[i].value);
+        found[i] =
+            dem2di_found_of(question, world->tree.found[i].value, world->tree.found[i].image);
     *count = question->count;
     return DEM2D_OK;
 }
@@ -24506,13 +24714,16 @@ static dem2d_result dem2di_ray_set(dem2di_question *question, dem2d_vec origin, 
     question->inverse.x = dem2di_inverse_component(question->direction.x);
     question->inverse.y = dem2di_inverse_component(question->direction.y);
     if (length > 0) question->limit = length;
+    if (length == 0 && question->world->periodic)
+        return dem2di_fail(env, DEM2D_OUT_OF_RANGE, -1, "length = 0: a ray in a cell needs an end");
     return DEM2D_OK;
 }
 
 /* The nearest of a question that has been asked, or nothing. */
 static void dem2di_hit_of(const dem2di_question *question, dem2d_hit *hit) {
     *hit = question->hit;
-    if (question->count > 0) hit->found = dem2di_found_of(question->world, question->item);
+    if (question->count > 0)
+        hit->found = dem2di_found_of(question, question->item, question->item_image);
 }
 
 DEM2D_API dem2d_result dem2d_world_cast_ray(dem2d_world *world, dem2d_vec origin,
@@ -24528,11 +24739,12 @@ DEM2D_API dem2d_result dem2d_world_cast_ray(dem2d_world *world, dem2d_vec origin
 
 /* Hits in the order of ids are sorted by distance, which for numbers that are not negative is the
    order of their bits. */
-static void dem2di_hits_sort(const dem2di_question *question) {
+static void dem2di_hits_sort(dem2di_question *question) {
     const dem2di_tree *tree = &question->world->tree;
     dem2di_found_sort(tree, question->count);
     for (int i = 0; i < question->count; i++) {
         dem2d_hit hit;
+        dem2di_question_to(question, tree->found[i].image);
         (void)dem2di_item_find(question, tree->found[i].value, &hit);
         double distance = hit.distance + 0.0; /* never -0 */
         memcpy(&tree->found[i].key, &distance, sizeof distance);
@@ -24553,9 +24765,10 @@ DEM2D_API dem2d_result dem2d_world_cast_ray_all(dem2d_world *world, dem2d_vec or
     if (result != DEM2D_OK) return result;
     dem2di_hits_sort(&question);
     for (int i = 0; i < question.count && i < capacity; i++) {
-        int item = world->tree.found[i].value;
+        int item = world->tree.found[i].value, image = world->tree.found[i].image;
+        dem2di_question_to(&question, image);
         (void)dem2di_item_find(&question, item, &hits[i]);
-        hits[i].found = dem2di_found_of(world, item);
+        hits[i].found = dem2di_found_of(&question, item, image);
     }
     *count = question.count;
     return DEM2D_OK;
@@ -24586,9 +24799,12 @@ static bool dem2di_is_behind(const dem2d_world *world, int part, dem2d_vec norma
            dem2di_dot(normal, dem2di_surface_normal(&world->surfaces[part])) > 0;
 }
 
-/* Overlap of the region of a question with an item, and the normal towards the item. */
-static double dem2di_overlap_with(const dem2di_question *question, int item, dem2d_vec *normal) {
+/* Overlap of the region of a question with what it has found, and the normal towards that. */
+static double dem2di_overlap_with(dem2di_question *question, const dem2di_order *found,
+                                  dem2d_vec *normal) {
     const dem2d_world *world = question->world;
+    const int item = found->value;
+    dem2di_question_to(question, found->image);
     dem2d_contact_desc desc;
     dem2d_contact contact;
     dem2d_result result;
@@ -24617,6 +24833,30 @@ static double dem2di_overlap_with(const dem2di_question *question, int item, dem
     return item < 0 && dem2di_is_behind(world, -1 - item, contact.normal) ? 0 : contact.depth;
 }
 
+/* Greatest overlap of a new particle with images of itself. */
+static double dem2di_overlap_with_images(const dem2d_world *world, const dem2d_shape *shape,
+                                         dem2d_pose pose) {
+    const double width = 2 * shape->circumscribed * pose.scale;
+    double greatest = 0;
+    dem2d_contact_desc desc;
+    dem2d_contact contact;
+    dem2d_box box;
+    memset(&desc, 0, sizeof desc);
+    desc.skip_points = true;
+    box.lower = dem2di_sub(pose.position, dem2di_vec(width, width));
+    box.upper = dem2di_add(pose.position, dem2di_vec(width, width));
+    dem2di_shifts at = dem2di_shifts_start(&world->cell, pose.position, &box);
+    while (dem2di_shifts_next(&at)) {
+        dem2d_pose there = pose;
+        there.position =
+            dem2di_add(pose.position, dem2di_cell_shift(&world->cell, at.along_a, at.along_b));
+        if ((at.along_a != 0 || at.along_b != 0) &&
+            dem2d_pair_contact(shape, pose, shape, there, &desc, &contact) == DEM2D_OK)
+            greatest = dem2di_max(greatest, contact.depth);
+    }
+    return greatest;
+}
+
 DEM2D_API dem2d_result dem2d_world_overlap_at(dem2d_world *world, const dem2d_particle_desc *desc,
                                               double *overlap) {
     if (world == NULL || desc == NULL || overlap == NULL) return DEM2D_NULL_ARGUMENT;
@@ -24636,8 +24876,12 @@ DEM2D_API dem2d_result dem2d_world_overlap_at(dem2d_world *world, const dem2d_pa
     if (!question.groups.sensor) result = dem2di_question_ask(&question);
     if (result != DEM2D_OK) return result;
     for (int i = 0; i < question.count; i++)
-        greatest = dem2di_max(greatest,
-                              dem2di_overlap_with(&question, world->tree.found[i].value, &normal));
+        greatest =
+            dem2di_max(greatest, dem2di_overlap_with(&question, &world->tree.found[i], &normal));
+    if (world->periodic && !question.groups.sensor &&
+        dem2di_meet(&question.groups, &question.groups))
+        greatest =
+            dem2di_max(greatest, dem2di_overlap_with_images(world, question.shape, question.pose));
     *overlap = greatest;
     return DEM2D_OK;
 }
@@ -24651,7 +24895,9 @@ static void dem2di_apart_add(dem2d_world *world, int slot, bool shared, double d
     apart->count++;
 }
 
-/* The overlaps of a particle with those of higher id and with walls. */
+/* The overlaps of a particle with those of higher id and with walls. In a cell each image of a
+   particle of higher id counts, and of its own images those with shift[1] > 0, or 0 and
+   shift[0] > 0: they move with it. */
 static dem2d_result dem2di_apart_find(dem2d_world *world, int slot, double tolerance,
                                       dem2d_relaxation *relaxation) {
     dem2di_question question = dem2di_question_make(world, DEM2DI_ASK_REGION, NULL);
@@ -24663,18 +24909,22 @@ static dem2d_result dem2di_apart_find(dem2d_world *world, int slot, double toler
     if (result != DEM2D_OK) return result;
     dem2di_found_sort(&world->tree, question.count);
     for (int i = 0; i < question.count; i++) {
-        int item = world->tree.found[i].value;
+        const dem2di_order *found = &world->tree.found[i];
+        int item = found->value, shift[2];
         bool own = world->inverse[slot].mass > 0;
         bool other = item >= 0 && world->inverse[item].mass > 0;
         dem2d_vec normal = dem2di_vec(0, 0);
         if (item >= 0 && world->bodies[item].index < world->bodies[slot].index) continue;
         if (!own && !other) continue;
+        dem2di_image_shift(&question, found->image, shift);
+        if (item == slot && (shift[1] < 0 || (shift[1] == 0 && shift[0] < 0))) continue;
         double radius = world->now[slot].radius;
         if (item >= 0) radius = dem2di_min(radius, world->now[item].radius);
-        double depth = dem2di_overlap_with(&question, item, &normal);
+        double depth = dem2di_overlap_with(&question, found, &normal);
         relaxation->overlap = dem2di_max(relaxation->overlap, depth);
         if (!(depth > tolerance * radius)) continue;
         relaxation->overlaps++;
+        if (item == slot) continue;
         depth -= tolerance * radius / 2;
         dem2di_apart_add(world, slot, other, depth, dem2di_negate(normal));
         if (item >= 0) dem2di_apart_add(world, item, own, depth, normal);
@@ -24709,27 +24959,28 @@ DEM2D_API dem2d_result dem2d_world_relax(dem2d_world *world, double tolerance, i
     memset(&done, 0, sizeof done);
     result = dem2di_tree_make(world); /* room for the moves, too */
     if (result != DEM2D_OK) return result;
-    if (world->body_count > 0)
-        memset(world->apart, 0, (size_t)world->body_count * sizeof *world->apart);
-    result = dem2di_apart_sweep(world, tolerance, &done); /* later ones need no more memory */
+    for (int i = 0; i < world->body_count; i++) world->apart[i].start = world->now[i].x;
+    result = dem2di_apart_sweep(world, tolerance, &done);
     for (; result == DEM2D_OK && done.overlaps > 0 && done.sweeps < sweeps; done.sweeps++) {
         for (int i = 0; i < world->body_count; i++) {
             const dem2di_apart *apart = &world->apart[i];
             if (apart->count == 0) continue;
             double share = apart->count > 1 ? 1.5 / apart->count : 1;
-            world->apart[i].way = dem2di_along(apart->way, share, apart->sum);
             world->now[i].x = dem2di_along(world->now[i].x, share, apart->sum);
         }
         world->tree.made = false;
         result = dem2di_apart_sweep(world, tolerance, &done);
     }
-    if (result != DEM2D_OK) return result;
-    for (int i = 0; i < world->body_count; i++) {
-        dem2d_vec way = world->apart[i].way;
-        if (way.x == 0 && way.y == 0) continue;
-        world->before[i] = world->now[i];
-        dem2di_moved(world, i, way);
+    for (int i = 0; i < world->body_count; i++) { /* in a cell a later sweep may find no memory */
+        dem2d_vec start = world->apart[i].start, end = world->now[i].x;
+        world->now[i].x = start;
+        if (result != DEM2D_OK || (end.x == start.x && end.y == start.y)) continue;
+        dem2di_put_at(world, i, end, world->now[i].q);
         done.moved++;
+    }
+    if (result != DEM2D_OK) {
+        world->tree.made = false;
+        return result;
     }
     *relaxation = done;
     return DEM2D_OK;
@@ -25740,8 +25991,8 @@ static dem2d_result dem2di_filler_meets(const dem2di_filler *filler, int i, bool
     if (result != DEM2D_OK) return result;
     question.shape = dem2di_filler_shape(filler, i); /* from now on of the grain, not the box */
     for (int k = 0; k < question.count && !*meets; k++) {
-        int item = filler->world->tree.found[k].value;
-        *meets = dem2di_overlap_with(&question, item, &normal) > -filler->gap;
+        const dem2di_order *found = &filler->world->tree.found[k];
+        *meets = dem2di_overlap_with(&question, found, &normal) > -filler->gap;
     }
     return DEM2D_OK;
 }

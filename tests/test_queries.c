@@ -848,12 +848,255 @@ static void test_work(void **state) {
     assert_between((double)rays[1], 1, (double)rays[0] + 8);
 }
 
+/* --- in a periodic cell ------------------------------------------------------------------------
+   The oracle is a world without a cell, in which each particle has copies at all cell vectors
+   nearby: what it finds of copy (s, t) of particle i is what the cell must tell as image (s, t). */
+
+enum { TWINS = 12, ROWS = 19, COPIES = ROWS * ROWS }; /* copies from -9 to 9 along both */
+
+typedef struct twins {
+    scene cell, copies;
+    dem2d_vec a, b;
+    int count;
+    dem2d_particle_id ids[TWINS];
+    uint64_t random;
+} twins;
+
+static void twins_make(twins *w, dem2d_vec a, dem2d_vec b, int count) {
+    const dem2d_material_desc material = stone_desc(1e6, 0.3);
+    dem2d_shape_id shapes[KINDS];
+    dem2d_world_desc desc = {0};
+    memset(w, 0, sizeof *w);
+    w->random = 5, w->count = count, desc.time_step = 1e-6;
+    desc.cell.a = a, desc.cell.b = b;
+    w->cell = open_scene(&desc, &material);
+    for (int kind = 0; kind < KINDS; kind++) shapes[kind] = give_shape(&w->cell, make_kind(kind));
+    const dem2d_vec far = vec(a.x > 0 ? a.x : 1, b.y > 0 ? b.y : 1);
+    for (int i = 0; i < count; i++) {
+        dem2d_particle_desc grain = grain_desc(&w->cell, shapes[i % KINDS], 1, far);
+        grain.scale = random_between(&w->random, 0.5, 2);
+        grain.angle = random_between(&w->random, 0, 6), grain.groups.sensor = i % 5 == 0;
+        grain.position.x *= random_between(&w->random, 0, 1);
+        grain.position.y *= random_between(&w->random, 0, 1);
+        w->ids[i] = add_grain(&w->cell, &grain);
+    }
+}
+
+/* The copies of what is in the cell now, particle by particle, row by row. */
+static void twins_copy(twins *w) {
+    const dem2d_material_desc material = stone_desc(1e6, 0.3);
+    dem2d_shape_id shapes[KINDS];
+    dem2d_world_desc desc = {0};
+    dem2d_cell_info now;
+    desc.time_step = 1e-6;
+    w->copies = open_scene(&desc, &material);
+    assert_ok(dem2d_world_get_cell(w->cell.world, &now));
+    w->a = now.cell.a, w->b = now.cell.b;
+    for (int kind = 0; kind < KINDS; kind++) shapes[kind] = give_shape(&w->copies, make_kind(kind));
+    for (int i = 0; i < w->count; i++) {
+        const dem2d_particle_info p = grain_of(&w->cell, w->ids[i]);
+        for (int k = 0; k < COPIES; k++) {
+            const int s = k % ROWS - ROWS / 2, t = k / ROWS - ROWS / 2;
+            dem2d_particle_desc grain =
+                grain_desc(&w->copies, shapes[i % KINDS], p.pose.scale, p.pose.position);
+            if ((s != 0 && !(w->a.x > 0)) || (t != 0 && !(w->b.y > 0))) grain.position.y += 1e6;
+            grain.position.x += s * w->a.x + t * w->b.x, grain.position.y += t * w->b.y;
+            grain.angle = dem2d_rot_angle(p.pose.rotation), grain.groups.sensor = i % 5 == 0;
+            assert_int_equal((int)add_grain(&w->copies, &grain).index, i * COPIES + k);
+        }
+    }
+}
+
+static void twins_end(twins *w) {
+    close_scene(&w->cell);
+    close_scene(&w->copies);
+}
+
+/* An image in the cell, as the index of its copy. */
+static int copy_of(const dem2d_found *found) {
+    const int s = found->shift[0] + ROWS / 2, t = found->shift[1] + ROWS / 2;
+    assert_between(s, 0, ROWS - 1);
+    assert_between(t, 0, ROWS - 1);
+    return (int)found->particle.index * COPIES + t * ROWS + s;
+}
+
+static void check_same(const dem2d_found *images, int count, const dem2d_found *copies, int other) {
+    assert_int_equal(count, other);
+    for (int i = 0; i < count; i++)
+        assert_int_equal(copy_of(&images[i]), (int)copies[i].particle.index);
+}
+
+static void check_same_hit(const dem2d_hit *image, const dem2d_hit *copy) {
+    assert_int_equal(image->found.particle.generation, copy->found.particle.generation);
+    if (image->found.particle.generation == 0) return;
+    assert_int_equal(copy_of(&image->found), (int)copy->found.particle.index);
+    assert_within(image->distance, copy->distance, 1e-10);
+    assert_within(image->point.x, copy->point.x, 1e-9);
+    assert_within(image->point.y, copy->point.y, 1e-9);
+    assert_within(image->normal.x, copy->normal.x, 1e-4);
+    assert_within(image->normal.y, copy->normal.y, 1e-4);
+}
+
+enum { MOST_IMAGES = TWINS * COPIES };
+
+/* Regions from a point to three cells, at places up to two cells away. */
+static void check_twin_regions(twins *w, dem2d_vec at, double width, const dem2d_query_desc *desc) {
+    static dem2d_found found[MOST_IMAGES], other[MOST_IMAGES];
+    dem2d_world *const worlds[2] = {w->cell.world, w->copies.world};
+    dem2d_shape *shape = make_kind(random_below(&w->random, KINDS));
+    dem2d_shape_info info;
+    dem2d_box box = {at, {at.x + width, at.y + 0.7 * width}};
+    dem2d_pose pose = {at, dem2d_rot_make(random_between(&w->random, 0, 6)), 1};
+    int counts[2];
+    assert_ok(dem2d_shape_get(shape, &info));
+    pose.scale = 0.05 + width / info.circumscribed / 2;
+    for (int kind = 0; kind < 3; kind++) {
+        for (int k = 0; k < 2; k++) {
+            dem2d_found *to = k == 0 ? found : other;
+            if (kind == 0)
+                assert_ok(
+                    dem2d_world_query_box(worlds[k], &box, desc, to, MOST_IMAGES, &counts[k]));
+            if (kind == 1)
+                assert_ok(
+                    dem2d_world_query_point(worlds[k], at, desc, to, MOST_IMAGES, &counts[k]));
+            if (kind == 2)
+                assert_ok(dem2d_world_query_shape(worlds[k], shape, pose, desc, to, MOST_IMAGES,
+                                                  &counts[k]));
+        }
+        check_same(found, counts[0], other, counts[1]);
+    }
+    dem2d_shape_destroy(shape);
+}
+
+static void check_twin_rays(twins *w, dem2d_vec at, double length, const dem2d_query_desc *desc) {
+    static dem2d_hit hits[MOST_IMAGES], other[MOST_IMAGES];
+    dem2d_hit first, second;
+    int count, more;
+    const int eighth = random_below(&w->random, 16); /* often along an axis */
+    const dem2d_vec d =
+        direction(eighth < 8 ? eighth * half_turn / 4 : random_between(&w->random, 0, 6));
+    assert_ok(
+        dem2d_world_cast_ray_all(w->cell.world, at, d, length, desc, hits, MOST_IMAGES, &count));
+    assert_ok(
+        dem2d_world_cast_ray_all(w->copies.world, at, d, length, desc, other, MOST_IMAGES, &more));
+    assert_int_equal(count, more);
+    for (int i = 0; i < count; i++) check_same_hit(&hits[i], &other[i]);
+    assert_ok(dem2d_world_cast_ray(w->cell.world, at, d, length, desc, &first));
+    assert_ok(dem2d_world_cast_ray(w->copies.world, at, d, length, desc, &second));
+    check_same_hit(&first, &second);
+    assert_ok(dem2d_world_nearest(w->cell.world, at, length > 1 ? 0 : length, desc, &first));
+    assert_ok(dem2d_world_nearest(w->copies.world, at, length > 1 ? 0 : length, desc, &second));
+    check_same_hit(&first, &second);
+}
+
+/* Overlaps of the particles themselves, and of new ones. */
+static void check_twin_particles(twins *w, dem2d_vec at) {
+    static dem2d_found found[MOST_IMAGES], other[MOST_IMAGES];
+    for (int i = 0; i < w->count; i++) {
+        dem2d_particle_id middle = {(uint32_t)(i * COPIES + COPIES / 2), 1};
+        int count, more;
+        assert_ok(dem2d_world_particle_overlaps(w->cell.world, w->ids[i], NULL, found, MOST_IMAGES,
+                                                &count));
+        assert_ok(dem2d_world_particle_overlaps(w->copies.world, middle, NULL, other, MOST_IMAGES,
+                                                &more));
+        check_same(found, count, other, more);
+    }
+    double overlaps[2];
+    dem2d_particle_desc grain = grain_desc(&w->cell, give_shape(&w->cell, make_disc(0.2)), 1, at);
+    assert_ok(dem2d_world_overlap_at(w->cell.world, &grain, &overlaps[0]));
+    grain.shape = give_shape(&w->copies, make_disc(0.2));
+    assert_ok(dem2d_world_overlap_at(w->copies.world, &grain, &overlaps[1]));
+    assert_within(overlaps[0], overlaps[1], 1e-12);
+}
+
+/* Upright, tilted by more than itself, periodic along x or b alone, with a single particle; a cell
+   that has been sheared and has changed its vector b. */
+static void test_cells(void **state) {
+    (void)state;
+    static const dem2d_vec cells[6][2] = {{{1, 0}, {0, 1.3}},     {{0.8, 0}, {2.1, 1.1}},
+                                          {{1, 0}, {0, 0}},       {{0, 0}, {0.4, 0.9}},
+                                          {{0.41, 0}, {0, 0.43}}, {{1, 0}, {-0.45, 1}}};
+    static twins w;
+    for (int k = 0; k < 6; k++) {
+        twins_make(&w, cells[k][0], cells[k][1], k == 4 ? 1 : TWINS);
+        if (k == 5) {
+            dem2d_deformation_desc shear = {0};
+            shear.xy = -1000, shear.yy = 100;
+            assert_ok(dem2d_world_deform(w.cell.world, &shear));
+            step(&w.cell, 300);
+        }
+        twins_copy(&w);
+        for (int round = 0; round < 40; round++) {
+            const dem2d_vec at =
+                vec(random_between(&w.random, -1, 1.5), random_between(&w.random, -0.8, 1.2));
+            const double size = pow(random_between(&w.random, 0, 1), 3);
+            const dem2d_query_desc desc = {false, false, round % 3 == 0, 0};
+            check_twin_regions(&w, at, k == 4 ? 0.5 * size : size, &desc);
+            check_twin_rays(&w, at, k == 4 ? 0.1 + size : 0.1 + 2 * size, &desc);
+            if (round < 4 && k != 4) check_twin_particles(&w, at);
+        }
+        twins_end(&w);
+    }
+}
+
+/* Large regions, long rays, distant places; half-planes; what can't be asked. */
+static void test_cell_contract(void **state) {
+    (void)state;
+    const dem2d_material_desc material = stone_desc(1e6, 0.3);
+    test_env env;
+    dem2d_world_desc desc = {0};
+    dem2d_found found[4];
+    dem2d_hit hit;
+    double overlap;
+    int count;
+    test_env_init(&env);
+    desc.time_step = 1e-6, desc.env = &env.env;
+    desc.cell.a = vec(1, 0);
+    scene s = open_scene(&desc, &material);
+    const dem2d_particle_id disc =
+        add_shape(&s, make_disc(0.3), DEM2D_FREE, vec(0.2, 0.5), 0, vec(0, 0), 0);
+    const dem2d_wall_id floor = add_plane(&s, 0, 0.25, 0, 1);
+    dem2d_box box = {{0, 0.4}, {1000, 0.6}};
+    assert_ok(dem2d_world_query_box(s.world, &box, NULL, found, 2, &count));
+    assert_int_equal(count, 1001); /* from -0.1 on, ... from 999.9 on */
+    assert_int_equal(found[1].shift[0], 1);
+    assert_ok(dem2d_world_wall_overlaps(s.world, floor, NULL, found, 4, &count));
+    assert_int_equal(count, 1);
+    assert_int_equal(found[0].shift[0], 0);
+    assert_ok(dem2d_world_cast_ray(s.world, vec(1e6 + 0.75, 0.5), vec(-1, 0), 1e7, NULL, &hit));
+    assert_int_equal(hit.found.shift[0], 1000000);
+    assert_within(hit.distance, 0.25, 1e-9);
+    assert_ok(dem2d_world_cast_ray(s.world, vec(0.75, 0.5), vec(0, -1), 10, NULL, &hit));
+    assert_int_equal(hit.found.wall.generation, floor.generation);
+    assert_ok(dem2d_world_nearest(s.world, vec(-123456.2, 0.9), 0, NULL, &hit));
+    assert_int_equal(hit.found.particle.index, disc.index);
+    assert_int_equal(hit.found.shift[0], -123457 + 1);
+    assert_ok(dem2d_world_nearest(s.world, vec(0.2, 30), 5, NULL, &hit));
+    assert_int_equal(hit.found.particle.generation + hit.found.wall.generation, 0);
+    const dem2d_box all = {{-1e300, -1e300}, {1e300, 1e300}};
+    assert_result(dem2d_world_query_box(s.world, &all, NULL, found, 4, &count), DEM2D_OUT_OF_RANGE);
+    assert_logged(&env, DEM2D_OUT_OF_RANGE, -1, "2^30 cells");
+    assert_result(dem2d_world_nearest(s.world, vec(1e10, 0), 0, NULL, &hit), DEM2D_OUT_OF_RANGE);
+    assert_result(dem2d_world_cast_ray(s.world, vec(0, 0), vec(1, 0), 0, NULL, &hit),
+                  DEM2D_OUT_OF_RANGE);
+    assert_logged(&env, DEM2D_OUT_OF_RANGE, -1, "length = 0");
+    dem2d_particle_desc wide = grain_desc(&s, give_shape(&s, make_disc(0.6)), 1, vec(7.5, 9));
+    assert_ok(dem2d_world_overlap_at(s.world, &wide, &overlap)); /* with its own images */
+    assert_within(overlap, 0.2, 1e-12);
+    wide.groups.sensor = true;
+    assert_ok(dem2d_world_overlap_at(s.world, &wide, &overlap));
+    assert_within(overlap, 0, 0);
+    close_scene(&s);
+    assert_clean(&env);
+}
+
 int main(void) {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(test_random),      cmocka_unit_test(test_rays),
-        cmocka_unit_test(test_custom_rays), cmocka_unit_test(test_contract),
-        cmocka_unit_test(test_extremes),    cmocka_unit_test(test_pile),
-        cmocka_unit_test(test_work),
+        cmocka_unit_test(test_random),        cmocka_unit_test(test_rays),
+        cmocka_unit_test(test_custom_rays),   cmocka_unit_test(test_contract),
+        cmocka_unit_test(test_extremes),      cmocka_unit_test(test_pile),
+        cmocka_unit_test(test_work),          cmocka_unit_test(test_cells),
+        cmocka_unit_test(test_cell_contract),
     };
     return cmocka_run_group_tests(tests, oracle_make, NULL);
 }

@@ -260,12 +260,136 @@ static void test_jammed(void **state) {
     close_scene(&s);
 }
 
+/* --- in a periodic cell ------------------------------------------------------------------------
+ */
+
+enum { CROWD = 40 };
+
+typedef struct crowd {
+    scene s;
+    dem2d_particle_id ids[CROWD];
+} crowd;
+
+/* At random places; with `discs` all of radius RADIUS, else of five kinds. The cell begins at
+   origin, and the particles are given from there on. */
+static crowd make_crowd(dem2d_vec a, dem2d_vec b, dem2d_vec origin, bool discs) {
+    const dem2d_material_desc material = stone_desc(5e5, 0.3);
+    dem2d_world_desc desc = {0};
+    dem2d_shape_id shapes[5];
+    crowd c;
+    uint64_t random = 11;
+    desc.time_step = 1e-5, desc.cell.a = a, desc.cell.b = b, desc.cell.origin = origin;
+    c.s = open_scene(&desc, &material);
+    for (int kind = 0; kind < 5; kind++) shapes[kind] = give_shape(&c.s, make_kind(kind));
+    for (int i = 0; i < CROWD; i++) {
+        const double x = random_between(&random, 0, 0.75), y = random_between(&random, 0, 0.75);
+        dem2d_particle_desc grain = grain_desc(&c.s, shapes[discs ? 0 : i % 5], 1, vec(x, y));
+        grain.angle = random_between(&random, 0, 6);
+        c.ids[i] = add_grain(&c.s, &grain);
+    }
+    return c;
+}
+
+/* Least distance of discs, of all images from -2 to 2 cells away. */
+static double least_distance(const crowd *c, dem2d_vec a, dem2d_vec b) {
+    double least = 1e9;
+    for (int i = 0; i < CROWD; i++)
+        for (int j = i; j < CROWD; j++)
+            for (int k = 0; k < 25; k++) {
+                const dem2d_vec p = grain_of(&c->s, c->ids[i]).pose.position;
+                const dem2d_vec q = grain_of(&c->s, c->ids[j]).pose.position;
+                const int m = k % 5 - 2, n = k / 5 - 2;
+                if ((i == j && m == 0 && n == 0) || (n != 0 && !(b.y > 0))) continue;
+                least = fmin(least, hypot(q.x - p.x + m * a.x + n * b.x, q.y - p.y + n * b.y));
+            }
+    return least;
+}
+
+/* Discs come apart from all images; so do grains of all kinds, which then stay at rest; the same
+   wherever the border is, and between walls. */
+static void test_cell(void **state) {
+    (void)state;
+    static const dem2d_vec cells[3][2] = {{{1, 0}, {0, 1}}, {{1, 0}, {1.75, 1}}, {{1, 0}, {0, 0}}};
+    for (int k = 0; k < 3; k++) {
+        const dem2d_vec a = cells[k][0], b = cells[k][1];
+        crowd c = make_crowd(a, b, vec(0, 0), true), moved = make_crowd(a, b, vec(0.5, 0.25), true);
+        for (int wall = 0; wall < (k == 2 ? 2 : 0); wall++) {
+            add_plane(&c.s, 0, wall, 0, 1 - 2 * wall);
+            add_plane(&moved.s, 0, wall, 0, 1 - 2 * wall);
+        }
+        assert_true(least_distance(&c, a, b) < RADIUS); /* half of the discs overlap */
+        const dem2d_relaxation done = relax(&c.s, 1e-2, 300), other = relax(&moved.s, 1e-2, 300);
+        assert_int_equal(done.overlaps, 0);
+        assert_int_equal(other.sweeps, done.sweeps);
+        assert_int_equal(other.moved, done.moved);
+        assert_between(least_distance(&c, a, b), 2 * RADIUS - 1e-2 * RADIUS, 2 * RADIUS);
+        for (int i = 0; i < CROWD; i++) { /* up to cell vectors */
+            const dem2d_vec p = grain_of(&c.s, c.ids[i]).pose.position;
+            const dem2d_vec q = grain_of(&moved.s, moved.ids[i]).pose.position;
+            const double n = k == 2 ? 0 : floor(q.y - p.y + 0.5);
+            const double m = floor(q.x - p.x - n * b.x + 0.5);
+            assert_within(q.y - p.y - n, 0, 1e-9);
+            assert_within(q.x - p.x - n * b.x - m, 0, 1e-9);
+            assert_between(p.y, 0, 1);
+        }
+        step(&c.s, 50);
+        assert_true(fastest(&c.s) < 1);
+        close_scene(&c.s), close_scene(&moved.s);
+        c = make_crowd(a, b, vec(0, 0), false);
+        assert_int_equal(relax(&c.s, 1e-2, 300).overlaps, 0);
+        step(&c.s, 50);
+        assert_true(fastest(&c.s) < 1);
+        close_scene(&c.s);
+    }
+}
+
+/* A grain in a cell below its size can't leave its own images: no move, and they are told, each
+   pair once. Without memory for all of them nothing changes. */
+static void test_own_images(void **state) {
+    (void)state;
+    const dem2d_material_desc material = stone_desc(5e5, 0.3);
+    dem2d_world_desc desc = {0};
+    dem2d_relaxation done = {0};
+    test_env env;
+    test_env_init(&env);
+    desc.time_step = 1e-5, desc.env = &env.env;
+    desc.cell.a = vec(0.5 * RADIUS, 0), desc.cell.b = vec(0, 0.5 * RADIUS);
+    const scene s = open_scene(&desc, &material);
+    add_shape(&s, make_disc(RADIUS), DEM2D_FREE, vec(0, 0), 0, vec(0, 0), 0);
+    add_shape(&s, make_disc(RADIUS), DEM2D_FREE, vec(0.12 * RADIUS, 0), 0, vec(0, 0), 0);
+    const uint64_t before = dem2d_world_hash(s.world);
+    int fails = 0;
+    dem2d_result result = DEM2D_OUT_OF_MEMORY;
+    for (; result != DEM2D_OK; fails++) {
+        test_env_fail(&env, fails + 1);
+        result = dem2d_world_relax(s.world, 0.1, 0, &done);
+        assert_true(result == DEM2D_OK || result == DEM2D_OUT_OF_MEMORY);
+        assert_true(dem2d_world_hash(s.world) == before);
+        assert_true(inside_holds(s.world));
+    }
+    test_env_fail(&env, 0);
+    assert_true(fails > 5);
+    /* each of the two with half of its images, and the one with all of the other */
+    int pairs = 0;
+    for (int i = -5; i <= 5; i++)
+        for (int j = -5; j <= 5; j++)
+            for (int k = 0; k < 2; k++) {
+                const double d = hypot(0.5 * i + 0.12 * k, 0.5 * j);
+                if (2 - d > 0.1 && (k == 1 || i != 0 || j != 0)) pairs++;
+            }
+    assert_int_equal(done.overlaps, pairs);
+    assert_int_equal(done.moved, 0);
+    close_scene(&s);
+    assert_clean(&env);
+}
+
 int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(test_overlap_at), cmocka_unit_test(test_two),
         cmocka_unit_test(test_hundred),    cmocka_unit_test(test_bed),
         cmocka_unit_test(test_jammed),     cmocka_unit_test(test_ledger),
-        cmocka_unit_test(test_one_sided),
+        cmocka_unit_test(test_one_sided),  cmocka_unit_test(test_cell),
+        cmocka_unit_test(test_own_images),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }
