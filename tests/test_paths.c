@@ -1,6 +1,6 @@
-/* The passes over circles have several paths: in plain C99, or by vectors of four where the machine
-   has them; force pass and motion one after the other, or in turns. Each path gives the same bits,
-   whatever the scene has. */
+/* The passes over circles and the motion have several paths: in plain C99, or by vectors of four
+   where the machine has them; force pass and motion one after the other, or in turns. Each path
+   gives the same bits, whatever the scene has. */
 #include "dem2d.h"
 #include "inside.h"
 #include "testing.h"
@@ -8,7 +8,7 @@
 
 /* So many that there are several blocks of particles and of contacts, and that no batch is full at
    the end. */
-enum { COLUMNS = 19, GRAINS = 19 * 31 + 2, ROUNDS = 6, EVERY = 12 };
+enum { COLUMNS = 19, GRAINS = 19 * 31 + 2, ROUNDS = 6, EVERY = 12, SHAPES = 6 };
 
 /* What a scene has. */
 typedef struct feature {
@@ -34,6 +34,14 @@ static const feature features[] = {
     {"both dashpots, no friction", 0, 0.2, 0.3, 0, 0, false, false, false, false, false, -10, 0, 0},
     {"rolling dashpot alone", 0.4, 0, 0, 0, 0.2, false, false, false, false, false, -10, 0, 0},
     {"loads", 0.4, 0, 0, 0, 0, false, true, true, false, false, 0, 0, 0},
+};
+
+/* Of grains of several shapes. */
+static const feature grain_features[] = {
+    {"grains", 0.4, 0, 0, 0, 0, false, true, false, false, true, -10, 0.3, 0},
+    {"grains, two laws", 0.4, 0, 0, 0, 0, true, false, false, true, false, 0, 0, 0},
+    {"grains, all dashpots", 0.4, 0.2, 0.3, 0.1, 0.2, true, false, false, true, true, -10, 0, 0.5},
+    {"grains, frictionless", 0, 0, 0, 0, 0, false, false, false, false, false, -10, 0, 0},
 };
 
 static void add_material(dem2d_world *world, const feature *f, double stiffness,
@@ -75,13 +83,29 @@ static void add_walls(dem2d_world *world, const feature *f, dem2d_material_id ma
     assert_ok(dem2d_world_add_wall(world, &slope, &id));
 }
 
+/* A disc, and what else there is in scenes of grains. */
+static int add_shapes(dem2d_world *world, bool grains, dem2d_shape_id ids[SHAPES]) {
+    static const double a[] = {0.05, 0, 0.002, 0.001}, b[] = {0, 0, 0.001, 0};
+    static const double reach[4] = {0.05, 0.045, 0.053, 0.05};
+    const double turn = 2 * (double)TEST_PI / 7;
+    dem2d_vec corners[7];
+    for (int k = 0; k < 7; k++) corners[k] = vec(0.053 * cos(turn * k), 0.05 * sin(turn * k));
+    dem2d_shape *shapes[SHAPES] = {
+        make_disc(0.05),      make_ellipse(0.053, 0.045),      make_polygon(corners, 7, 0),
+        make_series(a, b, 3), make_polygon(corners, 5, 0.002), make_oval(reach, 0.55)};
+    for (int k = 0; k < SHAPES; k++) {
+        if (grains || k == 0) assert_ok(dem2d_world_add_shape(world, shapes[k], &ids[k]));
+        dem2d_shape_destroy(shapes[k]);
+    }
+    return grains ? SHAPES : 1;
+}
+
 /* Discs in rows that overlap a little, some of them where another one is; in random motion. */
-static dem2d_world *make_world(const feature *f, uint64_t *random, int *threads) {
+static dem2d_world *make_world(const feature *f, bool grains, uint64_t *random, int *threads) {
     dem2d_world_desc desc;
     dem2d_world *world;
     dem2d_material_id materials[2];
-    dem2d_shape *disc;
-    dem2d_shape_id shape;
+    dem2d_shape_id shapes[SHAPES];
     dem2d_particle_id id;
     memset(&desc, 0, sizeof desc);
     desc.time_step = 1e-4, desc.gravity.y = f->gravity;
@@ -91,20 +115,19 @@ static dem2d_world *make_world(const feature *f, uint64_t *random, int *threads)
     assert_ok(dem2d_world_create(&desc, &world));
     add_material(world, f, 1e6, &materials[0]);
     add_material(world, f, 3e5, &materials[1]);
-    assert_ok(dem2d_shape_create_circle(NULL, 0.05, &disc));
-    assert_ok(dem2d_world_add_shape(world, disc, &shape));
-    dem2d_shape_destroy(disc);
+    const int count = add_shapes(world, grains, shapes);
     add_walls(world, f, materials[0]);
     for (int i = 0; i < GRAINS; i++) {
         dem2d_particle_desc grain;
         memset(&grain, 0, sizeof grain);
-        grain.shape = shape, grain.material = materials[f->two_laws && i % 3 == 0];
-        grain.scale = random_between(random, 0.8, 1.05);
+        grain.shape = shapes[i % count], grain.material = materials[f->two_laws && i % 3 == 0];
+        grain.scale = random_between(random, 0.8, 1.05) * (grains ? 1.07 : 1);
         grain.position.x = 0.1 * (i % COLUMNS) + 0.05 + random_between(random, -0.01, 0.01);
         grain.position.y = 0.095 * (i / COLUMNS) + 0.045;
         if (i == 77) grain.position = vec(0.05, 0.045), grain.scale = 0.1; /* in the first one */
         grain.velocity = vec(random_between(random, -1, 1), random_between(random, -1, 1));
-        if (f->friction > 0) grain.angular_velocity = random_between(random, -30, 30);
+        const double spin = grains ? 80 : 30; /* above 55 they turn by more than a small angle */
+        if (f->friction > 0) grain.angular_velocity = random_between(random, -spin, spin);
         if (f->fixed && i % 7 == 0) grain.motion = DEM2D_FIXED, grain.velocity = vec(0, 0);
         if (grain.motion == DEM2D_FIXED) grain.angular_velocity = 0;
         if (i == 0) grain.position = vec(0.05, 0.045);
@@ -133,11 +156,11 @@ typedef struct path {
 static const path paths[] = {
     {"plain", false, false}, {"fours, two passes", true, true}, {"fours", true, false}};
 
-static void run(const feature *f, const path *p, uint64_t hashes[ROUNDS]) {
+static void run(const feature *f, bool grains, const path *p, uint64_t hashes[ROUNDS]) {
     uint64_t random = 5;
     int threads = 3;
     dem2d_stats stats;
-    dem2d_world *world = make_world(f, &random, &threads);
+    dem2d_world *world = make_world(f, grains, &random, &threads);
     inside_choose_fours(world, p->fours);
     inside_choose_two_passes(world, p->in_two);
     for (int round = 0; round < ROUNDS; round++) {
@@ -151,9 +174,9 @@ static void run(const feature *f, const path *p, uint64_t hashes[ROUNDS]) {
 }
 
 /* Returns whether it differs from the path in plain C99 pass by pass. */
-static bool differs(const feature *f, const path *p, const uint64_t expected[ROUNDS]) {
+static bool differs(const feature *f, bool grains, const path *p, const uint64_t expected[ROUNDS]) {
     uint64_t hashes[ROUNDS];
-    run(f, p, hashes);
+    run(f, grains, p, hashes);
     for (int round = 0; round < ROUNDS; round++) {
         if (hashes[round] == expected[round]) continue;
         print_error("%s, %s: another hash after %d steps\n", f->name, p->name, (round + 1) * EVERY);
@@ -162,16 +185,21 @@ static bool differs(const feature *f, const path *p, const uint64_t expected[ROU
     return false;
 }
 
-static void test_same_bits(void **state) {
+/* Returns how many of the paths differ. */
+static int compare(const feature *f, bool grains) {
     static const path simple = {"plain, two passes", false, true};
+    uint64_t expected[ROUNDS];
+    int differ = 0;
+    run(f, grains, &simple, expected);
+    for (int i = 0; i < COUNT_OF(paths); i++) differ += differs(f, grains, &paths[i], expected);
+    return differ;
+}
+
+static void test_same_bits(void **state) {
     int differ = 0;
     (void)state;
-    for (int k = 0; k < COUNT_OF(features); k++) {
-        uint64_t expected[ROUNDS];
-        run(&features[k], &simple, expected);
-        for (int i = 0; i < COUNT_OF(paths); i++)
-            differ += differs(&features[k], &paths[i], expected);
-    }
+    for (int k = 0; k < COUNT_OF(features); k++) differ += compare(&features[k], false);
+    for (int k = 0; k < COUNT_OF(grain_features); k++) differ += compare(&grain_features[k], true);
     assert_int_equal(differ, 0);
 }
 
