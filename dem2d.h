@@ -18629,6 +18629,18 @@ static DEM2DI_INLINE void dem2di_batch_fetch(const dem2di_state *now, const dem2
     }
 }
 
+/* What the terms of the law need of the two of each contact, from contact `from` of a batch on. */
+static DEM2DI_INLINE void dem2di_batch_inverse(const dem2di_inverse *inverse,
+                                               const dem2di_key *keys, int from,
+                                               dem2di_batch *batch) {
+    for (int k = from; k < batch->count; k++) {
+        const dem2di_inverse *a = &inverse[keys[k].a], *b = &inverse[keys[k].b];
+        batch->inverse[k] = a->mass + b->mass;
+        batch->inverse_a[k] = a->inertia;
+        batch->inverse_b[k] = b->inertia;
+    }
+}
+
 #if DEM2DI_FOURS
 DEM2DI_AVX2_INLINE dem2di_four dem2di_four_at(const double *from) {
     dem2di_four four;
@@ -18694,26 +18706,36 @@ DEM2DI_AVX2_INLINE void dem2di_fours_fetch(const dem2di_state *now, const dem2di
     }
     dem2di_batch_fetch(now, keys, k, true, batch);
 }
+
+/* dem2di_batch_inverse for all contacts, four at a time. */
+DEM2DI_AVX2_INLINE void dem2di_fours_inverse(const dem2di_inverse *inverse, const dem2di_key *keys,
+                                             dem2di_batch *batch) {
+    int k = 0;
+    for (; k + 4 <= batch->count; k += 4) {
+        dem2di_four rows[4];
+        for (int j = 0; j < 4; j++) {
+            const dem2di_inverse *a = &inverse[keys[k + j].a], *b = &inverse[keys[k + j].b];
+            rows[j] =
+                DEM2DI_SHUFFLE(dem2di_lanes_at(&a->mass), dem2di_lanes_at(&b->mass), 0, 1, 2, 3);
+        }
+        dem2di_four_turn(rows);
+        dem2di_four_put(batch->inverse + k, rows[0] + rows[2]);
+        dem2di_four_put(batch->inverse_a + k, rows[1]);
+        dem2di_four_put(batch->inverse_b + k, rows[3]);
+    }
+    dem2di_batch_inverse(inverse, keys, k, batch);
+}
 #endif
 
-/* What the terms of the law need of the two of each contact, and the laws where there are several.
- */
-static DEM2DI_INLINE void dem2di_batch_laws(const dem2d_world *world, int first,
-                                            dem2di_batch *batch) {
-    const dem2di_key *keys = world->list.keys + first;
-    const int terms = world->plan.terms;
-    for (int k = 0; k < batch->count && terms; k++) {
-        const dem2di_inverse *a = &world->inverse[keys[k].a], *b = &world->inverse[keys[k].b];
-        batch->inverse[k] = a->mass + b->mass;
-        if (!(terms & ~(DEM2DI_DASHPOT | DEM2DI_ROLLING))) continue;
-        batch->inverse_a[k] = a->inertia;
-        batch->inverse_b[k] = b->inertia;
-    }
-    for (int k = 0; k < batch->count && !world->plan.one_law; k++) {
-        const dem2d_pair_desc *law = dem2di_law_of(world, first + k);
+/* The laws of the contacts where there are several. */
+static void dem2di_batch_laws(const dem2d_world *world, int first, dem2di_batch *batch) {
+    const bool terms = world->plan.terms != 0;
+    for (int k = 0; k < batch->count; k++) {
+        const dem2d_pair_desc *law = dem2di_law_with(world, first + k, false);
         batch->kn[k] = law->normal_stiffness;
         batch->kt[k] = law->tangential_stiffness;
         batch->mu[k] = law->friction;
+        if (!terms) continue;
         batch->zeta[k] = law->damping_ratio;
         batch->mu_r[k] = law->rolling_friction;
         batch->zeta_t[k] = law->tangential_damping_ratio;
@@ -18988,7 +19010,7 @@ static void dem2di_batch_check(const dem2di_batch *batch, dem2di_count *count) {
 
 /* Beside the fetch: what few scenes have, between it and the law, and behind. */
 static void dem2di_batch_amend(const dem2d_world *world, int first, dem2di_batch *batch) {
-    dem2di_batch_laws(world, first, batch);
+    if (!world->plan.one_law) dem2di_batch_laws(world, first, batch);
     if (world->redirected) dem2di_batch_made(world, first, batch);
     if (world->immovable) dem2di_batch_hold(world, first, batch);
 }
@@ -19014,6 +19036,7 @@ static void dem2di_disc_range_plain(const dem2d_world *world, int begin, int end
             dem2di_batch_fetch(world->now, keys, 0, true, &batch);
         else
             dem2di_batch_fetch(world->now, keys, 0, false, &batch);
+        if (plan->terms != 0) dem2di_batch_inverse(world->inverse, keys, 0, &batch);
         dem2di_batch_amend(world, first, &batch);
         dem2di_batch_end(world, &batch,
                          dem2di_batch_solve_plain(&batch, world->made_step, law, plan), count);
@@ -19027,9 +19050,11 @@ static DEM2DI_AVX2 void dem2di_disc_range_fours(const dem2d_world *world, int be
     const dem2d_pair_desc *law = dem2di_law(world, plan->material, plan->material);
     dem2di_batch batch;
     for (int first = begin; first < end; first += DEM2DI_BATCH) {
+        const dem2di_key *keys = world->list.keys + first;
         dem2di_batch_begin(world, first, dem2di_block_end(first, DEM2DI_BATCH, end) - first,
                            &batch);
-        dem2di_fours_fetch(world->now, world->list.keys + first, &batch);
+        dem2di_fours_fetch(world->now, keys, &batch);
+        if (plan->terms != 0) dem2di_fours_inverse(world->inverse, keys, &batch);
         dem2di_batch_amend(world, first, &batch);
         dem2di_batch_end(world, &batch,
                          dem2di_batch_solve_fours(&batch, world->made_step, law, plan), count);
