@@ -17731,7 +17731,8 @@ static void dem2di_find_lost(const dem2di_build *build, dem2di_finds *finds) {
     int image = build->image_base + build->images;
     for (int i = build->all.strayed ? 0 : list->pairs; i < list->count; i++) {
         int a = list->keys[i].a, b = list->keys[i].b;
-        if (!(list->contacts.depth[i] > 0 || list->contacts.depth[i] < -1)) continue;
+        const double depth = list->contacts.depth[i];
+        if (!(depth > 0 || (i >= list->pairs && depth < -1))) continue; /* of pairs a gap */
         const dem2di_disc *one = dem2di_disc_at(build, a);
         if (i >= list->pairs) {
             if (!dem2di_number_is_near(world, one, b)) dem2di_find(finds, ~a, b);

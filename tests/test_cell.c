@@ -515,6 +515,27 @@ static void test_servo(void **state) {
     close_scene(&p.s);
 }
 
+/* Two discs in contact across the border that are more than a metre apart after the next step: a gap
+   of a pair is no passage of a wall, whatever the unit of length. */
+static void test_flung(void **state) {
+    (void)state;
+    const dem2d_material_desc soft = soft_desc(false);
+    dem2d_world_desc desc = {0};
+    desc.time_step = DT, desc.cell.a = vec(40, 0), desc.cell.b = vec(0, 40);
+    const scene s = open_scene(&desc, &soft);
+    const dem2d_shape_id disc = give_shape(&s, make_disc(0.5));
+    for (int i = 0; i < 2; i++) {
+        dem2d_particle_desc grain = grain_desc(&s, disc, 1, vec(i ? 39.6 : 0.5, 20));
+        grain.velocity.x = (i ? -3 : 3) / DT;
+        (void)add_grain(&s, &grain);
+    }
+    for (int k = 0; k < 4; k++) {
+        step(&s, 1);
+        assert_true(inside_holds(s.world));
+    }
+    close_scene(&s);
+}
+
 static void expect_refused_cell(dem2d_vec a, dem2d_vec b, const char *word) {
     test_env env;
     dem2d_world_desc desc = {0};
@@ -586,7 +607,7 @@ int main(void) {
         cmocka_unit_test(test_porosity),    cmocka_unit_test(test_grid),
         cmocka_unit_test(test_conserved),   cmocka_unit_test(test_edits),
         cmocka_unit_test(test_memory),      cmocka_unit_test(test_servo),
-        cmocka_unit_test(test_refused),
+        cmocka_unit_test(test_refused),     cmocka_unit_test(test_flung),
     };
     return cmocka_run_group_tests_name("periodic cell", tests, NULL, NULL);
 }
