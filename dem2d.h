@@ -2135,11 +2135,13 @@ DEM2D_API void dem2d_grid_destroy(dem2d_grid *grid);
 /// forces that no field has. The kinetic stress is that of the velocities less the mean velocity of
 /// all that was added to the cell; its trace over twice the density is the granular temperature.
 ///
-/// In a periodic cell the grid has to be periodic with the same periods; if b of the cell is
+/// In a periodic cell a grid gets the images of particles and contacts as well. Where it is
+/// periodic along a vector of the cell, the periods have to be the same; if b of the cell is
 /// oblique, with nx = 1. While the cell deforms, velocities are the fluctuations about its flow.
 ///
 /// Errors: NULL_ARGUMENT, NOT_FINITE, OUT_OF_RANGE (weight; a particle longer than a period; the
-/// periods of the world's cell are others).
+/// periods of the world's cell are others; the box is above 1024 cells of the world along x or y,
+/// or 2^28 away).
 DEM2D_API dem2d_result dem2d_grid_add(dem2d_grid *grid, const dem2d_world *world, double weight);
 /// Averages of all cells, row by row, the lowest row first, x fastest: the first `capacity` of them
 /// go into cells (may be NULL if capacity is 0); count gets nx ny. A profile across a line is a
@@ -2149,12 +2151,13 @@ DEM2D_API dem2d_result dem2d_grid_read(const dem2d_grid *grid, dem2d_average *ce
 /// Forget what was added. Errors: NULL_ARGUMENT.
 DEM2D_API dem2d_result dem2d_grid_reset(dem2d_grid *grid);
 /// Averages over a box, sharp: of the particles whose centres are in it, and of contacts by the
-/// part of the line between the centres that is in it. Errors: NOT_FINITE, OUT_OF_RANGE (upper not
-/// above lower; a world with a cell).
+/// part of the line between the centres that is in it. In a periodic cell images count as well.
+/// Errors: NOT_FINITE, OUT_OF_RANGE (upper not above lower; the box is above 1024 cells of the
+/// world along x or y, or 2^28 away).
 DEM2D_API dem2d_result dem2d_world_average_box(const dem2d_world *world, const dem2d_box *box,
                                                dem2d_average *average);
-/// The same over a circle with a radius > 0 (m). Errors: NOT_FINITE, OUT_OF_RANGE (radius; a world
-/// with a cell).
+/// The same over a circle with a radius > 0 (m). Errors: NOT_FINITE, OUT_OF_RANGE (radius; too many
+/// cells of the world, or too far).
 DEM2D_API dem2d_result dem2d_world_average_circle(const dem2d_world *world, dem2d_vec centre,
                                                   double radius, dem2d_average *average);
 
@@ -2432,9 +2435,12 @@ DEM2D_API dem2d_result dem2d_world_draw(const dem2d_world *world, const dem2d_dr
 DEM2D_API dem2d_result dem2d_world_grading(const dem2d_world *world, dem2d_measure measure,
                                            const double *sizes, int count, double *passing);
 
-/// Part of the plane: a box, or the inside of an outline.
+/// Part of the plane: a box, or the inside of an outline. In a periodic cell, a box whose upper and
+/// lower are the same along x or y is all of the cell along a or b: all zero, the whole cell. Along
+/// b alone only if b is upright. A region has at most 1024 cells along x and y and is less than
+/// 2^28 cells away.
 typedef struct dem2d_region {
-    dem2d_box box;           ///< m, upper above lower; not read if there are points
+    dem2d_box box;           ///< m, upper above lower, but see above; not read if there are points
     const dem2d_vec *points; ///< m, of an outline that does not cross itself, either way; or NULL
     int count;               ///< of points, >= 3
 } dem2d_region;
@@ -2494,13 +2500,17 @@ typedef struct dem2d_flow {
 } dem2d_flow;
 
 /// Remove the free particles whose centroids are in a region, and add them to flow (may be NULL).
-/// Errors: those of dem2d_outline_measure for the region's points, OUT_OF_RANGE (box).
+/// In a periodic cell images count as well. Errors: those of dem2d_outline_measure for the region's
+/// points, OUT_OF_RANGE (box, as in dem2d_region).
 DEM2D_API dem2d_result dem2d_world_remove_in(dem2d_world *world, const dem2d_region *region,
                                              dem2d_flow *flow);
 /// Add to flow the particles (no sensors) whose centroids have crossed the line from one point to
 /// another (m) in the last step: those that went to its left, less those that went to its right. To
 /// be called after each step, or at the start of each: in dem2d_world_desc.loads. What a caller has
-/// moved has not crossed. Errors: NOT_FINITE, OUT_OF_RANGE (the points are the same; in a cell).
+/// moved has not crossed. In a periodic cell images cross as well: a line from one border to the
+/// other sees each particle once. While the cell deforms they move with it, the line stands still.
+/// Errors: NOT_FINITE, OUT_OF_RANGE (the points are the same; a line above 1024 cells along x or y,
+/// or 2^28 away).
 DEM2D_API dem2d_result dem2d_world_flow(const dem2d_world *world, dem2d_vec from, dem2d_vec to,
                                         dem2d_flow *flow);
 
@@ -13953,6 +13963,32 @@ static bool dem2di_shifts_next(dem2di_shifts *at) {
     return false;
 }
 
+/* The image of the point that this shift makes. */
+static dem2d_vec dem2di_shifts_point(const dem2di_shifts *at) {
+    return dem2di_add(at->x, dem2di_cell_shift(at->cell, at->along_a, at->along_b));
+}
+
+/* Cells along a box at most: a million images of each particle. */
+#define DEM2DI_CELLS_ALONG 1024
+
+/* A box in which images are looked for: not too many, and none too far away for whole numbers. */
+static dem2d_result dem2di_check_cells(const dem2d_env *env, const char *name,
+                                       const dem2d_cell *cell, const dem2d_box *box) {
+    const double sizes[2] = {cell->a.x, cell->b.y};
+    const double low[2] = {box->lower.x - cell->origin.x, box->lower.y - cell->origin.y};
+    const double high[2] = {box->upper.x - cell->origin.x, box->upper.y - cell->origin.y};
+    for (int k = 0; k < 2; k++) {
+        const double far = dem2di_max(fabs(low[k]), fabs(high[k]));
+        if (!(sizes[k] > 0) || (high[k] - low[k] <= DEM2DI_CELLS_ALONG * sizes[k] &&
+                                far <= DEM2DI_CELLS_MOST / 4 * sizes[k]))
+            continue;
+        return dem2di_fail(env, DEM2D_OUT_OF_RANGE, -1,
+                           "%s: above %d cells along %c, or 2^28 cells away", name,
+                           DEM2DI_CELLS_ALONG, 'x' + k);
+    }
+    return DEM2D_OK;
+}
+
 /* --- rows of images ----------------------------------------------------------------------------
  */
 
@@ -23120,7 +23156,7 @@ DEM2D_API dem2d_result dem2d_world_inertial_number(const dem2d_world *world, dou
 
 /* ============================================================================================
    >>grids  Coarse-grained fields: averages over the cells of a grid, a box or a circle
-   uses: config, math, memory, fields, broad, law, world, objects, measures
+   uses: config, math, memory, fields, broad, law, world, cell, objects, measures
 
    A grid holds sums for each cell. What is added at a point or along a line is shared out among the
    cells of a window, the cells that its smoothing function reaches:
@@ -23130,6 +23166,9 @@ DEM2D_API dem2d_result dem2d_world_inertial_number(const dem2d_world *world, dou
      weights       products of these shares; for a line their mean along it
      sums          weights times mass, momentum, force and branch, ... -> cells
      averages      sums over total weight and area
+   In a periodic cell images are added like what they are of: those whose point or line is within
+   reach of the grid. A grid with the periods of the cell does without: its windows come round.
+
    The mean along a line is exact: between the places where the line passes the edge of a cell, less
    or plus the width, each share is a polynomial of degree 5 of the place on the line, the product
    of two has degree 10, and Gauss's rule of 6 points integrates degree 11. An average over a box is
@@ -23163,6 +23202,7 @@ struct dem2d_grid {
     double reach[2];          /* width in cells */
     double radius;            /* m, of a circle about the middle of the box; 0 of a grid */
     double weight;            /* sum of the weights */
+    dem2d_box reached;        /* m, of the plane: what is beyond it has no weight */
     dem2di_window windows[2]; /* columns and rows */
     double *shares[2];        /* of these */
     double *weights;          /* of the cells of the window, row by row */
@@ -23368,6 +23408,23 @@ static dem2di_coarse_cell *dem2di_coarse_cell_at(dem2d_grid *grid, int column, i
     return &grid->cells[(size_t)y * (size_t)grid->desc.nx + (size_t)x];
 }
 
+/* The cell vectors along which the grid needs images: not those that are periods of its own. */
+static dem2d_cell dem2di_coarse_images(const dem2d_grid *grid, const dem2d_world *world) {
+    dem2d_cell cell = world->cell_before;
+    if (grid->desc.periodic_x) cell.a = dem2di_vec(0, 0);
+    if (grid->desc.periodic_y) cell.b = dem2di_vec(0, 0);
+    return cell;
+}
+
+/* The images of a line from a point along b that may reach the grid; of length 0 for a point. */
+static dem2di_shifts dem2di_coarse_start(const dem2d_grid *grid, const dem2d_cell *cell,
+                                         dem2d_vec point, dem2d_vec b) {
+    dem2d_box box = grid->reached;
+    box.lower = dem2di_sub(box.lower, dem2di_vec(dem2di_max(b.x, 0), dem2di_max(b.y, 0)));
+    box.upper = dem2di_sub(box.upper, dem2di_vec(dem2di_min(b.x, 0), dem2di_min(b.y, 0)));
+    return dem2di_shifts_start(cell, point, &box);
+}
+
 /* What is added to the cells of a window. */
 typedef struct dem2di_addend {
     double number, mass, area;
@@ -23399,7 +23456,10 @@ static void dem2di_cell_add(dem2di_coarse_cell *cell, const dem2di_addend *a, do
     dem2di_tensor_add(&cell->fabric, w * a->contacts, a->normal, a->normal);
 }
 
-static void dem2di_coarse_add(dem2d_grid *grid, const dem2di_addend *a, double weight) {
+/* Add to the cells that a line from a point along b reaches, of length 0 for a point. */
+static void dem2di_coarse_add(dem2d_grid *grid, dem2d_vec point, dem2d_vec b,
+                              const dem2di_addend *a, double weight) {
+    if (!dem2di_coarse_weigh(grid, point, b)) return;
     int columns = grid->windows[0].count, rows = grid->windows[1].count;
     for (int j = 0; j < rows; j++)
         for (int i = 0; i < columns; i++) {
@@ -23416,26 +23476,29 @@ static bool dem2di_coarse_counts(const dem2d_grid *grid, const dem2d_world *worl
 }
 
 static void dem2di_coarse_add_particles(dem2d_grid *grid, const dem2d_world *world, double weight) {
+    const dem2d_cell cell = dem2di_coarse_images(grid, world);
+    const dem2d_vec none = {0, 0};
     dem2di_addend add;
     memset(&add, 0, sizeof add);
     add.number = 1;
     for (int place = 0, slot; (slot = dem2di_next_particle(world, &place)) >= 0;) {
         const dem2di_body *body = &world->bodies[slot];
-        if (!dem2di_coarse_counts(grid, world, slot) ||
-            !dem2di_coarse_weigh(grid, world->before[slot].x, dem2di_vec(0, 0)))
-            continue;
+        if (!dem2di_coarse_counts(grid, world, slot)) continue;
         add.mass = dem2di_body_mass(world, body);
         add.area = dem2di_body_area(world, body);
         add.velocity = dem2di_velocities_mean(world, slot).v;
-        dem2di_coarse_add(grid, &add, weight);
+        dem2di_shifts at = dem2di_coarse_start(grid, &cell, world->before[slot].x, none);
+        while (dem2di_shifts_next(&at))
+            dem2di_coarse_add(grid, dem2di_shifts_point(&at), none, &add, weight);
     }
 }
 
 /* A line along which a force is passed on: from a particle's centre to the other's, or to the
    contact point, where the boundary pushes the particle back. */
-static void dem2di_coarse_add_line(dem2d_grid *grid, dem2d_vec start, dem2d_vec branch,
-                                   dem2d_vec force, const dem2d_vec *normal, double weight) {
-    dem2di_addend add;
+static void dem2di_coarse_add_line(dem2d_grid *grid, const dem2d_cell *cell, dem2d_vec start,
+                                   dem2d_vec branch, dem2d_vec force, const dem2d_vec *normal,
+                                   double weight) {
+    dem2di_addend add, back;
     memset(&add, 0, sizeof add);
     add.branch = branch;
     add.force = force;
@@ -23443,15 +23506,19 @@ static void dem2di_coarse_add_line(dem2d_grid *grid, dem2d_vec start, dem2d_vec 
         add.contacts = 1;
         add.normal = *normal;
     }
-    if (dem2di_coarse_weigh(grid, start, branch)) dem2di_coarse_add(grid, &add, weight);
-    if (normal != NULL) return;
-    memset(&add, 0, sizeof add);
-    add.boundary = dem2di_negate(force);
-    if (dem2di_coarse_weigh(grid, dem2di_add(start, branch), dem2di_vec(0, 0)))
-        dem2di_coarse_add(grid, &add, weight);
+    memset(&back, 0, sizeof back);
+    back.boundary = dem2di_negate(force);
+    dem2di_shifts at = dem2di_coarse_start(grid, cell, start, branch);
+    while (dem2di_shifts_next(&at)) {
+        const dem2d_vec point = dem2di_shifts_point(&at);
+        dem2di_coarse_add(grid, point, branch, &add, weight);
+        if (normal != NULL) continue;
+        dem2di_coarse_add(grid, dem2di_add(point, branch), dem2di_vec(0, 0), &back, weight);
+    }
 }
 
 static void dem2di_coarse_add_contacts(dem2d_grid *grid, const dem2d_world *world, double weight) {
+    const dem2d_cell cell = dem2di_coarse_images(grid, world);
     dem2di_contact_iterator iterator = dem2di_contacts_start(false);
     while (dem2di_next_contact(world, &iterator)) {
         const dem2di_key *key = &world->list.keys[iterator.number];
@@ -23460,12 +23527,13 @@ static void dem2di_coarse_add_contacts(dem2d_grid *grid, const dem2d_world *worl
         bool a = dem2di_coarse_counts(grid, world, key->a);
         bool b = !iterator.walls && dem2di_coarse_counts(grid, world, key->b);
         if (a && b)
-            dem2di_coarse_add_line(grid, start, iterator.branch, force, &contact->normal, weight);
+            dem2di_coarse_add_line(grid, &cell, start, iterator.branch, force, &contact->normal,
+                                   weight);
         else if (a)
-            dem2di_coarse_add_line(grid, start, dem2di_arm_a(contact), force, NULL, weight);
+            dem2di_coarse_add_line(grid, &cell, start, dem2di_arm_a(contact), force, NULL, weight);
         else if (b)
-            dem2di_coarse_add_line(grid, dem2di_add(start, iterator.branch), dem2di_arm_b(contact),
-                                   dem2di_negate(force), NULL, weight);
+            dem2di_coarse_add_line(grid, &cell, dem2di_add(start, iterator.branch),
+                                   dem2di_arm_b(contact), dem2di_negate(force), NULL, weight);
     }
 }
 
@@ -23510,12 +23578,20 @@ static dem2d_average dem2di_coarse_average(const dem2d_grid *grid, int i) {
 
 /* Sides, reach and axes of a grid from its desc. */
 static void dem2di_coarse_measure(dem2d_grid *grid, const dem2d_grid_desc *desc) {
+    const dem2d_vec wide = dem2di_vec(desc->width_x, desc->width_y);
+    const dem2d_vec low = dem2di_sub(desc->box.lower, wide);
+    const dem2d_vec high = dem2di_add(desc->box.upper, wide);
+    dem2d_vec corners[4], size;
     grid->desc = *desc;
     grid->axes = dem2d_rot_make(desc->angle);
     grid->side.x = (desc->box.upper.x - desc->box.lower.x) / desc->nx;
     grid->side.y = (desc->box.upper.y - desc->box.lower.y) / desc->ny;
     grid->reach[0] = desc->width_x / grid->side.x;
     grid->reach[1] = desc->width_y / grid->side.y;
+    for (int k = 0; k < 4; k++)
+        corners[k] =
+            dem2di_turn(grid->axes, dem2di_vec(k & 1 ? high.x : low.x, k & 2 ? high.y : low.y));
+    grid->reached = dem2di_box_of(corners, 4, &size);
 }
 
 /* A smoothing function reaches over at most so many periods of a grid: beyond one the fields are
@@ -23606,27 +23682,22 @@ static bool dem2di_is_period(double low, double high, double period) {
     return fabs(high - low - period) <= DEM2DI_ROUNDOFF * (fabs(low) + fabs(high) + period);
 }
 
-/* A world that is periodic needs a grid with the same periods. Along an oblique vector an image is
-   moved along x as well: a single cell along x does not notice. */
+/* Is a grid that is periodic along vectors of the cell so in the same way? Along an oblique vector
+   an image is moved along x as well: a single cell along x does not notice. Elsewhere images have
+   to be in reach. */
 static dem2d_result dem2di_check_grid_cell(const dem2d_grid *grid, const dem2d_world *world) {
     const dem2d_cell *cell = &world->cell;
     const dem2d_grid_desc *desc = &grid->desc;
     const dem2d_vec low = desc->box.lower, high = desc->box.upper;
-    bool x = desc->periodic_x && dem2di_is_period(low.x, high.x, cell->a.x);
-    bool y = desc->periodic_y && dem2di_is_period(low.y, high.y, cell->b.y);
-    bool upright = cell->b.x == 0 || (cell->a.x > 0 && desc->nx == 1);
-    if (!world->periodic ||
-        (desc->angle == 0 && upright && (x || !(cell->a.x > 0)) && (y || !(cell->b.y > 0))))
-        return DEM2D_OK;
+    const bool x = desc->periodic_x && cell->a.x > 0, y = desc->periodic_y && cell->b.y > 0;
+    const bool fits = (!x || dem2di_is_period(low.x, high.x, cell->a.x)) &&
+                      (!y || dem2di_is_period(low.y, high.y, cell->b.y)) &&
+                      (!y || cell->b.x == 0 || (x && desc->nx == 1));
+    const dem2d_cell images = dem2di_coarse_images(grid, world);
+    if (fits && (desc->angle == 0 || !(x || y)))
+        return dem2di_check_cells(&grid->env, "box", &images, &grid->reached);
     return dem2di_fail(&grid->env, DEM2D_OUT_OF_RANGE, -1,
-                       "box: the grid does not have the periods of the world's cell");
-}
-
-/* A box or circle has no images of what is beyond the border. */
-static dem2d_result dem2di_check_no_cell(const dem2d_world *world) {
-    if (!world->periodic) return DEM2D_OK;
-    return dem2di_fail(&world->env, DEM2D_OUT_OF_RANGE, -1,
-                       "cell: averages over a box or a circle do not work in a periodic cell");
+                       "box: the periods of the grid are not those of the world's cell");
 }
 
 DEM2D_API dem2d_result dem2d_grid_add(dem2d_grid *grid, const dem2d_world *world, double weight) {
@@ -23652,12 +23723,14 @@ DEM2D_API dem2d_result dem2d_grid_read(const dem2d_grid *grid, dem2d_average *ce
 }
 
 /* Average of a world over a grid of one cell; the box has been checked. */
-static dem2d_average dem2di_average_one(const dem2d_world *world, const dem2d_box *box,
-                                        double radius) {
+static dem2d_result dem2di_average_one(const dem2d_world *world, const dem2d_box *box,
+                                       double radius, dem2d_average *average) {
     double share[2], weight;
     dem2di_coarse_cell cell;
     dem2d_grid grid;
     dem2d_grid_desc desc;
+    dem2d_result result = dem2di_check_cells(&world->env, "box", &world->cell_before, box);
+    if (result != DEM2D_OK) return result;
     memset(&cell, 0, sizeof cell);
     memset(&grid, 0, sizeof grid);
     memset(&desc, 0, sizeof desc);
@@ -23670,16 +23743,15 @@ static dem2d_average dem2di_average_one(const dem2d_world *world, const dem2d_bo
     grid.weights = &weight;
     grid.cells = &cell;
     dem2di_coarse_add_world(&grid, world, 1);
-    return dem2di_coarse_average(&grid, 0);
+    *average = dem2di_coarse_average(&grid, 0);
+    return DEM2D_OK;
 }
 
 DEM2D_API dem2d_result dem2d_world_average_box(const dem2d_world *world, const dem2d_box *box,
                                                dem2d_average *average) {
     if (world == NULL || box == NULL || average == NULL) return DEM2D_NULL_ARGUMENT;
     dem2d_result result = dem2di_check_region(&world->env, "box", box);
-    if (result == DEM2D_OK) result = dem2di_check_no_cell(world);
-    if (result == DEM2D_OK) *average = dem2di_average_one(world, box, 0);
-    return result;
+    return result == DEM2D_OK ? dem2di_average_one(world, box, 0, average) : result;
 }
 
 DEM2D_API dem2d_result dem2d_world_average_circle(const dem2d_world *world, dem2d_vec centre,
@@ -23688,15 +23760,13 @@ DEM2D_API dem2d_result dem2d_world_average_circle(const dem2d_world *world, dem2
     dem2d_result result = dem2di_check_vec(&world->env, "centre", centre);
     if (result == DEM2D_OK)
         result = dem2di_check_number(&world->env, "radius", radius, DEM2DI_POSITIVE);
-    if (result == DEM2D_OK) result = dem2di_check_no_cell(world);
     if (result != DEM2D_OK) return result;
     if (!(radius * radius >= DBL_MIN && dem2di_finite(4 * radius * radius)))
         return dem2di_fail(&world->env, DEM2D_OUT_OF_RANGE, -1, "radius = %g: no area", radius);
     dem2d_box box;
     box.lower = dem2di_sub(centre, dem2di_vec(radius, radius));
     box.upper = dem2di_add(centre, dem2di_vec(radius, radius));
-    *average = dem2di_average_one(world, &box, radius);
-    return DEM2D_OK;
+    return dem2di_average_one(world, &box, radius, average);
 }
 
 /* ============================================================================================
@@ -25910,47 +25980,73 @@ DEM2D_API dem2d_result dem2d_world_grading(const dem2d_world *world, dem2d_measu
 /* --- regions -----------------------------------------------------------------------------------
  */
 
-/* A region that has been checked: its bounding box and its area. */
+/* A region that has been checked: its bounding box and its area. Where the box is all of the cell
+   along x or along b, both of its ends are one place. If it is so along both, it is the rectangle
+   of the sides a.x and b.y, which has each place of the cell once, however much b leans. */
 typedef struct dem2di_area {
     const dem2d_vec *points; /* NULL: the box */
     int count;
     dem2d_box box;
+    bool all_x, all_y; /* of the cell */
     double area;
 } dem2di_area;
 
-static dem2d_result dem2di_area_make(const dem2d_env *env, const dem2d_region *region,
+/* A box without extent along a vector of the cell is all of the cell along it. */
+static dem2d_result dem2di_area_box(const dem2d_world *world, const dem2d_box *box,
+                                    dem2di_area *made) {
+    const dem2d_cell *cell = &world->cell;
+    dem2d_result result = dem2di_check_vec(&world->env, "region.box.lower", box->lower);
+    if (result == DEM2D_OK) result = dem2di_check_vec(&world->env, "region.box.upper", box->upper);
+    if (result != DEM2D_OK) return result;
+    made->box = *box;
+    made->all_x = cell->a.x > 0 && box->upper.x == box->lower.x;
+    made->all_y = cell->b.y > 0 && box->upper.y == box->lower.y;
+    if (made->all_x) {
+        made->box.lower.x = cell->origin.x;
+        made->box.upper.x = cell->origin.x + cell->a.x;
+    }
+    if (made->all_y) {
+        made->box.lower.y = cell->origin.y;
+        made->box.upper.y = cell->origin.y + cell->b.y;
+    }
+    if (made->all_y && !made->all_x && cell->b.x != 0)
+        return dem2di_fail(&world->env, DEM2D_OUT_OF_RANGE, -1,
+                           "region.box is all of the cell along b, which leans, but not along a");
+    dem2d_vec size = dem2di_sub(made->box.upper, made->box.lower);
+    made->area = size.x * size.y;
+    if (size.x > 0 && size.y > 0 && made->area > 0 && dem2di_finite(made->area)) return DEM2D_OK;
+    return dem2di_fail(&world->env, DEM2D_OUT_OF_RANGE, -1,
+                       "region.box.upper = (%.10g, %.10g) is not above lower = (%.10g, %.10g)",
+                       box->upper.x, box->upper.y, box->lower.x, box->lower.y);
+}
+
+static dem2d_result dem2di_area_make(const dem2d_world *world, const dem2d_region *region,
                                      dem2di_area *made) {
-    dem2d_vec size;
+    dem2d_result result;
     made->points = region->points;
     made->count = region->count;
-    made->box = region->box;
+    made->all_x = made->all_y = false;
     if (region->points != NULL) {
         dem2d_mass mass;
-        dem2d_result result =
-            dem2di_check_outline(env, "region.points", region->points, region->count, true, &mass);
+        dem2d_vec size;
+        result = dem2di_check_outline(&world->env, "region.points", region->points, region->count,
+                                      true, &mass);
         if (result != DEM2D_OK) return result;
         made->box = dem2di_box_of(region->points, region->count, &size);
         made->area = mass.area;
-        return DEM2D_OK;
+    } else {
+        result = dem2di_area_box(world, &region->box, made);
+        if (result != DEM2D_OK) return result;
     }
-    dem2d_result result = dem2di_check_vec(env, "region.box.lower", region->box.lower);
-    if (result == DEM2D_OK) result = dem2di_check_vec(env, "region.box.upper", region->box.upper);
-    if (result != DEM2D_OK) return result;
-    size = dem2di_sub(region->box.upper, region->box.lower);
-    made->area = size.x * size.y;
-    if (size.x > 0 && size.y > 0 && made->area > 0 && dem2di_finite(made->area)) return DEM2D_OK;
-    return dem2di_fail(env, DEM2D_OUT_OF_RANGE, -1,
-                       "region.box.upper = (%.10g, %.10g) is not above lower = (%.10g, %.10g)",
-                       region->box.upper.x, region->box.upper.y, region->box.lower.x,
-                       region->box.lower.y);
+    return dem2di_check_cells(&world->env, "region", &world->cell, &made->box);
 }
 
 /* Is a point in a region? By the even-odd rule, half of the boundary included. */
 static bool dem2di_area_has(const dem2di_area *area, dem2d_vec p) {
     const dem2d_box *box = &area->box;
     bool inside = false;
-    if (!(p.x >= box->lower.x && p.x <= box->upper.x && p.y >= box->lower.y && p.y <= box->upper.y))
-        return false;
+    if (!(area->all_x || (p.x >= box->lower.x && p.x <= box->upper.x))) return false;
+    if (!(area->all_y || (p.y >= box->lower.y && p.y <= box->upper.y))) return false;
     if (area->points == NULL) return true;
     dem2d_vec a = area->points[area->count - 1];
     for (int i = 0; i < area->count; i++) {
@@ -25962,10 +26058,33 @@ static bool dem2di_area_has(const dem2di_area *area, dem2d_vec p) {
     return inside;
 }
 
+/* Is a point in a region, or one of its images? */
+static bool dem2di_area_sees(const dem2di_area *area, const dem2d_cell *cell, dem2d_vec p) {
+    dem2di_shifts at = dem2di_shifts_start(cell, p, &area->box);
+    while (dem2di_shifts_next(&at))
+        if (dem2di_area_has(area, dem2di_shifts_point(&at))) return true;
+    return false;
+}
+
+/* A region that is filled has each place of the cell once. */
+static dem2d_result dem2di_check_once(const dem2d_world *world, const dem2di_area *area) {
+    const dem2d_vec size = dem2di_sub(area->box.upper, area->box.lower);
+    const double more = 1 + DEM2DI_ROUNDOFF; /* of upper less lower */
+    const double x = world->cell.a.x, y = world->cell.b.y;
+    if ((area->all_x || !(x > 0) || size.x <= x * more) &&
+        (area->all_y || !(y > 0) || size.y <= y * more))
+        return DEM2D_OK;
+    return dem2di_fail(&world->env, DEM2D_OUT_OF_RANGE, -1,
+                       "region of %g by %g is greater than the cell of %g by %g: for all of it a "
+                       "box has no extent",
+                       size.x, size.y, x, y);
+}
+
 /* --- places for grains -------------------------------------------------------------------------
    Grains that have a place are in a hash table of square cells. From level to level the cells have
    half the width, at least that of the bounding circles of their grains and the gap. A chain may
-   hold grains of other cells, too; to look at these does no harm. */
+   hold grains of other cells, too; to look at these does no harm. In a periodic cell the images of
+   a grain that tries a place look for grains where these are. */
 
 typedef struct dem2di_filler {
     dem2d_world *world;
@@ -26012,10 +26131,10 @@ static dem2di_cell dem2di_filler_cell(const dem2di_filler *filler, dem2d_vec poi
     return cell;
 }
 
-/* Is grain i nearer to grain k than the gap? */
-static bool dem2di_filler_near(const dem2di_filler *filler, int i, int k) {
+/* Is grain i, at a pose, nearer to grain k than the gap? */
+static bool dem2di_filler_near(const dem2di_filler *filler, int i, const dem2d_pose *pose, int k) {
     const dem2d_shape *a = dem2di_filler_shape(filler, i), *b = dem2di_filler_shape(filler, k);
-    dem2d_vec d = dem2di_sub(filler->poses[i].position, filler->poses[k].position);
+    dem2d_vec d = dem2di_sub(pose->position, filler->poses[k].position);
     double reach = dem2di_filler_radius(filler, i) + dem2di_filler_radius(filler, k) + filler->gap;
     dem2d_contact_desc desc;
     dem2d_contact contact;
@@ -26023,24 +26142,50 @@ static bool dem2di_filler_near(const dem2di_filler *filler, int i, int k) {
     if (a->type == DEM2D_CIRCLE && b->type == DEM2D_CIRCLE) return true;
     memset(&desc, 0, sizeof desc);
     desc.skip_points = true;
-    return dem2d_pair_contact(a, filler->poses[i], b, filler->poses[k], &desc, &contact) !=
-               DEM2D_OK ||
+    return dem2d_pair_contact(a, *pose, b, filler->poses[k], &desc, &contact) != DEM2D_OK ||
            contact.depth > -filler->gap;
 }
 
-/* Is grain i nearer than the gap to one that has a place? */
-static bool dem2di_filler_blocked(const dem2di_filler *filler, int i) {
-    dem2d_vec at = filler->poses[i].position;
+/* Is grain i, at a pose, nearer than the gap to one that has a place? */
+static bool dem2di_filler_hits(const dem2di_filler *filler, int i, const dem2d_pose *pose) {
     double reach = dem2di_filler_radius(filler, i) + filler->gap, size = filler->cell;
     for (int level = 0; level < DEM2DI_LEVELS; level++, size /= 2) {
         if (!(filler->levels >> level & 1)) continue;
         dem2d_vec wide = dem2di_vec(reach + size / 2, reach + size / 2);
-        dem2di_cell low = dem2di_filler_cell(filler, dem2di_sub(at, wide), size), cell;
-        dem2di_cell high = dem2di_filler_cell(filler, dem2di_add(at, wide), size);
+        dem2di_cell low = dem2di_filler_cell(filler, dem2di_sub(pose->position, wide), size), cell;
+        dem2di_cell high = dem2di_filler_cell(filler, dem2di_add(pose->position, wide), size);
         for (cell.y = low.y; cell.y <= high.y; cell.y++)
             for (cell.x = low.x; cell.x <= high.x; cell.x++)
                 for (int k = *dem2di_filler_head(filler, level, cell); k >= 0; k = filler->next[k])
-                    if (dem2di_filler_near(filler, i, k)) return true;
+                    if (dem2di_filler_near(filler, i, pose, k)) return true;
+    }
+    return false;
+}
+
+/* Shifts that put the centre of grain i into a box, or nearer to it than `reach`. */
+static dem2di_shifts dem2di_filler_images(const dem2di_filler *filler, int i, const dem2d_box *box,
+                                          double reach) {
+    dem2d_box wide;
+    wide.lower = dem2di_sub(box->lower, dem2di_vec(reach, reach));
+    wide.upper = dem2di_add(box->upper, dem2di_vec(reach, reach));
+    return dem2di_shifts_start(&filler->world->cell, filler->poses[i].position, &wide);
+}
+
+/* Is grain i, or one of its images, nearer than the gap to one that has a place, or to itself? */
+static bool dem2di_filler_blocked(const dem2di_filler *filler, int i) {
+    dem2d_pose image = filler->poses[i];
+    const dem2d_box own = {image.position, image.position};
+    double reach = dem2di_filler_radius(filler, i) + filler->gap;
+    dem2di_shifts at = dem2di_filler_images(filler, i, &filler->area.box, reach + filler->cell / 2);
+    while (dem2di_shifts_next(&at)) {
+        image.position = dem2di_shifts_point(&at);
+        if (dem2di_filler_hits(filler, i, &image)) return true;
+    }
+    at = dem2di_filler_images(filler, i, &own, 2 * reach);
+    while (dem2di_shifts_next(&at)) {
+        image.position = dem2di_shifts_point(&at);
+        if ((at.along_a != 0 || at.along_b != 0) && dem2di_filler_near(filler, i, &image, i))
+            return true;
     }
     return false;
 }
@@ -26123,36 +26268,47 @@ static double dem2di_between(double low, double high, double u) {
     return low + (high - low) * u;
 }
 
-/* Give grain i an angle, and where its centre may be so that its box is inside `room`. */
+/* Give grain i an angle, and where its centre may be so that its box is inside `room`; NULL: the
+   region. */
 static bool dem2di_filler_turn(dem2di_filler *filler, int i, const dem2d_box *room,
                                dem2d_box *centres) {
     const dem2d_particle_desc *grain = &filler->grains[i];
+    const dem2di_area *area = &filler->area;
+    const dem2d_box *outer = room != NULL ? room : &area->box;
     double more = filler->turned ? 2 * DEM2DI_PI * dem2di_random(&filler->random) : 0;
     dem2d_pose *pose = &filler->poses[i];
     dem2d_box own;
     *pose = dem2d_pose_make(0, 0, filler->turned ? more : grain->angle, grain->scale);
     if (dem2d_shape_aabb(dem2di_filler_shape(filler, i), *pose, &own) != DEM2D_OK) return false;
     dem2d_vec gap = dem2di_vec(filler->gap, filler->gap);
-    centres->lower = dem2di_add(dem2di_sub(room->lower, own.lower), gap);
-    centres->upper = dem2di_sub(dem2di_sub(room->upper, own.upper), gap);
-    double slack = DEM2DI_ROUNDOFF * (dem2di_size_of(room->lower) + dem2di_size_of(room->upper));
+    centres->lower = dem2di_add(dem2di_sub(outer->lower, own.lower), gap);
+    centres->upper = dem2di_sub(dem2di_sub(outer->upper, own.upper), gap);
+    if (room == NULL && area->all_x) {
+        centres->lower.x = area->box.lower.x;
+        centres->upper.x = area->box.upper.x;
+    }
+    if (room == NULL && area->all_y) {
+        centres->lower.y = area->box.lower.y;
+        centres->upper.y = area->box.upper.y;
+    }
+    double slack = DEM2DI_ROUNDOFF * (dem2di_size_of(outer->lower) + dem2di_size_of(outer->upper));
     return centres->lower.x <= centres->upper.x + slack &&
            centres->lower.y <= centres->upper.y + slack;
 }
 
-/* Try grain i at a random place with its box inside `room`. Without success its scale is 0. */
-static dem2d_result dem2di_filler_try(dem2di_filler *filler, int i, const dem2d_box *room,
-                                      bool crowded) {
+/* Try grain i at a random place with its box inside `room`, in which it is alone; NULL: inside the
+   region, with the grains that have a place. Without success its scale is 0. */
+static dem2d_result dem2di_filler_try(dem2di_filler *filler, int i, const dem2d_box *room) {
     dem2d_pose *pose = &filler->poses[i];
-    dem2d_box centres = *room;
+    dem2d_box centres = filler->area.box;
     bool meets = !dem2di_filler_turn(filler, i, room, &centres);
     double u = dem2di_random(&filler->random), v = dem2di_random(&filler->random);
     dem2d_result result = DEM2D_OK;
     pose->position.x = dem2di_between(centres.lower.x, centres.upper.x, u);
     pose->position.y = dem2di_between(centres.lower.y, centres.upper.y, v);
     filler->tries++;
-    meets =
-        meets || (crowded && dem2di_filler_blocked(filler, i)) || !dem2di_filler_inside(filler, i);
+    meets = meets || (room == NULL && dem2di_filler_blocked(filler, i)) ||
+            !dem2di_filler_inside(filler, i);
     if (!meets) result = dem2di_filler_meets(filler, i, &meets);
     if (meets || result != DEM2D_OK) pose->scale = 0;
     return result;
@@ -26174,7 +26330,7 @@ static dem2d_result dem2di_fill_random(dem2di_filler *filler, int tries) {
     for (int k = 0; k < filler->count && result == DEM2D_OK;) {
         int i = filler->order[k].value;
         if (filler->tries == most) break;
-        result = dem2di_filler_try(filler, i, &filler->area.box, true);
+        result = dem2di_filler_try(filler, i, NULL);
         if (!(filler->poses[i].scale > 0)) continue;
         dem2di_filler_put(filler, i);
         k++;
@@ -26189,15 +26345,21 @@ static dem2d_result dem2di_fill_random(dem2di_filler *filler, int tries) {
    blocked: no narrower one is tried. */
 #define DEM2DI_LATTICE_CELLS 100.0
 
+/* How far inside the border of the region a lattice ends: by half of the gap. */
+static dem2d_vec dem2di_filler_edge(const dem2di_filler *filler) {
+    double half = filler->gap / 2;
+    return dem2di_vec(filler->area.all_x ? 0 : half, filler->area.all_y ? 0 : half);
+}
+
 /* Grains in the cells of a lattice of columns by rows, row by row, within which they keep half of
    the gap; returns in *placed how many have found a place. */
 static dem2d_result dem2di_fill_cells(dem2di_filler *filler, int64_t columns, int64_t rows,
                                       int *placed) {
     const dem2d_box *box = &filler->area.box;
     double half = filler->gap / 2; /* cells overlap by the gap, which grains keep from each side */
-    dem2d_vec corner = dem2di_add(box->lower, dem2di_vec(half, half));
-    double x = (box->upper.x - box->lower.x - 2 * half) / (double)columns;
-    double y = (box->upper.y - box->lower.y - 2 * half) / (double)rows;
+    dem2d_vec edge = dem2di_filler_edge(filler), corner = dem2di_add(box->lower, edge);
+    double x = (box->upper.x - box->lower.x - 2 * edge.x) / (double)columns;
+    double y = (box->upper.y - box->lower.y - 2 * edge.y) / (double)rows;
     dem2d_result result = DEM2D_OK;
     int i = 0;
     for (int k = 0; k < filler->count; k++) filler->poses[k].scale = 0;
@@ -26208,7 +26370,7 @@ static dem2d_result dem2di_fill_cells(dem2di_filler *filler, int64_t columns, in
         room.upper =
             dem2di_vec(corner.x + x * (column + 1) + half, corner.y + y * (row + 1) + half);
         for (int k = 0; k < DEM2DI_LATTICE_TRIES && !(filler->poses[i].scale > 0); k++) {
-            result = dem2di_filler_try(filler, i, &room, false);
+            result = dem2di_filler_try(filler, i, &room);
             if (result != DEM2D_OK) return result;
         }
         if (filler->poses[i].scale > 0) i++;
@@ -26226,11 +26388,12 @@ static dem2d_result dem2di_fill_lattice(dem2di_filler *filler) {
     for (int i = 0; i < filler->count; i++)
         least = dem2di_max(least, 2 * dem2di_filler_radius(filler, i));
     least += filler->gap;
+    const dem2d_vec edge = dem2di_filler_edge(filler);
     double pitch = dem2di_max(least, sqrt(filler->area.area / filler->count));
     double most = DEM2DI_LATTICE_CELLS * filler->count * (width * (height / filler->area.area));
     for (int placed = 0; result == DEM2D_OK; pitch = dem2di_max(least, pitch * 0.97)) {
-        double columns = floor((width - filler->gap) / pitch * (1 + 4 * DBL_EPSILON));
-        double rows = floor((height - filler->gap) / pitch * (1 + 4 * DBL_EPSILON));
+        double columns = floor((width - 2 * edge.x) / pitch * (1 + 4 * DBL_EPSILON));
+        double rows = floor((height - 2 * edge.y) / pitch * (1 + 4 * DBL_EPSILON));
         if (columns >= 1 && rows >= 1)
             result = dem2di_fill_cells(filler, (int64_t)columns, (int64_t)rows, &placed);
         if (placed == filler->count || !(pitch > least) || columns * rows > most) break;
@@ -26386,7 +26549,8 @@ DEM2D_API dem2d_result dem2d_world_fill(dem2d_world *world, const dem2d_fill_des
     memset((void *)&filler, 0, sizeof filler);
     dem2d_result result = dem2di_check_fields(env, DEM2DI_ALL(dem2di_fill_fields), desc);
     if (result == DEM2D_OK) result = dem2di_check_room(world, "ids", ids, capacity);
-    if (result == DEM2D_OK) result = dem2di_area_make(env, &desc->region, &filler.area);
+    if (result == DEM2D_OK) result = dem2di_area_make(world, &desc->region, &filler.area);
+    if (result == DEM2D_OK) result = dem2di_check_once(world, &filler.area);
     if (result != DEM2D_OK) return result;
     if ((desc->grading == NULL) == (desc->grains == NULL))
         return dem2di_fail(env, DEM2D_NULL_ARGUMENT, -1, "grading or grains: one has to be NULL");
@@ -26431,11 +26595,11 @@ DEM2D_API dem2d_result dem2d_world_remove_in(dem2d_world *world, const dem2d_reg
     dem2di_area area;
     if (world == NULL) return DEM2D_NULL_ARGUMENT;
     if (region == NULL) return dem2di_fail_null(&world->env, "region");
-    dem2d_result result = dem2di_area_make(&world->env, region, &area);
+    dem2d_result result = dem2di_area_make(world, region, &area);
     for (int place = 0, slot;
          result == DEM2D_OK && (slot = dem2di_next_particle(world, &place)) >= 0;) {
         if (world->bodies[slot].motion != DEM2D_FREE) continue;
-        if (!dem2di_area_has(&area, world->now[slot].x)) continue;
+        if (!dem2di_area_sees(&area, &world->cell, world->now[slot].x)) continue;
         dem2di_flow_add(world, slot, 1, flow);
         result = dem2d_world_remove_particle(world, dem2di_particle_id(world, slot));
     }
@@ -26454,19 +26618,61 @@ static int dem2di_crossing(dem2d_vec from, dem2d_vec e, dem2d_vec before, dem2d_
     return left_now > 0 ? 1 : -1;
 }
 
+/* How many images of a particle have crossed the line from `from` along e, in its box. The image
+   at before + m a + n b, with the vectors of the cell before the step, is afterwards at now + (m +
+   lean n + out[0]) a + (n + out[1]) b: b has been replaced by b - lean a, and the particle has been
+   put back by as many cells as it was out. Both follow from where the flow alone takes it. It moves
+   what is at a distance d from the corner by at most 1.5 |L| dt d, and less than once more what the
+   particle moves besides: |L| dt is at most 0.1 sqrt(3). */
+static int dem2di_images_crossing(const dem2d_world *world, int slot, dem2d_vec from,
+                                  const dem2d_box *line, dem2d_vec e) {
+    const dem2d_cell *old = &world->cell_before, *cell = &world->cell;
+    const dem2d_vec before = world->before[slot].x, now = world->now[slot].x;
+    const dem2d_vec b = dem2di_flow_map(&world->flow_made, world->time_step, old->b);
+    const int lean = cell->a.x > 0 ? (int)floor((b.x - cell->b.x) / cell->a.x + 0.5) : 0;
+    const dem2di_fractions f = dem2di_fractions_make(cell);
+    dem2d_vec d =
+        dem2di_flow_map(&world->flow_made, world->time_step, dem2di_sub(before, old->origin));
+    d = dem2di_sub(dem2di_add(d, old->origin), now);
+    const double up = floor(d.y * f.per_y + 0.5);
+    const double along = floor(d.x * f.per_x - d.y * f.per_y * f.slope + 0.5);
+    const int out[2] = {(int)along, (int)up};
+    d = dem2di_sub(d, dem2di_cell_shift(cell, out[0], out[1]));
+    const double size = dem2di_size_of(dem2di_sub(line->lower, old->origin)) +
+                        dem2di_size_of(dem2di_sub(line->upper, old->origin));
+    const double flow = dem2di_flow_size(&world->flow_made) * world->time_step;
+    const double reach = 1.5 * (flow * size + dem2di_size_of(d));
+    dem2d_box box;
+    box.lower = dem2di_sub(line->lower, dem2di_vec(reach, reach));
+    box.upper = dem2di_add(line->upper, dem2di_vec(reach, reach));
+    dem2di_shifts at = dem2di_shifts_start(old, before, &box);
+    int sum = 0;
+    while (dem2di_shifts_next(&at)) {
+        const dem2d_vec way =
+            dem2di_cell_shift(cell, at.along_a + lean * at.along_b + out[0], at.along_b + out[1]);
+        sum += dem2di_crossing(from, e, dem2di_shifts_point(&at), dem2di_add(now, way));
+    }
+    return sum;
+}
+
 DEM2D_API dem2d_result dem2d_world_flow(const dem2d_world *world, dem2d_vec from, dem2d_vec to,
                                         dem2d_flow *flow) {
     if (world == NULL || flow == NULL) return DEM2D_NULL_ARGUMENT;
     dem2d_result result = dem2di_check_vec(&world->env, "from", from);
     if (result == DEM2D_OK) result = dem2di_check_vec(&world->env, "to", to);
     if (result != DEM2D_OK) return result;
-    if (world->periodic) return dem2di_fail(&world->env, DEM2D_OUT_OF_RANGE, -1, "flow in a cell");
-    dem2d_vec e = dem2di_sub(to, from);
+    const dem2d_vec e = dem2di_sub(to, from), ends[2] = {from, to};
+    dem2d_vec size;
+    const dem2d_box line = dem2di_box_of(ends, 2, &size);
+    result = dem2di_check_cells(&world->env, "line", &world->cell, &line);
+    if (result != DEM2D_OK) return result;
     if (!(dem2di_dot(e, e) > 0 && dem2di_finite(dem2di_dot(e, e))))
         return dem2di_fail(&world->env, DEM2D_OUT_OF_RANGE, -1,
                            "from (%g, %g) to (%g, %g) is no line", from.x, from.y, to.x, to.y);
     for (int place = 0, slot; (slot = dem2di_next_grain(world, &place)) >= 0;) {
-        int sign = dem2di_crossing(from, e, world->before[slot].x, world->now[slot].x);
+        int sign = world->periodic
+                       ? dem2di_images_crossing(world, slot, from, &line, e)
+                       : dem2di_crossing(from, e, world->before[slot].x, world->now[slot].x);
         if (sign != 0) dem2di_flow_add(world, slot, sign, flow);
     }
     return DEM2D_OK;
@@ -26564,7 +26770,7 @@ static dem2d_result dem2di_feed_place(dem2di_filler *filler, dem2di_feed *feed, 
             v->y += desc->spread * dem2d_random_normal(&filler->random);
         }
         for (int k = 0; k < tries && !(filler->poses[i].scale > 0); k++) {
-            result = dem2di_filler_try(filler, i, &filler->area.box, true);
+            result = dem2di_filler_try(filler, i, NULL);
             if (result != DEM2D_OK) return result;
         }
         if (!(filler->poses[i].scale > 0)) return DEM2D_OK;
@@ -26627,7 +26833,8 @@ DEM2D_API dem2d_result dem2d_world_feed(dem2d_world *world, const dem2d_inlet_de
     const dem2d_env *env = &world->env;
     memset((void *)&filler, 0, sizeof filler);
     dem2d_result result = dem2di_feed_check(env, desc, seconds, inlet);
-    if (result == DEM2D_OK) result = dem2di_area_make(env, &desc->region, &filler.area);
+    if (result == DEM2D_OK) result = dem2di_area_make(world, &desc->region, &filler.area);
+    if (result == DEM2D_OK) result = dem2di_check_once(world, &filler.area);
     if (result == DEM2D_OK) result = dem2di_curve_make(world, desc->grading, &feed.curve);
     if (result != DEM2D_OK) return result;
     feed.desc = desc;

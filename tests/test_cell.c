@@ -338,8 +338,8 @@ static void test_porosity(void **state) {
     close_scene(&p.s);
 }
 
-/* A grid with the periods of the cell has its sums, and the contacts across the border; others are
-   refused. */
+/* A grid with the periods of the cell has its sums, and the contacts across the border, also when
+   along x it gets the images; other periods are refused. */
 static void test_grid(void **state) {
     (void)state;
     const dem2d_material_desc soft = soft_desc(false);
@@ -364,15 +364,15 @@ static void test_grid(void **state) {
         if (k == 2) made.box.upper.x = 3.4;
         if (k == 3) made.angle = 0.1;
         assert_ok(dem2d_grid_create(NULL, &made, &grid));
-        assert_result(dem2d_grid_add(grid, s.world, 1), k == 0 ? DEM2D_OK : DEM2D_OUT_OF_RANGE);
+        assert_result(dem2d_grid_add(grid, s.world, 1), k < 2 ? DEM2D_OK : DEM2D_OUT_OF_RANGE);
         assert_ok(dem2d_grid_read(grid, cells, 6, &count));
         double mass = 0, xx = 0, yy = 0;
         for (int i = 0; i < count; i++)
             mass += cells[i].density * 2, xx += cells[i].contact.xx / 6,
                 yy += cells[i].contact.yy / 6;
-        if (k == 0) assert_near(mass, 12 * 4 * 0.51 * 0.51, 1e-12);
-        if (k == 0) assert_near(xx, stress.xx, 1e-12);
-        if (k == 0) assert_near(yy, stress.yy, 1e-12);
+        if (k < 2) assert_near(mass, 12 * 4 * 0.51 * 0.51, 1e-12);
+        if (k < 2) assert_near(xx, stress.xx, 1e-12);
+        if (k < 2) assert_near(yy, stress.yy, 1e-12);
         dem2d_grid_destroy(grid);
     }
     close_scene(&s);
@@ -587,11 +587,6 @@ static void test_refused(void **state) {
         far.position = vec(0.5, 0.5);
         id = add_grain(&s, &far);
         assert_result(dem2d_world_move_particle(s.world, id, vec(1e10, 1e10), 0),
-                      DEM2D_OUT_OF_RANGE);
-        const dem2d_box box = {{0, 0}, {1, 1}};
-        dem2d_average average;
-        assert_result(dem2d_world_average_box(s.world, &box, &average), DEM2D_OUT_OF_RANGE);
-        assert_result(dem2d_world_average_circle(s.world, vec(0, 0), 1, &average),
                       DEM2D_OUT_OF_RANGE);
         assert_true(inside_holds(s.world));
         close_scene(&s);

@@ -725,6 +725,114 @@ static void test_flow(void **state) {
     close_scene(&b.s);
 }
 
+/* Whole numbers passed on the way from one place to another. */
+static int64_t passed(double from, double to) {
+    return (int64_t)(floor(to) - floor(from));
+}
+
+/* A gas in a cell: across a line from border to border each disc counts as often as its path in
+   units of the cell, without wraps, has passed a whole number. The cell stands still (0), is
+   sheared until its second vector is replaced (1), is extended and compressed (2). Parts of the
+   line add up to all of it; a line of three cells counts three times. */
+static void test_flow_in_cell(void **state) {
+    enum { DISCS = 30, STEPS = 1500 };
+    (void)state;
+    for (int k = 0; k < 3; k++) {
+        const dem2d_material_desc stone = material_desc(2700, 1e4, 0, 0);
+        const dem2d_deformation_desc deform = {
+            .xy = k == 1 ? 1.1 : 0, .xx = k == 2 ? 0.2 : 0, .yy = k == 2 ? -0.2 : 0};
+        dem2d_world_desc desc = {0};
+        dem2d_particle_id ids[DISCS];
+        dem2d_vec place[DISCS];
+        dem2d_cell_info info;
+        dem2d_flow up = {0}, parts = {0}, three = {0}, left = {0};
+        int64_t ups = 0, lefts = 0, all = 0;
+        uint64_t random = 3;
+        desc.time_step = 1e-3, desc.cell.a = vec(1, 0), desc.cell.b = vec(0, 0.7);
+        desc.cell.origin = vec(0.3, -0.2);
+        scene s = open_scene(&desc, &stone);
+        const dem2d_shape_id disc = give_shape(&s, make_disc(0.004));
+        for (int i = 0; i < DISCS; i++) {
+            dem2d_particle_desc g = grain_desc(&s, disc, 1, vec(0, 0));
+            g.position.x = dem2d_random_uniform(&random),
+            g.position.y = dem2d_random_uniform(&random);
+            g.velocity.x = 1 + 3 * dem2d_random_normal(&random);
+            g.velocity.y = 1 + 3 * dem2d_random_normal(&random);
+            ids[i] = add_grain(&s, &g);
+            place[i] = grain_of(&s, ids[i]).pose.position;
+        }
+        assert_ok(dem2d_world_deform(s.world, &deform));
+        assert_ok(dem2d_world_get_cell(s.world, &info));
+        for (int n = 0; n < STEPS; n++) {
+            const dem2d_cell old = info.cell;
+            const double high = 0.1, far = 0.77;
+            step(&s, 1);
+            assert_ok(dem2d_world_get_cell(s.world, &info));
+            const dem2d_vec a = info.cell.a, b = info.cell.b, o = old.origin;
+            const dem2d_vec start = vec(0.3, high), end = vec(0.3 + a.x, high);
+            const dem2d_vec middle = vec(0.3 + 0.4 * a.x, high);
+            assert_ok(dem2d_world_flow(s.world, start, end, &up));
+            assert_ok(dem2d_world_flow(s.world, start, middle, &parts));
+            assert_ok(dem2d_world_flow(s.world, middle, end, &parts));
+            assert_ok(dem2d_world_flow(s.world, vec(-8, high), vec(-8 + 3 * a.x, high), &three));
+            assert_ok(dem2d_world_flow(s.world, vec(far, 5), vec(far, 5 + b.y), &left));
+            for (int i = 0; i < DISCS; i++) {
+                const dem2d_vec now = grain_of(&s, ids[i]).pose.position;
+                const double t0 = (place[i].y - o.y) / old.b.y, s0 = (place[i].x - o.x) / old.a.x;
+                double t = (now.y - o.y) / b.y, along = (now.x - o.x) / a.x;
+                t -= rint(t - t0), along -= rint(along - s0);
+                const int64_t over = passed(t0 - (high - o.y) / old.b.y, t - (high - o.y) / b.y);
+                ups += over, all += llabs(over);
+                lefts -= passed(s0 - (far - o.x) / old.a.x, along - (far - o.x) / a.x);
+                place[i] = now;
+            }
+        }
+        assert_true(k != 1 || info.cell.b.x < 0.4);
+        assert_true(all > 100 && ups != 0);
+        assert_int_equal(up.count, ups);
+        assert_near(up.mass, (double)ups * 2700 * (double)TEST_PI * 1.6e-5, 1e-12);
+        assert_int_equal(parts.count, ups);
+        assert_int_equal(three.count, 3 * ups);
+        if (k != 1) assert_int_equal(left.count, lefts); /* b leans */
+        assert_result(dem2d_world_flow(s.world, vec(0, 0), vec(0, 1e4), &up), DEM2D_OUT_OF_RANGE);
+        assert_ok(dem2d_world_move_particle(s.world, ids[0], vec(0.5, 50), 0));
+        up.count = 0;
+        assert_ok(dem2d_world_flow(s.world, vec(0.3, 10), vec(0.31, 10), &up));
+        assert_true(up.count <= 1);
+        close_scene(&s);
+    }
+}
+
+/* An outlet in a cell sees images: a box across the border, all of the cell along one vector, or
+   along both. */
+static void test_outlet_in_cell(void **state) {
+    static const dem2d_vec at[4] = {{0.05, 0.5}, {0.95, 0.5}, {0.5, 0.1}, {0.5, 0.9}};
+    static const struct {
+        dem2d_box box;
+        int count;
+    } cases[] = {{{{0.9, 0.4}, {1.1, 0.6}}, 2},  {{{-0.1, 2.4}, {0, 2.6}}, 1},
+                 {{{0, 0.4}, {0, 0.6}}, 2},      {{{0.4, 0}, {0.6, 0}}, 2},
+                 {{{0, 0}, {0, 0}}, 4},          {{{-3, -3}, {9, 9}}, 4},
+                 {{{0.1, 0.15}, {0.9, 0.85}}, 0}};
+    (void)state;
+    for (int k = 0; k < COUNT_OF(cases); k++) {
+        const dem2d_material_desc stone = stone_desc(1e6, 0);
+        const dem2d_region region = {.box = cases[k].box};
+        dem2d_world_desc desc = {0};
+        dem2d_flow out = {0};
+        desc.time_step = 1e-3, desc.cell.a = vec(1, 0), desc.cell.b = vec(0, 1);
+        scene s = open_scene(&desc, &stone);
+        const dem2d_shape_id disc = give_shape(&s, make_disc(0.004));
+        for (int i = 0; i < 4; i++) {
+            const dem2d_particle_desc g = grain_desc(&s, disc, 1, at[i]);
+            add_grain(&s, &g);
+        }
+        assert_ok(dem2d_world_remove_in(s.world, &region, &out));
+        assert_int_equal(out.count, cases[k].count);
+        close_scene(&s);
+    }
+}
+
 int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(test_uniform),
@@ -741,6 +849,8 @@ int main(void) {
         cmocka_unit_test(test_inlet),
         cmocka_unit_test(test_inlet_behind),
         cmocka_unit_test(test_flow),
+        cmocka_unit_test(test_flow_in_cell),
+        cmocka_unit_test(test_outlet_in_cell),
         cmocka_unit_test(test_inlet_velocities),
     };
     return cmocka_run_group_tests_name("generators", tests, NULL, NULL);

@@ -795,6 +795,85 @@ static void test_whole(void **state) {
     close_scene(&s);
 }
 
+/* --- images in a periodic cell --------------------------------------------------------------- */
+
+/* Nine grains in an oblique cell, one of them fixed, or with copies by hand in the cells around. */
+static scene make_images(bool cell) {
+    const dem2d_vec a = vec(0.6, 0), b = vec(0.2, 0.5);
+    const dem2d_material_desc stone = stone_desc(5e6, 0.4);
+    const int around = cell ? 0 : 5;
+    dem2d_world_desc desc;
+    memset(&desc, 0, sizeof desc);
+    desc.time_step = 1e-4, desc.skip_time_step_check = true;
+    if (cell) desc.cell.a = a, desc.cell.b = b;
+    const scene s = open_scene(&desc, &stone);
+    const dem2d_shape_id shapes[2] = {give_shape(&s, make_disc(0.11)),
+                                      give_shape(&s, make_ellipse(0.13, 0.09))};
+    for (int i = 0; i < 9; i++)
+        for (int n = -around; n <= around; n++)
+            for (int m = -around; m <= around; m++) {
+                dem2d_particle_desc g = grain_desc(&s, shapes[i % 2], 1, vec(0, 0));
+                g.position.x = 0.21 * (i % 3) + 0.07 * (i / 3) + m * a.x + n * b.x;
+                g.position.y = 0.17 * (i / 3) + 0.01 * (i % 2) + n * b.y;
+                g.motion = i == 4 ? DEM2D_FIXED : DEM2D_FREE;
+                if (i != 4) g.velocity = vec(0.3 * (i - 2), 0.2 - 0.1 * i);
+                (void)add_grain(&s, &g);
+            }
+    step(&s, 1);
+    return s;
+}
+
+/* To 1e-9: the search finds depths of ellipses to about 1e-11 of their size, and they overlap by
+   some hundredths of it. */
+static void check_same(const dem2d_average *a, const dem2d_average *b, int count) {
+    double most[sizeof *a / sizeof(double)] = {0};
+    for (int pass = 0; pass < 2; pass++)
+        for (int i = 0; i < count; i++)
+            for (size_t k = 0; k < COUNT_OF(most); k++) {
+                double one, other;
+                memcpy(&one, (const char *)&a[i] + k * sizeof one, sizeof one);
+                memcpy(&other, (const char *)&b[i] + k * sizeof other, sizeof other);
+                if (pass == 0) most[k] = fmax(most[k], fabs(other));
+                if (pass == 1) assert_within(one, other, 1e-9L * most[k]);
+            }
+    assert_true(most[COUNT_OF(most) - 1] > 0); /* contacts */
+}
+
+/* In a cell a box, a circle and a grid, also one that is greater than the cell or turned, or has
+   the period of the cell along x alone, get what they get from copies by hand. */
+static void test_images(void **state) {
+    (void)state;
+    const scene cell = make_images(true), copies = make_images(false);
+    static const dem2d_box boxes[3] = {
+        {{-0.75, -0.3}, {0.8, 0.6}}, {{0.5, 0.4}, {0.75, 0.65}}, {{0.1, 0.1}, {0.4, 0.35}}};
+    dem2d_average a, b;
+    for (int i = 0; i < 3; i++) {
+        assert_ok(dem2d_world_average_box(cell.world, &boxes[i], &a));
+        assert_ok(dem2d_world_average_box(copies.world, &boxes[i], &b));
+        check_same(&a, &b, 1);
+        const dem2d_vec centre = boxes[i].upper;
+        assert_ok(dem2d_world_average_circle(cell.world, centre, 0.25 * (i + 1), &a));
+        assert_ok(dem2d_world_average_circle(copies.world, centre, 0.25 * (i + 1), &b));
+        check_same(&a, &b, 1);
+        dem2d_grid_desc d = {0};
+        d.nx = 3, d.ny = 4, d.box = boxes[i], d.angle = 0.3 * i;
+        d.width_x = 0.05 * i, d.width_y = i == 2 ? 0.7 : 0.03;
+        const int count = fields_of(&cell, &d, cells);
+        (void)fields_of(&copies, &d, others);
+        check_same(cells, others, count);
+    }
+    dem2d_grid_desc d = {0};
+    d.nx = 3, d.ny = 4, d.box.lower = vec(0.1, -0.2), d.box.upper = vec(0.7, 0.9), d.width_y = 0.2;
+    (void)fields_of(&copies, &d, others);
+    d.periodic_x = true;
+    check_same(cells, others, fields_of(&cell, &d, cells));
+    const dem2d_box long_box = {{0, 0}, {700, 1}}, far_box = {{0, 3e8}, {1, 3e8 + 1}};
+    assert_result(dem2d_world_average_box(cell.world, &long_box, &a), DEM2D_OUT_OF_RANGE);
+    assert_result(dem2d_world_average_box(cell.world, &far_box, &a), DEM2D_OUT_OF_RANGE);
+    assert_result(dem2d_world_average_circle(cell.world, vec(0, 0), 400, &a), DEM2D_OUT_OF_RANGE);
+    close_scene(&cell), close_scene(&copies);
+}
+
 /* --- what changes nothing -------------------------------------------------------------------- */
 
 /* Adding a world changes neither it nor what comes of it; the bits of the fields do not depend on
@@ -924,6 +1003,7 @@ int main(void) {
         cmocka_unit_test(test_turned),       cmocka_unit_test(test_oblique),
         cmocka_unit_test(test_sheared),      cmocka_unit_test(test_joints),
         cmocka_unit_test(test_files),        cmocka_unit_test(test_refused),
+        cmocka_unit_test(test_images),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }
