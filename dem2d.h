@@ -312,6 +312,7 @@ HOW TO
     deform a cell        dem2d_world_deform: shear and compression at given rates, or at stresses
                          that are held, changed at any time; from a gas to a packing: hold xx and
                          yy. Then dem2d_world_get_cell for the cell, its rates and its stress.
+                         dem2d_world_grow packs grains in a cell that keeps its shape.
     share a scene        Each world holds its own grains, and copies (ghosts) of the others' grains
       out to processes   within reach, with the same names. dem2d_world_desc.gather gives each ghost
                          the force that its owner has found: the worlds then move like one, to the
@@ -339,7 +340,8 @@ HOW TO
     draw a sample        dem2d_world_draw: sizes by a grading curve, log-normal or Fuller's law,
                          shapes and materials by shares. dem2d_world_grading: the curve of a world.
     fill a region        dem2d_world_fill: a box or the inside of an outline, with grains of a
-                         grading or of yours, on a lattice or by random sequential addition.
+                         grading or of yours, on a lattice or by random sequential addition. A box
+                         without extent is all of a periodic cell.
     pack grains          dem2d_world_fill loosely, then dem2d_world_grow: sizes grow while the world
                          steps, to a stress or a solid fraction; friction 0 for dense packings.
     put grains in over   dem2d_world_feed: a rate of mass or number in a region, with velocities.
@@ -2464,7 +2466,7 @@ typedef struct dem2d_fill_desc {
     /// 0 to 1, area of the grains over that of the region; of a grading only. If the count is given
     /// as well, all sizes are multiplied by one factor so that both hold.
     double solid_fraction;
-    dem2d_region region;      ///< m, all of each grain is inside
+    dem2d_region region;      ///< m, all of each grain is inside, but where it is all of a cell
     dem2d_fill_method method; ///< lattice or random
     double gap;               ///< m, >= 0, least distance of all things, and from the border
     int tries;                ///< for RANDOM, of all grains, per grain, 0 to 2^30; 0 for 1000
@@ -2482,12 +2484,13 @@ typedef struct dem2d_filling {
 } dem2d_filling;
 
 /// Add grains to a world, in a region, without overlaps with each other, with particles and with
-/// walls that they meet: contacts are evaluated exactly. All grains are added, or none
-/// (NOT_REACHED, the log tells the number and the solid fraction that were reached), unless
-/// desc->partial. ids (may be NULL if capacity is 0) gets the first `capacity` ids, in the order of
-/// the grains given or drawn; generation 0 for a grain that found no room. Errors: also those of
-/// dem2d_world_add_particle, of dem2d_world_draw, and of dem2d_outline_measure; OUT_OF_RANGE in a
-/// periodic cell.
+/// walls that they meet, in a periodic cell also with images: contacts are evaluated exactly. All
+/// grains are added, or none (NOT_REACHED, the log tells the number and the solid fraction that
+/// were reached), unless desc->partial. ids (may be NULL if capacity is 0) gets the first
+/// `capacity` ids, in the order of the grains given or drawn; generation 0 for a grain that found
+/// no room. Errors: also those of dem2d_world_add_particle, of dem2d_world_draw, and of
+/// dem2d_outline_measure; OUT_OF_RANGE (a region that is greater than the periodic cell along x or
+/// y).
 DEM2D_API dem2d_result dem2d_world_fill(dem2d_world *world, const dem2d_fill_desc *desc,
                                         dem2d_particle_id *ids, int capacity,
                                         dem2d_filling *filling);
@@ -2517,7 +2520,7 @@ DEM2D_API dem2d_result dem2d_world_flow(const dem2d_world *world, dem2d_vec from
 /// Grains that come into a world over time.
 typedef struct dem2d_inlet_desc {
     const dem2d_grading_desc *grading; ///< sizes and kinds; required
-    dem2d_region region;               ///< m, where they are put in; all of each grain is inside
+    dem2d_region region;               ///< m, where they are put in, as in dem2d_fill_desc
     double mass_rate;                  ///< kg/m/s, >= 0; or:
     double number_rate;                ///< 1/s, >= 0
     dem2d_vec velocity;                ///< m/s, added to that of the kind
@@ -2549,8 +2552,8 @@ DEM2D_API dem2d_result dem2d_world_feed(dem2d_world *world, const dem2d_inlet_de
 
 /// How grains grow to a packing. Give either a stress or a solid fraction.
 typedef struct dem2d_growth_desc {
-    double area;           ///< m2, > 0, of the sample: of a box of walls, or of the cell
-    double stress;         ///< Pa, >= 0, mean stress (xx + yy)/2 that is to be reached; or 0
+    double area;   ///< m2, >= 0, of the sample; 0: of the cell, if it is periodic along a and b
+    double stress; ///< Pa, >= 0, mean stress (xx + yy)/2 that is to be reached; or 0
     double solid_fraction; ///< >= 0, of the area, that is to be reached; or 0
     double friction;       ///< coefficient, >= 0, of all contacts meanwhile: 0 for dense packings
     double local_damping;  ///< [0, 1), meanwhile
@@ -26865,7 +26868,7 @@ DEM2D_API dem2d_result dem2d_world_feed(dem2d_world *world, const dem2d_inlet_de
    rises by more than the growth of the bounding radius. */
 
 static const dem2di_field dem2di_growth_fields[] = {
-    DEM2DI_ROW(dem2d_growth_desc, area, DEM2DI_POSITIVE, "m2 none"),
+    DEM2DI_ROW(dem2d_growth_desc, area, DEM2DI_FROM_0, "m2 of the cell"),
     DEM2DI_ROW(dem2d_growth_desc, stress, DEM2DI_FROM_0, "Pa 0; or solid_fraction"),
     DEM2DI_ROW(dem2d_growth_desc, solid_fraction, DEM2DI_FROM_0, "- 0; or stress"),
     DEM2DI_ROW(dem2d_growth_desc, friction, DEM2DI_FROM_0, "- 0"),
@@ -27001,6 +27004,8 @@ static dem2d_result dem2di_growth_check(const dem2d_world *world, const dem2d_gr
     dem2d_result result = dem2di_check_fields(env, DEM2DI_ALL(dem2di_growth_fields), desc);
     if (result == DEM2D_OK) result = dem2di_check_number(env, "steps", steps, DEM2DI_COUNT);
     if (result != DEM2D_OK) return result;
+    if (!(desc->area > 0))
+        return dem2di_fail(env, DEM2D_OUT_OF_RANGE, -1, "area = 0 without a cell along a and b");
     if ((desc->stress > 0) == (desc->solid_fraction > 0))
         return dem2di_fail(env, DEM2D_OUT_OF_RANGE, -1,
                            "stress = %g and solid_fraction = %g: one has to be 0", desc->stress,
@@ -27042,8 +27047,10 @@ DEM2D_API dem2d_result dem2d_world_grow(dem2d_world *world, const dem2d_growth_d
                                         int steps, dem2d_growth *growth) {
     dem2d_growth done;
     if (world == NULL || desc == NULL || growth == NULL) return DEM2D_NULL_ARGUMENT;
+    dem2d_growth_desc own = *desc;
+    if (own.area == 0) own.area = world->cell.a.x * world->cell.b.y;
     dem2d_result result = dem2d_world_step(world, 0, NULL); /* not by a callback of a step */
-    if (result == DEM2D_OK) result = dem2di_growth_check(world, desc, steps);
+    if (result == DEM2D_OK) result = dem2di_growth_check(world, &own, steps);
     if (result != DEM2D_OK) return result;
     int laws = world->material_count * world->material_count;
     double *frictions = (double *)dem2di_allocate(&world->env, (size_t)laws, sizeof *frictions);
@@ -27054,7 +27061,7 @@ DEM2D_API dem2d_result dem2d_world_grow(dem2d_world *world, const dem2d_growth_d
     done.factor = 1;
     dem2di_frictions_swap(world, frictions);
     world->local_damping = desc->local_damping;
-    result = dem2di_growth_run(world, desc, steps, &done);
+    result = dem2di_growth_run(world, &own, steps, &done);
     world->local_damping = damping;
     dem2di_frictions_swap(world, frictions);
     dem2di_release(&world->env, frictions, (size_t)laws, sizeof *frictions);

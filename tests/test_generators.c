@@ -16,14 +16,14 @@ typedef struct bed {
 
 static const dem2d_vec five[5] = {{-0.9, -0.6}, {0.7, -0.8}, {1.1, 0.1}, {0.4, 0.9}, {-0.6, 0.7}};
 
-static bed open_bed(const dem2d_env *env) {
+static bed open_bed_in(const dem2d_env *env, dem2d_vec cell_a, dem2d_vec cell_b) {
     bed b;
     dem2d_world_desc desc;
     dem2d_material_desc stone = stone_desc(1e7, 0.5);
     dem2d_shape *shape;
     memset(&b, 0, sizeof b);
     memset(&desc, 0, sizeof desc);
-    desc.time_step = 1e-5, desc.env = env;
+    desc.time_step = 1e-5, desc.env = env, desc.cell.a = cell_a, desc.cell.b = cell_b;
     b.s = open_scene(&desc, &stone);
     stone.density *= 3;
     assert_ok(dem2d_world_add_material(b.s.world, &stone, &b.heavy));
@@ -36,6 +36,10 @@ static bed open_bed(const dem2d_env *env) {
     assert_ok(dem2d_shape_create_polygon(NULL, five, 5, 0.2, &shape));
     b.shapes[3] = give_shape(&b.s, shape);
     return b;
+}
+
+static bed open_bed(const dem2d_env *env) {
+    return open_bed_in(env, vec(0, 0), vec(0, 0));
 }
 
 static dem2d_grain_kind kind_of(const bed *b, int shape, double share) {
@@ -355,7 +359,7 @@ static void test_fill(void **state) {
                 already = 1;
             }
             g.points = curve, g.point_count = 3, g.kinds = kinds, g.kind_count = 3;
-            fill.grading = &g, fill.solid_fraction = random ? 0.3 : 0.07, fill.gap = gap;
+            fill.grading = &g, fill.solid_fraction = random ? 0.25 : 0.07, fill.gap = gap;
             fill.region.box.upper = vec(2, 2), fill.seed = 5;
             fill.method = random ? DEM2D_FILL_RANDOM : DEM2D_FILL_LATTICE;
             if (outline) fill.region.points = star, fill.region.count = COUNT_OF(star);
@@ -725,6 +729,114 @@ static void test_flow(void **state) {
     close_scene(&b.s);
 }
 
+/* Greatest overlap of a grain with the images of all, and with its own but the one of no shift. */
+static double nearest_image(const bed *b, int i, const dem2d_particle_info *grains, int count,
+                            const dem2d_cell *cell) {
+    double most = -HUGE_VAL;
+    for (int k = 0; k < count; k++)
+        for (int n = -2; n <= 2; n++)
+            for (int m = -2; m <= 2; m++) {
+                dem2d_particle_info image = grains[k];
+                image.pose.position.x += m * cell->a.x + n * cell->b.x;
+                image.pose.position.y += n * cell->b.y;
+                const dem2d_particle_info pair[2] = {grains[i], image};
+                const dem2d_vec x = grains[i].pose.position, y = image.pose.position;
+                if ((k == i && n == 0 && m == 0) || hypot(x.x - y.x, x.y - y.y) > 0.5) continue;
+                most = fmax(most, nearest(b, 0, pair, 2));
+            }
+    return most;
+}
+
+/* Filling of cells: upright and oblique, of all of the cell or along one vector, by both methods,
+   with a gap, beside a grain across the border that is there already and, where the cell is
+   periodic along x alone, between walls. No grain or image is nearer than the gap, grains stand on
+   the border, and the area is what was asked for; then the same by an inlet. */
+static void test_fill_in_cell(void **state) {
+    static const dem2d_grade curve[] = {{0.05, 0}, {0.1, 0.5}, {0.15, 1}};
+    static dem2d_particle_info grains[400];
+    (void)state;
+    for (int which = 0; which < 12; which++) {
+        const bool random = which & 1;
+        const int kind_of_cell = which / 2 % 3, gap = which / 6; /* upright, oblique, along a */
+        bed b = open_bed_in(NULL, vec(2, 0),
+                            vec(kind_of_cell == 1 ? 0.8 : 0, kind_of_cell < 2 ? 2 : 0));
+        const dem2d_grain_kind kinds[3] = {kind_of(&b, 0, 1), kind_of(&b, 1, 1), kind_of(&b, 3, 1)};
+        dem2d_grading_desc g = {0};
+        dem2d_fill_desc fill = {0};
+        dem2d_inlet_desc inlet = {0};
+        dem2d_inlet through = {0};
+        dem2d_particle_id ids[400];
+        dem2d_filling done;
+        dem2d_cell cell = {{2, 0}, {kind_of_cell == 1 ? 0.8 : 0, 2}, {0, 0}};
+        int count, across = 0;
+        dem2d_particle_desc block = grain_desc(&b.s, b.shapes[1], 0.1, vec(0.05, 1));
+        block.motion = DEM2D_FIXED;
+        add_grain(&b.s, &block);
+        if (kind_of_cell == 2) add_plane(&b.s, 0, 0.3, 0, 1), add_plane(&b.s, 0, 1.7, 0, -1);
+        g.points = curve, g.point_count = 3, g.kinds = kinds, g.kind_count = 3;
+        fill.grading = &g, fill.solid_fraction = random ? 0.25 : 0.07, fill.gap = 0.01 * gap;
+        fill.seed = 5, fill.method = random ? DEM2D_FILL_RANDOM : DEM2D_FILL_LATTICE;
+        if (kind_of_cell == 2) fill.region.box.lower.y = 0.2, fill.region.box.upper.y = 1.8;
+        assert_ok(dem2d_world_fill(b.s.world, &fill, ids, COUNT_OF(ids), &done));
+        const double room = kind_of_cell == 2 ? 2 * 1.6 : 4;
+        assert_within(done.area, fill.solid_fraction * room, 0.02);
+        inlet.grading = &g, inlet.number_rate = 1, inlet.tries = 10000, inlet.region = fill.region,
+        inlet.gap = fill.gap;
+        assert_ok(dem2d_world_feed(b.s.world, &inlet, 5, &through));
+        assert_int_equal(through.count, 5);
+        assert_ok(dem2d_world_particles(b.s.world, ids, COUNT_OF(ids), &count));
+        assert_int_equal(count, done.count + 6);
+        for (int i = 0; i < count; i++) grains[i] = grain_of(&b.s, ids[i]);
+        for (int i = 0; i < count; i++) {
+            const dem2d_vec x = grains[i].pose.position;
+            assert_true(nearest_image(&b, i, grains, count, &cell) <= -fill.gap + 1e-8);
+            const double left = x.x - x.y * cell.b.x / 2;
+            across += left < 0.1 || left > 1.9;
+            if (kind_of_cell == 2) assert_between(x.y, 0.31, 1.69);
+        }
+        assert_true(across > 1);
+        step(&b.s, 1);
+        assert_true(packing_of(&b.s).max_overlap < 1e-8);
+        close_scene(&b.s);
+    }
+}
+
+/* What a cell refuses, and a box of one period: all of each grain is inside. A grain that would
+   overlap its own image finds no room. */
+static void test_fill_refused(void **state) {
+    test_env env;
+    (void)state;
+    test_env_init(&env);
+    bed b = open_bed_in(&env.env, vec(2, 0), vec(0.5, 1));
+    dem2d_particle_desc grains[20];
+    dem2d_particle_id ids[20];
+    dem2d_fill_desc fill = {0};
+    dem2d_filling done;
+    for (int i = 0; i < 20; i++) grains[i] = grain_desc(&b.s, b.shapes[1], 0.1, vec(NAN, 0));
+    fill.grains = grains, fill.count = 20, fill.method = DEM2D_FILL_RANDOM;
+    fill.region.box.upper = vec(2.1, 1);
+    assert_result(dem2d_world_fill(b.s.world, &fill, NULL, 0, &done), DEM2D_OUT_OF_RANGE);
+    assert_logged(&env, DEM2D_OUT_OF_RANGE, -1, "greater than the cell");
+    fill.region.box.upper = vec(2, 0); /* along b alone, which leans */
+    assert_result(dem2d_world_fill(b.s.world, &fill, NULL, 0, &done), DEM2D_OUT_OF_RANGE);
+    assert_logged(&env, DEM2D_OUT_OF_RANGE, -1, "leans");
+    fill.region.box.lower = vec(1, 3), fill.region.box.upper = vec(3, 4); /* once around */
+    assert_ok(dem2d_world_fill(b.s.world, &fill, ids, 20, &done));
+    assert_int_equal(done.count, 20);
+    for (int i = 0; i < 20; i++) {
+        double left = grain_of(&b.s, ids[i]).pose.position.x;
+        left -= 3 * 0.5;                   /* the box is three cells up */
+        left -= 2 * floor((left + 1) / 2); /* from -1 */
+        assert_true(left > -1 + 0.07 || left < 1 - 0.07);
+    }
+    grains[0].scale = 0.26; /* 1.04 long, in a cell 1 high */
+    grains[0].angle = (double)TEST_PI / 2;
+    fill.count = 1, fill.keep_angles = true, fill.region.box.lower = fill.region.box.upper;
+    assert_result(dem2d_world_fill(b.s.world, &fill, NULL, 0, &done), DEM2D_NOT_REACHED);
+    close_scene(&b.s);
+    assert_clean(&env);
+}
+
 /* Whole numbers passed on the way from one place to another. */
 static int64_t passed(double from, double to) {
     return (int64_t)(floor(to) - floor(from));
@@ -851,6 +963,8 @@ int main(void) {
         cmocka_unit_test(test_flow),
         cmocka_unit_test(test_flow_in_cell),
         cmocka_unit_test(test_outlet_in_cell),
+        cmocka_unit_test(test_fill_in_cell),
+        cmocka_unit_test(test_fill_refused),
         cmocka_unit_test(test_inlet_velocities),
     };
     return cmocka_run_group_tests_name("generators", tests, NULL, NULL);

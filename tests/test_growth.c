@@ -96,7 +96,9 @@ static void test_fraction(void **state) {
     assert_result(dem2d_world_grow(s.world, &d, 10, &done), DEM2D_OUT_OF_RANGE);
     d.solid_fraction = d.stress = 0;
     assert_result(dem2d_world_grow(s.world, &d, 10, &done), DEM2D_OUT_OF_RANGE);
-    d.solid_fraction = 0.6, d.rate = 0;
+    d.solid_fraction = 0.6, d.area = 0;
+    assert_result(dem2d_world_grow(s.world, &d, 10, &done), DEM2D_OUT_OF_RANGE);
+    d.area = 1, d.rate = 0;
     assert_result(dem2d_world_grow(s.world, &d, 10, &done), DEM2D_OUT_OF_RANGE);
     d.rate = 1, d.solid_fraction = 1e-9; /* less than the fixed grain has */
     assert_result(dem2d_world_grow(s.world, &d, 10, &done), DEM2D_OUT_OF_RANGE);
@@ -168,6 +170,52 @@ static void test_bits(void **state) {
     assert_true(hashes[0] == hashes[3]);
 }
 
+/* In an oblique cell the area is that of the cell, and the stress is reached that the cell measures;
+   the bits do not depend on the skin. */
+static void test_cell(void **state) {
+    uint64_t hashes[2];
+    (void)state;
+    for (int k = 0; k < 2; k++) {
+        const dem2d_grade sizes[2] = {{0.1, 0}, {0.16, 1}};
+        dem2d_material_desc stone = stone_desc(1e8, 0.3);
+        dem2d_world_desc desc = {0};
+        dem2d_grain_kind kinds[2] = {{0}};
+        dem2d_grading_desc grading = {0};
+        dem2d_fill_desc fill = {0};
+        dem2d_filling filled;
+        dem2d_growth_desc d = to_stress(0.1);
+        dem2d_growth done;
+        dem2d_cell_info cell;
+        double dt;
+        stone.normal_stiffness = 1e8, stone.damping_ratio = 0.2;
+        desc.time_step = 1e-6, desc.local_damping = 0.05, desc.skin = k == 0 ? 0.02 : 0.5;
+        desc.cell.a = vec(1, 0), desc.cell.b = vec(0.4, 0.6);
+        scene s = open_scene(&desc, &stone);
+        for (int i = 0; i < 2; i++) {
+            kinds[i].share = 1, kinds[i].grain.material = s.material;
+            kinds[i].grain.shape = give_shape(&s, i == 0 ? make_disc(1) : make_ellipse(1.3, 0.9));
+        }
+        grading.points = sizes, grading.point_count = 2, grading.kinds = kinds;
+        grading.kind_count = 2;
+        fill.grading = &grading, fill.solid_fraction = 0.45, fill.method = DEM2D_FILL_RANDOM;
+        assert_ok(dem2d_world_fill(s.world, &fill, NULL, 0, &filled));
+        assert_near(filled.solid_fraction, 0.45, 0.02);
+        assert_ok(dem2d_world_choose_time_step(s.world, 0.8, &dt));
+        assert_ok(dem2d_world_set_time_step(s.world, dt));
+        d.area = 0;
+        assert_ok(dem2d_world_grow(s.world, &d, 400000, &done));
+        assert_true(done.reached);
+        assert_ok(dem2d_world_get_cell(s.world, &cell));
+        assert_near(done.stress, (cell.contact.xx + cell.contact.yy) / 2, 1e-12);
+        assert_near(done.stress, 1e5, 0.01);
+        assert_near(done.solid_fraction, packing_of(&s).solid_area / 0.6, 1e-12);
+        assert_between(done.solid_fraction, 0.78, 0.9);
+        hashes[k] = dem2d_world_hash(s.world);
+        close_scene(&s);
+    }
+    assert_true(hashes[0] == hashes[1]);
+}
+
 /* A step that fails, for want of memory or of a stable time step: the result is its own; friction
    and damping are the world's again. */
 static void test_failing(void **state) {
@@ -193,10 +241,8 @@ static void test_failing(void **state) {
 
 int main(void) {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(test_fraction),
-        cmocka_unit_test(test_stress),
-        cmocka_unit_test(test_bits),
-        cmocka_unit_test(test_failing),
+        cmocka_unit_test(test_fraction), cmocka_unit_test(test_stress), cmocka_unit_test(test_bits),
+        cmocka_unit_test(test_failing),  cmocka_unit_test(test_cell),
     };
     return cmocka_run_group_tests_name("growth", tests, NULL, NULL);
 }
