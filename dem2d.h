@@ -1439,7 +1439,12 @@ typedef struct dem2d_cell {
 /// greatest target s and the drift D, a mean of L over some ten steps, so that the mean stress is
 /// right while the cell deforms steadily. |L| is at most max_rate: at this rate a cell without
 /// contacts shrinks. dem2d_cell_info.limited is true while a rate is at this limit, because its
-/// stress is not reached. The control takes energy out of the cell.
+/// stress is not reached: it stays true where a stress can't be held, as a shear stress above the
+/// friction of the packing, or a tension. A cell that is narrower or lower than an eighth of the
+/// greatest radius may not shrink further: steps are refused with OUT_OF_RANGE until it is deformed
+/// in another way. So a cell ends whose particles do not meet. A sample with a stress of 0 in one
+/// direction and a pressure in the other spreads: nothing holds it there. The control takes energy
+/// out of the cell.
 typedef struct dem2d_deformation_desc {
     double xx;        ///< 1/s, rate of extension along x; 0 where xx is held
     double xy;        ///< 1/s, simple shear: change of the velocity along x with y; 0 if held
@@ -21498,8 +21503,9 @@ static double dem2di_flow_pass(dem2d_world *world) {
     return used + 1.25 * (1 + strain) * path + dem2di_max(10, 1.06 / world->skin) * strain;
 }
 
-/* Stress, stiffness and viscosity of a cell by its velocity gradient (xx, xy, yy), times the area;
-   mean mass. Of component c and the rates of component k: sums over the contacts of
+/* Stress, stiffness and viscosity of a cell by its velocity gradient (xx, xy, yy), times the area,
+   of the components that are held; mean mass. Of component c and the rates of component k: sums
+   over the contacts of
        k_ip d_j d_q,   with (i, j) = (x, x), (x, y), (y, y) for c and (p, q) likewise for k
    where k_ip = kn n n + kt t t is the stiffness of the contact, and its dashpots likewise. */
 typedef struct dem2di_cell_response {
@@ -21507,15 +21513,16 @@ typedef struct dem2di_cell_response {
     double mass;
 } dem2di_cell_response;
 
-static void dem2di_response_add(double matrix[3][3], double coefficient, dem2d_vec along,
-                                dem2d_vec d) {
+static void dem2di_response_add(double matrix[3][3], const bool hold[3], double coefficient,
+                                dem2d_vec along, dem2d_vec d) {
     const double part[3] = {along.x * d.x, along.x * d.y, along.y * d.y};
     for (int c = 0; c < 3; c++)
-        for (int k = 0; k < 3; k++) matrix[c][k] += coefficient * part[c] * part[k];
+        for (int k = 0; k < 3 && hold[c]; k++)
+            if (hold[k]) matrix[c][k] += coefficient * part[c] * part[k];
 }
 
 /* Tangential springs count while they stick, dashpots while they push. */
-static void dem2di_response_contact(const dem2d_world *world, int i,
+static void dem2di_response_contact(const dem2d_world *world, int i, const bool hold[3],
                                     dem2di_cell_response *response) {
     dem2di_contact contact;
     if (!dem2di_contact_get(world, &world->list.contacts, i, &contact)) return;
@@ -21527,20 +21534,22 @@ static void dem2di_response_contact(const dem2d_world *world, int i,
     response->stress[0] += d.x * f.x;
     response->stress[1] += d.y * f.x;
     response->stress[2] += d.y * f.y;
-    dem2di_response_add(response->stiffness, weight * dem2di_normal_stiffness(world, i), n, d);
+    dem2di_response_add(response->stiffness, hold, weight * dem2di_normal_stiffness(world, i), n,
+                        d);
     if (world->law == NULL && fabs(contact.shear) < law->friction * contact.force) {
         const double kt = weight * law->tangential_stiffness;
-        dem2di_response_add(response->stiffness, kt, t, d);
+        dem2di_response_add(response->stiffness, hold, kt, t, d);
         if (world->plan.terms & DEM2DI_TANGENTIAL_DASHPOT)
-            dem2di_response_add(response->viscosity,
+            dem2di_response_add(response->viscosity, hold,
                                 weight * dem2di_tangential_dashpot(world, i, &contact.arms), t, d);
     }
     if ((world->plan.terms & DEM2DI_DASHPOT) && contact.force > 0)
-        dem2di_response_add(response->viscosity, weight * dem2di_normal_dashpot(world, i), n, d);
+        dem2di_response_add(response->viscosity, hold, weight * dem2di_normal_dashpot(world, i), n,
+                            d);
 }
 
 /* Sums over the particles and their contacts in the order of ranks. */
-static dem2di_cell_response dem2di_response_make(const dem2d_world *world) {
+static dem2di_cell_response dem2di_response_make(const dem2d_world *world, const bool hold[3]) {
     const dem2di_list *list = &world->list;
     dem2di_cell_response response;
     int count = 0;
@@ -21549,7 +21558,7 @@ static dem2di_cell_response dem2di_response_make(const dem2d_world *world) {
         const int slot = dem2di_slot_at(world, place);
         if (slot < 0) continue;
         for (int k = list->own[slot]; k < list->first[slot + 1]; k++)
-            dem2di_response_contact(world, list->adjacent[k], &response);
+            dem2di_response_contact(world, list->adjacent[k], hold, &response);
         if (!(world->inverse[slot].mass > 0)) continue;
         const double mass = dem2di_body_mass(world, &world->bodies[slot]);
         const dem2d_vec c = world->now[slot].v;
@@ -21571,6 +21580,10 @@ static dem2di_cell_response dem2di_response_make(const dem2d_world *world) {
 #define DEM2DI_CELL_GAS 3
 #define DEM2DI_CELL_RATE 0.1
 #define DEM2DI_CELL_FORGETS 0.1
+
+/* Least width and height from which a flow may make a cell smaller, of the greatest radius: each
+   particle sees 33^2 images of each other one then, and overlaps with its own one by 15/16. */
+#define DEM2DI_CELL_LEAST 0.125
 
 /* The x of A x = b, A symmetric and positive definite, for the components that are held; 0 of the
    others: Gauss's elimination. */
@@ -21594,7 +21607,7 @@ static void dem2di_held_solve(const bool hold[3], double a[3][3], double b[3]) {
 static void dem2di_cell_control(dem2d_world *world) {
     const dem2di_control control = dem2di_control_make(&world->control);
     if (!control.holds) return;
-    const dem2di_cell_response response = dem2di_response_make(world);
+    const dem2di_cell_response response = dem2di_response_make(world, control.hold);
     const double area = world->cell.a.x * world->cell.b.y, dt = world->time_step;
     const double last[3] = {world->flow_made.xx, world->flow_made.xy, world->flow_made.yy};
     double rate[3] = {world->flow.xx, world->flow.xy, world->flow.yy}, a[3][3], b[3];
@@ -21628,6 +21641,31 @@ static void dem2di_cell_control(dem2d_world *world) {
     world->drift.xx = drift[0];
     world->drift.xy = drift[1];
     world->drift.yy = drift[2];
+}
+
+/* Before a step: may the cell go on as it does? A rate of a held stress counts while it is at its
+   limit. In a step lengths change by 1.1 at most, areas by 1.1^2 < 4. A cell whose particles do not
+   meet would shrink until there is no memory for the images. */
+static dem2d_result dem2di_check_flow(const dem2d_world *world) {
+    const dem2di_control control = dem2di_control_make(&world->control);
+    const dem2di_flow *held = &world->flow_made;
+    const double xx = !control.hold[0] ? control.rate[0] : world->limited ? held->xx : 0;
+    const double yy = !control.hold[2] ? control.rate[2] : world->limited ? held->yy : 0;
+    const double width = world->cell.a.x, height = world->cell.b.y, area = width * height;
+    double radius = 0;
+    if ((xx + yy > 0 && area > DBL_MAX / 4) ||
+        (xx + yy < 0 && dem2di_min(area, dem2di_min(width, height)) < 4 * DBL_MIN))
+        return dem2di_fail(&world->env, DEM2D_STATE, -1,
+                           "the cell of %g by %g would get an area that is not finite, or 0", width,
+                           height);
+    for (int i = 0; i < world->body_count && (xx < 0 || yy < 0); i++)
+        if (world->bodies[i].shape_index >= 0) radius = dem2di_max(radius, world->now[i].radius);
+    radius *= DEM2DI_CELL_LEAST;
+    if (!(xx < 0 && width < radius) && !(yy < 0 && height < radius)) return DEM2D_OK;
+    return dem2di_fail(&world->env, DEM2D_OUT_OF_RANGE, -1,
+                       "the cell of %g by %g shrinks below %g, an eighth of the greatest radius: "
+                       "its particles do not resist",
+                       width, height, radius);
 }
 
 /* The stress times the area: of the contacts, and of the fluctuations at the last force pass. */
@@ -22264,9 +22302,11 @@ static dem2d_result dem2di_step_try(dem2d_world *world, dem2di_trial *trial) {
     if (world->wrap_due) return dem2di_out_of_memory(world, "images in the cell");
     if (!dem2di_sums_reserve(world)) return dem2di_out_of_memory(world, "sums of forces");
     const bool flows = dem2di_cell_flows(world);
+    dem2d_result result = flows ? dem2di_check_flow(world) : DEM2D_OK;
+    if (result != DEM2D_OK) return result;
     if (!dem2di_group_reserve(world, DEM2DI_EVENTS, world->event_capacity))
         return dem2di_out_of_memory(world, "events");
-    dem2d_result result = dem2di_prepare(world, &trial->listed);
+    result = dem2di_prepare(world, &trial->listed);
     if (result != DEM2D_OK) return result;
     world->list_stale = trial->listed; /* if the step fails, the next try builds a list as well */
     if (flows && !dem2di_group_reserve(world, DEM2DI_FLOWING, dem2di_slots(world)))

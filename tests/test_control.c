@@ -5,6 +5,8 @@
 #include "testing.h"
 #include "world_scene.h"
 
+#include <float.h>
+
 enum { SIDE = 7, GRAINS = SIDE * SIDE };
 
 #define P 1.0 /* Pa; discs of mean diameter 1 and mass 1: times are in sqrt(m/P) */
@@ -213,6 +215,87 @@ static void test_limited(void **state) {
     close_scene(&p.s);
 }
 
+/* Grains that do not meet and stand still: the cell shrinks at the greatest rate until a step is
+   refused, which changes nothing. Then it can expand. */
+static void test_nothing_resists(void **state) {
+    (void)state;
+    static cell p;
+    test_env env;
+    dem2d_world_desc desc = {0};
+    dem2d_deformation_desc by = pressed(P, P);
+    test_env_init(&env);
+    desc.env = &env.env;
+    fill(&p, &desc, 1e3, 0.4, 0.2, true);
+    by.max_rate = 20;
+    for (int i = 0; i < GRAINS; i++) {
+        const dem2d_groups alone = {1, 2, false};
+        const dem2d_vec still = {0, 0};
+        assert_ok(dem2d_world_set_groups(p.s.world, p.ids[i], alone));
+        assert_ok(dem2d_world_drive_particle(p.s.world, p.ids[i], DEM2D_FREE, still, 0));
+    }
+    deform(&p, &by);
+    int steps = 0, done = 1;
+    while (done == 1) {
+        const dem2d_result result = dem2d_world_step(p.s.world, 1, &done);
+        assert_result(result, done == 1 ? DEM2D_OK : DEM2D_OUT_OF_RANGE);
+        steps += done;
+    }
+    assert_logged(&env, DEM2D_OUT_OF_RANGE, -1, "resist");
+    dem2d_cell_info info = cell_of(&p);
+    assert_true(info.limited && info.xx == -20 && info.yy == -20);
+    assert_between(info.cell.a.x, 0.125 * 0.6 * 0.9, 0.125 * 0.6 * 1.2); /* the radius is 0.596 */
+    const uint64_t hash = dem2d_world_hash(p.s.world);
+    assert_result(dem2d_world_step(p.s.world, 5, &done), DEM2D_OUT_OF_RANGE);
+    assert_true(done == 0 && dem2d_world_hash(p.s.world) == hash);
+    assert_true(cell_of(&p).limited && inside_holds(p.s.world));
+    memset(&by, 0, sizeof by);
+    by.xx = by.yy = 20;
+    deform(&p, &by);
+    step(&p.s, steps);
+    assert_near(cell_of(&p).cell.a.x, sqrt(GRAINS * (double)TEST_PI / 4 / 0.5), 1e-9);
+    close_scene(&p.s);
+    assert_clean(&env);
+}
+
+/* A tension pulls the cell apart until its area would be infinite. */
+static void test_endless(void **state) {
+    (void)state;
+    static cell p;
+    const dem2d_world_desc plain = {0};
+    dem2d_deformation_desc by = pressed(-P, -P);
+    int done;
+    fill(&p, &plain, 1e3, 0.4, 0.2, true);
+    by.max_rate = 0.1 / p.dt;
+    deform(&p, &by);
+    assert_result(dem2d_world_step(p.s.world, 5000, &done), DEM2D_STATE);
+    const dem2d_cell_info info = cell_of(&p);
+    assert_true(info.limited && isfinite(info.area));
+    assert_between(info.area, 1e307, DBL_MAX);
+    close_scene(&p.s);
+}
+
+/* A shear stress above what friction bears: it flows at the greatest rate, and says so. */
+static void test_too_much_shear(void **state) {
+    (void)state;
+    static cell p;
+    const dem2d_world_desc plain = {0};
+    dem2d_deformation_desc by = pressed(P, P);
+    int limited = 0;
+    fill(&p, &plain, 1e3, 0.4, 0.2, true);
+    deform(&p, &by);
+    run(&p, 20);
+    by.hold_yx = true, by.stress_yx = -0.8 * P;
+    deform(&p, &by);
+    run(&p, 30);
+    for (int i = 0; i < 100; i++) {
+        run(&p, 0.1);
+        limited += cell_of(&p).limited;
+    }
+    print_message("limited %d of 100\n", limited);
+    assert_between(limited, 80, 100);
+    close_scene(&p.s);
+}
+
 static void test_refused(void **state) {
     (void)state;
     static cell p;
@@ -278,9 +361,11 @@ static void test_bits(void **state) {
 
 int main(void) {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(test_packing),      cmocka_unit_test(test_loading),
-        cmocka_unit_test(test_shear_stress), cmocka_unit_test(test_limited),
-        cmocka_unit_test(test_refused),      cmocka_unit_test(test_bits),
+        cmocka_unit_test(test_packing),         cmocka_unit_test(test_loading),
+        cmocka_unit_test(test_shear_stress),    cmocka_unit_test(test_limited),
+        cmocka_unit_test(test_refused),         cmocka_unit_test(test_bits),
+        cmocka_unit_test(test_nothing_resists), cmocka_unit_test(test_endless),
+        cmocka_unit_test(test_too_much_shear),
     };
     return cmocka_run_group_tests_name("stress control of a periodic cell", tests, NULL, NULL);
 }
