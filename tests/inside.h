@@ -14,8 +14,9 @@ void inside_renew_list(dem2d_world *world);
 /* Has a particle moved as far as its skin; will the next step renew the list? */
 bool inside_list_used_up(const dem2d_world *world);
 bool inside_list_stale(const dem2d_world *world);
-/* Sort the particles in space, and list the pairs, now. */
+/* Sort the particles in space now; list the pairs now. */
 bool inside_arrange(dem2d_world *world);
+bool inside_build_list(dem2d_world *world);
 /* The material whose law alone the steps of a world with pairs of circles go by, or -1. */
 int inside_one_law(const dem2d_world *world);
 /* Make as if so many steps had been too slow, and so many contacts not finite. */
@@ -26,6 +27,17 @@ bool inside_give_back(dem2d_world *whole, dem2d_world *part);
 /* The drift of a servo wall, and the position of the particle in a slot, by the last step. */
 double inside_wall_drift(const dem2d_world *world, int wall);
 dem2d_vec inside_position(const dem2d_world *world, int slot);
+/* Pairs of particles that the last force pass did not list, or took for apart, though they overlap
+   at its positions by more than 1e-7 of the size. */
+int inside_count_missed(const dem2d_world *world);
+/* Of a particle in a slot and a wall of one part: radius and both skins; how often they are listed.
+   Listed contacts with walls. */
+double inside_reach(const dem2d_world *world, int slot, int wall);
+int inside_count_listed(const dem2d_world *world, int slot, int wall);
+int inside_wall_contacts(const dem2d_world *world);
+/* Do steps pass over a wall, because it rests without a contact; end that. */
+bool inside_wall_is_quiet(const dem2d_world *world, int wall);
+void inside_wake_wall(dem2d_world *world, int wall);
 /* Tables of columns and fields: names that are one of a kind and fit into a record, no more fields
    than there are bits; a column is swapped with one of its kind. */
 bool inside_tables_hold(void);
@@ -74,6 +86,11 @@ bool inside_arrange(dem2d_world *world) {
     return dem2di_arrange(world);
 }
 
+bool inside_build_list(dem2d_world *world) {
+    const dem2di_plan plan = dem2di_plan_make(world);
+    return dem2di_build_list(world, &plan) == DEM2D_OK;
+}
+
 int inside_one_law(const dem2d_world *world) {
     return world->plan.one_law && world->list.discs > 0 ? world->plan.material : -1;
 }
@@ -99,6 +116,58 @@ double inside_wall_drift(const dem2d_world *world, int wall) {
 
 dem2d_vec inside_position(const dem2d_world *world, int slot) {
     return world->now[slot].x;
+}
+
+/* Overlap of two particles at the positions of the last force pass; 0: none. */
+static double inside_depth(const dem2d_world *w, int a, int b) {
+    dem2d_contact contact;
+    const dem2d_result result = dem2d_pair_contact(
+        dem2di_shape_of(w, &w->bodies[a]), dem2di_pose_of(w, w->before, a),
+        dem2di_shape_of(w, &w->bodies[b]), dem2di_pose_of(w, w->before, b), NULL, &contact);
+    if (result != DEM2D_OK) return HUGE_VAL;
+    return contact.state == DEM2D_PENETRATING ? contact.depth : 0;
+}
+
+int inside_count_missed(const dem2d_world *world) {
+    int missed = 0;
+    for (int a = 0; a < world->body_count; a++)
+        for (int b = 0; b < a; b++) {
+            const double size = dem2di_shape_of(world, &world->bodies[a])->circumscribed;
+            if (inside_depth(world, a, b) <= 1e-7 * size) continue;
+            dem2di_key key = {b, a};
+            if (world->bodies[a].index < world->bodies[b].index) key.a = a, key.b = b;
+            int last = -1;
+            const int listed = dem2di_listed(world, &key, false, &last);
+            missed += listed < 0 || (!dem2di_immovable(world, listed) &&
+                                     !(world->list.contacts.depth[listed] > 0));
+        }
+    return missed;
+}
+
+double inside_reach(const dem2d_world *world, int slot, int wall) {
+    return world->now[slot].radius + 1 / sqrt(world->inverse_skin_squared[slot]) +
+           world->walls[wall].skin;
+}
+
+int inside_count_listed(const dem2d_world *world, int slot, int wall) {
+    const dem2di_list *list = &world->list;
+    int listed = 0;
+    for (int k = list->first[slot]; k < list->first[slot + 1]; k++)
+        listed += list->adjacent[k] >= list->pairs &&
+                  list->keys[list->adjacent[k]].b == world->walls[wall].first;
+    return listed;
+}
+
+int inside_wall_contacts(const dem2d_world *world) {
+    return world->list.count - world->list.pairs;
+}
+
+bool inside_wall_is_quiet(const dem2d_world *world, int wall) {
+    return world->walls[wall].quiet;
+}
+
+void inside_wake_wall(dem2d_world *world, int wall) {
+    world->walls[wall].quiet = false;
 }
 
 void inside_choose_fours(dem2d_world *world, bool fours) {

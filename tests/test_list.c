@@ -1,8 +1,12 @@
 /* The list of pairs and the order of particles in memory: nothing is missed, whatever the sizes,
    places and speeds; nothing that can be seen depends on them; a refused step changes nothing. */
-#define DEM2D_IMPLEMENTATION
 #include "dem2d.h"
 #include "testing.h"
+#include "inside.h"
+
+enum {
+    CHECK_STEPS = 160
+}; /* every so many steps the world looks for fast motion (manual, LIMITS) */
 
 /* --- building blocks ------------------------------------------------------------------------- */
 
@@ -46,38 +50,6 @@ static dem2d_particle_id add(const scene *s, int shape, double scale, double x, 
     return id;
 }
 
-static uint64_t state_hash(const dem2d_world *world) {
-    uint64_t hash = 1469598103934665603u; /* FNV-1a */
-    for (int i = 0; i < world->id_count; i++) {
-        if (world->ids[i].slot < 0) continue;
-        const unsigned char *byte = (const unsigned char *)&world->now[world->ids[i].slot];
-        for (size_t k = 0; k < sizeof(dem2di_state); k++) hash = (hash ^ byte[k]) * 1099511628211u;
-    }
-    return hash;
-}
-
-/* Contacts of the last force pass against all pairs, one by one, at the positions of that pass. */
-static int count_missed(const dem2d_world *world) {
-    int missed = 0;
-    for (int a = 0; a < world->body_count; a++)
-        for (int b = 0; b < a; b++) {
-            const dem2d_shape *sa = dem2di_shape_of(world, &world->bodies[a]);
-            const dem2d_shape *sb = dem2di_shape_of(world, &world->bodies[b]);
-            dem2d_contact contact;
-            assert_ok(dem2d_pair_contact(sa, dem2di_pose_of(world, world->before, a), sb,
-                                         dem2di_pose_of(world, world->before, b), NULL, &contact));
-            if (contact.state != DEM2D_PENETRATING || contact.depth <= 1e-7 * sa->circumscribed)
-                continue;
-            dem2di_key key = {b, a};
-            if (world->bodies[a].index < world->bodies[b].index) key.a = a, key.b = b;
-            int last = -1;
-            const int listed = dem2di_listed(world, &key, false, &last);
-            missed += listed < 0 || (!dem2di_immovable(world, listed) &&
-                                     !(world->list.contacts.depth[listed] > 0));
-        }
-    return missed;
-}
-
 /* --- nothing is missed ------------------------------------------------------------------------ */
 
 /* Random clouds of sizes from 1 to 1/ratio, which fly about; far is where their middle is. */
@@ -93,7 +65,7 @@ static void check_cloud(double ratio, double far, double speed, double skin) {
     }
     for (int k = 0; k < 25; k++) {
         assert_ok(dem2d_world_step(s.world, k < 5 ? 1 : 20, NULL));
-        assert_int_equal(count_missed(s.world), 0);
+        assert_int_equal(inside_count_missed(s.world), 0);
     }
     dem2d_world_destroy(s.world);
 }
@@ -122,7 +94,7 @@ static void test_far_crawl(void **state) {
     assert_ok(dem2d_world_drive_particle(s.world, b, DEM2D_DRIVEN, vb, 0));
     for (int k = 0; k < 600; k++) {
         assert_ok(dem2d_world_step(s.world, 50, NULL));
-        assert_int_equal(count_missed(s.world), 0);
+        assert_int_equal(inside_count_missed(s.world), 0);
     }
     assert_ok(dem2d_world_drive_particle(s.world, b, DEM2D_FREE, vb, 0)); /* now it is a contact */
     assert_ok(dem2d_world_step(s.world, 1, NULL));
@@ -157,7 +129,7 @@ static void test_least_skin(void **state) {
     add(&s, 0, 1, 0, 0, 1);
     add(&s, 0, 1, 2.01, 0, 0);
     assert_ok(dem2d_world_step(s.world, 300, NULL));
-    assert_int_equal(count_missed(s.world), 0);
+    assert_int_equal(inside_count_missed(s.world), 0);
     dem2d_stats stats;
     assert_ok(dem2d_world_stats(s.world, &stats));
     assert_int_equal(stats.contacts, 1);
@@ -179,13 +151,13 @@ static uint64_t run_lattice(double radius, bool sorted, bool renewed, double ski
         add(&s, 0, 0.1 * radius, x + 0.8 * radius, y + 0.68 * radius, 0);
         add(&s, 0, 0.1 * radius, x - 0.8 * radius, y + 0.66 * radius, 0);
     }
-    if (!sorted) s.world->scattered = false;
+    if (!sorted) inside_scatter(s.world, false);
     for (int k = 0; k < 20; k++) {
-        if (sorted && k % 3 == 0) s.world->scattered = true;
-        if (renewed) s.world->list_stale = true;
+        if (sorted && k % 3 == 0) inside_scatter(s.world, true);
+        if (renewed) inside_renew_list(s.world);
         assert_ok(dem2d_world_step(s.world, 10, NULL));
     }
-    const uint64_t hash = state_hash(s.world);
+    const uint64_t hash = dem2d_world_hash(s.world);
     dem2d_world_destroy(s.world);
     return hash;
 }
@@ -412,9 +384,9 @@ static void check_fast(int shape, bool spins, double part, bool found) {
     assert_int_equal(stats_of(s.world).fast_motion, 0);
     assert_ok(dem2d_world_step(s.world, 1, NULL)); /* before it has moved */
     assert_int_equal(stats_of(s.world).fast_motion, found);
-    assert_ok(dem2d_world_step(s.world, DEM2DI_CHECK_STEPS - 1, NULL));
+    assert_ok(dem2d_world_step(s.world, CHECK_STEPS - 1, NULL));
     assert_int_equal(stats_of(s.world).fast_motion, found);
-    assert_ok(dem2d_world_step(s.world, DEM2DI_CHECK_STEPS, NULL));
+    assert_ok(dem2d_world_step(s.world, CHECK_STEPS, NULL));
     assert_int_equal(stats_of(s.world).fast_motion, 2 * found);
     assert_int_equal(env.log.count, found);
     if (found) assert_logged(&env, DEM2D_WARNING, (int)id.index, "inscribed");
@@ -440,8 +412,8 @@ static void test_falls_fast(void **state) {
         desc.gravity.y = -1e7, desc.skin = k;
         const scene s = open_scene(&desc, 1e-3, 0);
         add(&s, 0, 1, 0, 0, 0);
-        for (int steps = 0; steps <= 2 * DEM2DI_CHECK_STEPS; steps++) {
-            const int checks = steps > 0 ? (steps - 1) / DEM2DI_CHECK_STEPS : 0;
+        for (int steps = 0; steps <= 2 * CHECK_STEPS; steps++) {
+            const int checks = steps > 0 ? (steps - 1) / CHECK_STEPS : 0;
             assert_int_equal(stats_of(s.world).fast_motion, checks); /* the first: at rest */
             assert_ok(dem2d_world_step(s.world, 1, NULL));
         }
@@ -545,26 +517,22 @@ static double segment_distance(dem2d_vec a, dem2d_vec b, dem2d_vec x) {
 
 /* Each particle against each segment where the list was built. Pairs that are within both skins are
    listed once; returns how many. */
-static int check_segments_listed(const dem2d_world *world, const dem2d_vec (*ends)[2], int count) {
-    const dem2di_list *list = &world->list;
+static int check_segments_listed(const dem2d_world *world, int grains, const dem2d_vec (*ends)[2],
+                                 int count) {
     int near = 0, between = 0;
-    for (int i = 0; i < world->body_count; i++)
+    for (int i = 0; i < grains; i++)
         for (int j = 0; j < count; j++) {
-            const double reach = world->now[i].radius + 1 / sqrt(world->inverse_skin_squared[i]) +
-                                 world->walls[j].skin;
-            const double distance = segment_distance(ends[j][0], ends[j][1], world->now[i].x);
-            int listed = 0;
+            const double reach = inside_reach(world, i, j);
+            const double distance =
+                segment_distance(ends[j][0], ends[j][1], inside_position(world, i));
             if (fabs(distance - reach) < 1e-6 * reach) { /* either will do */
                 between++;
                 continue;
             }
-            for (int k = list->first[i]; k < list->first[i + 1]; k++)
-                listed += list->adjacent[k] >= list->pairs &&
-                          list->keys[list->adjacent[k]].b == world->walls[j].first;
-            assert_int_equal(listed, distance < reach);
+            assert_int_equal(inside_count_listed(world, i, j), distance < reach);
             near += distance < reach;
         }
-    assert_in_range(list->count - list->pairs, near, near + between);
+    assert_in_range(inside_wall_contacts(world), near, near + between);
     return near;
 }
 
@@ -583,7 +551,7 @@ static void check_segments(double side, double ratio, double away, int least) {
         dem2d_wall_desc wall = {0};
         dem2d_wall_id id;
         const double length = side * pow(10, random_between(&random, -3, j % 7 == 0 ? 4 : 0));
-        const double angle = random_between(&random, 0, 2 * DEM2DI_PI);
+        const double angle = random_between(&random, 0, 2 * (double)TEST_PI);
         wall.segment = true, wall.material = s.material;
         wall.point.x = random_between(&random, -side / 8, 9 * side / 8);
         wall.point.y = random_between(&random, -side / 8, 9 * side / 8);
@@ -593,9 +561,9 @@ static void check_segments(double side, double ratio, double away, int least) {
         assert_ok(dem2d_world_add_wall(s.world, &wall, &id));
         ends[j][0] = wall.point, ends[j][1] = wall.end;
     }
-    dem2di_plan plan = dem2di_plan_make(s.world);
-    assert_ok(dem2di_build_list(s.world, &plan));
-    assert_true(check_segments_listed(s.world, (const dem2d_vec(*)[2])ends, SEGMENTS) >= least);
+    assert_true(inside_build_list(s.world));
+    assert_true(check_segments_listed(s.world, GRAINS, (const dem2d_vec(*)[2])ends, SEGMENTS) >=
+                least);
     dem2d_world_destroy(s.world);
 }
 
@@ -651,7 +619,7 @@ static void edit_piece(const floor_scene *f, int i, int kind, double amount) {
     if (kind == 2) wall.mode = DEM2D_WALL_SERVO, wall.stress = 100 * amount, wall.max_speed = 0.1;
     assert_ok(dem2d_world_set_wall(f->s.world, id, &wall));
     if (kind > 3)
-        assert_ok(dem2d_world_drive_wall(f->s.world, id, dem2di_vec(0, -0.1 * amount),
+        assert_ok(dem2d_world_drive_wall(f->s.world, id, vec(0, -0.1 * amount),
                                          kind == 5 ? 0.2 * amount : 0));
 }
 
@@ -668,15 +636,15 @@ static void test_quiet_walls(void **state) {
             edit_piece(&f, piece, kind, amount);
             edit_piece(&other, piece, kind, amount);
         }
-        for (int j = 0; j < FLOOR_PIECES; j++) other.s.world->walls[j].quiet = false;
+        for (int j = 0; j < FLOOR_PIECES; j++) inside_wake_wall(other.s.world, j);
         bool was[FLOOR_PIECES];
-        for (int j = 0; j < FLOOR_PIECES; j++) was[j] = f.s.world->walls[j].quiet;
+        for (int j = 0; j < FLOOR_PIECES; j++) was[j] = inside_wall_is_quiet(f.s.world, j);
         assert_ok(dem2d_world_step(f.s.world, 1, NULL));
         assert_ok(dem2d_world_step(other.s.world, 1, NULL));
         assert_true(dem2d_world_hash(f.s.world) == dem2d_world_hash(other.s.world));
         for (int j = 0; j < FLOOR_PIECES; j++) {
             quiet += was[j];
-            woken += was[j] && !f.s.world->walls[j].quiet;
+            woken += was[j] && !inside_wall_is_quiet(f.s.world, j);
         }
     }
     assert_true(quiet > WALL_STEPS && woken > 20);
