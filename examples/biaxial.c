@@ -28,35 +28,6 @@
 #include "biaxial_options.h"
 #include "biaxial_results.h"
 
-/* ---- grains ---- */
-
-/* Grains whose circle of equal area has a diameter uniform in 0.04 to 0.06 m. Gives the world the
-   templates that are used. */
-static grain *draw_grains(dem2d_world *world, const options *o, template_set *set,
-                          uint64_t *random) {
-    grain *grains = get_memory(NULL, (size_t)o->particles, sizeof *grains);
-    const size_t room = (size_t)set->count + (size_t)o->particles; // an own one for each at most
-    dem2d_shape_id *ids = get_memory(NULL, room, sizeof *ids);
-    memset(ids, 0, room * sizeof *ids); // generation 0: not yet in the world
-    for (int i = 0; i < o->particles; i++) {
-        const int t = random_template(set, o->kinds, random);
-        const double radius = 0.5 * random_between(random, 0.04, 0.06);
-        dem2d_shape_info info;
-        must(dem2d_shape_get(set->shapes[t], &info), "template");
-        if (ids[t].generation == 0)
-            must(dem2d_world_add_shape(world, set->shapes[t], &ids[t]), "template");
-        grain g = {0};
-        g.shape = set->shapes[t];
-        g.id = ids[t];
-        g.pose.scale = radius / info.equivalent;
-        g.radius = info.circumscribed * g.pose.scale;
-        g.serial = i;
-        grains[i] = g;
-    }
-    free(ids);
-    return grains;
-}
-
 /* ---- steps, and what is watched meanwhile ---- */
 
 /* Pairs whose bounding circles overlap and that do not touch, every WATCH steps: those a step might
@@ -135,19 +106,9 @@ static void add_wall(job *j, int which, double x, double y, double nx, double ny
     must(dem2d_world_add_wall(j->world, &wall, &j->walls[which]), "wall");
 }
 
-static void fill_box(job *j, grain *grains, uint64_t *random) {
+static void fill_box(job *j, const dem2d_particle_desc *grains, uint64_t seed) {
     plan *p = &j->plan;
-    place_grains(grains, p->particles, p->width, &p->height, random);
-    for (int i = 0; i < p->particles; i++) {
-        dem2d_particle_desc desc = {0};
-        desc.scale = grains[i].pose.scale;
-        desc.shape = grains[i].id;
-        desc.material = j->grain_material;
-        desc.position = grains[i].pose.position;
-        desc.angle = grains[i].angle;
-        dem2d_particle_id id;
-        must(dem2d_world_add_particle(j->world, &desc, &id), "particle");
-    }
+    place_grains(j->world, grains, p->particles, p->width, &p->height, seed);
     add_wall(j, LEFT, 0, 0, 1, 0);
     add_wall(j, RIGHT, p->width, 0, -1, 0);
     add_wall(j, BOTTOM, 0, 0, 0, 1);
@@ -295,8 +256,9 @@ int main(int count, char **arguments) {
     j.plan = make_plan(&o);
     draft_open(&j.history);
     build_world(&j, &o);
-    grain *grains = draw_grains(j.world, &o, &set, &random);
-    fill_box(&j, grains, &random);
+    dem2d_particle_desc *grains =
+        draw_grains(j.world, j.grain_material, o.particles, o.kinds, 0.04, 0.06, &set, &random);
+    fill_box(&j, grains, random);
     free(grains); // the world has its own copies of all
     free_templates(&set);
 

@@ -1,4 +1,4 @@
-/* grains.h - templates of five kinds, and grains of them placed at random without overlap. */
+/* grains.h - templates of five kinds, and grains of them. */
 #ifndef DEM2D_EXAMPLES_GRAINS_H
 #define DEM2D_EXAMPLES_GRAINS_H
 
@@ -144,69 +144,53 @@ static inline int random_template(template_set *set, const bool kinds[KINDS], ui
     return set->count - 1;
 }
 
-/* ---- placement at random without overlap ---- */
+/* ---- grains ---- */
 
-typedef struct grain {
-    const dem2d_shape *shape;
-    dem2d_shape_id id; // the same template in a world, for the caller
-    double radius;     // of the bounding circle, m
-    double angle;
-    dem2d_pose pose; // its scale is given, the rest comes from place_grains
-    int serial;      // settles the order of equal radii
-} grain;
-
-static inline int compare_grains(const void *a, const void *b) {
-    const grain *p = a, *q = b;
-    if (p->radius != q->radius) return p->radius > q->radius ? -1 : 1;
-    return p->serial - q->serial;
-}
-
-/* Whether a grain is free of the first `count` others: bounding circles, then exactly. */
-static inline bool grain_is_free(const grain *g, const grain *others, int count) {
+/* Grains whose circle of equal area has a diameter uniform in a range, m. Gives the world the
+   templates that are used. */
+static inline dem2d_particle_desc *draw_grains(dem2d_world *world, dem2d_material_id material,
+                                               int count, const bool kinds[KINDS], double smallest,
+                                               double largest, template_set *set,
+                                               uint64_t *random) {
+    dem2d_particle_desc *grains = get_memory(NULL, (size_t)count, sizeof *grains);
+    const size_t room = (size_t)set->count + (size_t)count; // an own one for each at most
+    dem2d_shape_id *ids = get_memory(NULL, room, sizeof *ids);
+    memset(grains, 0, (size_t)count * sizeof *grains);
+    memset(ids, 0, room * sizeof *ids); // generation 0: not yet in the world
     for (int i = 0; i < count; i++) {
-        const double dx = others[i].pose.position.x - g->pose.position.x;
-        const double dy = others[i].pose.position.y - g->pose.position.y;
-        const double reach = others[i].radius + g->radius;
-        if (dx * dx + dy * dy > reach * reach) continue;
-        dem2d_contact contact;
-        must(dem2d_pair_overlap(g->shape, g->pose, others[i].shape, others[i].pose, NULL, &contact),
-             "placement");
-        if (contact.state != DEM2D_SEPARATED) return false; // unresolved counts as an overlap
+        const int t = random_template(set, kinds, random);
+        const double radius = 0.5 * random_between(random, smallest, largest);
+        dem2d_shape_info info;
+        must(dem2d_shape_get(set->shapes[t], &info), "template");
+        if (ids[t].generation == 0)
+            must(dem2d_world_add_shape(world, set->shapes[t], &ids[t]), "template");
+        grains[i].shape = ids[t];
+        grains[i].material = material;
+        grains[i].scale = radius / info.equivalent;
     }
-    return true;
+    free(ids);
+    return grains;
 }
 
-/* Tries places for grains[index] in the box from (0, 0) to (width, height). */
-static inline bool place_one(grain *grains, int index, double width, double height,
-                             uint64_t *random) {
-    enum { TRIES = 20000 };
-    grain *g = &grains[index];
-    for (int i = 0; i < TRIES; i++) {
-        dem2d_box box;
-        g->angle = random_between(random, 0, 6.283185307179586);
-        g->pose = dem2d_pose_make(0, 0, g->angle, g->pose.scale);
-        must(dem2d_shape_aabb(g->shape, g->pose, &box), "placement");
-        if (box.upper.x - box.lower.x >= width || box.upper.y - box.lower.y >= height) continue;
-        g->pose.position.x = random_between(random, -box.lower.x, width - box.upper.x);
-        g->pose.position.y = random_between(random, -box.lower.y, height - box.upper.y);
-        if (grain_is_free(g, grains, index)) return true;
+/* Places them at random without overlap, largest first, in the box from (0, 0) to (width, height).
+   A box that turns out too small is made a tenth higher, and stderr says so. */
+static inline void place_grains(dem2d_world *world, const dem2d_particle_desc *grains, int count,
+                                double width, double *height, uint64_t seed) {
+    dem2d_fill_desc fill = {0};
+    dem2d_filling filling;
+    dem2d_result result = DEM2D_NOT_REACHED;
+    fill.grains = grains, fill.count = count, fill.tries = 2000, fill.seed = seed;
+    fill.method = DEM2D_FILL_RANDOM, fill.region.box.upper.x = width;
+    for (int growths = 0; growths < 50 && result == DEM2D_NOT_REACHED; growths++) {
+        if (growths > 0) {
+            *height *= 1.1;
+            fprintf(stderr, "%s: no place for all grains; the box is now %.3g m high\n",
+                    example_name, *height);
+        }
+        fill.region.box.upper.y = *height;
+        result = dem2d_world_fill(world, &fill, NULL, 0, &filling);
     }
-    return false;
-}
-
-/* Places all grains, largest first (sorts them). A box that turns out too small is made a tenth
-   higher, and stderr says so. */
-static inline void place_grains(grain *grains, int count, double width, double *height,
-                                uint64_t *random) {
-    qsort(grains, (size_t)count, sizeof *grains, compare_grains);
-    for (int i = 0, growths = 0; i < count; i++) {
-        if (place_one(grains, i, width, *height, random)) continue;
-        if (++growths > 50) fail(STATUS_FAILED, "the grains find no place in the box");
-        *height *= 1.1;
-        fprintf(stderr, "%s: no place for grain %d of %d; the box is now %.3g m high\n",
-                example_name, i + 1, count, *height);
-        i = -1; // all over again
-    }
+    must(result, "filling");
 }
 
 #endif

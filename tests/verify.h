@@ -431,25 +431,9 @@ PART void fill(packing *p, int count, const bool kinds[KINDS], const char *path,
                double largest) {
     const dem2d_image_desc search = default_search();
     template_set set = load_templates(path, &search, 0, false);
-    grain *grains = get_memory(NULL, (size_t)count, sizeof *grains);
-    memset(grains, 0, (size_t)count * sizeof *grains);
-    for (int i = 0; i < count; i++) {
-        const int t = random_template(&set, kinds, &random_state);
-        dem2d_shape_info info;
-        must(dem2d_shape_get(set.shapes[t], &info), "template");
-        grains[i].shape = set.shapes[t], grains[i].serial = i;
-        grains[i].pose.scale = uniform(smallest, largest) / 2 / info.equivalent;
-        grains[i].radius = info.circumscribed * grains[i].pose.scale;
-    }
-    place_grains(grains, count, p->width, &p->height, &random_state);
-    for (int i = 0; i < count; i++) {
-        dem2d_particle_desc desc = {0};
-        dem2d_particle_id id;
-        must(dem2d_world_add_shape(p->s.world, grains[i].shape, &desc.shape), "template");
-        desc.scale = grains[i].pose.scale, desc.material = p->s.material;
-        desc.position = grains[i].pose.position, desc.angle = grains[i].angle;
-        must(dem2d_world_add_particle(p->s.world, &desc, &id), "particle");
-    }
+    dem2d_particle_desc *grains = draw_grains(p->s.world, p->s.material, count, kinds, smallest,
+                                              largest, &set, &random_state);
+    place_grains(p->s.world, grains, count, p->width, &p->height, random_state);
     free(grains);
     free_templates(&set);
 }
