@@ -3850,7 +3850,7 @@ static inline int dem2di_polygon_corner(const dem2d_shape *shape, dem2d_vec u) {
 }
 
 /* Point of an arc at t: start + 3 times the integral of (1-t)^2 d0 + 2t(1-t) d1 + t^2 d2. */
-static dem2d_vec dem2di_arc_point(const dem2di_arc *arc, double t) {
+static inline dem2d_vec dem2di_arc_point(const dem2di_arc *arc, double t) {
     double w0 = t * (3 - t * (3 - t)), w1 = t * t * (3 - 2 * t), w2 = t * t * t;
     return dem2di_vec(arc->start.x + w0 * arc->d0.x + w1 * arc->d1.x + w2 * arc->d2.x,
                       arc->start.y + w0 * arc->d0.y + w1 * arc->d1.y + w2 * arc->d2.y);
@@ -3875,24 +3875,28 @@ static double dem2di_arc_rho(const dem2di_arc *arc, double t) {
 }
 
 /* [P] sec. 2.2, eq. 9, corrected: the root of q0 (1-t)^2 + 2 q1 t(1-t) + q2 t^2. Its denominator is
-   a sum of terms of one sign, so that nothing cancels and t is in [0, 1]. */
-static double dem2di_arc_parameter(double q0, double q1, double q2) {
-    if (q2 > 0) return 1;
-    if (q0 < 0) return 0;
-    double root = sqrt(q1 * q1 - q0 * q2);
-    double top = q1 > 0 ? root + q1 : q0;
-    double bottom = q1 > 0 ? top - q2 : q0 + (root - q1);
-    return bottom > 0 ? top / bottom : 0;
+   a sum of terms of one sign, so that nothing cancels and t is in [0, 1]. *bend gets -B''.u/6, at
+   the root the square root in the formula. The sign of q1 chooses by index: a branch could not be
+   predicted. */
+static inline double dem2di_arc_parameter(double q0, double q1, double q2, double *bend) {
+    if (!(q0 >= 0 && q2 <= 0)) {
+        double end = q2 > 0 ? 1 : 0;
+        *bend = (q0 - q1) * (1 - end) + (q1 - q2) * end;
+        return end;
+    }
+    const double root = sqrt(q1 * q1 - q0 * q2), sum = root + fabs(q1);
+    const double top[2] = {q0, sum}, rest[2] = {q0, -q2};
+    const int falls = q1 > 0;
+    const double bottom = sum + rest[falls];
+    *bend = root;
+    return bottom > 0 ? top[falls] / bottom : 0;
 }
 
-/* Support point of an arc. rho = |B'|^2 / (-B''.u) = 3/2 speed^2 / bend, with speed = |B'|/3 and
-   bend = -B''.u/6; at the root, bend is the square root in [P]'s formula. */
+/* Support point of an arc. rho = |B'|^2 / (-B''.u) = 3/2 speed^2 / bend, with speed = |B'|/3. */
 static inline dem2d_vec dem2di_arc_support(const dem2di_arc *arc, dem2d_vec u, double *rho) {
-    double q0 = dem2di_dot(arc->d0, u), q1 = dem2di_dot(arc->d1, u), q2 = dem2di_dot(arc->d2, u);
-    double t = dem2di_arc_parameter(q0, q1, q2);
+    double bend, t = dem2di_arc_parameter(dem2di_dot(arc->d0, u), dem2di_dot(arc->d1, u),
+                                          dem2di_dot(arc->d2, u), &bend);
     if (rho != NULL) {
-        bool inside = q0 >= 0 && q2 <= 0;
-        double bend = inside ? sqrt(q1 * q1 - q0 * q2) : (q0 - q1) * (1 - t) + (q1 - q2) * t;
         double f = 1.5 / bend, s = 1 - t; /* does not wait for the division that gives t */
         double speed = dem2di_cross(u, arc->d0) * (s * s) + dem2di_cross(u, arc->d1) * (2 * t * s) +
                        dem2di_cross(u, arc->d2) * (t * t);
@@ -4969,8 +4973,8 @@ static int dem2di_arc_parts(dem2di_chain *chain, const dem2di_arc *arc, dem2di_a
         !dem2di_unit(dem2di_sub(dem2di_perp(start), dem2di_perp(end)), &tangent))
         return 1;
     dem2d_vec u = dem2di_vec(tangent.y, -tangent.x);
-    double t = dem2di_arc_parameter(dem2di_dot(arc->d0, u), dem2di_dot(arc->d1, u),
-                                    dem2di_dot(arc->d2, u));
+    double bend, t = dem2di_arc_parameter(dem2di_dot(arc->d0, u), dem2di_dot(arc->d1, u),
+                                          dem2di_dot(arc->d2, u), &bend);
     dem2di_arc_split(arc, t, part);
     for (int i = 0; i < 2; i++) { /* a tiny part becomes a corner */
         double length = dem2di_arc_length(&part[i]);
@@ -7734,8 +7738,9 @@ static int dem2di_arc_crossings(const dem2di_arc *arc, dem2d_vec p, dem2d_vec ed
     if (above || below || square == 0) return 0;
     /* the edge's left normal if the arc bulges to the left, else the right one */
     if (f.q0 < 0 || f.q2 > 0) normal = dem2di_negate(normal);
-    double split = dem2di_arc_parameter(dem2di_dot(arc->d0, normal), dem2di_dot(arc->d1, normal),
-                                        dem2di_dot(arc->d2, normal));
+    double bend,
+        split = dem2di_arc_parameter(dem2di_dot(arc->d0, normal), dem2di_dot(arc->d1, normal),
+                                     dem2di_dot(arc->d2, normal), &bend);
     double ends[3] = {0, split, 1};
     int found = 0;
     for (int i = 0; i < 2; i++) {
