@@ -12216,6 +12216,16 @@ static void dem2di_law_dashpots(dem2di_law_rows *rows, double time_step) {
 static void dem2di_law_all_dashpots(dem2di_law_rows *rows, double time_step) {
     dem2di_law_points(rows, time_step, true, true);
 }
+
+/* What the normal dashpots add to the springs. */
+static void dem2di_law_viscous(dem2di_law_rows *rows) {
+    for (int k = 0; k < rows->count; k++) {
+        const double weight = rows->weight[k];
+        const double spring = rows->stiffness[k] * weight * rows->depth[k];
+        rows->viscous[k] =
+            dem2di_damped(spring, weight * rows->dashpot[k], rows->approach[k]) - spring;
+    }
+}
 DEM2DI_VECTORS_END
 
 /* The law for all rows, with the terms that are in use. */
@@ -18691,6 +18701,15 @@ static DEM2DI_INLINE void dem2di_batch_inverse(const dem2di_inverse *inverse,
     }
 }
 
+static void dem2di_batch_fetch_plain(const dem2d_world *world, int first, dem2di_batch *batch) {
+    const dem2di_key *keys = world->list.keys + first;
+    if (world->plan.friction || world->plan.terms != 0)
+        dem2di_batch_fetch(world->now, keys, 0, true, batch);
+    else
+        dem2di_batch_fetch(world->now, keys, 0, false, batch);
+    if (world->plan.terms != 0) dem2di_batch_inverse(world->inverse, keys, 0, batch);
+}
+
 #if DEM2DI_FOURS
 DEM2DI_AVX2_INLINE dem2di_four dem2di_four_at(const double *from) {
     dem2di_four four;
@@ -18775,7 +18794,22 @@ DEM2DI_AVX2_INLINE void dem2di_fours_inverse(const dem2di_inverse *inverse, cons
     }
     dem2di_batch_inverse(inverse, keys, k, batch);
 }
+
+/* All that the law needs of the two of each contact. A function of its own, as all that use vectors
+   of four and are called in a loop: it leaves the upper halves of the registers zero. Other code
+   waits for them where they are not. */
+static DEM2DI_AVX2 void dem2di_batch_fetch_fours(const dem2d_world *world, int first,
+                                                 dem2di_batch *batch) {
+    const dem2di_key *keys = world->list.keys + first;
+    dem2di_fours_fetch(world->now, keys, batch);
+    if (world->plan.terms != 0) dem2di_fours_inverse(world->inverse, keys, batch);
+}
 #endif
+
+/* A coefficient of friction; without a tangential spring 0. */
+static DEM2DI_INLINE double dem2di_slides(const dem2d_pair_desc *law, double friction) {
+    return law->tangential_stiffness > 0 ? friction : 0;
+}
 
 /* The laws of the contacts where there are several. */
 static void dem2di_batch_laws(const dem2d_world *world, int first, dem2di_batch *batch) {
@@ -18784,10 +18818,10 @@ static void dem2di_batch_laws(const dem2d_world *world, int first, dem2di_batch 
         const dem2d_pair_desc *law = dem2di_law_with(world, first + k, false);
         batch->kn[k] = law->normal_stiffness;
         batch->kt[k] = law->tangential_stiffness;
-        batch->mu[k] = law->friction;
+        batch->mu[k] = dem2di_slides(law, law->friction);
         if (!terms) continue;
         batch->zeta[k] = law->damping_ratio;
-        batch->mu_r[k] = law->rolling_friction;
+        batch->mu_r[k] = dem2di_slides(law, law->rolling_friction);
         batch->zeta_t[k] = law->tangential_damping_ratio;
         batch->zeta_r[k] = law->rolling_damping_ratio;
     }
@@ -19072,54 +19106,34 @@ static inline void dem2di_batch_end(const dem2d_world *world, const dem2di_batch
     count->proofs[DEM2D_BY_FORM] += closed;
 }
 
+/* A batch of contacts from `first` on, up to `end`, before the law. */
+static void dem2di_batch_make(const dem2d_world *world, int first, int end, dem2di_batch *batch) {
+    dem2di_batch_begin(world, first, dem2di_block_end(first, DEM2DI_BATCH, end) - first, batch);
+#if DEM2DI_FOURS
+    if (world->fours)
+        dem2di_batch_fetch_fours(world, first, batch);
+    else
+#endif
+        dem2di_batch_fetch_plain(world, first, batch);
+    dem2di_batch_amend(world, first, batch);
+}
+
 /* Contacts of circles from begin to end. */
-static void dem2di_disc_range_plain(const dem2d_world *world, int begin, int end,
-                                    dem2di_count *count) {
-    const dem2di_plan *plan = &world->plan;
-    const dem2d_pair_desc *law = dem2di_law(world, plan->material, plan->material);
-    dem2di_batch batch;
-    for (int first = begin; first < end; first += DEM2DI_BATCH) {
-        const dem2di_key *keys = world->list.keys + first;
-        dem2di_batch_begin(world, first, dem2di_block_end(first, DEM2DI_BATCH, end) - first,
-                           &batch);
-        if (plan->friction || plan->terms != 0)
-            dem2di_batch_fetch(world->now, keys, 0, true, &batch);
-        else
-            dem2di_batch_fetch(world->now, keys, 0, false, &batch);
-        if (plan->terms != 0) dem2di_batch_inverse(world->inverse, keys, 0, &batch);
-        dem2di_batch_amend(world, first, &batch);
-        dem2di_batch_end(world, &batch,
-                         dem2di_batch_solve_plain(&batch, world->made_step, law, plan), count);
-    }
-}
-
-#if DEM2DI_FOURS
-static DEM2DI_AVX2 void dem2di_disc_range_fours(const dem2d_world *world, int begin, int end,
-                                                dem2di_count *count) {
-    const dem2di_plan *plan = &world->plan;
-    const dem2d_pair_desc *law = dem2di_law(world, plan->material, plan->material);
-    dem2di_batch batch;
-    for (int first = begin; first < end; first += DEM2DI_BATCH) {
-        const dem2di_key *keys = world->list.keys + first;
-        dem2di_batch_begin(world, first, dem2di_block_end(first, DEM2DI_BATCH, end) - first,
-                           &batch);
-        dem2di_fours_fetch(world->now, keys, &batch);
-        if (plan->terms != 0) dem2di_fours_inverse(world->inverse, keys, &batch);
-        dem2di_batch_amend(world, first, &batch);
-        dem2di_batch_end(world, &batch,
-                         dem2di_batch_solve_fours(&batch, world->made_step, law, plan), count);
-    }
-}
-#endif
-
 static void dem2di_disc_range(const dem2d_world *world, int begin, int end, dem2di_count *count) {
+    const dem2di_plan *plan = &world->plan;
+    const dem2d_pair_desc *law = dem2di_law(world, plan->material, plan->material);
+    dem2di_batch batch;
+    for (int first = begin; first < end; first += DEM2DI_BATCH) {
+        int64_t closed;
+        dem2di_batch_make(world, first, end, &batch);
 #if DEM2DI_FOURS
-    if (world->fours) {
-        dem2di_disc_range_fours(world, begin, end, count);
-        return;
-    }
+        if (world->fours)
+            closed = dem2di_batch_solve_fours(&batch, world->made_step, law, plan);
+        else
 #endif
-    dem2di_disc_range_plain(world, begin, end, count);
+            closed = dem2di_batch_solve_plain(&batch, world->made_step, law, plan);
+        dem2di_batch_end(world, &batch, closed, count);
+    }
 }
 
 /* Part of a gap that proves nothing: nearer to each other than this (m), two shapes may be found in
@@ -19431,8 +19445,8 @@ static DEM2DI_INLINE void dem2di_force_put(dem2d_world *world, int i, const dem2
 }
 
 /* What a caller's law says of the contact of row k beside its forces, into the columns. */
-static void dem2di_law_put_callers(dem2d_world *world, int i, bool two, int k,
-                                   const dem2di_law_rows *rows) {
+static DEM2DI_INLINE void dem2di_law_put_callers(dem2d_world *world, int i, bool two, int k,
+                                                 const dem2di_law_rows *rows) {
     const dem2di_contacts *to = &world->list.contacts;
     const int first = two && !(rows->weight[k] > 0) ? k + 1 : k;
     to->viscous[i] = rows->viscous[k];
@@ -19520,15 +19534,10 @@ static dem2d_law_batch dem2di_law_batch_of(const dem2d_world *world, dem2di_law_
 static void dem2di_law_ask(const dem2d_world *world, dem2di_law_rows *rows) {
     dem2d_law_batch batch = dem2di_law_batch_of(world, rows);
     const size_t bytes = (size_t)rows->count * sizeof(double);
-    double *const zero[] = {rows->viscous, rows->force,         rows->shear,         rows->moment,
-                            rows->energy,  rows->viscous_shear, rows->viscous_moment};
-    for (int z = 0; z < 7; z++) memset(zero[z], 0, bytes);
-    for (int k = 0; k < rows->count; k++) {
-        double weight = rows->weight[k], spring = rows->stiffness[k] * weight * rows->depth[k];
-        if (!(rows->dashpot[k] > 0)) continue;
-        rows->viscous[k] =
-            dem2di_damped(spring, weight * rows->dashpot[k], rows->approach[k]) - spring;
-    }
+    double *const zero[] = {rows->force,  rows->shear,         rows->moment,
+                            rows->energy, rows->viscous_shear, rows->viscous_moment};
+    for (int z = 0; z < 6; z++) memset(zero[z], 0, bytes);
+    dem2di_law_viscous(rows);
     world->law(world->law_user, &batch);
 }
 
@@ -20699,61 +20708,214 @@ static void dem2di_others_range(dem2d_world *world, int begin, int end, dem2di_c
     dem2di_law_apply(world, &rows, count);
 }
 
-/* Two circles that overlap, as a row for a caller's law: as dem2di_law_add. */
-static DEM2DI_INLINE void dem2di_disc_add(const dem2d_world *world, int i,
-                                          const dem2di_contact *contact, dem2di_law_rows *rows) {
-    const dem2di_contacts *from = &world->list.contacts;
-    const dem2di_key *key = &world->list.keys[i];
-    const dem2d_pair_desc *law = dem2di_law_of(world, i);
-    const double radius_a = world->now[key->a].radius, radius_b = world->now[key->b].radius;
-    const double radius = radius_a * (radius_b / (radius_a + radius_b));
-    const dem2di_relative_motion motion = dem2di_motion_of(world, i);
-    const int k = rows->count;
-    dem2di_contact last;
-    (void)dem2di_contact_get(world, from, i, &last);
-    dem2di_law_add_row(law, i, 1, contact->depth, dem2di_slip(&last, contact, &motion),
-                       last.shear - from->viscous_shear[i], rows);
-    rows->approach[k] = -dem2di_velocity_n(contact, &motion);
-    rows->spin[k] = motion.wb - motion.wa;
-    rows->dashpot[k] = law->damping_ratio > 0 ? dem2di_pair_dashpot(world, i) : 0;
-    rows->tangential_dashpot[k] =
-        law->tangential_damping_ratio > 0 ? dem2di_tangential_dashpot(world, i, &contact->arms) : 0;
-    rows->rolling_dashpot[k] =
-        law->rolling_damping_ratio > 0 ? dem2di_rolling_dashpot(world, i) : 0;
-    rows->rolling_stiffness[k] = dem2di_rolling_stiffness(law, radius);
-    rows->rolling_friction[k] = law->rolling_friction * radius;
-    rows->last_moment[k] = from->moment[i] - from->viscous_moment[i];
-    dem2di_law_row_callers(world, i, law, contact, radius, &from->state[i], k, rows);
+/* --- circles and a caller's law ------------------------------------------------------------------
+   A loop over a batch computes what the law reads, of closed contacts and of those that are apart,
+   as in the passes over circles. The rows of closed contacts are moved together, and the law is
+   called once for them. They get the same bits as from dem2di_law_add. */
+
+/* Has a law dashpots? */
+static DEM2DI_INLINE bool dem2di_has_dampers(const dem2d_pair_desc *law) {
+    return law->damping_ratio > 0 || law->tangential_damping_ratio > 0 ||
+           law->rolling_damping_ratio > 0;
 }
 
-/* Pairs of circles by rows, for a caller's law. */
-static void dem2di_discs_by_rows(dem2d_world *world, int begin, int end, dem2di_count *count) {
-    dem2di_list *list = &world->list;
-    dem2di_law_rows rows;
-    rows.count = 0;
-    for (int i = begin; i < end; i++) {
-        const dem2di_state *a = &world->now[list->keys[i].a], *b = &world->now[list->keys[i].b];
-        const bool held = world->immovable && dem2di_immovable(world, i);
-        dem2di_round r = dem2di_round_make(dem2di_disc_line(a, b), held ? 0 : a->radius,
-                                           held ? 0 : b->radius, 1);
-        dem2di_contact contact;
-        contact.normal = r.normal;
-        contact.depth = r.depth;
-        contact.arms.a_n = r.arm_a;
-        contact.arms.b_n = -r.arm_b;
-        contact.arms.a_t = contact.arms.b_t = 0;
-        if (r.depth > 0) {
-            dem2di_law_room(world, &rows, count);
-            dem2di_disc_add(world, i, &contact, &rows);
-            count->collisions++;
-            count->proofs[DEM2D_BY_FORM]++;
+DEM2DI_VECTORS_BEGIN
+/* Geometry of all contacts of a batch into the columns, and all that the law reads into the rows of
+   the same places. Without dampers the law has no dashpots. */
+static DEM2DI_INLINE void
+dem2di_batch_rows(const dem2di_batch *b, const dem2d_pair_desc *law, bool one_law, bool dampers,
+                  double *DEM2DI_APART normal_x, double *DEM2DI_APART normal_y,
+                  double *DEM2DI_APART depth, const double *DEM2DI_APART shear,
+                  const double *DEM2DI_APART viscous_shear, const double *DEM2DI_APART moment,
+                  const double *DEM2DI_APART viscous_moment, dem2di_law_rows *DEM2DI_APART rows) {
+    const int count = b->count;
+    const double mu = dem2di_slides(law, law->friction);
+    const double mu_r = dem2di_slides(law, law->rolling_friction);
+    DEM2DI_INDEPENDENT
+    for (int k = 0; k < count; k++) {
+        const double kn = one_law ? law->normal_stiffness : b->kn[k];
+        const double kt = one_law ? law->tangential_stiffness : b->kt[k];
+        const double radius = b->radius_a[k] * (b->radius_b[k] / (b->radius_a[k] + b->radius_b[k]));
+        const double rolling = kt * radius * radius;
+        const dem2d_vec last = {normal_x[k], normal_y[k]};
+        const dem2di_round r = dem2di_batch_normal(b, k, law, one_law, 0);
+        rows->sliding[k] = dem2di_batch_slip(b, k, &r, last, depth[k]);
+        rows->approach[k] = -(r.normal.x * b->vx[k] + r.normal.y * b->vy[k]);
+        rows->spin[k] = b->wb[k] - b->wa[k];
+        rows->mass[k] = 1 / b->inverse[k];
+        rows->radius[k] = radius;
+        rows->last_shear[k] = shear[k] - viscous_shear[k];
+        rows->last_moment[k] = moment[k] - viscous_moment[k];
+        rows->stiffness[k] = kn;
+        rows->tangential_stiffness[k] = kt;
+        rows->friction[k] = one_law ? mu : b->mu[k];
+        rows->rolling_stiffness[k] = rolling;
+        rows->rolling_friction[k] = (one_law ? mu_r : b->mu_r[k]) * radius;
+        if (dampers) {
+            const double normal = one_law ? law->damping_ratio : b->zeta[k];
+            const double along = one_law ? law->tangential_damping_ratio : b->zeta_t[k];
+            const double spin = one_law ? law->rolling_damping_ratio : b->zeta_r[k];
+            const double inverse = b->inverse_a[k] + b->inverse_b[k];
+            rows->dashpot[k] = 2 * normal * sqrt(1 / b->inverse[k] * kn);
+            rows->tangential_dashpot[k] = dem2di_batch_dashpot(b, k, kt, along, &r);
+            rows->rolling_dashpot[k] = 2 * spin * sqrt(1 / inverse * rolling);
         } else {
-            dem2di_contact_clear(world, i);
-            dem2di_no_load(world, i);
+            rows->dashpot[k] = rows->tangential_dashpot[k] = rows->rolling_dashpot[k] = 0;
         }
-        dem2di_geometry_put(list, i, &contact);
+        normal_x[k] = rows->normal_x[k] = r.normal.x;
+        normal_y[k] = rows->normal_y[k] = r.normal.y;
+        depth[k] = rows->depth[k] = r.depth;
+        rows->compression[k] = r.depth * r.depth / 2;
     }
-    dem2di_law_apply(world, &rows, count);
+}
+
+/* The loop for the laws that the scene has. */
+static DEM2DI_INLINE void dem2di_batch_rows_of(const dem2di_batch *b, const dem2d_pair_desc *law,
+                                               bool one_law, dem2di_law_rows *rows) {
+    const bool dampers = dem2di_has_dampers(law);
+#define DEM2DI_ROWS(one_law, dampers)                                                         \
+    dem2di_batch_rows(b, law, one_law, dampers, b->normal_x, b->normal_y, b->depth, b->shear, \
+                      b->viscous_shear, b->moment, b->viscous_moment, rows)
+    if (!one_law)
+        DEM2DI_ROWS(false, true);
+    else if (dampers)
+        DEM2DI_ROWS(true, true);
+    else
+        DEM2DI_ROWS(true, false);
+#undef DEM2DI_ROWS
+}
+
+static void dem2di_batch_rows_plain(const dem2di_batch *batch, const dem2d_pair_desc *law,
+                                    bool one_law, dem2di_law_rows *rows) {
+    dem2di_batch_rows_of(batch, law, one_law, rows);
+}
+
+#if DEM2DI_FOURS
+static DEM2DI_AVX2 void dem2di_batch_rows_fours(const dem2di_batch *batch,
+                                                const dem2d_pair_desc *law, bool one_law,
+                                                dem2di_law_rows *rows) {
+    dem2di_batch_rows_of(batch, law, one_law, rows);
+}
+#endif
+DEM2DI_VECTORS_END
+
+/* Rows `from` to `count`: that of place at[j] becomes row j. Coefficients that are the same in all
+   rows stay. */
+static void dem2di_rows_pack(dem2di_law_rows *rows, const int at[DEM2DI_BATCH], int from, int count,
+                             bool same) {
+    for (int j = from; j < count; j++) {
+        const int k = at[j];
+        rows->depth[j] = rows->depth[k];
+        rows->approach[j] = rows->approach[k];
+        rows->sliding[j] = rows->sliding[k];
+        rows->spin[j] = rows->spin[k];
+        rows->rolling_stiffness[j] = rows->rolling_stiffness[k];
+        rows->rolling_friction[j] = rows->rolling_friction[k];
+        rows->last_shear[j] = rows->last_shear[k];
+        rows->last_moment[j] = rows->last_moment[k];
+        rows->normal_x[j] = rows->normal_x[k];
+        rows->normal_y[j] = rows->normal_y[k];
+        rows->compression[j] = rows->compression[k];
+        rows->mass[j] = rows->mass[k];
+        rows->radius[j] = rows->radius[k];
+    }
+    for (int j = from; j < count && !same; j++) {
+        const int k = at[j];
+        rows->stiffness[j] = rows->stiffness[k];
+        rows->dashpot[j] = rows->dashpot[k];
+        rows->friction[j] = rows->friction[k];
+        rows->tangential_stiffness[j] = rows->tangential_stiffness[k];
+        rows->tangential_dashpot[j] = rows->tangential_dashpot[k];
+        rows->rolling_dashpot[j] = rows->rolling_dashpot[k];
+    }
+}
+
+/* The rest of the rows of closed contacts of a batch from `first` on, which are at these places. */
+static void dem2di_rows_name(const dem2d_world *world, int first, const int at[DEM2DI_BATCH],
+                             dem2di_law_rows *rows) {
+    const bool one_law = world->plan.one_law;
+    for (int j = 0; j < rows->count; j++) {
+        const int i = first + at[j];
+        rows->contact[j] = i;
+        rows->a[j] = dem2di_particle_id(world, world->list.keys[i].a);
+        rows->b[j] = dem2di_particle_id(world, world->list.keys[i].b);
+        memcpy(rows->state[j], world->list.contacts.state[i].at, sizeof rows->state[j]);
+        if (!one_law) rows->pair[j] = dem2di_law_with(world, i, false);
+    }
+}
+
+/* What the law has made of the rows into the columns of a batch from `first` on. */
+static void dem2di_rows_put(dem2d_world *world, int first, const dem2di_batch *batch,
+                            const dem2di_law_rows *rows, dem2di_count *count) {
+    const dem2di_contacts *to = &world->list.contacts;
+    for (int j = 0; j < rows->count; j++) {
+        const int i = rows->contact[j], k = i - first;
+        const dem2d_vec normal = {rows->normal_x[j], rows->normal_y[j]};
+        const double half = rows->depth[j] / 2, moment = rows->moment[j];
+        dem2di_action action;
+        to->force[i] = rows->force[j];
+        to->shear[i] = rows->shear[j];
+        to->moment[i] = moment;
+        to->viscous_shear[i] = rows->viscous_shear[j];
+        to->viscous_moment[i] = rows->viscous_moment[j];
+        dem2di_law_put_callers(world, i, false, j, rows);
+        dem2di_batch_act(&action, normal, rows->force[j], rows->shear[j], batch->radius_a[k] - half,
+                         batch->radius_b[k] - half);
+        action.a -= moment;
+        action.b += moment;
+        const double sum = dem2di_action_size(&action);
+        world->actions[i] = action;
+        count->unsound += !dem2di_finite(sum);
+        if (!world->bounded) count->load = dem2di_max(count->load, sum);
+    }
+}
+
+/* The closed contacts of a batch from `first` on through the law; the others have no force. */
+static void dem2di_rows_solve(dem2d_world *world, int first, bool same, const dem2di_batch *batch,
+                              dem2di_law_rows *rows, dem2di_count *count) {
+    int at[DEM2DI_BATCH], closed = 0, gap = batch->count;
+    for (int k = batch->count - 1; k >= 0; k--) {
+        if (batch->depth[k] > 0) continue;
+        dem2di_contact_clear(world, first + k);
+        dem2di_no_load(world, first + k);
+        gap = k;
+    }
+    for (int k = 0; k < batch->count; k++) {
+        at[closed] = k;
+        closed += batch->depth[k] > 0 ? 1 : 0;
+    }
+    rows->count = closed;
+    if (closed == 0) return;
+    dem2di_rows_pack(rows, at, gap, closed, same);
+    dem2di_rows_name(world, first, at, rows);
+    dem2di_law_ask(world, rows);
+    dem2di_rows_put(world, first, batch, rows, count);
+    count->collisions += closed;
+    count->proofs[DEM2D_BY_FORM] += closed;
+}
+
+/* Contacts of circles from begin to end, for a caller's law. */
+static void dem2di_discs_by_rows(dem2d_world *world, int begin, int end, dem2di_count *count) {
+    const dem2d_pair_desc *law = dem2di_law(world, world->plan.material, world->plan.material);
+    const bool same = world->plan.one_law && !dem2di_has_dampers(law);
+    dem2di_batch batch;
+    dem2di_law_rows rows;
+    memset(rows.wall, 0, sizeof rows.wall);
+    memset(rows.point, 0, sizeof rows.point);
+    for (int k = 0; k < DEM2DI_BATCH; k++) {
+        rows.weight[k] = rows.sign[k] = 1;
+        rows.pair[k] = law;
+    }
+    for (int first = begin; first < end; first += DEM2DI_BATCH) {
+        dem2di_batch_make(world, first, end, &batch);
+#if DEM2DI_FOURS
+        if (world->fours)
+            dem2di_batch_rows_fours(&batch, law, world->plan.one_law, &rows);
+        else
+#endif
+            dem2di_batch_rows_plain(&batch, law, world->plan.one_law, &rows);
+        dem2di_rows_solve(world, first, same, &batch, &rows, count);
+    }
 }
 
 /* Blocks of the three kinds of contacts, one kind after the other. */

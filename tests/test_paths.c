@@ -44,6 +44,14 @@ static const feature grain_features[] = {
     {"grains, frictionless", 0, 0, 0, 0, 0, false, false, false, false, false, -10, 0, 0},
 };
 
+/* Of discs with a caller's law, which is the built-in one. */
+static const feature law_features[] = {
+    {"law", 0.4, 0, 0, 0, 0, false, false, false, false, true, -10, 0.3, 0},
+    {"law, all terms", 0.4, 0.2, 0.3, 0.1, 0.2, true, true, true, true, false, 0, 0, 0},
+};
+
+typedef enum group { ROUND, SHAPED, LAW } group;
+
 static void add_material(dem2d_world *world, const feature *f, double stiffness,
                          dem2d_material_id *id) {
     dem2d_material_desc desc =
@@ -100,8 +108,14 @@ static int add_shapes(dem2d_world *world, bool grains, dem2d_shape_id ids[SHAPES
     return grains ? SHAPES : 1;
 }
 
+static void same_law(void *user, dem2d_law_batch *batch) {
+    (void)user;
+    dem2d_law_builtin(batch);
+}
+
 /* Discs in rows that overlap a little, some of them where another one is; in random motion. */
-static dem2d_world *make_world(const feature *f, bool grains, uint64_t *random, int *threads) {
+static dem2d_world *make_world(const feature *f, group kind, uint64_t *random, int *threads) {
+    const bool grains = kind == SHAPED;
     dem2d_world_desc desc;
     dem2d_world *world;
     dem2d_material_id materials[2];
@@ -109,6 +123,7 @@ static dem2d_world *make_world(const feature *f, bool grains, uint64_t *random, 
     dem2d_particle_id id;
     memset(&desc, 0, sizeof desc);
     desc.time_step = 1e-4, desc.gravity.y = f->gravity;
+    desc.law = kind == LAW ? same_law : NULL;
     desc.local_damping = f->local, desc.global_damping = f->global;
     desc.faces = f->segment ? DEM2D_ONE_POINT : DEM2D_TWO_POINTS;
     desc.parallel_for = f->threads ? run_parts : NULL, desc.parallel_user = threads;
@@ -156,11 +171,11 @@ typedef struct path {
 static const path paths[] = {
     {"plain", false, false}, {"fours, two passes", true, true}, {"fours", true, false}};
 
-static void run(const feature *f, bool grains, const path *p, uint64_t hashes[ROUNDS]) {
+static void run(const feature *f, group kind, const path *p, uint64_t hashes[ROUNDS]) {
     uint64_t random = 5;
     int threads = 3;
     dem2d_stats stats;
-    dem2d_world *world = make_world(f, grains, &random, &threads);
+    dem2d_world *world = make_world(f, kind, &random, &threads);
     inside_choose_fours(world, p->fours);
     inside_choose_two_passes(world, p->in_two);
     for (int round = 0; round < ROUNDS; round++) {
@@ -174,9 +189,9 @@ static void run(const feature *f, bool grains, const path *p, uint64_t hashes[RO
 }
 
 /* Returns whether it differs from the path in plain C99 pass by pass. */
-static bool differs(const feature *f, bool grains, const path *p, const uint64_t expected[ROUNDS]) {
+static bool differs(const feature *f, group kind, const path *p, const uint64_t expected[ROUNDS]) {
     uint64_t hashes[ROUNDS];
-    run(f, grains, p, hashes);
+    run(f, kind, p, hashes);
     for (int round = 0; round < ROUNDS; round++) {
         if (hashes[round] == expected[round]) continue;
         print_error("%s, %s: another hash after %d steps\n", f->name, p->name, (round + 1) * EVERY);
@@ -186,20 +201,22 @@ static bool differs(const feature *f, bool grains, const path *p, const uint64_t
 }
 
 /* Returns how many of the paths differ. */
-static int compare(const feature *f, bool grains) {
+static int compare(const feature *f, group kind) {
     static const path simple = {"plain, two passes", false, true};
     uint64_t expected[ROUNDS];
     int differ = 0;
-    run(f, grains, &simple, expected);
-    for (int i = 0; i < COUNT_OF(paths); i++) differ += differs(f, grains, &paths[i], expected);
+    run(f, kind, &simple, expected);
+    for (int i = 0; i < COUNT_OF(paths); i++) differ += differs(f, kind, &paths[i], expected);
     return differ;
 }
 
 static void test_same_bits(void **state) {
     int differ = 0;
     (void)state;
-    for (int k = 0; k < COUNT_OF(features); k++) differ += compare(&features[k], false);
-    for (int k = 0; k < COUNT_OF(grain_features); k++) differ += compare(&grain_features[k], true);
+    for (int k = 0; k < COUNT_OF(features); k++) differ += compare(&features[k], ROUND);
+    for (int k = 0; k < COUNT_OF(grain_features); k++)
+        differ += compare(&grain_features[k], SHAPED);
+    for (int k = 0; k < COUNT_OF(law_features); k++) differ += compare(&law_features[k], LAW);
     assert_int_equal(differ, 0);
 }
 
