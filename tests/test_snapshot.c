@@ -896,6 +896,7 @@ static void check_flipped(int kind) {
     assert_ok(try_load(&bytes, &env));
     for (size_t i = 0; i < bytes.size; i++)
         for (int bit = 0; bit < 8; bit++) {
+            if (!test_long() && i >= 32 && bit != (int)(i / 8 % 8)) continue; /* of the head: all */
             bytes.bytes[i] = (char)(bytes.bytes[i] ^ 1 << bit);
             env.peak = 0;
             const dem2d_result result = try_load(&bytes, &env);
@@ -1204,8 +1205,8 @@ static void test_crafted(void **state) {
                                 SCENE_DASHED,  SCENE_FULL,  SCENE_LAW};
     int refused = 0, taken = 0;
     for (int n = 0; n < COUNT_OF(kinds); n++) {
-        const int kind = kinds[n], rare = test_long() ? 7 : 37; /* odd: all bytes of numbers */
-        const int stride = kind == SCENE_RUBBING ? 3 : kind == SCENE_DASHED ? 7 : rare;
+        const int kind = kinds[n], often = test_long() ? 3 : 7, rare = test_long() ? 7 : 37;
+        const int stride = kind == SCENE_RUBBING ? often : rare; /* odd: all bytes of numbers */
         scene_bytes bytes = small_snapshot(kind);
         const size_t body = bytes.size - 8;
         for (size_t i = 24; i < body; i += (size_t)stride)
@@ -1254,17 +1255,20 @@ static void check_writes_fail(int kind) {
     scene_bytes whole = scene_save(s.world), part = {0};
     assert_true(whole.size > 2 * inside_chunk());
     const dem2d_save_desc save = {.write = scene_write, .user = &part};
-    for (part.limit = 1; part.limit <= whole.size; part.limit++) {
+    const size_t stride = test_long() ? 1 : 7;
+    for (part.limit = 1 + (whole.size - 1) % stride; part.limit <= whole.size;
+         part.limit += stride) {
         part.size = 0;
         test_log_clear(&env);
         assert_result(dem2d_world_save(s.world, &save, NULL), DEM2D_IO);
         assert_logged(&env, DEM2D_IO, -1, "callback");
         assert_memory_equal(part.bytes, whole.bytes, part.size);
     }
-    part.limit++, part.size = 0;
+    part.limit = whole.size + 1, part.size = 0;
     assert_ok(dem2d_world_save(s.world, &save, NULL));
     assert_int_equal(part.size, whole.size);
-    for (whole.limit = 1; whole.limit <= whole.size; whole.limit++) {
+    for (whole.limit = 1 + (whole.size - 1) % stride; whole.limit <= whole.size;
+         whole.limit += stride) {
         test_env other;
         test_env_init(&other);
         assert_result(try_load(&whole, &other), DEM2D_IO);
