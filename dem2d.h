@@ -346,7 +346,9 @@ HOW TO
                          steps, to a stress or a solid fraction; friction 0 for dense packings.
     put grains in over   dem2d_world_feed: a rate of mass or number in a region, with velocities.
       time, take them    dem2d_world_remove_in: what is in a region goes. dem2d_world_flow: what has
-      out, count them    crossed a line in a step. Both add up number, mass and area.
+      out, count them    crossed a line in a step. Both add up number, mass and area. An inlet that
+                         puts in as much as went out: dem2d_inlet_desc.replaced
+                         (examples/hopper.c).
     use random numbers   dem2d_random_uniform, dem2d_random_normal: the same bits everywhere.
     put grains in        dem2d_world_overlap_at tells how deep a new particle would be in others;
                          dem2d_world_relax moves those that overlap apart, without speed.
@@ -2533,14 +2535,16 @@ typedef struct dem2d_inlet_desc {
     double gap;       ///< m, >= 0, as in dem2d_fill_desc
     int tries;        ///< for each grain in a call, 0 to 2^30; 0 for 100
     bool keep_angles; ///< grains have the angle of their kind; else a random one
+    /// Instead of a rate: as much mass as this flow has counted, from the beginning; or NULL.
+    const dem2d_flow *replaced;
 } dem2d_inlet_desc;
 
 /// State of an inlet: yours to keep and to save. At first all zero, but for the seed.
 typedef struct dem2d_inlet {
     uint64_t seed;   ///< same seed, same grains
     uint64_t random; ///< how far its random numbers have gone
-    double due;      ///< kg/m, or a number: less than the next grain needs
-    double missed;   ///< kg/m, or a number: what was due and found no room
+    double due;      ///< kg/m, or a number: less than the next grain needs, but see replaced
+    double missed;   ///< kg/m, or a number: what was due at a rate and found no room
     int64_t count;   ///< of grains put in
     double mass;     ///< kg/m, of them
     double area;     ///< m2, of them
@@ -2551,7 +2555,11 @@ typedef struct dem2d_inlet {
 /// kinds of all grains together follow the grading more closely than by chance (a sequence of low
 /// discrepancy: M. Roberts' R2). A grain that finds no room ends the call and is the next again:
 /// what is due then counts as missed, and is not made up for. At most 2^20 grains in a call.
-/// Errors: those of dem2d_world_fill but NOT_REACHED; OUT_OF_RANGE (both rates above 0).
+/// With desc->replaced the mass of all grains put in follows the mass of this flow, which
+/// dem2d_world_remove_in or dem2d_world_flow adds up: what has left comes in again, `seconds` does
+/// not matter, and what finds no room stays due.
+/// Errors: those of dem2d_world_fill but NOT_REACHED; OUT_OF_RANGE (more than one of both rates and
+/// replaced).
 DEM2D_API dem2d_result dem2d_world_feed(dem2d_world *world, const dem2d_inlet_desc *desc,
                                         double seconds, dem2d_inlet *inlet);
 
@@ -26903,6 +26911,7 @@ static const dem2di_field dem2di_inlet_fields[] = {
     DEM2DI_ROW(dem2d_inlet_desc, gap, DEM2DI_FROM_0, "m 0"),
     DEM2DI_ROW(dem2d_inlet_desc, tries, DEM2DI_WHOLE(0, 1 << 30), "- 100"),
     DEM2DI_ROW(dem2d_inlet_desc, keep_angles, DEM2DI_SWITCH, "- false"),
+    DEM2DI_ROW(dem2d_inlet_desc, replaced, DEM2DI_OPTIONAL, "- NULL; or a rate"),
 };
 
 /* Number n of a sequence in [0, 1) whose steps are 2^64 times an irrational number. */
@@ -26949,6 +26958,11 @@ typedef struct dem2di_feed {
     int count; /* of grains that are due */
 } dem2di_feed;
 
+/* Is what is due a mass, or a number? */
+static bool dem2di_feed_by_mass(const dem2d_inlet_desc *desc) {
+    return desc->mass_rate > 0 || desc->replaced != NULL;
+}
+
 /* The grains that are due; NULL counts them. What they need of `due` is left for the next ones. */
 static int dem2di_feed_due(const dem2d_world *world, dem2di_feed *feed, double due,
                            dem2d_particle_desc *grains) {
@@ -26956,7 +26970,7 @@ static int dem2di_feed_due(const dem2d_world *world, dem2di_feed *feed, double d
     for (int n = 0;; n++) {
         dem2d_particle_desc grain = dem2di_inlet_grain(world, feed->desc->grading, &feed->curve,
                                                        feed->shares, inlet->seed, inlet->count + n);
-        double need = feed->desc->mass_rate > 0 ? dem2di_grain_mass(world, &grain) : 1;
+        double need = dem2di_feed_by_mass(feed->desc) ? dem2di_grain_mass(world, &grain) : 1;
         if (!(need <= due * (1 + 1e-12)) || n == DEM2DI_INLET_MOST) return n;
         due -= need;
         if (grains != NULL) grains[n] = grain;
@@ -27007,12 +27021,12 @@ static dem2d_result dem2di_feed_run(dem2di_filler *filler, dem2di_feed *feed, do
     if (result == DEM2D_OK) result = dem2di_filler_add(filler, NULL, 0, &done);
     for (int i = 0; i < placed; i++) {
         double mass = dem2di_grain_mass(world, &feed->grains[i]);
-        due -= feed->desc->mass_rate > 0 ? mass : 1;
+        due -= dem2di_feed_by_mass(feed->desc) ? mass : 1;
         inlet->mass += mass;
         inlet->area += dem2di_grain_area(world, &feed->grains[i]);
     }
     inlet->due = dem2di_max(0, due);
-    if (placed < feed->count) {
+    if (placed < feed->count && feed->desc->replaced == NULL) {
         inlet->missed += inlet->due;
         inlet->due = 0;
     }
@@ -27032,7 +27046,13 @@ static dem2d_result dem2di_feed_check(const dem2d_env *env, const dem2d_inlet_de
         return dem2di_fail(env, DEM2D_OUT_OF_RANGE, -1,
                            "mass_rate = %g and number_rate = %g: one has to be 0", desc->mass_rate,
                            desc->number_rate);
-    return result;
+    if (result != DEM2D_OK || desc->replaced == NULL) return result;
+    if (desc->mass_rate > 0 || desc->number_rate > 0)
+        return dem2di_fail(env, DEM2D_OUT_OF_RANGE, -1,
+                           "replaced is given, and mass_rate = %g, number_rate = %g",
+                           desc->mass_rate, desc->number_rate);
+    return dem2di_check_number(env, "replaced->mass - inlet.mass",
+                               desc->replaced->mass - inlet->mass, DEM2DI_FINITE);
 }
 
 DEM2D_API dem2d_result dem2d_world_feed(dem2d_world *world, const dem2d_inlet_desc *desc,
@@ -27053,7 +27073,9 @@ DEM2D_API dem2d_result dem2d_world_feed(dem2d_world *world, const dem2d_inlet_de
     filler.world = world;
     filler.gap = desc->gap;
     filler.turned = !desc->keep_angles;
-    double due = inlet->due + seconds * dem2di_max(desc->mass_rate, desc->number_rate);
+    double due = desc->replaced != NULL
+                     ? dem2di_max(0, desc->replaced->mass - inlet->mass)
+                     : inlet->due + seconds * dem2di_max(desc->mass_rate, desc->number_rate);
     feed.count = dem2di_feed_due(world, &feed, due, NULL);
     if (feed.count == DEM2DI_INLET_MOST)
         return dem2di_fail(env, DEM2D_OUT_OF_RANGE, -1, "seconds = %g: %d grains or more are due",

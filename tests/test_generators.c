@@ -676,6 +676,60 @@ static void test_inlet_behind(void **state) {
     assert_true(last[0].random == last[1].random && last[0].missed == last[1].missed);
 }
 
+static double all_mass(const bed *b) {
+    dem2d_particle_id ids[400];
+    double mass = 0;
+    int count;
+    assert_ok(dem2d_world_particles(b->s.world, ids, COUNT_OF(ids), &count));
+    assert_true(count <= COUNT_OF(ids));
+    for (int i = 0; i < count; i++) mass += grain_of(&b->s, ids[i]).mass;
+    return mass;
+}
+
+/* An inlet that replaces what has left: the mass in the world stays the same within a grain; what
+   finds no room stays due until there is. */
+static void test_replaced(void **state) {
+    static const dem2d_grade curve[] = {{0.02, 0}, {0.04, 1}};
+    (void)state;
+    test_env env;
+    test_env_init(&env);
+    bed b = open_bed(&env.env);
+    const dem2d_grain_kind kind = kind_of(&b, 1, 1);
+    dem2d_grading_desc g = {0};
+    dem2d_inlet inlet = {0};
+    dem2d_flow out = {0};
+    double heaviest = 2700 * 0.04 * 0.04 * (double)TEST_PI / 4;
+    add_plane(&b.s, 0, 0, 1, 0), add_plane(&b.s, 0.5, 0, -1, 0);
+    g.points = curve, g.point_count = 2, g.kinds = &kind, g.kind_count = 1;
+    dem2d_inlet_desc d = top_inlet(&g);
+    d.replaced = &out;
+    assert_ok(dem2d_world_feed(b.s.world, &d, 100, &inlet));
+    assert_int_equal(inlet.count, 0);
+    out.mass = 60; /* at first: what is to be in the shaft */
+    assert_ok(dem2d_world_feed(b.s.world, &d, 0, &inlet));
+    assert_within(inlet.mass + inlet.due, 60, 1e-9);
+    assert_true(inlet.due >= 0 && inlet.due <= heaviest && inlet.missed == 0);
+    for (int k = 0; k < 6; k++) {
+        const dem2d_region half = {.box = {{k % 2 ? 0.25 : 0, 0}, {k % 2 ? 0.5 : 0.25, 1}}};
+        assert_ok(dem2d_world_remove_in(b.s.world, &half, &out));
+        assert_ok(dem2d_world_feed(b.s.world, &d, 0, &inlet));
+        assert_within(all_mass(&b) + inlet.due, 60, 1e-9);
+        assert_true(inlet.due <= heaviest);
+    }
+    out.mass += 1000; /* more than there is room for: 0.1 m2 hold at most 270 kg */
+    assert_ok(dem2d_world_feed(b.s.world, &d, 0, &inlet));
+    assert_true(inlet.due > 800 && inlet.missed == 0);
+    assert_within(inlet.mass + inlet.due, out.mass, 1e-9);
+    d.mass_rate = 1;
+    assert_result(dem2d_world_feed(b.s.world, &d, 0, &inlet), DEM2D_OUT_OF_RANGE);
+    assert_logged(&env, DEM2D_OUT_OF_RANGE, -1, "replaced");
+    d.mass_rate = 0, out.mass = (double)NAN;
+    assert_result(dem2d_world_feed(b.s.world, &d, 0, &inlet), DEM2D_NOT_FINITE);
+    assert_logged(&env, DEM2D_NOT_FINITE, -1, "replaced");
+    close_scene(&b.s);
+    assert_clean(&env);
+}
+
 /* Grains that fly across a line: each is counted once, with its sign, not beside the line; what a
    caller moves across is not. The outlet takes free grains alone, in a box or in an outline. */
 static void test_flow(void **state) {
@@ -961,6 +1015,7 @@ int main(void) {
         cmocka_unit_test(test_inlet),
         cmocka_unit_test(test_inlet_behind),
         cmocka_unit_test(test_flow),
+        cmocka_unit_test(test_replaced),
         cmocka_unit_test(test_flow_in_cell),
         cmocka_unit_test(test_outlet_in_cell),
         cmocka_unit_test(test_fill_in_cell),
