@@ -164,14 +164,16 @@ QUICK START (examples/hello.c, the same bytes)
         check(dem2d_shape_create_fourier(NULL, a, b, 3, &shapes[2]));
         for (int i = 0; i < 3; i++) check(dem2d_world_add_shape(world, shapes[i], &ids[i]));
         for (int i = 0; i < 3; i++) dem2d_shape_destroy(shapes[i]); // the world has its own
+        dem2d_particle_desc grains[30] = {{0}};
         for (int i = 0; i < 30; i++) {
-            dem2d_particle_desc grain = {0};
-            grain.scale = 1;
-            grain.shape = ids[i % 3], grain.material = material, grain.angle = i;
-            grain.position.x = 0.1 + 0.1 * (i % 5), grain.position.y = 0.1 + 0.1 * (i / 5);
-            dem2d_particle_id id;
-            check(dem2d_world_add_particle(world, &grain, &id));
+            grains[i].scale = 1;
+            grains[i].shape = ids[i % 3], grains[i].material = material;
         }
+        dem2d_fill_desc fill = {0}; // at random places and angles, without overlaps
+        fill.grains = grains, fill.count = 30;
+        fill.region.box.upper.x = fill.region.box.upper.y = 0.6;
+        dem2d_filling filling;
+        check(dem2d_world_fill(world, &fill, NULL, 0, &filling));
         check(dem2d_world_step(world, 20000, NULL));
         check(dem2d_world_write_svg(world, &(dem2d_svg_desc){.force_chains = true}, "hello.svg"));
         dem2d_world_destroy(world);

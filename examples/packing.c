@@ -17,10 +17,10 @@ int main(void) {
     const dem2d_world_desc desc = {.time_step = 1e-6, .local_damping = 0.2};
     const dem2d_material_desc stone = {2700, 1e8, 1e8, 0.5, .damping_ratio = 0.2};
     const dem2d_material_desc smooth = {.density = 2700, .normal_stiffness = 1e8};
-    static const double planes[4][4] = {{0, 0, 0, 1}, {0, 0, 1, 0}, {1, 1, -1, 0}, {1, 1, 0, -1}};
-    static const dem2d_grade curve[3] = {{1, 0}, {1.5, 0.4}, {2, 1}}; // relative sizes
-    dem2d_wall_desc wall[4] = {{0}};
-    dem2d_wall_id walls[4];                                       // floor, left, right, top
+    static const dem2d_vec in[4] = {{0, 1}, {1, 0}, {-1, 0}, {0, -1}}; // normals
+    static const dem2d_grade curve[3] = {{1, 0}, {1.5, 0.4}, {2, 1}};  // relative sizes
+    dem2d_wall_desc wall[4];                                           // floor, left, right, top
+    dem2d_wall_id walls[4];
     dem2d_grain_kind kinds[2] = {{.share = 0.7}, {.share = 0.3}}; // of the mass
     dem2d_material_id plate;
     dem2d_world *world;
@@ -29,9 +29,7 @@ int main(void) {
     check(dem2d_world_add_material(world, &stone, &kinds[0].grain.material));
     check(dem2d_world_add_material(world, &smooth, &plate)); // no tangential spring: no friction
     for (int i = 0; i < 4; i++) {
-        wall[i].material = plate;
-        wall[i].point.x = planes[i][0], wall[i].point.y = planes[i][1];
-        wall[i].normal.x = planes[i][2], wall[i].normal.y = planes[i][3];
+        wall[i] = (dem2d_wall_desc){.material = plate, .normal = in[i], .point = {i == 2, i == 3}};
         check(dem2d_world_add_wall(world, &wall[i], &walls[i]));
     }
     check(dem2d_shape_create_circle(NULL, 1, &shapes[0]));
@@ -41,18 +39,16 @@ int main(void) {
         check(dem2d_world_add_shape(world, shapes[i], &kinds[i].grain.shape));
         dem2d_shape_destroy(shapes[i]);
     }
-    const dem2d_grading_desc grading = {
-        .points = curve, .point_count = 3, .kinds = kinds, .kind_count = 2};
+    const dem2d_grading_desc grading = {curve, 3, kinds, 2, .measure = DEM2D_MEASURE_MASS};
     dem2d_fill_desc fill = {.grading = &grading, .count = 500, .solid_fraction = 0.45};
     fill.region.box.upper = (dem2d_vec){1, 1}, fill.method = DEM2D_FILL_RANDOM;
-    const dem2d_growth_desc grow = {
-        .area = 1, .stress = 1e5, .friction = 0.1, .local_damping = 0.2};
+    const dem2d_growth_desc grow = {1, 1e5, .friction = 0.1, .local_damping = 0.2}; // m2, Pa
     dem2d_filling filling;
     dem2d_growth packed;
-    double step, solid = 1, ratio = 0, peak = 0;
+    double dt, solid = 1, ratio = 0, peak = 0;
     check(dem2d_world_fill(world, &fill, NULL, 0, &filling));
-    check(dem2d_world_choose_time_step(world, 0.8, &step));
-    check(dem2d_world_set_time_step(world, step));
+    check(dem2d_world_choose_time_step(world, 0.8, &dt));
+    check(dem2d_world_set_time_step(world, dt));
     check(dem2d_world_grow(world, &grow, 200000, &packed));
     printf("%d grains, solid fraction %.4f at %.1f kPa after %d steps\n", filling.count,
            packed.solid_fraction, packed.stress / 1e3, packed.steps);
@@ -63,10 +59,10 @@ int main(void) {
     for (int i = 2; i < 4; i++) check(dem2d_world_set_wall(world, walls[i], &wall[i]));
     for (double height = 1; height > 0.92;) {
         dem2d_wall_info side, top;
+        const bool append = height < 1;
         check(dem2d_world_step(world, 500, NULL));
         check(dem2d_world_get_wall(world, walls[2], &side));
         check(dem2d_world_get_wall(world, walls[3], &top));
-        const bool append = height < 1;
         height = top.point.y, solid = packed.solid_fraction / (height * side.point.x);
         const double axial = top.force.y / side.point.x, lateral = side.stress;
         ratio = (axial - lateral) / (axial + lateral); // sine of the mobilised angle of friction
@@ -77,8 +73,7 @@ int main(void) {
         check(dem2d_world_write_csv(world, &csv, "packing.csv"));
     }
     check(dem2d_world_write_svg(world, &(dem2d_svg_desc){.force_chains = true}, "sheared.svg"));
-    printf("stress ratio: greatest %.3f, at the end %.3f; solid fraction %.4f\n", peak, ratio,
-           solid);
+    printf("stress ratio up to %.3f, at the end %.3f; solid fraction %.4f\n", peak, ratio, solid);
     dem2d_world_destroy(world);
     return !packed.reached || !(peak > 0.3 && peak < 0.75 && solid < packed.solid_fraction);
 }
