@@ -157,7 +157,7 @@ combination() {
         objects="$objects $work/$source.o"
     done
     $compiler $objects -o "$work/program" -lm || return 1
-    "$work/program" || { echo "the program returned $?"; return 1; }
+    (cd "$work" && ./program) || { echo "the program returned $?"; return 1; }
     if [ "$kind" = two-files ]; then exports "$work/implementation.o" || return 1; fi
 }
 

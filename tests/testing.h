@@ -183,6 +183,23 @@ PART void test_env_clean(const test_env *env, const char *file, int line) {
 }
 #define assert_clean(env) test_env_clean((env), __FILE__, __LINE__)
 
+/* Steps of a world whose allocations fail now and then, each again until it is done. One that fails
+   changes nothing. Returns how many failed. */
+PART int test_steps_fail(dem2d_world *world, int steps) {
+    int failed = 0;
+    while (steps > 0) {
+        int done;
+        const uint64_t before = dem2d_world_hash(world);
+        const dem2d_result result = dem2d_world_step(world, 1, &done);
+        steps -= done;
+        if (result == DEM2D_OK) continue;
+        assert_result(result, DEM2D_OUT_OF_MEMORY);
+        assert_true(dem2d_world_hash(world) == before);
+        failed++;
+    }
+    return failed;
+}
+
 /* Whether a text holds a word as a whole: "radius" is not found in "radii", nor "a" in "area". */
 PART bool test_has_word(const char *text, const char *word) {
     const char *const letters = "abcdefghijklmnopqrstuvwxyzABCDEFGHIJKLMNOPQRSTUVWXYZ0123456789_";
