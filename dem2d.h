@@ -504,9 +504,10 @@ THREADS
     to desc.parallel_for, if there is one, in blocks of some hundred contacts or particles: any
     thread system will do (examples/threads_posix.c, threads_openmp.c). A block writes only its own
     results, and sums are taken in the order of names and ids. So neither the number of threads nor
-    the distribution of the blocks can change a bit. One thread does the short loops over all
-    particles when the list is rebuilt, the sums of the forces on walls, the speeds of servo
-    walls, wraps and held stresses of a periodic cell, and the sums of dem2d_grid_add. All threads
+    the distribution of the blocks can change a bit. One thread counts the particles of the search's
+    cells and collects the contacts of each particle when the list is rebuilt, adds up the forces
+    on walls, the held stresses of a periodic cell and the sums of dem2d_grid_add, sets the speeds
+    of servo walls, and moves the particles that have left a cell. All threads
     call custom support functions and laws; only the thread that called the step allocates and
     writes to the log.
 
@@ -11772,8 +11773,8 @@ static DEM2DI_INLINE void dem2di_grid_loop(const dem2di_grid *grid, const dem2di
     finds->count = count;
 }
 
-static inline void dem2di_grid_range(const dem2di_grid *grid, const dem2di_disc *own, int begin,
-                                     int end, int level, dem2di_finds *finds) {
+static DEM2DI_INLINE void dem2di_grid_range(const dem2di_grid *grid, const dem2di_disc *own,
+                                            int begin, int end, int level, dem2di_finds *finds) {
     if (level < grid->dense && finds->groups == NULL && !own->fixed &&
         end - begin <= finds->room - finds->count)
         dem2di_grid_loop(grid, own, begin, end, level, true, finds);
@@ -11803,12 +11804,6 @@ static void dem2di_grid_row(const dem2di_grid *grid, const dem2di_disc *own, int
     }
 }
 
-/* The same in the three cells of a row around a cell that is not in the hash table. */
-static inline void dem2di_grid_three(const dem2di_grid *grid, const dem2di_disc *own, int head,
-                                     int level, dem2di_finds *finds) {
-    dem2di_grid_range(grid, own, grid->heads[head - 1], grid->heads[head + 2], level, finds);
-}
-
 /* Find the partners of a disc, which is at a place in sorted, so that each pair is found once: on
    its own level the discs after it in its cell, and those in cells to the right and above; on
    coarser levels all around. Discs that overlap are at most one cell apart, so the cost is linear
@@ -11821,11 +11816,12 @@ static void dem2di_grid_partners(const dem2di_grid *grid, int place, dem2di_find
         const int64_t x = cell.x, y = cell.y;
         const bool same = level == own->level;
         if (level < grid->dense) {
-            const int head = dem2di_cell_head(grid, x, y, level), width = grid->width[level];
-            if (same) dem2di_grid_range(grid, own, place + 1, grid->heads[head + 2], level, finds);
-            if (!same) dem2di_grid_three(grid, own, head - width, level, finds);
-            if (!same) dem2di_grid_three(grid, own, head, level, finds);
-            dem2di_grid_three(grid, own, head + width, level, finds);
+            const int *head = grid->heads + dem2di_cell_head(grid, x, y, level);
+            for (int row = same ? 0 : -1; row <= 1; row++) {
+                const int *cells = head + row * grid->width[level]; /* three of them, around x */
+                const int begin = same && row == 0 ? place + 1 : cells[-1];
+                dem2di_grid_range(grid, own, begin, cells[2], level, finds);
+            }
         } else {
             dem2di_grid_row(grid, own, same ? x : x - 1, x + 1, y, level, same ? place + 1 : 0,
                             finds);
@@ -12709,6 +12705,7 @@ typedef struct dem2di_block_result {
     bool walls;             /* some particle has listed contacts with walls */
     int fast;               /* slot of the one of least rank that may pass through others, or -1 */
     int64_t spread;         /* sum of the distances in memory of the partners found */
+    int64_t images;         /* that may be needed for particles that have left the cell */
     int changes;            /* contacts that close or open */
     /* Of a block of contacts of circles: the first block of particles that has no contacts of
        circles behind it; of a block of particles: the next one of the same. -1: none. */
@@ -13722,6 +13719,31 @@ static dem2d_result dem2di_out_of_memory(const dem2d_world *world, const char *w
     return dem2di_fail(&world->env, DEM2D_OUT_OF_MEMORY, -1, "no memory for %s", what);
 }
 
+/* Parallel work is cut into blocks of so many items: enough to pay for a call of the callback's,
+   few enough to share 10,000 particles out evenly. Contacts of other shapes take ten times longer
+   than those of circles. */
+#define DEM2DI_BLOCK 256
+#define DEM2DI_BLOCK_OTHERS 64
+
+static int dem2di_blocks(int items, int block) {
+    return items / block + (items % block > 0);
+}
+
+/* The end of a block that begins at `begin`. */
+static int dem2di_block_end(int begin, int block, int items) {
+    return items - begin < block ? items : begin + block;
+}
+
+/* All that takes time goes through here. A count of 1 is work that is not cut. */
+static void dem2di_run(const dem2d_world *world, dem2d_phase phase, int count, dem2d_task_fn *task,
+                       void *context) {
+    if (count == 0) return;
+    if (world->parallel_for == NULL)
+        task(context, 0, count);
+    else
+        world->parallel_for(world->parallel_user, phase, count, task, context);
+}
+
 /* ============================================================================================
    >>cell  The periodic cell: images of particles, wraps
    uses: config, math, memory, fields, broad, motion, world
@@ -14160,23 +14182,47 @@ static void dem2di_wrap(dem2d_world *world, int slot, const int out[2]) {
     }
 }
 
+/* How many images the particles of a block may need that have left the cell: for all of their
+   contacts, and one of their own. */
+static void dem2di_cells_out_task(void *context, int begin, int end) {
+    dem2d_world *world = (dem2d_world *)context;
+    const int *first = world->list.first;
+    const dem2di_fractions f = dem2di_fractions_make(&world->cell);
+    int out[2];
+    for (int block = begin; block < end; block++) {
+        int i = block * DEM2DI_BLOCK, last = dem2di_block_end(i, DEM2DI_BLOCK, world->body_count);
+        int64_t needed = 0;
+        for (; i < last; i++)
+            if (dem2di_cells_out(&f, world->now[i].x, out) && world->bodies[i].shape_index >= 0)
+                needed += first[i + 1] - first[i] + 1;
+        world->block_results[block].images = needed;
+    }
+}
+
 /* Particles that have left the cell go back into it; false when there is no memory: nothing has
    changed then. */
 static bool dem2di_wrap_all(dem2d_world *world) {
-    const dem2di_list *list = &world->list;
     const dem2di_fractions f = dem2di_fractions_make(&world->cell);
+    const int blocks = dem2di_blocks(world->body_count, DEM2DI_BLOCK);
     int64_t more = 0;
     int out[2];
-    for (int i = 0; i < world->body_count; i++) {
-        if (!dem2di_cells_out(&f, world->now[i].x, out) || world->bodies[i].shape_index < 0)
-            continue;
-        more += list->first[i + 1] - list->first[i] + 1;
-    }
+    if (!dem2di_group_reserve(world, DEM2DI_BLOCK_RESULTS, blocks)) return false;
+    dem2di_run(world, DEM2D_PHASE_MOTION, blocks, dem2di_cells_out_task, world);
+    for (int k = 0; k < blocks; k++) more += world->block_results[k].images;
     if (more > 1 << 29 || (more > 0 && !dem2di_images_reserve(world, (int)more))) return false;
-    for (int i = 0; i < world->body_count && more > 0; i++)
-        if (dem2di_cells_out(&f, world->now[i].x, out) && world->bodies[i].shape_index >= 0)
-            dem2di_wrap(world, i, out);
+    for (int k = 0; k < blocks; k++) {
+        int i = k * DEM2DI_BLOCK, last = dem2di_block_end(i, DEM2DI_BLOCK, world->body_count);
+        for (; i < last && world->block_results[k].images > 0; i++)
+            if (dem2di_cells_out(&f, world->now[i].x, out) && world->bodies[i].shape_index >= 0)
+                dem2di_wrap(world, i, out);
+    }
     return true;
+}
+
+static void dem2di_images_move_task(void *context, int begin, int end) {
+    dem2d_world *world = (dem2d_world *)context;
+    int last = dem2di_block_end((end - 1) * DEM2DI_BLOCK, DEM2DI_BLOCK, world->image_count);
+    for (int k = begin * DEM2DI_BLOCK; k < last; k++) dem2di_image_move(world, k);
 }
 
 /* The positions after a step, in the cell, and those of the images. What finds no memory is tried
@@ -14184,7 +14230,8 @@ static bool dem2di_wrap_all(dem2d_world *world) {
 static void dem2di_cell_wrap(dem2d_world *world) {
     world->wrap_due = !dem2di_wrap_all(world);
     world->tree.made = false;
-    for (int k = 0; k < world->image_count; k++) dem2di_image_move(world, k);
+    dem2di_run(world, DEM2D_PHASE_MOTION, dem2di_blocks(world->image_count, DEM2DI_BLOCK),
+               dem2di_images_move_task, world);
 }
 
 /* The cell after a step, and what is in it. A cell that leans by more than half of a is replaced by
@@ -16819,31 +16866,6 @@ static dem2d_vec dem2di_vertex_place(const dem2d_world *world, int number) {
    uses: config, math, broad, law, motion, world, cell, objects, walls, joints
    ============================================================================================ */
 
-/* Parallel work is cut into blocks of so many items: enough to pay for a call of the callback's,
-   few enough to share 10,000 particles out evenly. Contacts of other shapes take ten times longer
-   than those of circles. */
-#define DEM2DI_BLOCK 256
-#define DEM2DI_BLOCK_OTHERS 64
-
-static int dem2di_blocks(int items, int block) {
-    return items / block + (items % block > 0);
-}
-
-/* The end of a block that begins at `begin`. */
-static int dem2di_block_end(int begin, int block, int items) {
-    return items - begin < block ? items : begin + block;
-}
-
-/* All that takes time goes through here. A count of 1 is work that is not cut. */
-static void dem2di_run(const dem2d_world *world, dem2d_phase phase, int count, dem2d_task_fn *task,
-                       void *context) {
-    if (count == 0) return;
-    if (world->parallel_for == NULL)
-        task(context, 0, count);
-    else
-        world->parallel_for(world->parallel_user, phase, count, task, context);
-}
-
 /* Scratch memory, cut up from its start: places to fit into, or NULL to count only. */
 typedef struct dem2di_cutter {
     char *memory;
@@ -16944,29 +16966,46 @@ static inline int dem2di_adjacency_rank(const dem2d_world *world, int slot, int 
     return wall ? (1 << 30) + key->b : rank;
 }
 
+/* An entry of adjacent on its way, in scratch memory: by this rank, then by the contact. */
+static inline uint64_t dem2di_entry_make(int rank, int contact) {
+    return (uint64_t)rank << 32 | (uint64_t)contact;
+}
+
+static inline int dem2di_entry_contact(uint64_t entry) {
+    return (int)(entry & 0x7FFFFFFFu);
+}
+
 /* Up to so many contacts of a particle are sorted by counting: most have a handful. */
 #define DEM2DI_FEW_CONTACTS 8
 
-/* The few contacts of a particle in order: the place of each is how many have a lower rank, or the
-   same and come before. No branch depends on the ranks. Returns of how many it is B. */
-static int dem2di_adjacency_sort_few(const dem2d_world *world, int slot, int *run, int count) {
-    int rank[DEM2DI_FEW_CONTACTS], place[DEM2DI_FEW_CONTACTS], contact[DEM2DI_FEW_CONTACTS];
-    int as_b = 0, own = world->bodies[slot].rank;
+/* The few contacts of a particle in order: the place of each is how many entries are lower, or the
+   same and come before. No branch depends on the ranks. */
+static void dem2di_entries_sort_few(const uint64_t *entries, int count, int *run) {
+    int place[DEM2DI_FEW_CONTACTS];
     for (int i = 0; i < count; i++) {
-        const int contact_rank = dem2di_adjacency_rank(world, slot, run[i]);
-        int before = 0;
+        place[i] = i;
         for (int k = 0; k < i; k++) {
-            const int follows = rank[k] > contact_rank;
+            const int follows = entries[k] > entries[i];
             place[k] += follows;
-            before += 1 - follows;
+            place[i] -= follows;
         }
-        contact[i] = run[i];
-        rank[i] = contact_rank;
-        place[i] = before;
-        as_b += contact_rank < own;
     }
-    for (int i = 0; i < count; i++) run[place[i]] = contact[i];
-    return as_b;
+    for (int i = 0; i < count; i++) run[place[i]] = dem2di_entry_contact(entries[i]);
+}
+
+/* The same for many by Shell's sort (Ciura's gaps): a particle that is a hundred times larger than
+   its neighbours has hundreds. */
+static void dem2di_entries_sort_many(uint64_t *entries, int count, int *run) {
+    static const int gaps[] = {301, 132, 57, 23, 10, 4, 1};
+    for (int g = 0; g < 7; g++)
+        for (int i = gaps[g]; i < count; i++) {
+            const uint64_t entry = entries[i];
+            int k = i;
+            for (; k >= gaps[g] && entries[k - gaps[g]] > entry; k -= gaps[g])
+                entries[k] = entries[k - gaps[g]];
+            entries[k] = entry;
+        }
+    for (int i = 0; i < count; i++) run[i] = dem2di_entry_contact(entries[i]);
 }
 
 /* Is contact i of a pair before contact k of the same two, by the shifts of their images? */
@@ -17003,23 +17042,6 @@ static int dem2di_adjacency_images(const dem2d_world *world, int slot, int *run,
     return as_b + own;
 }
 
-/* The same for many by Shell's sort (Ciura's gaps): a particle that is a hundred times larger than
-   its neighbours has hundreds. */
-static int dem2di_adjacency_sort_many(const dem2d_world *world, int slot, int *run, int count) {
-    static const int gaps[] = {301, 132, 57, 23, 10, 4, 1};
-    int as_b = 0;
-    for (int g = 0; g < 7; g++)
-        for (int i = gaps[g]; i < count; i++) {
-            int contact = run[i], k = i, rank = dem2di_adjacency_rank(world, slot, contact);
-            for (; k >= gaps[g] && dem2di_adjacency_rank(world, slot, run[k - gaps[g]]) > rank;
-                 k -= gaps[g])
-                run[k] = run[k - gaps[g]];
-            run[k] = contact;
-        }
-    while (as_b < count && world->list.keys[run[as_b]].a != slot) as_b++;
-    return as_b;
-}
-
 /* Is a wall near a particle? Contacts with walls are the last of its contacts. */
 static inline bool dem2di_has_walls(const dem2di_list *list, int slot) {
     const int end = list->first[slot + 1];
@@ -17030,16 +17052,21 @@ static inline bool dem2di_has_walls(const dem2di_list *list, int slot) {
 static void dem2di_adjacency_sort_task(void *context, int begin, int end) {
     const dem2d_world *world = (const dem2d_world *)context;
     const dem2di_list *list = &world->list;
+    uint64_t *all = (uint64_t *)(void *)world->scratch;
     for (int block = begin; block < end; block++) {
         int first = block * DEM2DI_BLOCK;
         int last = dem2di_block_end(first, DEM2DI_BLOCK, world->body_count);
         bool walls = false;
         for (int slot = first; slot < last; slot++) {
+            uint64_t *entries = all + list->first[slot];
             int *run = list->adjacent + list->first[slot];
-            int count = list->first[slot + 1] - list->first[slot];
-            int as_b = count <= DEM2DI_FEW_CONTACTS
-                           ? dem2di_adjacency_sort_few(world, slot, run, count)
-                           : dem2di_adjacency_sort_many(world, slot, run, count);
+            int count = list->first[slot + 1] - list->first[slot], as_b = 0;
+            const uint64_t own = dem2di_entry_make(world->bodies[slot].rank, 0);
+            for (int i = 0; i < count; i++) as_b += entries[i] < own;
+            if (count <= DEM2DI_FEW_CONTACTS)
+                dem2di_entries_sort_few(entries, count, run);
+            else
+                dem2di_entries_sort_many(entries, count, run);
             if (world->image_count > 0)
                 as_b = dem2di_adjacency_images(world, slot, run, count, as_b);
             list->own[slot] = list->first[slot] + as_b;
@@ -17052,6 +17079,7 @@ static void dem2di_adjacency_sort_task(void *context, int begin, int end) {
 static void dem2di_adjacency_fill_task(void *context, int begin, int end) {
     dem2d_world *world = (dem2d_world *)context;
     dem2di_list *list = &world->list;
+    uint64_t *entries = (uint64_t *)(void *)world->scratch;
     int *first = list->first, *last = first + 1, slots = world->body_count;
     (void)begin;
     (void)end;
@@ -17063,9 +17091,12 @@ static void dem2di_adjacency_fill_task(void *context, int begin, int end) {
     }
     (void)dem2di_starts(last, slots);
     for (int i = 0; i < list->count; i++) {
-        if (list->keys[i].a < 0) continue;
-        list->adjacent[last[list->keys[i].a]++] = i;
-        if (i < list->pairs) list->adjacent[last[dem2di_owner(world, list->keys[i].b)]++] = i;
+        const int a = list->keys[i].a, b = list->keys[i].b;
+        if (a < 0) continue;
+        const int rank_b = i < list->pairs ? world->bodies[b].rank : (1 << 30) + b;
+        entries[last[a]++] = dem2di_entry_make(rank_b, i);
+        if (i < list->pairs)
+            entries[last[dem2di_owner(world, b)]++] = dem2di_entry_make(world->bodies[a].rank, i);
     }
 }
 
@@ -17086,12 +17117,13 @@ static void dem2di_completions_find(dem2d_world *world) {
     }
 }
 
-/* The contacts of each particle, for which there is room. */
+/* The contacts of each particle, for which there is room: the entries take less scratch memory than
+   the actions of a step. */
 static void dem2di_adjacency_make(dem2d_world *world) {
     dem2di_run(world, DEM2D_PHASE_LIST, 1, dem2di_adjacency_fill_task, world);
     dem2di_run(world, DEM2D_PHASE_LIST, dem2di_blocks(world->body_count, DEM2DI_BLOCK),
                dem2di_adjacency_sort_task, world);
-    dem2di_completions_find(world);
+    if (world->parallel_for == NULL) dem2di_completions_find(world);
 }
 
 /* Room for two entries of each pair and one of each contact with a wall. */
@@ -17885,8 +17917,8 @@ static int dem2di_listed(const dem2d_world *world, const dem2di_key *key, bool w
 /* A column of contacts on its way from the old list to the new one. */
 typedef struct dem2di_carry {
     const int *old; /* number in the old list, or -1 */
-    const char *from;
-    char *to;
+    char *column;   /* of the old list, at last of the new one */
+    char *spare;    /* where the new one is made */
     size_t size;
     int begin, old_begin, count; /* numbers of the first elements; of contacts in the new list */
 } dem2di_carry;
@@ -17896,9 +17928,9 @@ static DEM2DI_INLINE void dem2di_carry_range(const dem2di_carry *carry, int begi
     const int *old = carry->old + carry->begin;
     for (int i = begin; i < end; i++) {
         const int from = old[i] - carry->old_begin;
-        char *to = carry->to + (size_t)i * size;
+        char *to = carry->spare + (size_t)i * size;
         if (from >= 0)
-            memcpy(to, carry->from + (size_t)from * size, size);
+            memcpy(to, carry->column + (size_t)from * size, size);
         else
             memset(to, 0, size);
     }
@@ -17914,6 +17946,14 @@ static void dem2di_carry_task(void *context, int begin, int end) {
         dem2di_carry_range(carry, first, last, carry->size);
 }
 
+static void dem2di_carry_back_task(void *context, int begin, int end) {
+    const dem2di_carry *carry = (const dem2di_carry *)context;
+    int items = carry->count - carry->begin, first = begin * DEM2DI_BLOCK;
+    int last = dem2di_block_end((end - 1) * DEM2DI_BLOCK, DEM2DI_BLOCK, items);
+    memcpy(carry->column + (size_t)first * carry->size, carry->spare + (size_t)first * carry->size,
+           (size_t)(last - first) * carry->size);
+}
+
 /* The contacts of the old list to their places in the new one. Pairs that were not listed were
    apart: all zero. */
 static void dem2di_carry_over(const dem2di_build *build, int discs, int count) {
@@ -17923,19 +17963,17 @@ static void dem2di_carry_over(const dem2di_build *build, int discs, int count) {
         const dem2di_column *column = &dem2di_columns[k];
         if (!(column->treatment & DEM2DI_STORED)) continue;
         dem2di_carry carry;
-        char *array = (char *)dem2di_column_get(world, column);
         carry.old = build->old;
-        carry.from = array;
-        carry.to = build->column;
+        carry.column = (char *)dem2di_column_get(world, column);
+        carry.spare = build->column;
         carry.size = column->size;
         carry.count = count;
         carry.begin = dem2di_contacts_begin(&build->plan, discs, count, column->group);
         carry.old_begin =
             dem2di_contacts_begin(&world->plan, list->discs, list->count, column->group);
-        int items = count - carry.begin;
-        dem2di_run(world, DEM2D_PHASE_LIST, dem2di_blocks(items, DEM2DI_BLOCK), dem2di_carry_task,
-                   &carry);
-        if (items > 0) memcpy(array, build->column, (size_t)items * column->size);
+        const int blocks = dem2di_blocks(count - carry.begin, DEM2DI_BLOCK);
+        dem2di_run(world, DEM2D_PHASE_LIST, blocks, dem2di_carry_task, &carry);
+        dem2di_run(world, DEM2D_PHASE_LIST, blocks, dem2di_carry_back_task, &carry);
     }
 }
 
@@ -18166,12 +18204,20 @@ static size_t dem2di_step_cut(dem2d_world *world, char *memory, int discs, int p
     return cutter.used;
 }
 
+static void dem2di_loads_clear_task(void *context, int begin, int end) {
+    dem2d_world *world = (dem2d_world *)context;
+    int first = begin * DEM2DI_BLOCK;
+    int last = dem2di_block_end((end - 1) * DEM2DI_BLOCK, DEM2DI_BLOCK, world->list.count);
+    memset(world->actions + first, 0, (size_t)(last - first) * sizeof *world->actions);
+}
+
 /* No loads yet, in scratch memory that has room. */
 static void dem2di_loads_clear(dem2d_world *world) {
     const dem2di_list *list = &world->list;
     (void)dem2di_step_cut(world, world->scratch, list->discs, list->pairs, list->count,
                           &world->plan, false);
-    if (list->count > 0) memset(world->actions, 0, (size_t)list->count * sizeof *world->actions);
+    dem2di_run(world, DEM2D_PHASE_LIST, dem2di_blocks(list->count, DEM2DI_BLOCK),
+               dem2di_loads_clear_task, world);
 }
 
 /* Room for the contacts of the last force pass, which keeps them where it writes over them. */
@@ -18353,8 +18399,8 @@ static void dem2di_build_finish(dem2di_build *build) {
                    dem2di_displacement_task, world);
     dem2di_images_make(world);
     world->immovable = dem2di_some_immovable(world);
-    dem2di_loads_clear(world);
     dem2di_adjacency_make(world);
+    dem2di_loads_clear(world);
     dem2di_extent_set(world, &build->all);
     world->bounded = build->bounded;
     world->softness = build->softness;
@@ -21617,14 +21663,25 @@ static void dem2di_flow_enter(dem2d_world *world) {
 }
 
 /* And back. */
-static void dem2di_flow_leave(dem2d_world *world) {
-    const int slots = dem2di_slots(world);
-    if (!world->periodic || !dem2di_flows(&world->flow_made)) return;
-    for (int i = 0; i < slots; i++) {
-        if (i == world->body_count && world->image_count > 0) i = world->image_first;
+static void dem2di_flow_back(dem2d_world *world, int begin, int end) {
+    for (int i = begin; i < end; i++) {
         world->now[i].v = world->fluctuations[i].v;
         if (world->redirected) world->made[i] = world->made_fluctuations[i];
     }
+}
+
+static void dem2di_flow_back_task(void *context, int begin, int end) {
+    dem2d_world *world = (dem2d_world *)context;
+    int last = dem2di_block_end((end - 1) * DEM2DI_BLOCK, DEM2DI_BLOCK, world->body_count);
+    dem2di_flow_back(world, begin * DEM2DI_BLOCK, last);
+}
+
+static void dem2di_flow_leave(dem2d_world *world) {
+    if (!world->periodic || !dem2di_flows(&world->flow_made)) return;
+    dem2di_run(world, DEM2D_PHASE_MOTION, dem2di_blocks(world->body_count, DEM2DI_BLOCK),
+               dem2di_flow_back_task, world);
+    if (world->image_count > 0)
+        dem2di_flow_back(world, world->image_first, world->image_first + world->image_count);
 }
 
 /* The first half of the flow: fluctuations before the forces act on them, of free particles. */

@@ -1697,7 +1697,7 @@ static double time_list(dem2d_world *world) {
     enum { TRIES = 5 };
     double times[TRIES];
     for (int k = 0; k < TRIES; k++) {
-        expect_ok(dem2d_world_set_time_step(world, TIME_STEP), "time step"); /* makes it stale */
+        world->list_stale = true;
         const double before = busy_seconds();
         expect_ok(dem2d_world_step(world, 1, NULL), "step");
         times[k] = busy_seconds() - before;

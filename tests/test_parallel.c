@@ -192,6 +192,7 @@ typedef struct scene_row {
     bool chain; /* the floor is one of segments */
     bool book;  /* a ledger */
     int rounds; /* the state is compared after each */
+    bool cell;  /* periodic, instead of walls and gravity */
     int steps;  /* of a round; 0 for 40 */
     calls calls;
 } scene_row;
@@ -231,6 +232,12 @@ static scene_row scenes[] = {
      .law = true,
      .chain = true,
      .change = true,
+     .book = true,
+     .rounds = 2},
+    {.name = "a cell that is sheared and takes another vector b",
+     .friction = 0.4,
+     .full = true,
+     .cell = true,
      .book = true,
      .rounds = 2},
 };
@@ -351,6 +358,14 @@ static void add_walls(run *r, const scene_row *s) {
     if (s->chain) add_chain(r);
 }
 
+/* By so much in a round that the cell leans by more than half of a. */
+static void shear(dem2d_world *world) {
+    dem2d_deformation_desc flow = {0};
+    flow.xy = 10;
+    flow.hold_yy = true, flow.stress_yy = 2e4;
+    assert_ok(dem2d_world_deform(world, &flow));
+}
+
 /* Without a runner the library does its work itself. */
 static void make_empty(run *r, const scene_row *s, const runner *runner, calls *calls) {
     dem2d_material_desc stone = material_desc(2700, 1e6, s->friction > 0 ? 1e6 : 0, s->friction);
@@ -360,19 +375,24 @@ static void make_empty(run *r, const scene_row *s, const runner *runner, calls *
     if (runner && runner->way == ON_THREADS) crew_start(&r->host.crew, runner->threads);
     test_env_init(&r->host.env);
     r->env = (dem2d_env){&r->host, host_allocate, host_release, host_log};
-    desc.time_step = 1e-4, desc.gravity.y = -9.81, desc.local_damping = 0.3;
+    desc.time_step = 1e-4, desc.gravity.y = s->cell ? 0 : -9.81, desc.local_damping = 0.3;
     desc.solver = s->solver, desc.faces = s->faces, desc.env = &r->env;
     desc.parallel_for = runner ? run_items : NULL, desc.parallel_user = &r->host;
     desc.ledger = s->book, desc.law = s->law ? own_law : NULL;
     if (s->full) stone.damping_ratio = 0.15, stone.rolling_friction = 0.1;
+    if (s->cell) {
+        desc.cell.a.x = PITCH * COLUMNS;
+        desc.cell.b = vec(0.49 * desc.cell.a.x, PITCH * GRAINS / COLUMNS);
+    }
     assert_ok(dem2d_world_create(&desc, &r->world));
+    if (s->cell) shear(r->world);
     assert_ok(dem2d_world_add_material(r->world, &stone, &r->material));
     for (int i = 0; i < COUNT_OF(r->shapes); i++) {
         dem2d_shape *shape = make_shape(i);
         assert_ok(dem2d_world_add_shape(r->world, shape, &r->shapes[i]));
         dem2d_shape_destroy(shape);
     }
-    add_walls(r, s);
+    if (!s->cell) add_walls(r, s);
 }
 
 static void make_run(run *r, const scene_row *s, const runner *runner, calls *calls) {
@@ -520,6 +540,10 @@ static void check_books(const dem2d_world *world, const scene_row *s) {
     assert_true((e.rolling > 0) == s->full);
     if (s->lid) assert_true(l.walls != 0);
     if (s->drive) assert_true(l.driven != 0);
+    if (!s->cell) return;
+    dem2d_cell_info info;
+    assert_ok(dem2d_world_get_cell(world, &info));
+    assert_true(l.cell != 0 && info.cell.b.x < 0); /* it has another vector b */
 }
 
 /* order: of the particles in memory, see add_in_order; -1 as they come. */
