@@ -352,8 +352,8 @@ HOW TO
                          puts in as much as went out: dem2d_inlet_desc.replaced
                          (examples/hopper.c).
     use random numbers   dem2d_random_uniform, dem2d_random_normal: the same bits everywhere.
-    put grains in        dem2d_world_overlap_at tells how deep a new particle would be in others;
-                         dem2d_world_relax moves those that overlap apart, without speed.
+    put one grain in     dem2d_world_add_particle. dem2d_world_overlap_at tells how deep it would be
+                         in others; dem2d_world_relax moves those that overlap apart, without speed.
     change a grain       dem2d_world_set_material, dem2d_world_set_shape (template and scale; with
                          another scale alone, contacts keep their springs, so that grains can grow).
     choose who meets     groups of particles and walls: category and mask. dem2d_world_set_groups,
