@@ -2591,12 +2591,14 @@ typedef struct dem2d_growth {
 /// Let all free particles (no sensors) grow by the same factor while the world steps, in at most
 /// `steps` steps (>= 0): until the mean stress is reached and the particles are at rest, or until
 /// the solid fraction is reached. Contacts keep their springs. Meanwhile all contacts have the
-/// friction of the desc, and the world its local damping; then they have their own again. Sizes
-/// change every 10 steps, by 1 % at most. They grow at the rate below a tenth of the stress, then
-/// at 0.3 of the rate, less in the last 5 %; above the stress they shrink, the more the greater the
-/// excess. If growth->reached is false, the next call goes on; the bits do not depend on how steps
-/// are shared out among calls, in tens. A step that fails ends the growth with its result; sizes
-/// stay as they are then. Errors: those of dem2d_world_step; OUT_OF_RANGE.
+/// friction of the desc, the world its local damping and a time step of 0.5 of the safe bound (0.8
+/// above a tenth of the stress; see dem2d_world_time_step_bounds; with a law of yours the world's);
+/// then they have their own again. Sizes and time step change every 10 steps, sizes by 1 % at most.
+/// They grow at the rate below a tenth of the stress, then at 0.3 of the rate, less in the last
+/// 5 %; above the stress they shrink, the more the greater the excess. If growth->reached is false,
+/// the next call goes on; the bits do not depend on how steps are shared out among calls, in tens.
+/// A step that fails ends the growth with its result; sizes stay as they are then. Errors: those of
+/// dem2d_world_step and dem2d_world_set_time_step; OUT_OF_RANGE.
 DEM2D_API dem2d_result dem2d_world_grow(dem2d_world *world, const dem2d_growth_desc *desc,
                                         int steps, dem2d_growth *growth);
 
@@ -22204,9 +22206,10 @@ static void dem2di_stiffest_range(const dem2d_world *world, const dem2di_state *
             dem2di_stiffness damping;
             const dem2di_stiffness k = dem2di_stiffness_sum(world, states, i, bound, &damping);
             touched = touched || k.xx + k.yy > 0;
-            double value = dem2di_lagging(&k, &damping, mass, inertia, enough);
+            double most = stiffest->value[bound] * (1 - 4 * DBL_EPSILON); /* ties are exact */
+            double value = dem2di_lagging(&k, &damping, mass, inertia, dem2di_max(enough, most));
             dem2di_stiffest_meet(world, stiffest, bound, value, i);
-            if (value <= enough) break;
+            if (value <= enough || value < stiffest->value[0]) break; /* so is the limit's */
         }
         if (!loose || touched) continue;
         const dem2d_pair_desc *law = dem2di_law(world, body->material, body->material);
@@ -27168,6 +27171,12 @@ static const dem2di_field dem2di_growth_fields[] = {
 #define DEM2DI_GROWTH_STEPS 10     /* from one change of the sizes to the next */
 #define DEM2DI_GROWTH_MOST 0.01    /* of the sizes in a change: they can't pass each other */
 #define DEM2DI_GROWTH_INERTIA 0.01 /* inertial number: sizes grow by a few thousand steps to jam */
+/* Part of the safe time step. Of a grain with one contact the safe bound counts two springs; six
+   contacts are three along any direction, six faces of two points are six: the limit can fall to
+   (2/6)^(1/2) = 0.58 of it within ten steps. A jammed grain has its contacts already. */
+#define DEM2DI_GROWTH_LOOSE 0.5
+#define DEM2DI_GROWTH_JAMMED 0.8
+#define DEM2DI_GROWTH_JAMS 0.1 /* part of the stress from which a sample counts as jammed */
 
 /* The free particles of a growing sample, and all of them. */
 typedef struct dem2di_sample {
@@ -27238,17 +27247,16 @@ static double dem2di_stiffest_spring(const dem2d_world *world) {
 /* By what factor sizes change now. Where the stress is too great, the relative change in time is
    that of the overlaps, stress over stiffness, in three times sqrt(mass/stiffness). */
 static double dem2di_growth_factor(const dem2d_world *world, const dem2d_growth_desc *desc,
-                                   const dem2di_sample *sample) {
+                                   const dem2di_sample *sample, double part) {
     double change = 0, rate = desc->rate, time = DEM2DI_GROWTH_STEPS * world->time_step;
     if (!(desc->stress > 0)) {
         double aim = (desc->solid_fraction * desc->area - (sample->all - sample->free));
         change = sqrt(dem2di_max(0, aim) / sample->free) - 1;
         return 1 + dem2di_max(-rate * time, dem2di_min(rate * time, change));
     }
-    double part = dem2di_mean_stress(world, desc->area) / desc->stress;
     double mass = sample->mass / sample->count, stiffness = dem2di_stiffest_spring(world);
     if (!(rate > 0)) rate = DEM2DI_GROWTH_INERTIA * sqrt(desc->stress / mass);
-    if (part < 0.1)
+    if (part < DEM2DI_GROWTH_JAMS)
         change = rate;
     else if (part < 1)
         change = rate * 0.3 * dem2di_min(1, (1 - part) / 0.05);
@@ -27311,14 +27319,28 @@ static dem2d_result dem2di_growth_check(const dem2d_world *world, const dem2d_gr
     return DEM2D_OK;
 }
 
+/* The time step until sizes change again: by the contacts of the last force pass, which do not
+   depend on the neighbour list. With a law of a caller it stays as it is: its springs are not known
+   before they act. */
+static dem2d_result dem2di_growth_pace(dem2d_world *world, double part) {
+    double safe, limit,
+        share = part < DEM2DI_GROWTH_JAMS ? DEM2DI_GROWTH_LOOSE : DEM2DI_GROWTH_JAMMED;
+    if (world->law != NULL) return DEM2D_OK;
+    (void)dem2d_world_time_step_bounds(world, &safe, &limit, NULL);
+    return dem2d_world_set_time_step(world, share * safe);
+}
+
 /* Growth with the friction and damping of the world as they are. */
 static dem2d_result dem2di_growth_run(dem2d_world *world, const dem2d_growth_desc *desc, int steps,
                                       dem2d_growth *growth) {
     dem2d_result result = DEM2D_OK;
     dem2di_growth_measure(world, desc, growth);
-    while (result == DEM2D_OK && growth->steps < steps && !growth->reached) {
+    while (growth->steps < steps && !growth->reached) {
         const dem2di_sample sample = dem2di_sample_of(world);
-        double factor = dem2di_growth_factor(world, desc, &sample);
+        double part = desc->stress > 0 ? growth->stress / desc->stress : 0;
+        result = dem2di_growth_pace(world, part);
+        if (result != DEM2D_OK) return result;
+        double factor = dem2di_growth_factor(world, desc, &sample, part);
         int done = 0, left = steps - growth->steps;
         factor = dem2di_max(1 - DEM2DI_GROWTH_MOST, dem2di_min(1 + DEM2DI_GROWTH_MOST, factor));
         dem2di_sizes_multiply(world, factor);
@@ -27327,6 +27349,7 @@ static dem2d_result dem2di_growth_run(dem2d_world *world, const dem2d_growth_des
             dem2d_world_step(world, left < DEM2DI_GROWTH_STEPS ? left : DEM2DI_GROWTH_STEPS, &done);
         growth->steps += done;
         dem2di_growth_measure(world, desc, growth);
+        if (result != DEM2D_OK) return result;
     }
     return result;
 }
@@ -27344,13 +27367,14 @@ DEM2D_API dem2d_result dem2d_world_grow(dem2d_world *world, const dem2d_growth_d
     double *frictions = (double *)dem2di_allocate(&world->env, (size_t)laws, sizeof *frictions);
     if (frictions == NULL) return dem2di_fail_memory(&world->env, laws, "frictions");
     for (int i = 0; i < laws; i++) frictions[i] = desc->friction;
-    double damping = world->local_damping;
+    double damping = world->local_damping, time_step = world->time_step;
     memset(&done, 0, sizeof done);
     done.factor = 1;
     dem2di_frictions_swap(world, frictions);
     world->local_damping = desc->local_damping;
     result = dem2di_growth_run(world, &own, steps, &done);
     world->local_damping = damping;
+    (void)dem2d_world_set_time_step(world, time_step); /* that was good before */
     dem2di_frictions_swap(world, frictions);
     dem2di_release(&world->env, frictions, (size_t)laws, sizeof *frictions);
     if (result == DEM2D_OK) *growth = done;
