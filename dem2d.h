@@ -494,7 +494,8 @@ ERRORS
     written only on success, and a failing call leaves everything as it was. The log callback of
     the environment gets the details: which field, which value, which index. It also gets warnings
     (DEM2D_WARNING) of calls that succeed. A step that fails (non-finite state, no memory, time
-    step too long) leaves the world as it was before that step.
+    step too long, a cell that shrinks because nothing resists its stress) leaves the world as it
+    was before that step.
     Contact queries return a state and never a guess: DEM2D_UNRESOLVED comes with the bounds that
     were reached.
 

@@ -733,11 +733,12 @@ static void make_peer(int seed) {
 static void write_peer(void) {
     static const char *const names[COMPARED] = {"xx", "yy", "mu"};
     FILE *csv = create("lammps.csv");
-    fprintf(csv, "quantity,seeds,here,here_error,lammps,lammps_error\n");
+    fprintf(csv,
+            "quantity,seeds,here,here_error,lammps,lammps_error,difference,difference_error\n");
     for (int q = 0; q < COMPARED; q++) {
-        double of[2][64], square[2] = {0, 0};
+        double of[3][64], square[3] = {0, 0, 0}; /* here, LAMMPS, their difference */
         int count = 0;
-        mean m[2];
+        mean m[3];
         for (int seed = 1; seed <= 64; seed++) {
             char key[64];
             snprintf(key, sizeof key, "%slammps %d", haste(), seed);
@@ -746,18 +747,20 @@ static void write_peer(void) {
             for (int k = 0; k < 2; k++) {
                 const double *v = r->of + 2 * COMPARED * k + 2 * q;
                 of[k][count] = v[0], square[k] += v[1] * v[1];
+                square[2] += v[1] * v[1];
             }
+            of[2][count] = of[0][count] - of[1][count];
             count++;
         }
         if (count == 0) break;
-        for (int k = 0; k < 2; k++) {
+        for (int k = 0; k < 3; k++) {
             m[k] = mean_of(of[k], count);
             m[k].error = fmax(m[k].error, sqrt(square[k]) / count);
         }
-        printf("constant volume, %s, %d seeds: here %.4f +- %.4f, LAMMPS %.4f +- %.4f\n", names[q],
-               count, m[0].value, m[0].error, m[1].value, m[1].error);
-        fprintf(csv, "%s,%d,%.6f,%.6f,%.6f,%.6f\n", names[q], count, m[0].value, m[0].error,
-                m[1].value, m[1].error);
+        printf("constant volume, %s, %d seeds: here %.4f, LAMMPS %.4f, difference %.4f +- %.4f\n",
+               names[q], count, m[0].value, m[1].value, m[2].value, m[2].error);
+        fprintf(csv, "%s,%d,%.6f,%.6f,%.6f,%.6f,%.6f,%.6f\n", names[q], count, m[0].value,
+                m[0].error, m[1].value, m[1].error, m[2].value, m[2].error);
     }
     if (fclose(csv) != 0) bench_fail("can't write lammps.csv");
 }
@@ -783,6 +786,7 @@ static const char jamming_panels[] =
     "pointtype 6 title n.' discs', 3.7 * sqrt(x) with lines linecolor '#444444' title "
     "'3.7 (P/k_n)^{1/2}'\n"
     "unset logscale y\nset yrange [*:*]\nset format y '%g'\nset ylabel 'solid fraction'\n"
+    "set key outside top center horizontal\n"
     "plot for [n in '400 2000 8000'] 'jamming.csv' using ($1 == n ? $2 : NaN):4 with points "
     "pointtype 6 title n.' discs'\n";
 
