@@ -8,22 +8,13 @@
    of the flow with colours by speed, silo.svg. */
 #define DEM2D_IMPLEMENTATION
 #include "dem2d.h"
-#include "random.h"
 
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 
-enum {
-    COLUMNS = 14,
-    ROWS = 70,
-    LAYERS = 40,
-    SIDE = 40,
-    CELLS = SIDE * SIDE,
-    WIDTHS = 3,
-    SILOS = 4
-};
+enum { DISCS = 980, LAYERS = 40, SIDE = 40, CELLS = SIDE * SIDE, WIDTHS = 3, SILOS = 4 };
 
 static const double width = 0.35, size = 0.02, gravity = 9.81, dt = 1e-4; /* size: of a grain */
 
@@ -51,30 +42,28 @@ static void step(const silo *s, double seconds) {
 }
 
 /* Discs of 16 to 24 mm that have come to rest between two walls. */
-static silo fill(uint64_t random) {
+static silo fill(uint64_t seed) {
     const dem2d_world_desc desc = {.time_step = dt, .gravity = {0, -gravity}, .local_damping = 0.5};
     const dem2d_material_desc stone = {
         2700, 1e6, 5e5, 0.5, .damping_ratio = 0.3, .rolling_friction = 0.3};
+    const dem2d_grade sizes[2] = {{0.8 * size, 0}, {1.2 * size, 1}};
+    dem2d_grain_kind kind = {.share = 1};
+    dem2d_filling filling;
     silo s;
     dem2d_shape *disc;
-    dem2d_shape_id shape;
     check(dem2d_world_create(&desc, &s.world));
     check(dem2d_world_add_material(s.world, &stone, &s.material));
-    check(dem2d_shape_create_circle(NULL, size / 2, &disc));
-    check(dem2d_world_add_shape(s.world, disc, &shape));
+    check(dem2d_shape_create_circle(NULL, 1, &disc));
+    check(dem2d_world_add_shape(s.world, disc, &kind.grain.shape));
     dem2d_shape_destroy(disc);
     (void)add_wall(&s, (dem2d_wall_desc){.normal = {1, 0}});
     (void)add_wall(&s, (dem2d_wall_desc){.normal = {-1, 0}, .point = {width, 0}});
     s.floor = add_wall(&s, (dem2d_wall_desc){.normal = {0, 1}});
-    for (int i = 0; i < COLUMNS * ROWS; i++) {
-        dem2d_particle_desc grain = {.shape = shape, .material = s.material};
-        dem2d_particle_id id;
-        grain.scale = random_between(&random, 0.8, 1.2);
-        grain.velocity.x = random_between(&random, -1, 1);
-        grain.position.x = 0.025 * (i % COLUMNS + 0.5),
-        grain.position.y = 0.025 * (i / COLUMNS + 1);
-        check(dem2d_world_add_particle(s.world, &grain, &id));
-    }
+    kind.grain.material = s.material;
+    const dem2d_grading_desc grading = {sizes, 2, &kind, 1, .measure = DEM2D_MEASURE_NUMBER};
+    dem2d_fill_desc discs = {.grading = &grading, .count = DISCS, .seed = seed};
+    discs.region.box.upper = (dem2d_vec){width, 1.8};
+    check(dem2d_world_fill(s.world, &discs, NULL, 0, &filling));
     step(&s, 1.5);
     check(dem2d_world_set_damping(s.world, 0, 0)); /* a force that no field has */
     return s;
