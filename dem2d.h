@@ -18996,33 +18996,9 @@ dem2di_batch_points(dem2di_batch *batch, double time_step, const dem2d_pair_desc
         depth[k] = r.depth;
         force[k] = r.force;
         shear[k] = next;
-        if (terms & DEM2DI_TANGENTIAL_DASHPOT) continue;
+        if (terms & (DEM2DI_TANGENTIAL_DASHPOT | DEM2DI_ROLLING)) continue;
         dem2di_action action = {r.normal.x * r.force, r.normal.y * r.force, 0, 0};
         if (friction) dem2di_batch_act(&action, r.normal, r.force, next, r.arm_a, r.arm_b);
-        actions[k].x = action.x;
-        actions[k].y = action.y;
-        actions[k].a = action.a;
-        actions[k].b = action.b;
-    }
-}
-
-/* The rest where dashpots are beside the tangential springs: these pull where two are apart. */
-static DEM2DI_INLINE void
-dem2di_batch_part(const dem2di_batch *batch, const double *DEM2DI_APART normal_x,
-                  const double *DEM2DI_APART normal_y, const double *DEM2DI_APART depth,
-                  const double *DEM2DI_APART force, double *DEM2DI_APART shear,
-                  double *DEM2DI_APART viscous_shear, dem2di_action *DEM2DI_APART actions) {
-    const int count = batch->count;
-    DEM2DI_INDEPENDENT
-    for (int k = 0; k < count; k++) {
-        const dem2d_vec normal = {normal_x[k], normal_y[k]};
-        double next = shear[k], viscous = viscous_shear[k];
-        dem2di_action action;
-        viscous_shear[k] = depth[k] > 0 ? viscous : 0;
-        next = depth[k] > 0 ? next : 0;
-        shear[k] = next;
-        dem2di_batch_act(&action, normal, force[k], next, batch->radius_a[k] - depth[k] / 2,
-                         batch->radius_b[k] - depth[k] / 2);
         actions[k].x = action.x;
         actions[k].y = action.y;
         actions[k].a = action.a;
@@ -19058,23 +19034,38 @@ static DEM2DI_INLINE void dem2di_batch_rolling(dem2di_batch *batch, double time_
     }
 }
 
-/* The rest of it. */
-static DEM2DI_INLINE void dem2di_batch_rolled(const dem2di_batch *batch, bool dashpots,
-                                              const double *DEM2DI_APART depth,
-                                              double *DEM2DI_APART moment,
-                                              double *DEM2DI_APART viscous_moment,
-                                              dem2di_action *DEM2DI_APART actions) {
+/* What has been made as if all were closed: 0 where they are apart. */
+static DEM2DI_INLINE void dem2di_batch_part(int count, const double *DEM2DI_APART depth,
+                                            double *DEM2DI_APART force) {
+    DEM2DI_INDEPENDENT
+    for (int k = 0; k < count; k++) {
+        const double closed = force[k];
+        force[k] = depth[k] > 0 ? closed : 0;
+    }
+}
+
+/* Actions where dem2di_batch_points does not write them: they are written once, moments included.
+   To add a moment to one that has just been stored would wait for that. */
+static DEM2DI_INLINE void
+dem2di_batch_actions(const dem2di_batch *batch, bool rolls, const double *DEM2DI_APART normal_x,
+                     const double *DEM2DI_APART normal_y, const double *DEM2DI_APART depth,
+                     const double *DEM2DI_APART force, const double *DEM2DI_APART shear,
+                     const double *DEM2DI_APART moment, dem2di_action *DEM2DI_APART actions) {
     const int count = batch->count;
     DEM2DI_INDEPENDENT
     for (int k = 0; k < count; k++) {
-        if (dashpots) {
-            double viscous = viscous_moment[k];
-            viscous_moment[k] = depth[k] > 0 ? viscous : 0;
+        const dem2d_vec normal = {normal_x[k], normal_y[k]};
+        dem2di_action action;
+        dem2di_batch_act(&action, normal, force[k], shear[k], batch->radius_a[k] - depth[k] / 2,
+                         batch->radius_b[k] - depth[k] / 2);
+        if (rolls) {
+            action.a -= moment[k];
+            action.b += moment[k];
         }
-        double next = depth[k] > 0 ? moment[k] : 0;
-        moment[k] = next;
-        actions[k].a -= next;
-        actions[k].b += next;
+        actions[k].x = action.x;
+        actions[k].y = action.y;
+        actions[k].a = action.a;
+        actions[k].b = action.b;
     }
 }
 
@@ -19096,27 +19087,38 @@ static DEM2DI_INLINE void dem2di_batch_solve(dem2di_batch *b, double time_step,
                                           b->viscous_moment)                                       \
                    : dem2di_batch_rolling(b, time_step, law, dashpots, false, b->force, b->moment, \
                                           b->viscous_moment))
+#define DEM2DI_ACTIONS(rolls)                                                              \
+    dem2di_batch_actions(b, rolls, b->normal_x, b->normal_y, b->depth, b->force, b->shear, \
+                         b->moment, b->actions)
     if (sliders)
         DEM2DI_POINTS(true, both);
+    else if (terms & DEM2DI_ROLLING)
+        DEM2DI_POINTS(true, DEM2DI_DASHPOT | DEM2DI_ROLLING);
     else if (terms != 0)
         DEM2DI_POINTS(true, DEM2DI_DASHPOT);
     else if (plan->friction)
         DEM2DI_POINTS(true, 0);
     else
         DEM2DI_POINTS(false, 0);
-    if (sliders)
-        dem2di_batch_part(b, b->normal_x, b->normal_y, b->depth, b->force, b->shear,
-                          b->viscous_shear, b->actions);
-    if (!(terms & (DEM2DI_ROLLING | DEM2DI_ROLLING_DASHPOT))) return;
     if (sliders) {
+        dem2di_batch_part(b->count, b->depth, b->shear);
+        dem2di_batch_part(b->count, b->depth, b->viscous_shear);
+    }
+    if (terms & DEM2DI_ROLLING_DASHPOT) {
         DEM2DI_ROLLING_OF(true);
-        dem2di_batch_rolled(b, true, b->depth, b->moment, b->viscous_moment, b->actions);
-    } else {
+        dem2di_batch_part(b->count, b->depth, b->viscous_moment);
+    } else if (terms & DEM2DI_ROLLING) {
         DEM2DI_ROLLING_OF(false);
-        dem2di_batch_rolled(b, false, b->depth, b->moment, b->viscous_moment, b->actions);
+    }
+    if (terms & DEM2DI_ROLLING) {
+        dem2di_batch_part(b->count, b->depth, b->moment);
+        DEM2DI_ACTIONS(true);
+    } else if (sliders) {
+        DEM2DI_ACTIONS(false);
     }
 #undef DEM2DI_POINTS
 #undef DEM2DI_ROLLING_OF
+#undef DEM2DI_ACTIONS
 }
 
 /* How many contacts of a batch are closed. */
