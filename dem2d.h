@@ -14120,9 +14120,14 @@ static bool dem2di_images_reserve(dem2d_world *world, int more) {
     return true;
 }
 
+/* Slots that are at most free between those of particles and of images. */
+static int dem2di_images_gap(int bodies) {
+    return 64 + bodies / 4;
+}
+
 /* The slots of images go up when one more particle would take the first of them. */
 static bool dem2di_images_make_way(dem2d_world *world) {
-    const int first = world->image_first, more = 64 + world->body_count / 4;
+    const int first = world->image_first, more = dem2di_images_gap(world->body_count);
     if (world->image_count == 0 || world->body_count < first) return true;
     if (!dem2di_images_reserve(world, more)) return false;
     world->image_first += more;
@@ -15265,7 +15270,8 @@ DEM2D_API dem2d_result dem2d_world_set_groups(dem2d_world *world, dem2d_particle
     if (!world->grouped) return DEM2D_OK;
     world->groups[slot] = now;
     dem2di_images_follow(world, slot);
-    if (!dem2di_meets_others(world, &old, &now, false)) return DEM2D_OK;
+    const bool itself = world->periodic && dem2di_meet(&old, &old) != dem2di_meet(&now, &now);
+    if (!itself && !dem2di_meets_others(world, &old, &now, false)) return DEM2D_OK;
     for (int k = list->first[slot]; k < list->first[slot + 1]; k++)
         dem2di_contact_regroup(world, list->adjacent[k]);
     world->list_stale = world->check_due = world->ledger.edited = true;
@@ -15280,7 +15286,9 @@ DEM2D_API dem2d_result dem2d_world_set_user_data(dem2d_world *world, dem2d_parti
     dem2di_groups now = dem2di_groups_at(world, slot);
     now.user_data = user_data;
     if (!dem2di_groups_begin(world, &now)) return dem2di_out_of_memory(world, "user data");
-    if (world->grouped) world->groups[slot] = now;
+    if (!world->grouped) return DEM2D_OK;
+    world->groups[slot] = now;
+    dem2di_images_follow(world, slot);
     return DEM2D_OK;
 }
 
@@ -16840,7 +16848,7 @@ static dem2d_result dem2di_join(dem2d_world *world) {
     bool room = before != NULL && joining.ends != NULL;
     if (room) {
         joining.of = (int *)(void *)(joining.ends + ends);
-        memcpy(before, world->joints, (size_t)parts * old);
+        if (parts > 0) memcpy(before, world->joints, (size_t)parts * old);
         bool joined = dem2di_joints_find(world, &joining), same = true;
         for (int k = 0; k < 2 * parts; k++)
             same = same && dem2di_partner_of(&before[k / 2], k % 2) ==
@@ -28351,10 +28359,10 @@ static bool dem2di_is_own_image(const dem2d_world *w, int slot) {
     return shift[1] > 0 || (shift[1] == 0 && shift[0] > 0);
 }
 
-/* The cell and the images in it. They come right behind the particles, whatever slots they had. */
+/* The cell and the images in it. */
 static void dem2di_finish_images(dem2di_loader *loader) {
     dem2d_world *w = loader->world;
-    const int down = w->image_first - w->body_count;
+    const int gap = w->image_first - w->body_count;
     dem2d_cell last = w->cell_before;
     last.origin = w->cell.origin;
     dem2di_load_check(loader, dem2di_check_cell(loader->env, &w->cell));
@@ -28372,12 +28380,11 @@ static void dem2di_finish_images(dem2di_loader *loader) {
     if (!dem2di_load_good(loader)) return;
     dem2di_cell_set(w, &w->cell);
     w->cell_before = last;
-    dem2di_load_expect(loader, w->image_count == 0 || (w->periodic && down >= 0), "images");
+    dem2di_load_expect(loader,
+                       w->image_count == 0 ||
+                           (w->periodic && gap >= 0 && gap <= dem2di_images_gap(w->body_count)),
+                       "images");
     if (!dem2di_load_good(loader) || w->image_count == 0) return;
-    for (int i = 0; i < w->list.pairs; i++)
-        if (w->list.keys[i].a >= 0 && w->list.keys[i].b >= w->image_first)
-            w->list.keys[i].b -= down;
-    w->image_first = w->body_count;
     for (int k = 0; k < w->image_count && dem2di_load_good(loader); k++) {
         const dem2di_image *image = &w->images[k];
         const bool lives = image->owner < 0 || (image->owner < w->body_count &&

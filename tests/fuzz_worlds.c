@@ -15,8 +15,17 @@ static int64_t met[WITH_COUNT][WITH_COUNT];
 /* Two that can't be used together. */
 static bool exclusive(int a, int b) {
     static const int never[][2] = {{WITH_LAW, WITH_TWO_POINTS}, {WITH_TWO_POINTS, WITH_ONE_POINT}};
+    static const int no_cell[] = {WITH_SEGMENT, WITH_CHAIN, WITH_POINTS, WITH_ONE_SIDED,
+                                  WITH_TURNING};
+    static const int no_flow[] = {WITH_SERVO, WITH_MOVING, WITH_TURNED,
+                                  WITH_WALLS, WITH_BELT,   WITH_REFUSED};
     for (size_t k = 0; k < sizeof never / sizeof *never; k++)
         if (never[k][0] == a && never[k][1] == b) return true;
+    if (b < WITH_CELL || b > WITH_HELD) return false;
+    for (size_t k = 0; k < sizeof no_cell / sizeof *no_cell; k++)
+        if (no_cell[k] == a) return true;
+    for (size_t k = 0; k < sizeof no_flow / sizeof *no_flow; k++)
+        if (no_flow[k] == a) return b != WITH_CELL;
     return false;
 }
 
@@ -47,9 +56,9 @@ static int print_pairs(void) {
 /* The script of a world, in short. */
 static void tell(uint64_t seed, int64_t index) {
     static const char *const events[EVENT_KINDS] = {
-        "add",         "remove", "move",     "load",    "drive",     "add wall",  "set wall",
-        "remove wall", "pair",   "gravity",  "damping", "time step", "refused",   "groups",
-        "scale",       "shape",  "material", "rows",    "relax",     "drive wall"};
+        "add",         "remove", "move",     "load",    "drive",     "add wall",   "set wall",
+        "remove wall", "pair",   "gravity",  "damping", "time step", "refused",    "groups",
+        "scale",       "shape",  "material", "rows",    "relax",     "drive wall", "deform"};
     static world_script s;
     world_make_script(seed, index, &s);
     printf("time step %g, %d steps, gravity %g, damping %g %g, skin %g, solver %d, faces %d%s\n",
@@ -83,6 +92,8 @@ static void tell(uint64_t seed, int64_t index) {
                    w->one_sided ? ", one-sided" : "", w->angular_velocity);
         if (w->surface_speed != 0) printf("    belt, %g\n", w->surface_speed);
     }
+    printf("cell %g %g, %g, from %g\n", s.desc.cell.a.x, s.desc.cell.b.x, s.desc.cell.b.y,
+           s.desc.cell.origin.x);
     for (int k = 0; k < s.event_count; k++)
         printf("step %d: %s %d (%d)\n", s.events[k].step, events[s.events[k].kind],
                s.events[k].which, s.events[k].other);
