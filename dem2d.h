@@ -17856,9 +17856,17 @@ static void dem2di_find_lost(const dem2di_build *build, dem2di_finds *finds) {
     }
 }
 
-/* The kind of contact that was found. */
-static inline int dem2di_kind_of(const dem2di_key *found) {
-    return found->a < 0 ? DEM2DI_WALL_CONTACTS : found->b < 0 ? DEM2DI_OTHERS : DEM2DI_DISCS;
+/* How many contacts of each kind were found. */
+static void dem2di_kinds_count(const dem2di_finds *finds, int numbers[DEM2DI_KINDS]) {
+    const int count = finds->count < finds->room ? finds->count : finds->room;
+    int walls = 0, others = 0;
+    for (int k = 0; k < count; k++) {
+        walls += finds->to[k].a < 0;
+        others += finds->to[k].b < 0; /* of a wall it is a part, and from 0 */
+    }
+    numbers[DEM2DI_DISCS] = count - walls - others;
+    numbers[DEM2DI_OTHERS] = others;
+    numbers[DEM2DI_WALL_CONTACTS] = walls;
 }
 
 static void dem2di_search_task(void *context, int begin, int end) {
@@ -17882,9 +17890,7 @@ static void dem2di_search_task(void *context, int begin, int end) {
                  j++)
                 if (world->parts[j].extent > 0) dem2di_search_segment(build, j, &finds);
         result->found = finds.count;
-        memset(result->starts, 0, sizeof result->starts);
-        for (int k = 0; k < finds.count && k < finds.room; k++)
-            result->starts[dem2di_kind_of(&finds.to[k])]++;
+        dem2di_kinds_count(&finds, result->starts);
     }
 }
 
