@@ -27321,8 +27321,8 @@ static dem2d_result dem2di_growth_check(const dem2d_world *world, const dem2d_gr
         return dem2di_fail(env, DEM2D_OUT_OF_RANGE, -1, "area = 0 without a cell along a and b");
     if ((desc->stress > 0) == (desc->solid_fraction > 0))
         return dem2di_fail(env, DEM2D_OUT_OF_RANGE, -1,
-                           "stress = %g and solid_fraction = %g: one has to be 0", desc->stress,
-                           desc->solid_fraction);
+                           "stress = %g and solid_fraction = %g: one has to be > 0, one 0",
+                           desc->stress, desc->solid_fraction);
     if (!(desc->stress > 0) && !(desc->rate > 0))
         return dem2di_fail(env, DEM2D_OUT_OF_RANGE, -1, "rate = %g is not > 0, without a stress",
                            desc->rate);
