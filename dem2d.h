@@ -524,7 +524,7 @@ in use is decided after an edit)
     fixed particles, walls, segments, parallel_for        +1    present, but nothing touches them
     polygons for a tenth of the circles                 +480
     energy and stress queried in every step            +1030
-    fields added to a grid in every step              +31300    cells of a diameter, width two
+    fields added to a grid in every step              +31500    cells of a diameter, width two
     the ledger of energies                             +1580
     a dashpot                                            +69    with friction; as the next two rows:
     a dashpot and rolling friction                      +113    in beds of bench-guard
@@ -23713,15 +23713,6 @@ static dem2d_cell dem2di_coarse_images(const dem2d_grid *grid, const dem2d_world
     return cell;
 }
 
-/* The images of a line from a point along b that may reach the grid; of length 0 for a point. */
-static dem2di_shifts dem2di_coarse_start(const dem2d_grid *grid, const dem2d_cell *cell,
-                                         dem2d_vec point, dem2d_vec b) {
-    dem2d_box box = grid->reached;
-    box.lower = dem2di_sub(box.lower, dem2di_vec(dem2di_max(b.x, 0), dem2di_max(b.y, 0)));
-    box.upper = dem2di_sub(box.upper, dem2di_vec(dem2di_min(b.x, 0), dem2di_min(b.y, 0)));
-    return dem2di_shifts_start(cell, point, &box);
-}
-
 /* What is added to the cells of a window. */
 typedef struct dem2di_addend {
     double number, mass, area;
@@ -23765,6 +23756,20 @@ static void dem2di_coarse_add(dem2d_grid *grid, dem2d_vec point, dem2d_vec b,
         }
 }
 
+/* The same for the images of the line that may reach the grid. */
+static void dem2di_coarse_add_images(dem2d_grid *grid, const dem2d_cell *cell, dem2d_vec point,
+                                     dem2d_vec b, const dem2di_addend *a, double weight) {
+    dem2d_box box = grid->reached;
+    if (!(cell->a.x > 0 || cell->b.y > 0)) {
+        dem2di_coarse_add(grid, point, b, a, weight);
+        return;
+    }
+    box.lower = dem2di_sub(box.lower, dem2di_vec(dem2di_max(b.x, 0), dem2di_max(b.y, 0)));
+    box.upper = dem2di_sub(box.upper, dem2di_vec(dem2di_min(b.x, 0), dem2di_min(b.y, 0)));
+    dem2di_shifts at = dem2di_shifts_start(cell, point, &box);
+    while (dem2di_shifts_next(&at)) dem2di_coarse_add(grid, dem2di_shifts_point(&at), b, a, weight);
+}
+
 /* Does a particle count? */
 static bool dem2di_coarse_counts(const dem2d_grid *grid, const dem2d_world *world, int slot) {
     const dem2di_groups groups = dem2di_groups_at(world, slot);
@@ -23784,9 +23789,7 @@ static void dem2di_coarse_add_particles(dem2d_grid *grid, const dem2d_world *wor
         add.mass = dem2di_body_mass(world, body);
         add.area = dem2di_body_area(world, body);
         add.velocity = dem2di_velocities_mean(world, slot).v;
-        dem2di_shifts at = dem2di_coarse_start(grid, &cell, world->before[slot].x, none);
-        while (dem2di_shifts_next(&at))
-            dem2di_coarse_add(grid, dem2di_shifts_point(&at), none, &add, weight);
+        dem2di_coarse_add_images(grid, &cell, world->before[slot].x, none, &add, weight);
     }
 }
 
@@ -23795,7 +23798,8 @@ static void dem2di_coarse_add_particles(dem2d_grid *grid, const dem2d_world *wor
 static void dem2di_coarse_add_line(dem2d_grid *grid, const dem2d_cell *cell, dem2d_vec start,
                                    dem2d_vec branch, dem2d_vec force, const dem2d_vec *normal,
                                    double weight) {
-    dem2di_addend add, back;
+    const dem2d_vec none = {0, 0};
+    dem2di_addend add;
     memset(&add, 0, sizeof add);
     add.branch = branch;
     add.force = force;
@@ -23803,15 +23807,11 @@ static void dem2di_coarse_add_line(dem2d_grid *grid, const dem2d_cell *cell, dem
         add.contacts = 1;
         add.normal = *normal;
     }
-    memset(&back, 0, sizeof back);
-    back.boundary = dem2di_negate(force);
-    dem2di_shifts at = dem2di_coarse_start(grid, cell, start, branch);
-    while (dem2di_shifts_next(&at)) {
-        const dem2d_vec point = dem2di_shifts_point(&at);
-        dem2di_coarse_add(grid, point, branch, &add, weight);
-        if (normal != NULL) continue;
-        dem2di_coarse_add(grid, dem2di_add(point, branch), dem2di_vec(0, 0), &back, weight);
-    }
+    dem2di_coarse_add_images(grid, cell, start, branch, &add, weight);
+    if (normal != NULL) return;
+    memset(&add, 0, sizeof add);
+    add.boundary = dem2di_negate(force);
+    dem2di_coarse_add_images(grid, cell, dem2di_add(start, branch), none, &add, weight);
 }
 
 static void dem2di_coarse_add_contacts(dem2d_grid *grid, const dem2d_world *world, double weight) {
