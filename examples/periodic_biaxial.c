@@ -18,11 +18,10 @@ static const char usage[] =
     "  --out DIR       for periodic.csv, periodic_packed.svg, periodic_final.svg (out)\n"
     "  --quick         less strain, faster\n";
 
+static const double PRESSURE = 1e5; // Pa
 enum { QUICK, PARTICLES, SEED, SHAPES, GRAINS, OUT, OPTIONS };
 static const char *const option_names[OPTIONS] = {
     "--quick", "--particles=", "--seed=", "--shapes=", "--grains=", "--out="};
-
-static const double PRESSURE = 1e5; // Pa
 
 typedef struct test {
     int particles, steps, rows;
@@ -116,7 +115,7 @@ int main(int count, char **arguments) {
         .hold_xx = true, .stress_xx = PRESSURE, .hold_yy = true, .stress_yy = PRESSURE};
     dem2d_equilibrium now = {.unbalanced = 1};
     dem2d_cell_info cell;
-    double peak = 0, worst = 0;
+    double peak = 0, worst = 0; // of q/p; of the lateral stress, its error
     make_directory(t.out);
     t.history = join_text(t.out, "/", "periodic.csv");
     fill_cell(&t, &set);
@@ -145,5 +144,6 @@ int main(int count, char **arguments) {
     printf("peak_ratio %.4f -\nlast_ratio %.4f -\nlateral_error %.4f -\n", peak, t.ratio, worst);
     dem2d_world_destroy(t.world);
     if (stop_asked) return STATUS_STOPPED;
-    return packed && worst < 0.1 && peak > 0.2 && peak < 0.6 ? STATUS_OK : STATUS_FAILED;
+    const bool bears = peak > (t.quick ? 0.1 : 0.2) && peak < 0.6; // few grains, little strain
+    return packed && worst < 0.1 && bears ? STATUS_OK : STATUS_FAILED;
 }
