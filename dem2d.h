@@ -2887,6 +2887,10 @@ static bool dem2di_has_fours(void) {
 #define DEM2DI_PREFETCH(array, ahead) ((void)0)
 #endif
 
+/* So many contact points or pairs are taken at once: 6 kB of arrays for the law, little of
+   the innermost cache. */
+#define DEM2DI_BATCH 32
+
 #define DEM2DI_PI 3.14159265358979323846
 
 /* Rounding error of a support value of A minus B, in units of R_A + R_B + |d|: two rotations, two
@@ -9690,13 +9694,83 @@ static inline double dem2di_edge_near(const dem2di_core *core, int k, dem2d_vec 
 /* Faces of polygons are edges whose normals are at most about 45 degrees (cosine) off a contact. */
 #define DEM2DI_FACE_COSINE 0.7071
 
-/* A corner of one core at an edge of the other, in coordinates along the edge's normal and tangent.
- */
+/* Corners of one core and edges of the other, each in the coordinates of its shape, in arrays for
+   vector instructions. A circle is a corner without neighbours: these, and the tangents beside it,
+   are 0. */
+typedef struct dem2di_corners {
+    double own_c[DEM2DI_BATCH], own_s[DEM2DI_BATCH];     /* rotation of the edge's shape */
+    double other_c[DEM2DI_BATCH], other_s[DEM2DI_BATCH]; /* rotation of the corner's shape */
+    double scale[DEM2DI_BATCH], other_scale[DEM2DI_BATCH];
+    double sign[DEM2DI_BATCH]; /* 1: the edge is of A; -1: of B, which is reflected */
+    double along_x[DEM2DI_BATCH], along_y[DEM2DI_BATCH]; /* tangent of the edge */
+    double from_x[DEM2DI_BATCH], from_y[DEM2DI_BATCH];   /* its ends */
+    double to_x[DEM2DI_BATCH], to_y[DEM2DI_BATCH];
+    double earlier_x[DEM2DI_BATCH], earlier_y[DEM2DI_BATCH]; /* tangent of the edge before it */
+    double corner_x[DEM2DI_BATCH], corner_y[DEM2DI_BATCH];
+    double before_x[DEM2DI_BATCH], before_y[DEM2DI_BATCH]; /* the neighbours of the corner */
+    double after_x[DEM2DI_BATCH], after_y[DEM2DI_BATCH];
+    double leading_x[DEM2DI_BATCH], leading_y[DEM2DI_BATCH]; /* tangents before and after it */
+    double leaving_x[DEM2DI_BATCH], leaving_y[DEM2DI_BATCH];
+    double radius_a[DEM2DI_BATCH], radius_b[DEM2DI_BATCH]; /* by which the cores are grown */
+    double inner[DEM2DI_BATCH];                            /* sum of the inscribed radii */
+} dem2di_corners;
+
+/* Puts corner `corner` of a shape, and what is beside it, at place k. */
+static DEM2DI_INLINE void dem2di_corners_put(const dem2d_shape *shape, int corner, int k,
+                                             dem2di_corners *e) {
+    const dem2d_vec *corners = dem2di_core_corners(shape);
+    e->corner_x[k] = corners[corner].x;
+    e->corner_y[k] = corners[corner].y;
+    e->before_x[k] = e->before_y[k] = e->after_x[k] = e->after_y[k] = 0;
+    e->leading_x[k] = e->leading_y[k] = e->leaving_x[k] = e->leaving_y[k] = 0;
+    if (shape->type != DEM2D_POLYGON) return;
+    const int before = dem2di_before(shape->count, corner);
+    const int after = dem2di_after(shape->count, corner);
+    e->before_x[k] = corners[before].x;
+    e->before_y[k] = corners[before].y;
+    e->after_x[k] = corners[after].x;
+    e->after_y[k] = corners[after].y;
+    e->leading_x[k] = shape->tangents[before].x;
+    e->leading_y[k] = shape->tangents[before].y;
+    e->leaving_x[k] = shape->tangents[corner].x;
+    e->leaving_y[k] = shape->tangents[corner].y;
+}
+
+/* Puts the feature of a pair at place k. What is where the pair is, is not asked. */
+static DEM2DI_INLINE void dem2di_corners_set(const dem2di_pair *pair, const dem2di_feature *feature,
+                                             int k, dem2di_corners *e) {
+    const bool of_a = feature->own == 0;
+    const dem2d_shape *own = of_a ? pair->a : pair->b, *other = of_a ? pair->b : pair->a;
+    const dem2d_rot q = of_a ? pair->ra : pair->rb, turn = of_a ? pair->rb : pair->ra;
+    const int edge = of_a ? feature->corner[0] : feature->corner[1];
+    const int next = dem2di_after(own->count, edge), last = dem2di_before(own->count, edge);
+    e->own_c[k] = q.c;
+    e->own_s[k] = q.s;
+    e->other_c[k] = turn.c;
+    e->other_s[k] = turn.s;
+    e->scale[k] = of_a ? pair->scale_a : pair->scale_b;
+    e->other_scale[k] = of_a ? pair->scale_b : pair->scale_a;
+    e->sign[k] = of_a ? 1 : -1;
+    e->along_x[k] = own->tangents[edge].x;
+    e->along_y[k] = own->tangents[edge].y;
+    e->from_x[k] = own->corners[edge].x;
+    e->from_y[k] = own->corners[edge].y;
+    e->to_x[k] = own->corners[next].x;
+    e->to_y[k] = own->corners[next].y;
+    e->earlier_x[k] = own->tangents[last].x;
+    e->earlier_y[k] = own->tangents[last].y;
+    dem2di_corners_put(other, of_a ? feature->corner[1] : feature->corner[0], k, e);
+    e->radius_a[k] = dem2di_core_radius(pair->a, pair->scale_a);
+    e->radius_b[k] = dem2di_core_radius(pair->b, pair->scale_b);
+    e->inner[k] = pair->a->inscribed * pair->scale_a + pair->b->inscribed * pair->scale_b;
+}
+
+/* The same in coordinates along the edge's normal and tangent. */
 typedef struct dem2di_corner_at_edge {
     double low, high; /* ends of the edge along its tangent, from the corner on */
     double h, radii;  /* overlap of the cores, radii by which they are grown */
-    dem2d_vec v;      /* the normal, against the corner, in coordinates of the corner's shape */
-    double sine[2];   /* of the angles between the edge and the edges after and before the corner */
+    double vx, vy;    /* the normal, against the corner, in coordinates of its shape */
+    double sine_after, sine_before; /* of the angles between the edge and those beside the corner */
 } dem2di_corner_at_edge;
 
 /* Is there no second contact point between an edge and the one beside the corner that rests on it?
@@ -9719,29 +9793,25 @@ static DEM2DI_INLINE bool dem2di_side_apart(const dem2di_corner_at_edge *at, dou
     return no_face | (far_apart & end_apart);
 }
 
-/* Is it certain that two overlapping polygons, a corner k of one at an edge of the other, have no
+/* Is it certain that two overlapping polygons, a corner of one at an edge of the other, have no
    second contact point? The computation of dem2di_pair_second then need not be made: the edge is
    the face of its shape on both sides, and each edge beside the corner that of the other. Both
    computations have errors of a few eps times the size of the pair, 64 eps together at most:
    support values have ROUNDOFF, 16 eps, heights on a face at a slope below 1 twice that. The edges
    of the first shape must not be parallel within rounding errors, so that its face is this edge. */
-static DEM2DI_INLINE bool dem2di_corner_alone(const dem2di_pair *pair, const dem2d_shape *own,
-                                              int edge, const dem2d_shape *other, double scale,
-                                              int k, const dem2di_corner_at_edge *at) {
-    const double unsure = 4 * DEM2DI_ROUNDOFF * pair->size;
-    if (other->type != DEM2D_POLYGON) return true; /* a circle */
-    int before = dem2di_before(other->count, k), after = dem2di_after(other->count, k);
-    dem2d_vec here = other->corners[k], v = at->v;
-    double rise_after = -dem2di_dot(dem2di_sub(other->corners[after], here), v) * scale;
-    double rise_before = -dem2di_dot(dem2di_sub(other->corners[before], here), v) * scale;
-    double cosine_after = dem2di_cross(v, other->tangents[k]);
-    double cosine_before = dem2di_cross(v, other->tangents[before]);
-    dem2d_vec last = own->tangents[dem2di_before(own->count, edge)];
-    bool distinct = fabs(dem2di_cross(last, own->tangents[edge])) > 4 * DEM2DI_ROUNDOFF;
-    bool after_apart =
-        dem2di_side_apart(at, at->sine[0], cosine_after, rise_after, -at->low, unsure);
-    bool before_apart =
-        dem2di_side_apart(at, at->sine[1], cosine_before, rise_before, at->high, unsure);
+static DEM2DI_INLINE bool dem2di_corner_alone(const dem2di_corners *e, int k,
+                                              const dem2di_corner_at_edge *at, double size) {
+    const double unsure = 4 * DEM2DI_ROUNDOFF * size, x = e->corner_x[k], y = e->corner_y[k];
+    const double after = -((e->after_x[k] - x) * at->vx + (e->after_y[k] - y) * at->vy);
+    const double before = -((e->before_x[k] - x) * at->vx + (e->before_y[k] - y) * at->vy);
+    const double cosine_after = at->vx * e->leaving_y[k] - at->vy * e->leaving_x[k];
+    const double cosine_before = at->vx * e->leading_y[k] - at->vy * e->leading_x[k];
+    const double turn = e->earlier_x[k] * e->along_y[k] - e->earlier_y[k] * e->along_x[k];
+    bool distinct = fabs(turn) > 4 * DEM2DI_ROUNDOFF;
+    bool after_apart = dem2di_side_apart(at, at->sine_after, cosine_after,
+                                         after * e->other_scale[k], -at->low, unsure);
+    bool before_apart = dem2di_side_apart(at, at->sine_before, cosine_before,
+                                          before * e->other_scale[k], at->high, unsure);
     return distinct & after_apart & before_apart;
 }
 
@@ -9749,58 +9819,66 @@ static DEM2DI_INLINE bool dem2di_corner_alone(const dem2di_pair *pair, const dem
    answer if the origin's foot is on the edge and if the cores are separated, or the ends of the
    edge exclude all other directions within a right angle to each side of d (see
    dem2di_corners_exclude). In coordinates along n and the tangent t only the other core's corner
-   has to be rotated. With `check` the corner is checked first, and whether there is no second
-   contact point. */
+   has to be rotated. With `check` the corner is checked, and whether there is no second contact
+   point. d, distance and size are those of the pair. All numbers one by one, and no short circuits:
+   loops over many pairs turn this into vector instructions. */
+static DEM2DI_INLINE bool dem2di_corner_rests(const dem2di_corners *e, int k, double dx, double dy,
+                                              double distance, double size, bool check,
+                                              dem2di_search *search) {
+    const double sign = e->sign[k];
+    const double tx = (e->own_c[k] * e->along_x[k] - e->own_s[k] * e->along_y[k]) * sign;
+    const double ty = (e->own_s[k] * e->along_x[k] + e->own_c[k] * e->along_y[k]) * sign;
+    const double nx = ty, ny = -tx, mx = nx * -sign, my = ny * -sign;
+    const double side = -sign * e->other_scale[k];
+    const double px = (e->other_c[k] * e->corner_x[k] - e->other_s[k] * e->corner_y[k]) * side;
+    const double py = (e->other_s[k] * e->corner_x[k] + e->other_c[k] * e->corner_y[k]) * side;
+    const double height =
+        (e->from_x[k] * e->along_y[k] - e->from_y[k] * e->along_x[k]) * e->scale[k];
+    const double dn = dx * nx + dy * ny, dt = dx * tx + dy * ty;
+    const double fx = dx - px, fy = dy - py; /* on the edge if the depth is 0 */
+    const double foot = fx * tx + fy * ty;
+    dem2di_corner_at_edge at;
+    at.vx = e->other_c[k] * mx + e->other_s[k] * my;
+    at.vy = e->other_c[k] * my - e->other_s[k] * mx;
+    at.sine_after = -(e->leaving_x[k] * at.vx + e->leaving_y[k] * at.vy);
+    at.sine_before = e->leading_x[k] * at.vx + e->leading_y[k] * at.vy;
+    at.low = (e->from_x[k] * e->along_x[k] + e->from_y[k] * e->along_y[k]) * e->scale[k] - foot;
+    at.high = (e->to_x[k] * e->along_x[k] + e->to_y[k] * e->along_y[k]) * e->scale[k] - foot;
+    at.h = height - (fx * nx + fy * ny);
+    at.radii = e->radius_a[k] + e->radius_b[k];
+    const double least = at.h * distance, turned = at.h * dt;
+    const double own_x = nx * height + foot * tx, own_y = ny * height + foot * ty;
+    const double ax = sign > 0 ? own_x : px, ay = sign > 0 ? own_y : py;
+    const double bx = sign > 0 ? px : own_x, by = sign > 0 ? py : own_y;
+    search->normal.x = nx;
+    search->normal.y = ny;
+    search->upper = search->lower = at.h + at.radii;
+    search->a.x = ax + e->radius_a[k] * nx;
+    search->a.y = ay + e->radius_a[k] * ny;
+    search->b.x = -(bx + e->radius_b[k] * nx);
+    search->b.y = -(by + e->radius_b[k] * ny);
+    search->alone = check & dem2di_corner_alone(e, k, &at, size);
+    bool farthest = (!check) | ((at.sine_after >= 0) & (at.sine_before >= 0));
+    bool ends = (dn > 0) & (dn * at.high - turned >= least) & (turned - dn * at.low >= least);
+    return farthest & (at.low <= 0) & (at.high >= 0) &
+           ((at.h < 0) | (ends & (at.h + at.radii <= e->inner[k])));
+}
+
+/* dem2di_corner_rests for a feature of a pair. */
 static bool dem2di_feature_holds(const dem2di_pair *pair, const dem2di_feature *feature, bool check,
                                  dem2di_search *search) {
-    const bool of_a = feature->own == 0; /* B is reflected: its scale counts as negative */
-    const dem2d_shape *own = of_a ? pair->a : pair->b, *other = of_a ? pair->b : pair->a;
-    const dem2d_rot q = of_a ? pair->ra : pair->rb, turn = of_a ? pair->rb : pair->ra;
-    const double scale = of_a ? pair->scale_a : pair->scale_b, sign = of_a ? 1 : -1;
-    const double other_scale = of_a ? pair->scale_b : pair->scale_a;
-    const int edge = of_a ? feature->corner[0] : feature->corner[1];
-    const int k = of_a ? feature->corner[1] : feature->corner[0];
-    const dem2d_vec along = own->tangents[edge], c0 = own->corners[edge];
-    const dem2d_vec c1 = own->corners[dem2di_after(own->count, edge)];
-    dem2di_corner_at_edge at;
-    dem2d_vec t = dem2di_turn(q, along);
-    t.x *= sign;
-    t.y *= sign;
-    dem2d_vec n = dem2di_right(t);
-    at.sine[0] = at.sine[1] = 0;
-    at.v = dem2di_turn_back(turn, dem2di_scale(n, -sign));
-    if (check && other->type == DEM2D_POLYGON) {
-        at.sine[0] = -dem2di_dot(other->tangents[k], at.v);
-        at.sine[1] = dem2di_dot(other->tangents[dem2di_before(other->count, k)], at.v);
-        if (!((at.sine[0] >= 0) & (at.sine[1] >= 0))) return false;
-    }
-    dem2d_vec p = dem2di_turn(turn, dem2di_core_corners(other)[k]);
-    p.x *= -sign * other_scale;
-    p.y *= -sign * other_scale;
-    double height = dem2di_cross(c0, along) * scale;
-    double dn = dem2di_dot(pair->d, n), dt = dem2di_dot(pair->d, t);
-    dem2d_vec from = dem2di_sub(pair->d, p); /* on the edge if the depth is 0 */
-    double foot = dem2di_dot(from, t);
-    at.low = dem2di_dot(c0, along) * scale - foot;
-    at.high = dem2di_dot(c1, along) * scale - foot;
-    at.h = height - dem2di_dot(from, n);
-    double radius_a = dem2di_core_radius(pair->a, pair->scale_a);
-    double radius_b = dem2di_core_radius(pair->b, pair->scale_b);
-    at.radii = radius_a + radius_b;
-    double inner = pair->a->inscribed * pair->scale_a + pair->b->inscribed * pair->scale_b;
-    double least = at.h * pair->distance, turned = at.h * dt;
-    bool ends = (dn > 0) & (dn * at.high - turned >= least) & (turned - dn * at.low >= least);
-    if (!((at.low <= 0) & (at.high >= 0) & ((at.h < 0) | (ends & (at.h + at.radii <= inner)))))
+    dem2di_corners e; /* one of them */
+    dem2di_search found;
+    dem2di_corners_set(pair, feature, 0, &e);
+    if (!dem2di_corner_rests(&e, 0, pair->d.x, pair->d.y, pair->distance, pair->size, check,
+                             &found))
         return false;
-    dem2d_vec foot_own = dem2di_along(dem2di_scale(n, height), foot, t);
-    dem2d_vec on_a = of_a ? foot_own : p, on_b = of_a ? p : foot_own;
     search->feature = *feature;
-    search->normal.x = n.x;
-    search->normal.y = n.y;
-    search->upper = search->lower = at.h + at.radii;
-    search->a = dem2di_along(on_a, radius_a, n);
-    search->b = dem2di_negate(dem2di_along(on_b, radius_b, n));
-    search->alone = check && dem2di_corner_alone(pair, own, edge, other, other_scale, k, &at);
+    search->normal = found.normal;
+    search->upper = search->lower = found.upper;
+    search->a = found.a;
+    search->b = found.b;
+    search->alone = found.alone;
     return true;
 }
 
@@ -9822,16 +9900,21 @@ static bool dem2di_edge_warm(const dem2di_pair *pair, const dem2di_core core[2],
            dem2di_feature_holds(pair, &near, false, search);
 }
 
+/* May two shapes have this feature, an edge and a corner? */
+static DEM2DI_INLINE bool dem2di_is_feature(const dem2d_shape *a, const dem2d_shape *b,
+                                            const dem2di_feature *feature) {
+    int count_a = dem2di_core_count(a), count_b = dem2di_core_count(b);
+    return (unsigned)feature->own <= 1 && (unsigned)feature->corner[0] < (unsigned)count_a &&
+           (unsigned)feature->corner[1] < (unsigned)count_b &&
+           (feature->own == 0 ? count_a : count_b) > 1;
+}
+
 /* Try the feature of the last step, which may be that of any pair; false if it is not known to be
    the answer. */
 static DEM2DI_INLINE bool dem2di_edge_last(dem2di_pair *pair, const dem2di_feature *last,
                                            dem2di_search *search) {
-    if (last == NULL || (unsigned)last->own > 1) return false;
-    int count_a = dem2di_core_count(pair->a), count_b = dem2di_core_count(pair->b);
-    if (!((unsigned)last->corner[0] < (unsigned)count_a &&
-          (unsigned)last->corner[1] < (unsigned)count_b &&
-          (last->own == 0 ? count_a : count_b) > 1 &&
-          dem2di_feature_holds(pair, last, true, search)))
+    if (last == NULL || !dem2di_is_feature(pair->a, pair->b, last) ||
+        !dem2di_feature_holds(pair, last, true, search))
         return false;
     pair->calls++;
     search->proof = DEM2D_BY_FORM;
@@ -12087,10 +12170,6 @@ DEM2D_API dem2d_result dem2d_damping_ratio(double restitution, double *damping_r
 
 /* --- the law over contact points in arrays -------------------------------------------------------
  */
-
-/* So many contact points or pairs of circles go through the law at once: 6 kB of arrays, little of
-   the innermost cache. */
-#define DEM2DI_BATCH 32
 
 /* Contact points of closed contacts on their way through the law; those of a contact of two are in
    two rows, one after the other. Of terms that are not in use nothing is written or read. */
@@ -18688,8 +18767,8 @@ static double dem2di_ledger_turnover(const dem2di_ledger *ledger, const dem2di_l
 
 /* ============================================================================================
    >>step  Contacts, their sums, walls, motion; the stable time step
-   uses: config, math, memory, fields, support, shapes, gjk, minimum, faces, contact, broad, law,
-         motion, world, cell, objects, walls, joints, list, ledger
+   uses: config, math, memory, fields, support, shapes, gjk, edges, minimum, faces, contact, broad,
+         law, motion, world, cell, objects, walls, joints, list, ledger
    ============================================================================================ */
 
 /* Bound of the force and the torques of a contact. */
@@ -20514,16 +20593,20 @@ static inline void dem2di_collide(dem2d_world *world, int i, dem2di_law_rows *ro
     }
 }
 
-/* --- smooth contacts that go on ------------------------------------------------------------------
+/* --- contacts that go on -------------------------------------------------------------------------
    Most contacts of particles without edges are where they were in the last step, see
-   dem2di_smooth_last. They are taken in tiles: fetched with their support points along the last
-   normal, computed by loops that compilers turn into vector instructions, and put into the columns.
-   They get the same bits as from dem2di_update_pair, which takes those that do not go on. */
+   dem2di_smooth_last, and most of two polygons are of the same corner and edge, see
+   dem2di_edge_last. They are taken in tiles: fetched with their support points along the last
+   normal, or with corner and edge; computed by loops that compilers turn into vector instructions;
+   and put into the columns. They get the same bits as from dem2di_update_pair, which takes those
+   that do not go on, and polygons with two points. */
 typedef struct dem2di_tile {
+    dem2di_corners *corners; /* of polygons; NULL for smooth contacts */
     int count;
     bool round; /* some contact is of a circle */
     int contact[DEM2DI_BATCH];
-    double held[DEM2DI_BATCH]; /* 1: goes on, 0: does not */
+    double held[DEM2DI_BATCH];  /* 1: goes on, 0: does not */
+    double alone[DEM2DI_BATCH]; /* of polygons, 1: there is no second point, 0: there may be */
     double dx[DEM2DI_BATCH], dy[DEM2DI_BATCH], reach[DEM2DI_BATCH];
     double ax[DEM2DI_BATCH], ay[DEM2DI_BATCH]; /* support point of A along the last normal, */
     double bx[DEM2DI_BATCH], by[DEM2DI_BATCH]; /* of B against it; each from its centre */
@@ -20541,17 +20624,52 @@ typedef struct dem2di_tile {
     double sum[DEM2DI_BATCH]; /* of the loads, without signs */
 } dem2di_tile;
 
-/* Fetch the two of a contact. */
-static DEM2DI_INLINE void dem2di_tile_fetch(const dem2d_world *world, int i,
-                                            const dem2d_shape *shape_a, const dem2d_shape *shape_b,
-                                            dem2di_tile *tile) {
+/* Fetch what all tiles need of a contact: the two, its law and its last step. */
+static DEM2DI_INLINE void dem2di_tile_fetch(const dem2d_world *world, int i, dem2di_tile *tile) {
     const dem2di_contacts *from = &world->list.contacts;
-    const int slot_a = world->list.keys[i].a, slot_b = world->list.keys[i].b, k = tile->count++;
+    const dem2di_key *key = &world->list.keys[i];
+    const dem2di_state *a = &world->now[key->a], *b = &world->now[key->b];
+    const dem2d_pair_desc *law =
+        dem2di_law(world, world->bodies[key->a].material, world->bodies[key->b].material);
+    const dem2di_arms *arms = &from->arms[i - world->list.discs];
+    const int k = tile->count++;
+    dem2d_vec d = dem2di_centre_line(a->x, b->x);
+    tile->contact[k] = i;
+    tile->dx[k] = d.x;
+    tile->dy[k] = d.y;
+    tile->reach[k] = a->radius + b->radius;
+    tile->kn[k] = law->normal_stiffness;
+    tile->kt[k] = law->tangential_stiffness;
+    tile->mu[k] = law->friction;
+    tile->last_x[k] = from->normal_x[i];
+    tile->last_y[k] = from->normal_y[i];
+    tile->last_shear[k] = from->shear[i];
+    tile->last_a_n[k] = arms->a_n;
+    tile->last_a_t[k] = arms->a_t;
+    tile->last_b_n[k] = arms->b_n;
+    tile->last_b_t[k] = arms->b_t;
+    if (law->friction > 0) {
+        const dem2di_relative_motion motion = dem2di_motion_with(world, i, false);
+        tile->vx[k] = motion.v.x;
+        tile->vy[k] = motion.v.y;
+        tile->wa[k] = motion.wa;
+        tile->wb[k] = motion.wb;
+    } else { /* the sliding velocity does not count */
+        tile->vx[k] = tile->vy[k] = tile->wa[k] = tile->wb[k] = 0;
+    }
+}
+
+/* Fetch a contact of two particles without edges. */
+static DEM2DI_INLINE void dem2di_tile_add_smooth(const dem2d_world *world, int i,
+                                                 const dem2d_shape *shape_a,
+                                                 const dem2d_shape *shape_b, dem2di_tile *tile) {
+    const dem2di_contacts *from = &world->list.contacts;
+    const int slot_a = world->list.keys[i].a, slot_b = world->list.keys[i].b, k = tile->count;
     const dem2di_state *a = &world->now[slot_a], *b = &world->now[slot_b];
     const double scale_a = world->bodies[slot_a].scale, scale_b = world->bodies[slot_b].scale;
     double rho;
     dem2d_vec u = dem2di_vec(from->normal_x[i], from->normal_y[i]);
-    tile->contact[k] = i;
+    dem2di_tile_fetch(world, i, tile);
     tile->round |= world->lever[slot_a] == 0 || world->lever[slot_b] == 0;
     dem2d_vec s = dem2di_support(shape_a, dem2di_turn_back(a->q, u), &rho);
     s = dem2di_scale(dem2di_turn(a->q, s), scale_a);
@@ -20566,51 +20684,82 @@ static DEM2DI_INLINE void dem2di_tile_fetch(const dem2d_world *world, int i,
     tile->least_a[k] = shape_a->rho_min * scale_a;
     tile->least_b[k] = shape_b->rho_min * scale_b;
     tile->most[k] = shape_a->rho_max * scale_a + shape_b->rho_max * scale_b;
-    dem2d_vec d = dem2di_centre_line(a->x, b->x);
-    tile->dx[k] = d.x;
-    tile->dy[k] = d.y;
-    tile->reach[k] = a->radius + b->radius;
-    if (tile->mu[k] > 0) {
-        const dem2di_relative_motion motion = dem2di_motion_with(world, i, false);
-        tile->vx[k] = motion.v.x;
-        tile->vy[k] = motion.v.y;
-        tile->wa[k] = motion.wa;
-        tile->wb[k] = motion.wb;
-    } else { /* the sliding velocity does not count */
-        tile->vx[k] = tile->vy[k] = tile->wa[k] = tile->wb[k] = 0;
-    }
 }
 
-/* Fetch contact i, its last step and its law, if it may go on; else false. */
-static DEM2DI_INLINE bool dem2di_tile_add(const dem2d_world *world, int i, dem2di_tile *tile) {
+/* Fetch a contact of two polygons that had one point; false if it had two, or its feature is not
+   known. */
+static DEM2DI_INLINE bool dem2di_tile_add_corner(const dem2d_world *world, int i,
+                                                 const dem2d_shape *a, const dem2d_shape *b,
+                                                 dem2di_tile *tile) {
     const dem2di_contacts *from = &world->list.contacts;
-    const dem2di_body *a = &world->bodies[world->list.keys[i].a];
-    const dem2di_body *b = &world->bodies[world->list.keys[i].b];
-    if (!(from->depth[i] > 0)) return false;
-    const dem2d_shape *shape_a = dem2di_shape_of(world, a), *shape_b = dem2di_shape_of(world, b);
-    if (shape_a->flat || shape_b->flat || dem2di_edges_unknown(shape_a) ||
-        dem2di_edges_unknown(shape_b))
-        return false;
-    const int k = tile->count;
-    const dem2d_pair_desc *law = dem2di_law(world, a->material, b->material);
-    const dem2di_arms *arms = &from->arms[i - world->list.discs];
-    tile->kn[k] = law->normal_stiffness;
-    tile->kt[k] = law->tangential_stiffness;
-    tile->mu[k] = law->friction;
-    dem2di_tile_fetch(world, i, shape_a, shape_b, tile);
-    tile->last_x[k] = from->normal_x[i];
-    tile->last_y[k] = from->normal_y[i];
-    tile->last_shear[k] = from->shear[i];
-    tile->last_a_n[k] = arms->a_n;
-    tile->last_a_t[k] = arms->a_t;
-    tile->last_b_n[k] = arms->b_n;
-    tile->last_b_t[k] = arms->b_t;
+    const int at = i - world->list.discs;
+    const dem2di_key *key = &world->list.keys[i];
+    const dem2di_feature *feature = &from->history[at].feature;
+    if (world->plan.faces && dem2di_has_two_points(&from->point_pairs[at])) return false;
+    if (!dem2di_is_feature(a, b, feature)) return false;
+    dem2di_pair pair; /* without places */
+    pair.a = a;
+    pair.b = b;
+    pair.ra = world->now[key->a].q;
+    pair.rb = world->now[key->b].q;
+    pair.scale_a = world->bodies[key->a].scale;
+    pair.scale_b = world->bodies[key->b].scale;
+    dem2di_corners_set(&pair, feature, tile->count, tile->corners);
+    dem2di_tile_fetch(world, i, tile);
     return true;
 }
 
+/* Fetch contact i into its tile, if it may go on; else NULL. */
+static DEM2DI_INLINE dem2di_tile *dem2di_tile_add(const dem2d_world *world, int i,
+                                                  dem2di_tile *smooth, dem2di_tile *corners) {
+    const dem2di_key *key = &world->list.keys[i];
+    if (!(world->list.contacts.depth[i] > 0)) return NULL;
+    const dem2d_shape *a = dem2di_shape_of(world, &world->bodies[key->a]);
+    const dem2d_shape *b = dem2di_shape_of(world, &world->bodies[key->b]);
+    if (a->type == DEM2D_POLYGON && b->type == DEM2D_POLYGON)
+        return dem2di_tile_add_corner(world, i, a, b, corners) ? corners : NULL;
+    if (a->flat || b->flat || dem2di_edges_unknown(a) || dem2di_edges_unknown(b)) return NULL;
+    dem2di_tile_add_smooth(world, i, a, b, smooth);
+    return smooth;
+}
+
 DEM2DI_VECTORS_BEGIN
-/* Geometry of all, as dem2di_smooth_last and dem2di_contact_place. */
-static void dem2di_tile_place(dem2di_tile *t, double tolerance) {
+/* What a search has found, and the arms, as dem2di_contact_place. */
+static DEM2DI_INLINE void dem2di_tile_found(dem2di_tile *t, int k, const dem2di_search *search,
+                                            bool held) {
+    const double dx = t->dx[k], dy = t->dy[k], nx = search->normal.x, ny = search->normal.y;
+    const double px = (search->a.x + (search->b.x + dx)) * 0.5;
+    const double py = (search->a.y + (search->b.y + dy)) * 0.5;
+    const double along = nx * dx + ny * dy, across = nx * dy - ny * dx;
+    const double a_n = nx * px + ny * py, a_t = nx * py - ny * px;
+    t->held[k] = (held & (search->upper > 0)) ? 1 : 0;
+    t->x[k] = nx;
+    t->y[k] = ny;
+    t->depth[k] = search->upper;
+    t->a_n[k] = a_n;
+    t->a_t[k] = a_t;
+    t->b_n[k] = a_n - along;
+    t->b_t[k] = a_t - across;
+}
+
+/* Geometry of polygons, as dem2di_edge_last. With `faces` none may have a second point. */
+static DEM2DI_INLINE void dem2di_tile_corners(dem2di_tile *DEM2DI_APART t,
+                                              const dem2di_corners *DEM2DI_APART corners,
+                                              bool faces) {
+    DEM2DI_INDEPENDENT
+    for (int k = 0; k < t->count; k++) {
+        const double dx = t->dx[k], dy = t->dy[k];
+        const double distance = sqrt(dx * dx + dy * dy), size = t->reach[k] + distance;
+        dem2di_search search;
+        bool rests = dem2di_corner_rests(corners, k, dx, dy, distance, size, true, &search);
+        t->alone[k] = search.alone ? 1 : 0;
+        dem2di_tile_found(t, k, &search, rests & (distance < t->reach[k]));
+    }
+    for (int k = 0; k < t->count && faces; k++) t->held[k] *= t->alone[k];
+}
+
+/* Geometry of smooth contacts, as dem2di_smooth_last. */
+static DEM2DI_INLINE void dem2di_tile_place(dem2di_tile *t, double tolerance) {
     dem2di_demand demand;
     demand.detect = true;
     demand.tolerance = 0;
@@ -20633,24 +20782,12 @@ static void dem2di_tile_place(dem2di_tile *t, double tolerance) {
         eval.slope[0] = ux * wy - uy * wx;
         bool rests = dem2di_rest_found(size, t->least_a[k], t->least_b[k], t->most[k], &eval,
                                        &demand, &search);
-        const double nx = search.normal.x, ny = search.normal.y, depth = search.upper;
-        const double px = (search.a.x + (search.b.x + dx)) * 0.5;
-        const double py = (search.a.y + (search.b.y + dy)) * 0.5;
-        const double along = nx * dx + ny * dy, across = nx * dy - ny * dx;
-        const double a_n = nx * px + ny * py, a_t = nx * py - ny * px;
-        t->held[k] = (rests & (distance < t->reach[k]) & (depth > 0)) ? 1 : 0;
-        t->x[k] = nx;
-        t->y[k] = ny;
-        t->depth[k] = depth;
-        t->a_n[k] = a_n;
-        t->a_t[k] = a_t;
-        t->b_n[k] = a_n - along;
-        t->b_t[k] = a_t - across;
+        dem2di_tile_found(t, k, &search, rests & (distance < t->reach[k]));
     }
 }
 
 /* Springs and friction of all, as dem2di_contact_load. */
-static void dem2di_tile_springs(dem2di_tile *t, double time_step) {
+static DEM2DI_INLINE void dem2di_tile_springs(dem2di_tile *t, double time_step) {
     for (int k = 0; k < t->count; k++) {
         const double x = t->x[k], y = t->y[k], vx = t->vx[k], vy = t->vy[k];
         const double wa = t->wa[k], wb = t->wb[k], a_n = t->a_n[k], b_n = t->b_n[k], none = 0;
@@ -20673,6 +20810,35 @@ static void dem2di_tile_springs(dem2di_tile *t, double time_step) {
         t->sum[k] = fabs(load_x) + fabs(load_y) + fabs(load_a) + fabs(load_b);
     }
 }
+
+/* Geometry of a tile, whichever. */
+static DEM2DI_INLINE void dem2di_tile_solve(dem2di_tile *t, double tolerance, bool faces) {
+    if (t->corners != NULL)
+        dem2di_tile_corners(t, t->corners, faces);
+    else
+        dem2di_tile_place(t, tolerance);
+}
+
+static void dem2di_tile_solve_plain(dem2di_tile *t, double tolerance, bool faces) {
+    dem2di_tile_solve(t, tolerance, faces);
+}
+
+static void dem2di_tile_springs_plain(dem2di_tile *t, double time_step) {
+    dem2di_tile_springs(t, time_step);
+}
+
+#if DEM2DI_FOURS
+static DEM2DI_AVX2 void dem2di_tile_solve_fours(dem2di_tile *t, double tolerance, bool faces) {
+    dem2di_tile_solve(t, tolerance, faces);
+}
+
+static DEM2DI_AVX2 void dem2di_tile_springs_fours(dem2di_tile *t, double time_step) {
+    dem2di_tile_springs(t, time_step);
+}
+#else
+#define dem2di_tile_solve_fours dem2di_tile_solve_plain
+#define dem2di_tile_springs_fours dem2di_tile_springs_plain
+#endif
 DEM2DI_VECTORS_END
 
 /* Geometry of contact k of a tile. */
@@ -20733,9 +20899,12 @@ static void dem2di_tile_apply(dem2d_world *world, dem2di_tile *tile, dem2di_law_
     dem2di_contact contact;
     dem2di_last last;
     if (tile->count == 0) return;
-    dem2di_tile_place(tile, world->tolerance);
+    (world->fours ? dem2di_tile_solve_fours : dem2di_tile_solve_plain)(tile, world->tolerance,
+                                                                       world->plan.faces);
     if (tile->round) dem2di_tile_round(world, tile);
-    if (!terms) dem2di_tile_springs(tile, world->made_step);
+    if (!terms)
+        (world->fours ? dem2di_tile_springs_fours : dem2di_tile_springs_plain)(tile,
+                                                                               world->made_step);
     for (int k = 0; k < tile->count; k++) {
         const int i = tile->contact[k];
         dem2di_history *history = &world->list.contacts.history[i - discs];
@@ -20746,9 +20915,10 @@ static void dem2di_tile_apply(dem2d_world *world, dem2di_tile *tile, dem2di_law_
         }
         count->collisions++;
         count->calls++;
-        count->proofs[DEM2D_BY_RADIUS]++;
+        count->proofs[tile->corners != NULL ? DEM2D_BY_FORM : DEM2D_BY_RADIUS]++;
         history->bound = 0;
-        history->feature.own = history->feature.corner[0] = history->feature.corner[1] = -1;
+        if (tile->corners == NULL)
+            history->feature.own = history->feature.corner[0] = history->feature.corner[1] = -1;
         dem2di_tile_get(tile, k, &contact);
         if (terms) {
             dem2di_last_get(world, &world->list.contacts, i, &last);
@@ -20768,18 +20938,24 @@ static void dem2di_tile_apply(dem2d_world *world, dem2di_tile *tile, dem2di_law_
 static void dem2di_others_range(dem2d_world *world, int begin, int end, dem2di_count *count) {
     const bool tiled = world->solver == DEM2D_CERTIFIED && world->plan.turns && !world->immovable;
     dem2di_law_rows rows;
-    dem2di_tile tile;
-    rows.count = tile.count = 0;
-    tile.round = false;
+    dem2di_corners features;
+    dem2di_tile smooth, corners;
+    rows.count = smooth.count = corners.count = 0;
+    smooth.round = corners.round = false;
+    smooth.corners = NULL;
+    corners.corners = &features;
     for (int i = begin; i < end; i++) {
-        if (tiled && i < world->list.pairs && dem2di_tile_add(world, i, &tile)) {
-            if (tile.count == DEM2DI_BATCH) dem2di_tile_apply(world, &tile, &rows, count);
-        } else {
+        dem2di_tile *tile = NULL;
+        if (tiled && i < world->list.pairs) tile = dem2di_tile_add(world, i, &smooth, &corners);
+        if (tile == NULL) {
             dem2di_law_room(world, &rows, count);
             dem2di_collide(world, i, &rows, count);
+        } else if (tile->count == DEM2DI_BATCH) {
+            dem2di_tile_apply(world, tile, &rows, count);
         }
     }
-    dem2di_tile_apply(world, &tile, &rows, count);
+    dem2di_tile_apply(world, &smooth, &rows, count);
+    dem2di_tile_apply(world, &corners, &rows, count);
     dem2di_law_apply(world, &rows, count);
 }
 
