@@ -14062,12 +14062,15 @@ typedef struct dem2di_shifts {
     int last_a, last_b;
 } dem2di_shifts;
 
-/* Numbers n with low <= x + n size <= high, a few more for rounding errors of the box. */
+/* Numbers n with low <= x + n size <= high, to rounding errors: those just outside count. */
 static void dem2di_shift_range(double x, double size, double low, double high, int *first,
                                int *last) {
     *first = *last = 0;
     if (!(size > 0)) return;
-    const double from = floor((low - x) / size), to = ceil((high - x) / size);
+    const double margin = DEM2DI_ROUNDOFF * (1 + fabs(x) / size);
+    const double down = (low - x) / size, up = (high - x) / size;
+    const double from = ceil(down - (margin + DEM2DI_ROUNDOFF * fabs(down)));
+    const double to = floor(up + (margin + DEM2DI_ROUNDOFF * fabs(up)));
     *first = (int)dem2di_max(-DEM2DI_CELLS_MOST, dem2di_min(DEM2DI_CELLS_MOST, from));
     *last = (int)dem2di_max(-DEM2DI_CELLS_MOST, dem2di_min(DEM2DI_CELLS_MOST, to));
 }
@@ -14087,6 +14090,7 @@ static dem2di_shifts dem2di_shifts_start(const dem2d_cell *cell, dem2d_vec x,
     dem2di_shift_range(x.y, cell->b.y, box->lower.y, box->upper.y, &at.along_b, &at.last_b);
     dem2di_shifts_row(&at);
     at.along_a--;
+    if (at.along_b > at.last_b) at.last_a = at.along_a; /* there is no row */
     return at;
 }
 
@@ -25126,6 +25130,9 @@ static void dem2di_images_row(const dem2di_question *question, const dem2d_box *
     }
     dem2di_shift_range(tree->lower.x + way.x, cell->a.x, low - (tree->upper.x - tree->lower.x),
                        high, first, last);
+    const int begin = question->first[0], end = begin + question->columns - 1;
+    *first = *first > begin ? *first : begin; /* both ends are rounded */
+    *last = *last < end ? *last : end;
 }
 
 /* The rectangle of shifts within reach: rows from first[1] to `last`. */

@@ -310,9 +310,15 @@ static void set_dashpot(bench *b, double damping_ratio) {
     expect_ok(dem2d_world_set_pair(b->world, b->material, b->material, &pair), "pair");
 }
 
+/* A periodic cell in place of the box. */
+static bool in_cell(const char *feature, int state) {
+    return strcmp(feature, "cell") == 0 && state == ON;
+}
+
 /* What is given at creation. */
-static void describe(const char *feature, int state, dem2d_world_desc *desc) {
+static void describe(const bench *b, const char *feature, int state, dem2d_world_desc *desc) {
     static int one_by_one;
+    if (in_cell(feature, state)) desc->cell.a.x = b->width, desc->cell.b.y = b->height;
     if (strcmp(feature, "parallel_for") == 0 && state != ABSENT)
         desc->parallel_for = serial, desc->parallel_user = state == ON ? &one_by_one : NULL;
     if (strcmp(feature, "empty region") == 0) desc->skin = 1e-3; /* many lists */
@@ -350,7 +356,7 @@ static void place_discs(bench *b, const char *feature, int state) {
     const bool still = polygons || strcmp(feature, "gaps of discs") == 0;
     if (strcmp(feature, "empty region") == 0) shift_half(b, state);
     if (still) space_out(b, state, polygons);
-    for (int i = 0; i < WALLS; i++) add_wall(b, i, DEM2D_WALL_STILL);
+    for (int i = 0; i < WALLS && !in_cell(feature, state); i++) add_wall(b, i, DEM2D_WALL_STILL);
     for (int i = 0; i < b->count; i++) {
         dem2d_particle_desc d = disc_desc(b, b->at[i], b->radius[i]);
         d.velocity.x = bed_uniform(-0.01, 0.01), d.velocity.y = bed_uniform(-0.01, 0.01);
@@ -502,7 +508,7 @@ static bench open_feature(const char *path, const char *feature, int state) {
     bench b = load_discs(path);
     dem2d_world_desc desc = {0};
     desc.time_step = TIME_STEP;
-    describe(feature, state, &desc);
+    describe(&b, feature, state, &desc);
     open_bench(&b, &desc, 0);
     add_disc(&b);
     if (strcmp(feature, "gaps of polygons") == 0) add_polygon(&b);

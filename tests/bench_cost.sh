@@ -79,6 +79,7 @@ energy, stress
 fields
 ledger
 parallel_for
+cell
 gaps of discs
 gaps of polygons
 END
