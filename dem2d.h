@@ -526,6 +526,7 @@ in use is decided after an edit)
     energy and stress queried in every step            +1030
     fields added to a grid in every step              +31500    cells of a diameter, width two
     the ledger of energies                             +1580
+    a periodic cell in place of a box                    +33    23 of it to find who has left it
     a dashpot                                            +69    with friction; as the next two rows:
     a dashpot and rolling friction                      +113    in beds of bench-guard
     a law of your own, springs and friction             +866    by rows, called for all at once
