@@ -559,8 +559,8 @@ SNAPSHOTS
 DETERMINISM
     Same input, same bits: on gcc and clang, C and C++, -O0 to -O3, with or without FMA hardware
     (contraction is off inside this header), with or without AVX2 (gcc from 12 on and clang compile
-    the passes over circles twice on x86-64; a world takes the AVX2 ones where the processor has
-    it). Steps use only + - * / and sqrt; sine, cosine and arctangent are the header's own. A pair
+    loops over contacts and particles twice on x86-64; a world takes the AVX2 ones where the processor
+    has it). Steps use only + - * / and sqrt; sine, cosine and arctangent are the header's own. A pair
     is (lower id, higher id) and forces are summed in the order of the partner's id, so neither
     addresses nor storage order can change a bit. With names of your own (see Name in CONCEPTS) the
     bits do not depend on ids, either. Not covered: clang -ffp-contract=fast on the command line,
@@ -2859,8 +2859,8 @@ DEM2D_API dem2d_result dem2d_world_write_csv(const dem2d_world *world, const dem
 #define DEM2DI_INDEPENDENT
 #endif
 
-/* The passes over circles are compiled twice: in plain C99, and for processors with AVX2, where
-   compiler and machine are known to have it. Vectors of four doubles are used in functions with
+/* Loops over contacts and particles are compiled twice: in plain C99, and for processors with AVX2,
+   where compiler and machine are known to have it. Vectors of four doubles are used in functions with
    DEM2DI_AVX2 only; without FMA every result has the bits of the plain path. */
 #if defined(__x86_64__) && !defined(DEM2DI_NO_FOURS) && \
     (defined(__clang__) || (defined(__GNUC__) && __GNUC__ >= 12))
@@ -12944,7 +12944,7 @@ struct dem2d_world {
     dem2d_loads_fn *set_loads;
     void *loads_user;
     bool stepping; /* a step is on its way: callbacks can't start another */
-    bool fours;    /* circles take the path with vectors: see dem2di_has_fours */
+    bool fours;    /* passes take the path with vectors: see dem2di_has_fours */
     bool in_two;   /* steps never move particles during the force pass: for tests */
     bool foreseen; /* this step has: their next states are there before the walls move */
     double time_step, local_damping, global_damping, tolerance;
