@@ -1,4 +1,4 @@
-/* dem2d.h - two-dimensional discrete element method for smooth and irregular grains, version 0.8.0
+/* dem2d.h - two-dimensional discrete element method for smooth and irregular grains, version 0.9.0
 
    One C99 header, no dependency but the C standard library. MIT licence (end of file).
 
@@ -585,7 +585,7 @@ DETERMINISM
    ============================================================================================ */
 
 #define DEM2D_VERSION_MAJOR 0
-#define DEM2D_VERSION_MINOR 8
+#define DEM2D_VERSION_MINOR 9
 #define DEM2D_VERSION_PATCH 0
 #define DEM2D_VERSION \
     (DEM2D_VERSION_MAJOR * 10000 + DEM2D_VERSION_MINOR * 100 + DEM2D_VERSION_PATCH)
@@ -29987,6 +29987,27 @@ DEM2D_API dem2d_result dem2d_world_write_csv(const dem2d_world *world, const dem
    >>licence  Changes and licence
 
    CHANGES
+     0.9.0  Scenes of 0.8.0 run to the same bits, but packings by dem2d_world_grow; snapshots
+            of 0.8.0 are read.
+            Periodic cell: queries of space see images and tell which (dem2d_found.shift), as do
+            dem2d_world_overlap_at, dem2d_world_relax, averages over a box or circle, grids without
+            the periods of the cell, dem2d_world_remove_in and dem2d_world_flow.
+            dem2d_world_fill and dem2d_world_feed work in a cell; a box without extent is all of it.
+            A cell whose held stress nothing resists ends with a result: it shrank until the memory
+            was used up. When a sheared cell takes another vector b, the step no longer costs the
+            square of the number of particles.
+            Samples: inlets that replace what has left (dem2d_inlet_desc.replaced).
+            dem2d_world_grow takes a time step of its own, near the safe one, and gives the world
+            its own back: a tenth of the steps.
+            Examples: periodic_biaxial; mu_of_i also with real grains; hopper refills itself.
+            Mended in a cell: the list read outside of its arrays when the discs of a contact were
+            more than one unit of length apart a step later; a change of groups after which a
+            particle no longer meets itself kept its contacts with its images; a snapshot taken
+            after particles were added, before a step, was not saved again with the same bytes.
+            Faster, with the same bits: circles with dashpots, rolling friction or a law of the
+            caller (called with the contacts of a batch), contacts of polygons that go on at the
+            same corner, motion of particles that turn, support points of polybeziers, the list,
+            bounds of the time step, images of a cell. More of a step is shared out to threads.
      0.8.0  Scenes of 0.7.0 run to the same bits; its snapshots are read.
             Periodic cell: dem2d_world_desc.cell; dem2d_world_deform gives its rates, or holds
             stresses instead, each component alone; dem2d_world_get_cell. Contacts reach across the
