@@ -511,7 +511,10 @@ static void check_extremes(const function *of, const row *rows, int count, bool 
     for (int i = 0; i < count; i++)
         for (int part = 0; part < doubles_of(rows[i].kind); part++)
             for (int k = 0; k < 2 * COUNT_OF(values); k++)
-                check_extreme(of, &rows[i], in_desc, part, k % 2 ? -values[k / 2] : values[k / 2]);
+                if (test_long() ||
+                    (i + part + k) % 3 == 0) /* large and small ones, of both signs */
+                    check_extreme(of, &rows[i], in_desc, part,
+                                  k % 2 ? -values[k / 2] : values[k / 2]);
 }
 
 static void test_extremes(void **state) {
