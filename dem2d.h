@@ -559,9 +559,9 @@ SNAPSHOTS
 DETERMINISM
     Same input, same bits: on gcc and clang, C and C++, -O0 to -O3, with or without FMA hardware
     (contraction is off inside this header), with or without AVX2 (gcc from 12 on and clang compile
-    loops over contacts and particles twice on x86-64; a world takes the AVX2 ones where the processor
-    has it). Steps use only + - * / and sqrt; sine, cosine and arctangent are the header's own. A pair
-    is (lower id, higher id) and forces are summed in the order of the partner's id, so neither
+    loops over contacts and particles twice on x86-64; a world takes the AVX2 ones where the
+    processor has it). Steps use only + - * / and sqrt; sine, cosine and arctangent are the header's
+    own. A pair is (lower id, higher id) and forces are summed in the order of the partner's id, so neither
     addresses nor storage order can change a bit. With names of your own (see Name in CONCEPTS) the
     bits do not depend on ids, either. Not covered: clang -ffp-contract=fast on the command line,
     and 80-bit x87 arithmetic. Compare two runs by dem2d_world_hash.
@@ -2860,8 +2860,8 @@ DEM2D_API dem2d_result dem2d_world_write_csv(const dem2d_world *world, const dem
 #endif
 
 /* Loops over contacts and particles are compiled twice: in plain C99, and for processors with AVX2,
-   where compiler and machine are known to have it. Vectors of four doubles are used in functions with
-   DEM2DI_AVX2 only; without FMA every result has the bits of the plain path. */
+   where compiler and machine are known to have it. Vectors of four doubles are used in functions
+   with DEM2DI_AVX2 only; without FMA every result has the bits of the plain path. */
 #if defined(__x86_64__) && !defined(DEM2DI_NO_FOURS) && \
     (defined(__clang__) || (defined(__GNUC__) && __GNUC__ >= 12))
 #define DEM2DI_FOURS 1
