@@ -561,17 +561,17 @@ DETERMINISM
     (contraction is off inside this header), with or without AVX2 (gcc from 12 on and clang compile
     loops over contacts and particles twice on x86-64; a world takes the AVX2 ones where the
     processor has it). Steps use only + - * / and sqrt; sine, cosine and arctangent are the header's
-    own. A pair is (lower id, higher id) and forces are summed in the order of the partner's id,
-    so neither  addresses nor storage order can change a bit. With names of your own (see Name
-    in CONCEPTS) the  bits do not depend on ids, either. Not covered: clang -ffp-contract=fast
-    on the command line,  and 80-bit x87 arithmetic. Compare two runs by dem2d_world_hash.  Your
-    own arithmetic (positions and velocities you compute, support functions, contact laws) is
-    compiled with your flags: give -ffp-contract=off if its bits have to be the same as well.
-    The  implementation ends by setting clang's contraction to the mode of the command line: put
-    a  contraction pragma of yours after it.  gcc does not inline across the header's
-    floating-point region: calls into it stay calls.
-    ================================================================================================
-    */
+    own. A pair is (lower id, higher id) and forces are summed in the order of the partner's id, so
+    neither addresses nor storage order can change a bit. With names of your own (see Name in
+    CONCEPTS) the bits do not depend on ids, either. Not covered: clang -ffp-contract=fast on the
+    command line, and 80-bit x87 arithmetic. Compare two runs by dem2d_world_hash.
+    Your own arithmetic (positions and velocities you compute, support functions, contact laws) is
+    compiled with your flags: give -ffp-contract=off if its bits have to be the same as well. The
+    implementation ends by setting clang's contraction to the mode of the command line: put a
+    contraction pragma of yours after it.
+    gcc does not inline across the header's floating-point region: calls into it stay calls.
+================================================================================================
+*/
 
 #ifndef DEM2D_H
 #define DEM2D_H
