@@ -346,8 +346,8 @@ HOW TO
                          without extent is all of a periodic cell.
     pack grains          dem2d_world_fill loosely, then dem2d_world_grow: sizes grow while the world
                          steps, to a stress or a solid fraction; friction 0 for dense packings.
-                         Discs 1 : 1.4 reach 0.84 with friction 0, with 0.5 0.80 at k_n/P = 1e3 and
-                         0.79 at 1e4 (make -C tests bench-packing).
+                         Discs 1 : 1.4 reach 0.840 with friction 0 and 0.795 with 0.5, within 0.003
+                         of it at k_n/P = 1e3, 1e4 and 1e5 (make -C tests bench-packing).
     put grains in over   dem2d_world_feed: a rate of mass or number in a region, with velocities.
       time, take them    dem2d_world_remove_in: what is in a region goes. dem2d_world_flow: what has
       out, count them    crossed a line in a step. Both add up number, mass and area. An inlet that
