@@ -34,22 +34,22 @@ static void run(int segments, int seed, int seconds, double sums[3]) {
     static const double a[4] = {0.06, 0, 0.003, 0.0012}, b[4] = {0};
     const dem2d_world_desc desc = {.time_step = 1e-4, .gravity = {0, -9.81}};
     const dem2d_material_desc stone = {2700, 1e6, 5e5, 0.5, .damping_ratio = 0.2};
-    dem2d_particle_desc grain = {.scale = 1};
+    dem2d_particle_desc grains[GRAINS] = {{.scale = 1}};
+    dem2d_fill_desc fill = {.grains = grains, .count = GRAINS, .seed = (uint64_t)seed};
+    dem2d_filling filling;
     dem2d_particle_id ids[GRAINS];
     dem2d_particle_info info;
     dem2d_world *world;
     dem2d_shape *shape;
     check(dem2d_world_create(&desc, &world));
-    check(dem2d_world_add_material(world, &stone, &grain.material));
+    check(dem2d_world_add_material(world, &stone, &grains[0].material));
     check(dem2d_shape_create_fourier(NULL, a, b, 3, &shape));
-    check(dem2d_world_add_shape(world, shape, &grain.shape));
+    check(dem2d_world_add_shape(world, shape, &grains[0].shape));
     dem2d_shape_destroy(shape);
-    add_drum(world, grain.material, segments);
-    for (int i = 0; i < GRAINS; i++) {
-        grain.position.x = 0.072 * (i % 9 - 4), grain.position.y = 0.072 * (double)(i / 9) - 0.31;
-        grain.angle = i + 0.1 * seed;
-        check(dem2d_world_add_particle(world, &grain, &ids[i]));
-    }
+    add_drum(world, grains[0].material, segments);
+    for (int i = 1; i < GRAINS; i++) grains[i] = grains[0];
+    fill.region.box = (dem2d_box){{-0.35, -0.35}, {0.35, 0.35}};
+    check(dem2d_world_fill(world, &fill, ids, GRAINS, &filling));
     for (int second = 0; second < seconds; second++) {
         double mean = 0;
         for (int frame = 0; frame < 100; frame++) {
