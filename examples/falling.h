@@ -32,7 +32,7 @@ static inline fall parse_fall(int count, char **arguments) {
     return f;
 }
 
-/* A box without a lid, about half as high as wide when it is filled in rows. */
+/* A box without a lid. */
 static inline void add_box(dem2d_world *world, dem2d_material_id material, double width) {
     const double normals[3][2] = {{0, 1}, {1, 0}, {-1, 0}}; // floor, left, right
     for (int i = 0; i < 3; i++) {
@@ -46,36 +46,31 @@ static inline void add_box(dem2d_world *world, dem2d_material_id material, doubl
     }
 }
 
-/* Grains of 20 templates of all kinds, in rows above the floor, each with a velocity of its own. */
+/* Grains of 20 templates of all kinds, at random places and angles above the floor, each template
+   with a velocity of its own, so that grains collide while they fall. */
 static inline void add_falling(dem2d_world *world, dem2d_material_id material, int particles,
-                               int columns, double pitch) {
+                               double width) {
     enum { TEMPLATES = 20 };
     const bool all[KINDS] = {true, true, true, true, true};
-    dem2d_shape_id ids[TEMPLATES];
-    dem2d_shape_info info[TEMPLATES];
+    const dem2d_grade sizes[2] = {{0.03, 0}, {0.04, 1}}; // m
+    dem2d_grain_kind kinds[TEMPLATES] = {{0}};
+    const dem2d_grading_desc grading = {sizes, 2, kinds, TEMPLATES,
+                                        .measure = DEM2D_MEASURE_NUMBER};
+    dem2d_fill_desc fill = {.grading = &grading, .count = particles, .method = DEM2D_FILL_RANDOM};
+    dem2d_filling filling;
     uint64_t random = 1;
     const dem2d_image_desc search = default_search();
     template_set set = load_templates(NULL, &search, 0, false);
     for (int i = 0; i < TEMPLATES; i++) {
         const int t = random_template(&set, all, &random); // may move set.shapes
-        const dem2d_shape *shape = set.shapes[t];
-        must(dem2d_shape_get(shape, &info[i]), "template");
-        must(dem2d_world_add_shape(world, shape, &ids[i]), "template");
+        kinds[i].share = 1, kinds[i].grain.material = material;
+        kinds[i].grain.velocity.x = random_between(&random, -1, 1);
+        kinds[i].grain.velocity.y = random_between(&random, -1, 1);
+        must(dem2d_world_add_shape(world, set.shapes[t], &kinds[i].grain.shape), "template");
     }
     free_templates(&set); // the world has its own
-    for (int i = 0; i < particles; i++) {
-        dem2d_particle_desc g = {0};
-        dem2d_particle_id id;
-        g.shape = ids[i % TEMPLATES];
-        g.material = material;
-        g.scale = random_between(&random, 0.4, 0.49) * pitch / info[i % TEMPLATES].circumscribed;
-        g.position.x = (i % columns + 0.5) * pitch;
-        g.position.y = (double)(i / columns + 1) * pitch;
-        g.angle = random_between(&random, 0, 6.283185307179586);
-        g.velocity.x = random_between(&random, -0.5, 0.5);
-        g.velocity.y = random_between(&random, -0.5, 0.5);
-        must(dem2d_world_add_particle(world, &g, &id), "grain");
-    }
+    fill.region.box.upper.x = width, fill.region.box.upper.y = width / 2 + 0.05;
+    must(dem2d_world_fill(world, &fill, NULL, 0, &filling), "filling");
 }
 
 /* All steps, a few at a time, and how long they took. */
@@ -105,9 +100,7 @@ static inline dem2d_world *run_fall(const fall *f, dem2d_parallel_fn *parallel_f
     stone.normal_stiffness = stone.tangential_stiffness = 1e7;      // N/m
     dem2d_material_id material;
     dem2d_world *world;
-    const double pitch = 0.05; // m
-    int columns = 1;
-    while (columns * columns < 2 * f->particles) columns++;
+    const double width = 0.065 * sqrt(f->particles); // m: grains fill 0.45 of the region
     scene.time_step = 1e-4;
     scene.gravity.y = -9.81;
     scene.parallel_for = parallel_for;
@@ -115,8 +108,8 @@ static inline dem2d_world *run_fall(const fall *f, dem2d_parallel_fn *parallel_f
     scene.env = example_env();
     must(dem2d_world_create(&scene, &world), "world");
     must(dem2d_world_add_material(world, &stone, &material), "material");
-    add_box(world, material, columns * pitch);
-    add_falling(world, material, f->particles, columns, pitch);
+    add_box(world, material, width);
+    add_falling(world, material, f->particles, width);
     take_fall(world, f, parallel_for != NULL ? "several threads" : "one thread", seconds);
     return world;
 }
