@@ -57,11 +57,13 @@ int main(void) {
     dem2d_world *world;
     dem2d_shape *shapes[2];
     dem2d_shape_id ids[2];
+    dem2d_particle_desc pile[GRAINS];
+    const dem2d_fill_desc fill = {.grains = pile, .count = GRAINS, .region.box.upper = {2, 2}};
+    dem2d_filling filling;
     dem2d_wall_desc walls[3] = {
         {.normal = {0, 1}}, {.normal = {1, 0}}, {.normal = {-1, 0}, .point = {2, 0}}};
     dem2d_wall_id wall;
     dem2d_particle_info grain;
-    dem2d_particle_id id;
     dem2d_hit hit = {0};
     double loudest = 0;
     int played = 0;
@@ -76,11 +78,9 @@ int main(void) {
         walls[k].material = walls[0].material;
         check(dem2d_world_add_wall(world, &walls[k], &wall));
     }
-    for (int i = 0; i < GRAINS; i++) {
-        dem2d_particle_desc d = {.scale = 1, .shape = ids[i % 2], .material = walls[0].material};
-        d.position.x = 0.08 + 0.13 * (i % 15), d.position.y = 0.1 + 0.14 * (i / 15), d.angle = i;
-        check(dem2d_world_add_particle(world, &d, &id));
-    }
+    for (int i = 0; i < GRAINS; i++) /* two discs, two blocks, two discs ... */
+        pile[i] = (dem2d_particle_desc){1, ids[i / 2 % 2], .material = walls[0].material};
+    check(dem2d_world_fill(world, &fill, NULL, 0, &filling));
     for (int frame = 0; frame < 240; frame++) {
         if (frame == 120) { /* the button goes down: what is under the mouse? */
             check(dem2d_world_cast_ray(world, above, down, 0, &grains, &hit));
