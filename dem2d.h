@@ -2574,8 +2574,10 @@ DEM2D_API dem2d_result dem2d_world_feed(dem2d_world *world, const dem2d_inlet_de
 
 /// How grains grow to a packing. Give either a stress or a solid fraction.
 typedef struct dem2d_growth_desc {
-    double area;   ///< m2, >= 0, of the sample; 0: of the cell, if it is periodic along a and b
-    double stress; ///< Pa, >= 0, mean stress (xx + yy)/2 that is to be reached; or 0
+    /// m2, >= 0, of the sample; 0: of the cell, if it is periodic along a and b and its area stays
+    /// (it may be sheared)
+    double area;
+    double stress;         ///< Pa, >= 0, mean stress (xx + yy)/2 that is to be reached; or 0
     double solid_fraction; ///< >= 0, of the area, that is to be reached; or 0
     double friction;       ///< coefficient, >= 0, of all contacts meanwhile: 0 for dense packings
     double local_damping;  ///< [0, 1), meanwhile
@@ -27499,14 +27501,25 @@ static void dem2di_frictions_swap(dem2d_world *world, double *frictions) {
     dem2di_edited(world);
 }
 
+/* The area of the cell, which has to stay what it is. */
+static dem2d_result dem2di_growth_area(const dem2d_world *world, double *area) {
+    const dem2d_deformation_desc *control = &world->control;
+    *area = world->cell.a.x * world->cell.b.y;
+    if (!(*area > 0))
+        return dem2di_fail(&world->env, DEM2D_OUT_OF_RANGE, -1,
+                           "area = 0 without a cell along a and b");
+    if (control->xx == 0 && control->yy == 0 && !control->hold_xx && !control->hold_yy)
+        return DEM2D_OK;
+    return dem2di_fail(&world->env, DEM2D_OUT_OF_RANGE, -1,
+                       "area = 0, and the cell changes its own: see dem2d_world_deform");
+}
+
 static dem2d_result dem2di_growth_check(const dem2d_world *world, const dem2d_growth_desc *desc,
                                         int steps) {
     const dem2d_env *env = &world->env;
     dem2d_result result = dem2di_check_fields(env, DEM2DI_ALL(dem2di_growth_fields), desc);
     if (result == DEM2D_OK) result = dem2di_check_number(env, "steps", steps, DEM2DI_COUNT);
     if (result != DEM2D_OK) return result;
-    if (!(desc->area > 0))
-        return dem2di_fail(env, DEM2D_OUT_OF_RANGE, -1, "area = 0 without a cell along a and b");
     if ((desc->stress > 0) == (desc->solid_fraction > 0))
         return dem2di_fail(env, DEM2D_OUT_OF_RANGE, -1,
                            "stress = %g and solid_fraction = %g: one has to be > 0, one 0",
@@ -27532,6 +27545,8 @@ static dem2d_result dem2di_growth_pace(dem2d_world *world, double part) {
         share = part < DEM2DI_GROWTH_JAMS ? DEM2DI_GROWTH_LOOSE : DEM2DI_GROWTH_JAMMED;
     if (world->law != NULL) return DEM2D_OK;
     (void)dem2d_world_time_step_bounds(world, &safe, &limit, NULL);
+    world->timed = dem2di_time(world); /* where the time step stays, another call sets it anew */
+    world->timed_at = world->steps;
     return dem2d_world_set_time_step(world, share * safe);
 }
 
@@ -27564,8 +27579,8 @@ DEM2D_API dem2d_result dem2d_world_grow(dem2d_world *world, const dem2d_growth_d
     dem2d_growth done;
     if (world == NULL || desc == NULL || growth == NULL) return DEM2D_NULL_ARGUMENT;
     dem2d_growth_desc own = *desc;
-    if (own.area == 0) own.area = world->cell.a.x * world->cell.b.y;
     dem2d_result result = dem2d_world_step(world, 0, NULL); /* not by a callback of a step */
+    if (result == DEM2D_OK && own.area == 0) result = dem2di_growth_area(world, &own.area);
     if (result == DEM2D_OK) result = dem2di_growth_check(world, &own, steps);
     if (result != DEM2D_OK) return result;
     int laws = world->material_count * world->material_count;

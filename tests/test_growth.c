@@ -174,6 +174,44 @@ static void test_bits(void **state) {
     assert_true(hashes[0] == hashes[3]);
 }
 
+/* In tens where the time step stays, that of a small sensor, which does not grow: also the time is
+   the same. */
+static void test_tens(void **state) {
+    uint64_t hashes[2];
+    (void)state;
+    for (int k = 0; k < 2; k++) {
+        scene s = open_box(40, false, 0.3, 0, NULL);
+        const dem2d_groups sensor = {.sensor = true};
+        const dem2d_particle_id id =
+            add_shape(&s, make_disc(0.01), DEM2D_FREE, vec(0.5, 0.5), 0, vec(0, 0), 0);
+        assert_ok(dem2d_world_set_groups(s.world, id, sensor));
+        dem2d_growth_desc d = to_stress(0.1);
+        dem2d_growth done;
+        d.rate = 1e-3;
+        for (int i = 0; i < (k == 0 ? 1 : 100); i++)
+            assert_ok(dem2d_world_grow(s.world, &d, k == 0 ? 1000 : 10, &done));
+        assert_true(done.stress == 0);
+        hashes[k] = dem2d_world_hash(s.world);
+        close_scene(&s);
+    }
+    assert_true(hashes[0] == hashes[1]);
+}
+
+/* The area of a cell can be taken if it stays as it is: not where the cell is stretched or a stress
+   along a or b is held. */
+static void check_area_stays(const scene *s) {
+    const dem2d_growth_desc d = {.stress = 1e5};
+    dem2d_growth done;
+    for (int k = 0; k < 6; k++) {
+        dem2d_deformation_desc how = {.xx = k == 0, .yy = k == 1, .xy = k == 4};
+        how.hold_xx = k == 2, how.stress_xx = k == 2;
+        how.hold_yy = k == 3, how.stress_yy = k == 3;
+        assert_ok(dem2d_world_deform(s->world, &how));
+        assert_result(dem2d_world_grow(s->world, &d, 10, &done),
+                      k < 4 ? DEM2D_OUT_OF_RANGE : DEM2D_OK);
+    }
+}
+
 /* In an oblique cell the area is that of the cell, and the stress is reached that the cell measures;
    the bits do not depend on the skin. */
 static void test_cell(void **state) {
@@ -215,6 +253,7 @@ static void test_cell(void **state) {
         assert_near(done.solid_fraction, packing_of(&s).solid_area / 0.6, 1e-12);
         assert_between(done.solid_fraction, 0.78, 0.9);
         hashes[k] = dem2d_world_hash(s.world);
+        check_area_stays(&s);
         close_scene(&s);
     }
     assert_true(hashes[0] == hashes[1]);
@@ -249,7 +288,8 @@ static void test_failing(void **state) {
 
 int main(void) {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(test_fraction), cmocka_unit_test(test_stress), cmocka_unit_test(test_bits),
+        cmocka_unit_test(test_fraction), cmocka_unit_test(test_stress),
+        cmocka_unit_test(test_bits),     cmocka_unit_test(test_tens),
         cmocka_unit_test(test_failing),  cmocka_unit_test(test_cell),
     };
     return cmocka_run_group_tests_name("growth", tests, NULL, NULL);
