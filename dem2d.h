@@ -1368,7 +1368,8 @@ typedef struct dem2d_law_batch {
 
 /// A contact law: writes the forces of all rows. Each closed contact is in one call of each force
 /// pass, by the threads of parallel_for; results must not depend on which contacts share a call.
-/// When the shapes separate, force and state are dropped.
+/// When the shapes separate, force and state are dropped. A step is refused (DEM2D_STATE) when a
+/// force, a moment, or a viscous part of them is not finite.
 typedef void dem2d_law_fn(void *user, dem2d_law_batch *batch);
 
 /// The built-in law for all rows of a batch, for a law that begins or ends with it: springs,
@@ -19626,6 +19627,14 @@ static DEM2DI_INLINE void dem2di_law_put_callers(dem2d_world *world, int i, bool
     memcpy(to->point_state[i - world->list.discs].at, rows->state[k + 1], sizeof to->state[i].at);
 }
 
+/* Are the viscous parts finite that a caller's law gives for the contact of row k? */
+static bool dem2di_law_is_sound(const dem2di_law_rows *rows, int k, bool two) {
+    double sum = 0;
+    for (int p = k; p < (two ? k + 2 : k + 1); p++)
+        sum += rows->viscous[p] + rows->viscous_shear[p] + rows->viscous_moment[p];
+    return dem2di_finite(sum);
+}
+
 /* Forces of the contact of row k into the columns, and its loads. Returns the number of its rows.
  */
 static DEM2DI_INLINE int dem2di_law_put(dem2d_world *world, const dem2di_law_rows *rows, int k,
@@ -19648,6 +19657,7 @@ static DEM2DI_INLINE int dem2di_law_put(dem2d_world *world, const dem2di_law_row
     if (world->law != NULL) {
         dem2di_law_put_callers(world, i, two, k, rows);
         moment = contacts->moment[i];
+        if (!dem2di_law_is_sound(rows, k, two)) contact.force = HUGE_VAL; /* refuses the step */
     }
     dem2di_force_put(world, i, &contact, moment, count);
     return two ? 2 : 1;

@@ -204,6 +204,41 @@ static void fill(const scene *s, int count, double speed) {
     add_plane(s, 0.48, 0, -1, 0), add_plane(s, 0, 0.48, 0, -1);
 }
 
+/* Writes one number that is not finite, into the array of this number; -1: none. */
+static void unsound_law(void *user, dem2d_law_batch *b) {
+    double *arrays[6];
+    dem2d_law_builtin(b);
+    arrays[0] = b->normal_force, arrays[1] = b->tangential_force, arrays[2] = b->moment;
+    arrays[3] = b->viscous_normal, arrays[4] = b->viscous_tangential;
+    arrays[5] = b->viscous_moment;
+    if (*(const int *)user >= 0) arrays[*(const int *)user][0] = NAN;
+}
+
+/* The step is refused at once, and the next is as if nothing had been: with one point and two. */
+static void test_unsound_law(void **state) {
+    (void)state;
+    for (int faces = 0; faces < 2; faces++) {
+        int which = -1;
+        dem2d_world_desc desc = {0};
+        desc.time_step = 2e-5, desc.gravity.y = -9.81;
+        desc.faces = faces == 0 ? DEM2D_ONE_POINT : DEM2D_TWO_POINTS;
+        desc.law = unsound_law, desc.law_user = &which;
+        scene s = make_scene(desc, stone_desc(KN / 2, 0.3));
+        add_floor(&s);
+        add_free(&s, make_box(0.2, 0.1), vec(0.5, 0.0499), 0, vec(0, 0), 0);
+        assert_ok(dem2d_world_step(s.world, 2, NULL));
+        for (int k = 0; k < 6; k++) {
+            const uint64_t hash = dem2d_world_hash(s.world);
+            which = k;
+            assert_result(dem2d_world_step(s.world, 1, NULL), DEM2D_STATE);
+            assert_true(dem2d_world_hash(s.world) == hash);
+            which = -1;
+            assert_ok(dem2d_world_step(s.world, 1, NULL));
+        }
+        dem2d_world_destroy(s.world);
+    }
+}
+
 /* The same grains by the built-in law and by the caller's copy of it. */
 static void test_callers_law(void **state) {
     (void)state;
@@ -661,11 +696,11 @@ int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(test_damping_ratio),    cmocka_unit_test(test_restitution),
         cmocka_unit_test(test_rolling),          cmocka_unit_test(test_callers_law),
-        cmocka_unit_test(test_builtin_law),      cmocka_unit_test(test_tension),
-        cmocka_unit_test(test_ledger_order),     cmocka_unit_test(test_ledger_closes),
-        cmocka_unit_test(test_ledger_edits),     cmocka_unit_test(test_law_changes),
-        cmocka_unit_test(test_damped_time_step), cmocka_unit_test(test_circles_two_ways),
-        cmocka_unit_test(test_infinite_circles),
+        cmocka_unit_test(test_unsound_law),      cmocka_unit_test(test_builtin_law),
+        cmocka_unit_test(test_tension),          cmocka_unit_test(test_ledger_order),
+        cmocka_unit_test(test_ledger_closes),    cmocka_unit_test(test_ledger_edits),
+        cmocka_unit_test(test_law_changes),      cmocka_unit_test(test_damped_time_step),
+        cmocka_unit_test(test_circles_two_ways), cmocka_unit_test(test_infinite_circles),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }
