@@ -407,7 +407,9 @@ HOW TO
     explain its strength dem2d_world_fabric: anisotropies of contacts and forces, and the q/p that
                          they predict; dem2d_world_histogram for polar diagrams.
     look in ParaView     dem2d_world_write_vtp, a file for each part and time; dem2d_pvd_write
-                         makes a series of them. Colour grains by any of their arrays.
+                         makes a series of them. Colour grains by any of their arrays. In a
+                         periodic cell the file of particles has images as well (array image:
+                         Threshold takes them out), and the part CELL is the border.
     plot fields          dem2d_grid_write_csv for tables and plots, dem2d_grid_write_vti for
                          ParaView.
     keep a history       dem2d_world_write_csv after every so many steps, with append from the
@@ -2706,6 +2708,7 @@ typedef enum dem2d_vtp_part {
     DEM2D_VTP_PARTICLES, ///< outlines
     DEM2D_VTP_CONTACTS,  ///< lines along the branches
     DEM2D_VTP_WALLS,     ///< lines, half-planes clipped by the scene's bounding box
+    DEM2D_VTP_CELL,      ///< lines, the border of the periodic cell; none without a cell
     DEM2D_VTP_PART_COUNT
 } dem2d_vtp_part;
 
@@ -2743,7 +2746,9 @@ typedef struct dem2d_csv_desc {
 /// Draw shapes (with a colour per model, or as desc.colour says), walls, force chains and, below, a
 /// scale bar and the key of the colours. Allocates 8 bytes for each particle if there is a colour
 /// bar (OUT_OF_MEMORY). The whole scene is the box of particles and segments, with half-planes
-/// whose distance from it is at most a third of its size. The line of the mean normal force is as
+/// whose distance from it is at most a third of its size, and the border of a periodic cell. In a
+/// cell, the images that reach into the view are drawn as well, and its border: a parallelogram, or
+/// two lines where it is periodic in one direction. The line of the mean normal force is as
 /// wide as a quarter of the mean radius, but at most 1/400 of the picture; no line is wider than
 /// the radius of the smaller particle. desc may be NULL: all zero.
 DEM2D_API dem2d_result dem2d_world_write_svg(const dem2d_world *world, const dem2d_svg_desc *desc,
@@ -2752,8 +2757,14 @@ DEM2D_API dem2d_result dem2d_world_write_svg(const dem2d_world *world, const dem
 /// material, motion, contacts (walls not counted), velocity (mean of the half steps),
 /// angular_velocity, angle, mass, radius (equivalent), stress (3 x 3); of contacts: a, b, wall
 /// (indices, or -1), points, normal, force (on B), position, normal_force, tangential_force,
-/// moment, depth; of walls: id, mode, velocity (mean of the half steps), force, stress. desc may be
-/// NULL: all zero.
+/// moment, depth; of walls: id, mode, velocity (mean of the half steps), force, stress; of the
+/// lines of a cell: id, period (the cell vector that leads to the opposite line). In a world with a
+/// cell, images of particles are written as well, if their bounding circle meets the box of all
+/// particles and the cell. An image has the values of its particle. Three more arrays tell them
+/// apart: image (1; 0 for the particle), shift_a and shift_b (the image is at shift_a a + shift_b b
+/// from the particle). To count or sum, take those whose image is 0. A contact is written once:
+/// from the centre of A to that of the image of B at shift_a a + shift_b b. desc may be NULL: all
+/// zero.
 DEM2D_API dem2d_result dem2d_world_write_vtp(const dem2d_world *world, const dem2d_vtp_desc *desc,
                                              const char *path);
 /// Write the averages of a grid: a header line, then a row for each cell in the order of
@@ -28927,9 +28938,8 @@ static void dem2di_box_reach(const dem2d_world *world, int part, double size, de
     dem2di_box_add(all, dem2di_along(nearest, -gap, n));
 }
 
-/* The bounding box of particles and segments and, if `beside`, of half-planes beside them, with a
-   margin of a twentieth of the larger side; a unit square if there are none. */
-static dem2d_box dem2di_scene_box(const dem2d_world *world, bool beside) {
+/* The bounding box of all particles, without their images; if there are none, from inf to -inf. */
+static dem2d_box dem2di_particle_box(const dem2d_world *world) {
     dem2d_box all = {{HUGE_VAL, HUGE_VAL}, {-HUGE_VAL, -HUGE_VAL}};
     for (int place = 0, slot; (slot = dem2di_next_particle(world, &place)) >= 0;) {
         dem2d_box box;
@@ -28938,25 +28948,150 @@ static dem2d_box dem2di_scene_box(const dem2d_world *world, bool beside) {
         dem2di_box_add(&all, box.lower);
         dem2di_box_add(&all, box.upper);
     }
+    return all;
+}
+
+/* Extend the box to the border of the cell, in the directions in which it is periodic. */
+static void dem2di_box_cell(const dem2d_cell *cell, dem2d_box *all) {
+    const dem2d_vec o = cell->origin, a = cell->a, b = cell->b;
+    if (a.x > 0) {
+        all->lower.x = dem2di_min(all->lower.x, o.x + dem2di_min(0, b.x));
+        all->upper.x = dem2di_max(all->upper.x, o.x + a.x + dem2di_max(0, b.x));
+    }
+    if (b.y > 0) {
+        all->lower.y = dem2di_min(all->lower.y, o.y);
+        all->upper.y = dem2di_max(all->upper.y, o.y + b.y);
+    }
+}
+
+/* Where the box is empty along x or y: from 0 to 1, or to the length of a cell with one period. */
+static void dem2di_box_fill(const dem2d_cell *cell, dem2d_box *all) {
+    const double period = cell->a.x + cell->b.y, side = period > 0 ? period : 1;
+    if (all->lower.x > all->upper.x) {
+        all->lower.x = 0;
+        all->upper.x = side;
+    }
+    if (all->lower.y > all->upper.y) {
+        all->lower.y = 0;
+        all->upper.y = side;
+    }
+}
+
+/* The bounding box of particles, segments and the cell's border and, if `beside`, of half-planes
+   beside them; a unit square if there are none. The margin is a twentieth of the larger side. In a
+   direction with a period it is a twentieth of the side in that direction: a cell that is much
+   higher than wide shows few images. */
+static dem2d_box dem2di_scene_box(const dem2d_world *world, bool beside) {
+    const dem2d_cell *cell = &world->cell_before;
+    dem2d_box all = dem2di_particle_box(world);
     for (int k = 0; k < world->part_count; k++) {
         const dem2di_surface surface = dem2di_surface_of(world, world->wall_before, k);
         if (!(world->parts[k].extent > 0)) continue;
         dem2di_box_add(&all, surface.point);
         dem2di_box_add(&all, dem2di_surface_end(&surface, world->parts[k].extent));
     }
-    if (all.lower.x > all.upper.x) { /* none: a unit square */
-        all.lower = dem2di_vec(0, 0);
-        all.upper = dem2di_vec(1, 1);
-    }
+    dem2di_box_cell(cell, &all);
+    dem2di_box_fill(cell, &all);
     dem2d_vec size = dem2di_sub(all.upper, all.lower);
     for (int k = 0; beside && k < world->part_count; k++)
         if (!(world->parts[k].extent > 0))
             dem2di_box_reach(world, k, dem2di_max(size.x, size.y), &all);
     size = dem2di_sub(all.upper, all.lower);
-    double margin = dem2di_max(size.x, size.y) / 20;
-    all.lower = dem2di_sub(all.lower, dem2di_vec(margin, margin));
-    all.upper = dem2di_add(all.upper, dem2di_vec(margin, margin));
+    const double larger = dem2di_max(size.x, size.y);
+    const dem2d_vec margin =
+        dem2di_vec((cell->a.x > 0 ? size.x : larger) / 20, (cell->b.y > 0 ? size.y : larger) / 20);
+    all.lower = dem2di_sub(all.lower, margin);
+    all.upper = dem2di_add(all.upper, margin);
     return all;
+}
+
+/* The border of a cell: two lines for each direction in which it is periodic. */
+typedef struct dem2di_border {
+    int count; /* of lines: 0, 2 or 4 */
+    dem2d_vec ends[4][2];
+    dem2d_vec period[4]; /* the vector of the cell that leads to the opposite line */
+} dem2di_border;
+
+/* Two opposite lines of the border, the first from `start` to `start + along`. */
+static void dem2di_border_add(dem2di_border *border, dem2d_vec start, dem2d_vec along,
+                              dem2d_vec across, dem2d_vec period) {
+    for (int k = 0; k < 2; k++) {
+        const int line = border->count++;
+        border->ends[line][0] = k == 0 ? start : dem2di_add(start, across);
+        border->ends[line][1] = dem2di_add(border->ends[line][0], along);
+        border->period[line] = k == 0 ? period : dem2di_scale(period, -1);
+    }
+}
+
+/* A parallelogram, or two lines across the box where the cell is periodic in one direction. */
+static dem2di_border dem2di_border_make(const dem2d_world *world, const dem2d_box *box) {
+    const dem2d_cell *cell = &world->cell_before;
+    const bool along_a = cell->a.x > 0, along_b = cell->b.y > 0;
+    dem2d_vec corner = cell->origin, a = cell->a, b = cell->b;
+    dem2di_border border;
+    memset(&border, 0, sizeof border);
+    if (!along_a) {
+        corner.x = box->lower.x;
+        a = dem2di_vec(box->upper.x - box->lower.x, 0);
+        b.x = 0;
+    }
+    if (!along_b) {
+        corner.y = box->lower.y;
+        b = dem2di_vec(0, box->upper.y - box->lower.y);
+    }
+    if (along_b) dem2di_border_add(&border, corner, a, b, cell->b);
+    if (along_a) dem2di_border_add(&border, corner, b, a, cell->a);
+    return border;
+}
+
+/* Shifts that put the centre of a particle into the box, or nearer to it than a length. */
+static dem2di_shifts dem2di_seen_start(const dem2d_world *world, const dem2d_box *seen, int slot,
+                                       double near) {
+    dem2d_box box = *seen;
+    box.lower = dem2di_sub(box.lower, dem2di_vec(near, near));
+    box.upper = dem2di_add(box.upper, dem2di_vec(near, near));
+    return dem2di_shifts_start(&world->cell_before, world->before[slot].x, &box);
+}
+
+/* Is the bounding circle of a particle, or of its image, outside the box? */
+static bool dem2di_unseen(const dem2d_world *world, const dem2d_box *box, int slot, dem2d_vec way) {
+    dem2d_vec c = dem2di_add(world->before[slot].x, way);
+    const dem2di_body *body = &world->bodies[slot];
+    double r = dem2di_shape_of(world, body)->circumscribed * body->scale;
+    return c.x + r < box->lower.x || c.x - r > box->upper.x || c.y + r < box->lower.y ||
+           c.y - r > box->upper.y;
+}
+
+/* An iterator over the particles in the order of ranks, each with its images, as far as their
+   bounding circles meet a box. */
+typedef struct dem2di_images {
+    dem2d_box box;
+    int place;        /* of the next particle */
+    int slot;         /* of the particle */
+    dem2di_shifts at; /* of the image, in cell vectors; 0, 0: the particle itself */
+    dem2d_vec way;    /* the same in metres */
+} dem2di_images;
+
+static dem2di_images dem2di_images_start(const dem2d_box *box) {
+    dem2di_images images;
+    memset(&images, 0, sizeof images);
+    images.box = *box;
+    images.slot = -1;
+    return images;
+}
+
+static bool dem2di_images_next(const dem2d_world *world, dem2di_images *images) {
+    for (;;) {
+        while (images->slot >= 0 && dem2di_shifts_next(&images->at)) {
+            const dem2di_shifts *at = &images->at;
+            images->way = dem2di_cell_shift(at->cell, at->along_a, at->along_b);
+            if (!dem2di_unseen(world, &images->box, images->slot, images->way)) return true;
+        }
+        images->slot = dem2di_next_particle(world, &images->place);
+        if (images->slot < 0) return false;
+        images->at = dem2di_seen_start(world, &images->box, images->slot,
+                                       world->before[images->slot].radius);
+    }
 }
 
 /* Clip the range t[0] to t[1] of a line to where start + t rate is between low and high. */
@@ -29051,25 +29186,6 @@ static dem2di_view dem2di_view_make(const dem2d_world *world, const dem2d_svg_de
     return view;
 }
 
-/* Shifts that put the centre of a particle into the view, or nearer to it than a length. */
-static dem2di_shifts dem2di_seen_start(const dem2d_world *world, const dem2di_view *view, int slot,
-                                       double near) {
-    dem2d_box box = view->box;
-    box.lower = dem2di_sub(box.lower, dem2di_vec(near, near));
-    box.upper = dem2di_add(box.upper, dem2di_vec(near, near));
-    return dem2di_shifts_start(&world->cell_before, world->before[slot].x, &box);
-}
-
-/* Is the bounding circle of a particle, or of its image, outside the view? */
-static bool dem2di_off_view(const dem2d_world *world, const dem2di_view *view, int slot,
-                            dem2d_vec way) {
-    dem2d_vec c = dem2di_add(world->before[slot].x, way);
-    const dem2di_body *body = &world->bodies[slot];
-    double r = dem2di_shape_of(world, body)->circumscribed * body->scale;
-    return c.x + r < view->box.lower.x || c.x - r > view->box.upper.x ||
-           c.y + r < view->box.lower.y || c.y - r > view->box.upper.y;
-}
-
 /* What the colours of a picture show. */
 typedef struct dem2di_colours {
     dem2d_colour by;
@@ -29111,7 +29227,7 @@ static void dem2di_colours_find(const dem2d_world *world, const dem2d_svg_desc *
     for (int index = 0; index < world->id_count; index++) {
         int slot = world->ids[index].slot;
         if (slot < 0) continue;
-        bool drawn = world->periodic || !dem2di_off_view(world, view, slot, dem2di_vec(0, 0));
+        bool drawn = world->periodic || !dem2di_unseen(world, &view->box, slot, dem2di_vec(0, 0));
         if (colours->values == NULL) {
             int of = dem2di_class_of(world, colours->by, slot);
             if (drawn && of >= 0) colours->seen[of] = true;
@@ -29226,20 +29342,14 @@ static void dem2di_draw_walls(const dem2d_world *world, const dem2di_view *view,
     dem2di_print(writer, "</g>\n");
 }
 
-/* The border of a cell that is periodic along a and b. */
 static void dem2di_draw_cell(const dem2d_world *world, const dem2di_view *view,
                              dem2di_writer *writer) {
-    const dem2d_cell *cell = &world->cell_before;
-    dem2d_vec corner[4];
-    if (!(cell->a.x > 0 && cell->b.y > 0)) return;
-    corner[0] = cell->origin;
-    corner[1] = dem2di_add(corner[0], cell->a);
-    corner[2] = dem2di_add(corner[1], cell->b);
-    corner[3] = dem2di_add(corner[0], cell->b);
+    const dem2di_border border = dem2di_border_make(world, &view->box);
+    if (border.count == 0) return;
     dem2di_print(writer, "<g stroke=\"#1f5fa8\">\n");
-    for (int k = 0; k < 4; k++)
-        dem2di_draw_line(dem2di_pixel(view, corner[k]), dem2di_pixel(view, corner[(k + 1) % 4]),
-                         view->width / 400, writer);
+    for (int k = 0; k < border.count; k++)
+        dem2di_draw_line(dem2di_pixel(view, border.ends[k][0]),
+                         dem2di_pixel(view, border.ends[k][1]), view->width / 400, writer);
     dem2di_print(writer, "</g>\n");
 }
 
@@ -29264,11 +29374,11 @@ static void dem2di_draw_chains(const dem2d_world *world, const dem2di_view *view
         const dem2di_key *key = &world->list.keys[iterator.number];
         const dem2d_vec none = dem2di_vec(0, 0);
         double most = dem2di_smaller_radius(world, &iterator) * view->factor;
-        if (!world->periodic && dem2di_off_view(world, view, key->a, none) &&
-            (iterator.walls || dem2di_off_view(world, view, key->b, none)))
+        if (!world->periodic && dem2di_unseen(world, &view->box, key->a, none) &&
+            (iterator.walls || dem2di_unseen(world, &view->box, key->b, none)))
             continue;
         double far = dem2di_length(iterator.branch) + world->now[key->a].radius;
-        dem2di_shifts at = dem2di_seen_start(world, view, key->a, far);
+        dem2di_shifts at = dem2di_seen_start(world, &view->box, key->a, far);
         while (dem2di_shifts_next(&at)) {
             dem2d_vec way = dem2di_cell_shift(&world->cell_before, at.along_a, at.along_b);
             dem2d_vec start = dem2di_add(world->before[key->a].x, way);
@@ -29387,15 +29497,12 @@ static void dem2di_draw(const dem2d_world *world, const dem2d_svg_desc *desc,
                  "<svg width=\"%.2f\" height=\"%.2f\">\n"
                  "<g stroke=\"#333\" stroke-width=\"%.3f\">\n",
                  view->width, view->height, view->width / 1600);
-    for (int place = 0, slot; (slot = dem2di_next_particle(world, &place)) >= 0 && writer->good;) {
+    dem2di_images images = dem2di_images_start(&view->box);
+    while (writer->good && dem2di_images_next(world, &images)) {
         char text[8];
-        const char *fill = dem2di_fill_of(world, colours, slot, text);
-        dem2di_shifts at = dem2di_seen_start(world, view, slot, world->before[slot].radius);
-        while (dem2di_shifts_next(&at)) {
-            dem2d_vec way = dem2di_cell_shift(&world->cell_before, at.along_a, at.along_b);
-            if (!dem2di_off_view(world, view, slot, way))
-                dem2di_draw_particle(world, view, desc->outline_points, slot, way, fill, writer);
-        }
+        const char *fill = dem2di_fill_of(world, colours, images.slot, text);
+        dem2di_draw_particle(world, view, desc->outline_points, images.slot, images.way, fill,
+                             writer);
     }
     dem2di_print(writer, "</g>\n");
     dem2di_draw_walls(world, view, writer);
@@ -29444,13 +29551,18 @@ DEM2D_API dem2d_result dem2d_world_write_svg(const dem2d_world *world, const dem
 /* --- files for VTK ------------------------------------------------------------------------------
  */
 
-/* An iterator over the items of a .vtp file (VTK's cells): particles, contacts or walls. */
+/* An iterator over the items of a .vtp file (VTK's cells): particles with their images, contacts,
+   walls or lines of the border. Images are those that meet the box of all particles and the cell. A
+   contact leads from the centre of A to that of an image of B that touches A: so the file of
+   particles has this image. */
 typedef struct dem2di_item {
     dem2d_vtp_part part;
     int outline_points;
     dem2d_box box;                    /* of the scene, for walls */
-    int index;                        /* the next particle or part of a wall */
-    int slot;                         /* of the particle, or number of the part */
+    int index;                        /* the next part of a wall or line of the border */
+    int slot;                         /* of the particle, or number of the part or line */
+    dem2di_images images;             /* particles and their images */
+    dem2di_border border;             /* of the cell */
     dem2di_contact_iterator iterator; /* contacts of particles, then with walls */
 } dem2di_item;
 
@@ -29459,19 +29571,28 @@ static dem2di_item dem2di_item_start(const dem2d_world *world, const dem2d_vtp_d
     memset(&item, 0, sizeof item);
     item.part = desc->part;
     item.outline_points = desc->outline_points;
-    if (desc->part == DEM2D_VTP_WALLS) item.box = dem2di_scene_box(world, false);
+    if (desc->part == DEM2D_VTP_WALLS || desc->part == DEM2D_VTP_CELL)
+        item.box = dem2di_scene_box(world, false);
+    if (desc->part == DEM2D_VTP_CELL) item.border = dem2di_border_make(world, &item.box);
+    if (desc->part == DEM2D_VTP_PARTICLES) {
+        dem2d_box seen = {{-HUGE_VAL, -HUGE_VAL}, {HUGE_VAL, HUGE_VAL}};
+        if (world->periodic) seen = dem2di_particle_box(world);
+        dem2di_box_cell(&world->cell_before, &seen);
+        item.images = dem2di_images_start(&seen);
+    }
     item.iterator = dem2di_contacts_start(false);
     return item;
 }
 
 static bool dem2di_item_next(const dem2d_world *world, dem2di_item *item) {
     if (item->part == DEM2D_VTP_PARTICLES) {
-        item->slot = dem2di_next_particle(world, &item->index);
-        return item->slot >= 0;
+        const bool more = dem2di_images_next(world, &item->images);
+        item->slot = item->images.slot;
+        return more;
     }
     if (item->part == DEM2D_VTP_CONTACTS) return dem2di_next_contact(world, &item->iterator);
     item->slot = item->index++;
-    return item->slot < world->part_count;
+    return item->slot < (item->part == DEM2D_VTP_CELL ? item->border.count : world->part_count);
 }
 
 static int dem2di_item_points(const dem2d_world *world, const dem2di_item *item) {
@@ -29481,25 +29602,50 @@ static int dem2di_item_points(const dem2d_world *world, const dem2di_item *item)
 }
 
 /* Greatest number of components of all arrays of a part. */
-#define DEM2DI_ITEM_NUMBERS 21
+#define DEM2DI_ITEM_NUMBERS 24
 
 /* The arrays of cell data of a part, NULL after the last. The first letter is the kind: i integers
-   of 32 bits, d doubles, v vectors, t tensors. */
+   of 32 bits, I the same, but only in worlds with a cell, d doubles, v vectors, t tensors. */
 static const char *const *dem2di_arrays_of(dem2d_vtp_part part) {
-    static const char *const particles[] = {
-        "i id",       "i type",     "i material",         "i motion",
-        "i contacts", "v velocity", "d angular_velocity", "d angle",
-        "d mass",     "d radius",   "t stress",           NULL};
-    static const char *const contacts[] = {
-        "i a",     "i b",        "i wall",         "i points",           "v normal",
-        "v force", "v position", "d normal_force", "d tangential_force", "d moment",
-        "d depth", NULL};
+    static const char *const particles[] = {"i id",
+                                            "i type",
+                                            "i material",
+                                            "i motion",
+                                            "i contacts",
+                                            "v velocity",
+                                            "d angular_velocity",
+                                            "d angle",
+                                            "d mass",
+                                            "d radius",
+                                            "t stress",
+                                            "I image",
+                                            "I shift_a",
+                                            "I shift_b",
+                                            NULL};
+    static const char *const contacts[] = {"i a",
+                                           "i b",
+                                           "i wall",
+                                           "i points",
+                                           "v normal",
+                                           "v force",
+                                           "v position",
+                                           "d normal_force",
+                                           "d tangential_force",
+                                           "d moment",
+                                           "d depth",
+                                           "I shift_a",
+                                           "I shift_b",
+                                           NULL};
     static const char *const walls[] = {"i id",    "i mode",   "v velocity",
                                         "v force", "d stress", NULL};
-    return part == DEM2D_VTP_PARTICLES ? particles : part == DEM2D_VTP_CONTACTS ? contacts : walls;
+    static const char *const cell[] = {"i id", "v period", NULL};
+    static const char *const *const arrays[] = {particles, contacts, walls, cell};
+    return arrays[part];
 }
 
-static void dem2di_particle_numbers(const dem2d_world *world, int slot, double *numbers) {
+static void dem2di_particle_numbers(const dem2d_world *world, const dem2di_images *images,
+                                    double *numbers) {
+    const int slot = images->slot, a = images->at.along_a, b = images->at.along_b;
     const dem2di_body *body = &world->bodies[slot];
     dem2di_velocities mean = dem2di_velocities_mean(world, slot);
     dem2d_stress stress = dem2di_particle_stress(world, slot);
@@ -29523,7 +29669,10 @@ static void dem2di_particle_numbers(const dem2d_world *world, int slot, double *
                           0,
                           0,
                           0,
-                          0};
+                          0,
+                          a != 0 || b != 0 ? 1.0 : 0.0,
+                          (double)a,
+                          (double)b};
     memcpy(numbers, all, sizeof all);
 }
 
@@ -29547,7 +29696,9 @@ static void dem2di_contact_numbers(const dem2d_world *world,
                           info.normal_force,
                           info.tangential_force,
                           info.moment,
-                          info.depth};
+                          info.depth,
+                          (double)info.shift[0],
+                          (double)info.shift[1]};
     memcpy(numbers, all, sizeof all);
 }
 
@@ -29568,12 +29719,19 @@ static void dem2di_wall_numbers(const dem2d_world *world, int part, double *numb
     memcpy(numbers, all, sizeof all);
 }
 
+static void dem2di_border_numbers(const dem2di_border *border, int line, double *numbers) {
+    const double all[] = {(double)line, border->period[line].x, border->period[line].y, 0};
+    memcpy(numbers, all, sizeof all);
+}
+
 static void dem2di_item_numbers(const dem2d_world *world, const dem2di_item *item,
                                 double numbers[DEM2DI_ITEM_NUMBERS]) {
     if (item->part == DEM2D_VTP_PARTICLES)
-        dem2di_particle_numbers(world, item->slot, numbers);
+        dem2di_particle_numbers(world, &item->images, numbers);
     else if (item->part == DEM2D_VTP_CONTACTS)
         dem2di_contact_numbers(world, &item->iterator, numbers);
+    else if (item->part == DEM2D_VTP_CELL)
+        dem2di_border_numbers(&item->border, item->slot, numbers);
     else
         dem2di_wall_numbers(world, item->slot, numbers);
 }
@@ -29604,6 +29762,7 @@ static void dem2di_item_put_points(const dem2d_world *world, const dem2di_item *
         const dem2d_shape *shape = dem2di_shape_of(world, &world->bodies[item->slot]);
         dem2d_pose pose = dem2di_pose_of(world, world->before, item->slot);
         int points = dem2di_item_points(world, item);
+        if (world->periodic) pose.position = dem2di_add(pose.position, item->images.way);
         for (int i = 0; i < points; i++)
             dem2di_vtp_point(writer, dem2di_place(&pose, dem2di_outline_point(shape, i, points)));
         return;
@@ -29611,6 +29770,8 @@ static void dem2di_item_put_points(const dem2d_world *world, const dem2di_item *
     if (item->part == DEM2D_VTP_CONTACTS) {
         ends[0] = world->before[world->list.keys[item->iterator.number].a].x;
         ends[1] = dem2di_add(ends[0], item->iterator.branch);
+    } else if (item->part == DEM2D_VTP_CELL) {
+        memcpy(ends, item->border.ends[item->slot], sizeof ends);
     } else {
         (void)dem2di_part_line(world, item->slot, &item->box, ends);
     }
@@ -29633,11 +29794,13 @@ static void dem2di_vtp_cell_data(const dem2d_world *world, const dem2d_vtp_desc 
     for (const char *const *array = dem2di_arrays_of(desc->part); *array != NULL; array++) {
         dem2di_item item = dem2di_item_start(world, desc);
         char kind = **array;
+        bool whole = kind == 'i' || kind == 'I';
         int components = kind == 'v' ? 3 : kind == 't' ? 9 : 1;
-        dem2di_vtp_tag(writer, kind == 'i' ? "Int32" : "Float64", *array + 2, components);
+        if (kind == 'I' && !world->periodic) continue; /* none follows but such */
+        dem2di_vtp_tag(writer, whole ? "Int32" : "Float64", *array + 2, components);
         while (dem2di_item_next(world, &item)) {
             dem2di_item_numbers(world, &item, numbers);
-            if (kind == 'i')
+            if (whole)
                 dem2di_print(writer, "%d\n", (int)numbers[first]);
             else
                 dem2di_vtp_doubles(writer, numbers + first, components);

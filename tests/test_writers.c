@@ -132,6 +132,11 @@ static dem2d_result put_walls(const dem2d_world *world, dem2d_write_fn *write, v
     return put_part(world, write, user, path, DEM2D_VTP_WALLS, 0);
 }
 
+static dem2d_result put_cell(const dem2d_world *world, dem2d_write_fn *write, void *user,
+                             const char *path) {
+    return put_part(world, write, user, path, DEM2D_VTP_CELL, 0);
+}
+
 static dem2d_result put_pvd(const dem2d_world *world, dem2d_write_fn *write, void *user,
                             const char *path) {
     static const char *const files[2] = {"a & <b>.vtp", "\"c\" 'd'.vtp"};
@@ -151,8 +156,8 @@ static dem2d_result put_csv(const dem2d_world *world, dem2d_write_fn *write, voi
     return dem2d_world_write_csv(world, &desc, path);
 }
 
-static writer_fn *const writers[] = {put_svg,   put_particles, put_contacts,
-                                     put_walls, put_pvd,       put_csv};
+static writer_fn *const writers[] = {put_svg,  put_particles, put_contacts, put_walls,
+                                     put_cell, put_pvd,       put_csv};
 
 /* All that a writer gives, with an end. */
 static const char *text_of(writer_fn *writer, const dem2d_world *world) {
@@ -1159,6 +1164,186 @@ static void test_vtp_tiny(void **state) {
     dem2d_world_destroy(s.base.world);
 }
 
+/* --- pictures and files of periodic cells ---------------------------------------------------- */
+
+/* Discs of radius 0.5: the first two touch across the left border, the last crosses the upper one,
+   the third is in the middle. */
+static const double cell_places[4][2] = {{0.25, 1.5}, {3.375, 1.5}, {2, 1.5}, {2, 2.875}};
+
+static scene open_cell(dem2d_vec a, dem2d_vec b) {
+    const dem2d_material_desc stone = stone_desc(1e7, 0.4);
+    dem2d_world_desc desc = {0};
+    dem2d_particle_id id;
+    desc.time_step = 1e-4, desc.cell.a = a, desc.cell.b = b;
+    scene s = open_scene(&desc, &stone);
+    const dem2d_shape_id disc = give_shape(&s, make_disc(1));
+    for (int i = 0; i < 4; i++) {
+        dem2d_particle_desc grain = {0};
+        grain.scale = 0.5, grain.shape = disc, grain.material = s.material;
+        grain.position = vec(cell_places[i][0], cell_places[i][1]);
+        assert_ok(dem2d_world_add_particle(s.world, &grain, &id));
+    }
+    step(&s, 1);
+    return s;
+}
+
+/* The file has these images, and besides the particles no other: id, shift_a, shift_b of each. */
+static void check_images(const scene *s, const int (*images)[3], int count, dem2d_vec a,
+                         dem2d_vec b) {
+    static char text[SINK_ROOM];
+    static double id[64], image[64], along_a[64], along_b[64];
+    int particles = 0, found = 0;
+    strcpy(text, text_of(put_particles, s->world));
+    assert_int_equal(read_array(text, "id", id, 64), 4 + count);
+    assert_int_equal(read_array(text, "image", image, 64), 4 + count);
+    assert_int_equal(read_array(text, "shift_a", along_a, 64), 4 + count);
+    assert_int_equal(read_array(text, "shift_b", along_b, 64), 4 + count);
+    assert_int_equal(read_array(text, "Points", numbers, NUMBERS), 9 * (4 + count));
+    for (int i = 0; i < 4 + count; i++) {
+        const double *place = cell_places[(int)id[i]], *p = numbers + 9 * i;
+        particles += image[i] == 0;
+        assert_int_equal(image[i] != 0, along_a[i] != 0 || along_b[i] != 0);
+        for (int k = 0; k < count; k++)
+            found += image[i] == 1 && id[i] == images[k][0] && along_a[i] == images[k][1] &&
+                     along_b[i] == images[k][2];
+        assert_within((p[0] + p[3] + p[6]) / 3, place[0] + along_a[i] * a.x + along_b[i] * b.x,
+                      1e-14);
+        assert_within((p[1] + p[4] + p[7]) / 3, place[1] + along_b[i] * b.y, 1e-14);
+    }
+    assert_int_equal(particles, 4);
+    assert_int_equal(found, count);
+}
+
+/* The contact across the border leads from the particle to an image; it is there once. */
+static void check_across(const scene *s, double period) {
+    const char *text = text_of(put_contacts, s->world);
+    double ends[6], a, b, along_a, along_b;
+    assert_int_equal(read_array(text, "Points", ends, 6), 6);
+    assert_int_equal(read_array(text, "a", &a, 1), 1);
+    assert_int_equal(read_array(text, "b", &b, 1), 1);
+    assert_int_equal(read_array(text, "shift_a", &along_a, 1), 1);
+    assert_int_equal(read_array(text, "shift_b", &along_b, 1), 1);
+    assert_true(a + b == 1 && fabs(along_a) == 1 && along_b == 0);
+    assert_within(ends[0], cell_places[(int)a][0], 1e-14);
+    assert_within(ends[3], cell_places[(int)b][0] + along_a * period, 1e-14);
+    assert_within(fabs(ends[3] - ends[0]), 0.875, 1e-14);
+    assert_within(ends[1], 1.5, 1e-14);
+    assert_within(ends[4], 1.5, 1e-14);
+}
+
+/* The lines of the border: their number, and that each with its period is on the opposite one. */
+static void check_border(const scene *s, int count, double *ends) {
+    const char *text = text_of(put_cell, s->world);
+    double period[12];
+    assert_int_equal(count_of(text, "NumberOfPolys=\"0\""), 1);
+    assert_int_equal(read_array(text, "id", period, 12), count);
+    for (int i = 0; i < count; i++) assert_true(period[i] == i);
+    assert_int_equal(read_array(text, "period", period, 12), 3 * count);
+    assert_int_equal(read_array(text, "Points", ends, 24), 6 * count);
+    for (int i = 0; i < count; i++) {
+        const double *from = ends + 6 * i, *to = ends + 6 * (i ^ 1), *p = period + 3 * i;
+        const double along[2] = {to[3] - to[0], to[4] - to[1]};
+        const double off[2] = {from[0] + p[0] - to[0], from[1] + p[1] - to[1]};
+        assert_true(hypot(p[0], p[1]) > 0);
+        assert_within(along[0] * off[1] - along[1] * off[0], 0, 1e-13);
+    }
+}
+
+static void check_cell_picture(const scene *s, int circles, int lines, const char *path) {
+    dem2d_svg_desc desc = {0};
+    assert_ok(dem2d_world_write_svg(s->world, &desc, path));
+    const char *text = svg_text(s->world, desc);
+    assert_int_equal(count_of(text, "<circle"), circles);
+    const char *border = strstr(text, "<g stroke=\"#1f5fa8\">");
+    assert_int_equal(border != NULL, lines > 0);
+    if (lines == 0) return;
+    int drawn = 0;
+    for (border = strchr(border, '>') + 2; strncmp(border, "<line", 5) == 0; drawn++)
+        border = strchr(border, '\n') + 1;
+    assert_int_equal(drawn, lines);
+}
+
+/* A rectangle, and an oblique cell whose corners show more images. */
+static void test_cell_both(void **state) {
+    (void)state;
+    static const int images[3][3] = {{0, 1, 0}, {1, -1, 0}, {3, 0, -1}};
+    const dem2d_vec a = vec(4, 0);
+    double ends[24];
+    scene s = open_cell(a, vec(0, 3));
+    check_images(&s, images, 3, a, vec(0, 3));
+    check_across(&s, 4);
+    check_border(&s, 4, ends);
+    assert_within(ends[3] - ends[0], 4, 1e-14);
+    assert_within(ends[7] - ends[1], 3, 1e-14);
+    check_cell_picture(&s, 7, 4, "build/test_writers_both.svg");
+    close_scene(&s);
+    s = open_cell(a, vec(1, 3));
+    check_border(&s, 4, ends);
+    const double expected[4][4] = {{0, 0, 4, 0}, {1, 3, 5, 3}, {0, 0, 1, 3}, {4, 0, 5, 3}};
+    for (int i = 0; i < 4; i++)
+        for (int k = 0; k < 4; k++)
+            assert_within(ends[6 * i + k % 2 + 3 * (k / 2)], expected[i][k], 1e-14);
+    /* the first is moved into the cell, to x = 4.25, and has an image at the left; the last has
+       images at both lower corners; the margin shows one of the second */
+    assert_int_equal(read_array(text_of(put_particles, s.world), "image", ends, 24), 7);
+    check_cell_picture(&s, 8, 4, "build/test_writers_oblique.svg");
+    close_scene(&s);
+}
+
+/* Periodic one way: two lines across the scene. A grain far above does not widen the picture. */
+static void test_cell_one_way(void **state) {
+    (void)state;
+    static const int along_a[2][3] = {{0, 1, 0}, {1, -1, 0}}, along_b[1][3] = {{3, 0, -1}};
+    const dem2d_vec a = vec(4, 0), b = vec(0, 3), none = vec(0, 0);
+    double ends[24];
+    scene s = open_cell(a, none);
+    check_images(&s, along_a, 2, a, none);
+    check_across(&s, 4);
+    check_border(&s, 2, ends);
+    for (int i = 0; i < 2; i++) {
+        assert_within(ends[6 * i], 4.0 * i, 1e-14);
+        assert_within(ends[6 * i + 3], 4.0 * i, 1e-14);
+        assert_true(ends[6 * i + 1] < 1 && ends[6 * i + 4] > 3.375);
+    }
+    check_cell_picture(&s, 6, 2, "build/test_writers_one_way.svg");
+    dem2d_particle_desc stray = {0};
+    dem2d_particle_info info;
+    dem2d_particle_id ids[4], id;
+    int count;
+    assert_ok(dem2d_world_particles(s.world, ids, 4, &count));
+    assert_ok(dem2d_world_get_particle(s.world, ids[0], &info));
+    stray.shape = info.shape, stray.material = s.material, stray.scale = 0.5;
+    stray.position = vec(2, 400);
+    assert_ok(dem2d_world_add_particle(s.world, &stray, &id));
+    check_cell_picture(&s, 7, 2, "build/test_writers_high.svg");
+    close_scene(&s);
+    s = open_cell(none, b);
+    check_images(&s, along_b, 1, none, b);
+    check_border(&s, 2, ends);
+    for (int i = 0; i < 2; i++) {
+        assert_within(ends[6 * i + 1], 3.0 * i, 1e-14);
+        assert_within(ends[6 * i + 4], 3.0 * i, 1e-14);
+        assert_true(ends[6 * i] < -0.25 && ends[6 * i + 3] > 3.875);
+    }
+    check_cell_picture(&s, 5, 2, "build/test_writers_along_b.svg");
+    close_scene(&s);
+}
+
+/* Without a cell: no array of images, no border. */
+static void test_cell_none(void **state) {
+    (void)state;
+    static writer_fn *const parts[2] = {put_particles, put_contacts};
+    double ends[24];
+    scene s = open_cell(vec(0, 0), vec(0, 0));
+    for (int i = 0; i < 2; i++) {
+        assert_null(strstr(text_of(parts[i], s.world), "shift_"));
+        assert_null(strstr(text_of(parts[i], s.world), "image"));
+    }
+    check_border(&s, 0, ends);
+    check_cell_picture(&s, 4, 0, "build/test_writers_none.svg");
+    close_scene(&s);
+}
+
 /* --- VTK's files, read by VTK ---------------------------------------------------------------- */
 
 /* What the reader of VTK makes of a .vtp file is what its text says; of a .pvd file, that what it
@@ -1373,6 +1558,9 @@ int main(void) {
         cmocka_unit_test(test_vtp_contacts),
         cmocka_unit_test(test_vtp_walls),
         cmocka_unit_test(test_vtp_tiny),
+        cmocka_unit_test(test_cell_both),
+        cmocka_unit_test(test_cell_one_way),
+        cmocka_unit_test(test_cell_none),
         cmocka_unit_test(test_vtk_reads),
         cmocka_unit_test(test_vti_reads),
         cmocka_unit_test(test_pvd_names),
