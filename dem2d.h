@@ -19638,14 +19638,6 @@ static DEM2DI_INLINE void dem2di_law_put_callers(dem2d_world *world, int i, bool
     memcpy(to->point_state[i - world->list.discs].at, rows->state[k + 1], sizeof to->state[i].at);
 }
 
-/* Are the viscous parts finite that a caller's law gives for the contact of row k? */
-static bool dem2di_law_is_sound(const dem2di_law_rows *rows, int k, bool two) {
-    double sum = 0;
-    for (int p = k; p < (two ? k + 2 : k + 1); p++)
-        sum += rows->viscous[p] + rows->viscous_shear[p] + rows->viscous_moment[p];
-    return dem2di_finite(sum);
-}
-
 /* Forces of the contact of row k into the columns, and its loads. Returns the number of its rows.
  */
 static DEM2DI_INLINE int dem2di_law_put(dem2d_world *world, const dem2di_law_rows *rows, int k,
@@ -19668,7 +19660,6 @@ static DEM2DI_INLINE int dem2di_law_put(dem2d_world *world, const dem2di_law_row
     if (world->law != NULL) {
         dem2di_law_put_callers(world, i, two, k, rows);
         moment = contacts->moment[i];
-        if (!dem2di_law_is_sound(rows, k, two)) contact.force = HUGE_VAL; /* refuses the step */
     }
     dem2di_force_put(world, i, &contact, moment, count);
     return two ? 2 : 1;
@@ -19725,6 +19716,9 @@ static void dem2di_law_ask(const dem2d_world *world, dem2di_law_rows *rows) {
     for (int z = 0; z < 6; z++) memset(zero[z], 0, bytes);
     dem2di_law_viscous(rows);
     world->law(world->law_user, &batch);
+    for (int k = 0; k < rows->count; k++) /* a viscous part that is not finite: no step is made */
+        if (!dem2di_finite(rows->viscous[k] + rows->viscous_shear[k] + rows->viscous_moment[k]))
+            rows->force[k] = HUGE_VAL;
 }
 
 /* The law for the rows: their forces into the columns. */

@@ -214,18 +214,24 @@ static void unsound_law(void *user, dem2d_law_batch *b) {
     if (*(const int *)user >= 0) arrays[*(const int *)user][0] = NAN;
 }
 
-/* The step is refused at once, and the next is as if nothing had been: with one point and two. */
+/* The step is refused at once, and the next is as if nothing had been: with one point, two, and of circles.
+ */
 static void test_unsound_law(void **state) {
     (void)state;
-    for (int faces = 0; faces < 2; faces++) {
+    for (int kind = 0; kind < 3; kind++) {
         int which = -1;
         dem2d_world_desc desc = {0};
         desc.time_step = 2e-5, desc.gravity.y = -9.81;
-        desc.faces = faces == 0 ? DEM2D_ONE_POINT : DEM2D_TWO_POINTS;
+        desc.faces = kind == 0 ? DEM2D_ONE_POINT : DEM2D_TWO_POINTS;
         desc.law = unsound_law, desc.law_user = &which;
         scene s = make_scene(desc, stone_desc(KN / 2, 0.3));
         add_floor(&s);
-        add_free(&s, make_box(0.2, 0.1), vec(0.5, 0.0499), 0, vec(0, 0), 0);
+        if (kind < 2) {
+            add_free(&s, make_box(0.2, 0.1), vec(0.5, 0.0499), 0, vec(0, 0), 0);
+        } else {
+            add_free(&s, make_disc(0.1), vec(0.5, 0.5), 0, vec(0, 0), 0);
+            add_free(&s, make_disc(0.1), vec(0.6999, 0.5), 0, vec(0, 0), 0);
+        }
         assert_ok(dem2d_world_step(s.world, 2, NULL));
         for (int k = 0; k < 6; k++) {
             const uint64_t hash = dem2d_world_hash(s.world);
