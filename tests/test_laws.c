@@ -214,8 +214,8 @@ static void unsound_law(void *user, dem2d_law_batch *b) {
     if (*(const int *)user >= 0) arrays[*(const int *)user][0] = NAN;
 }
 
-/* The step is refused at once, and the next is as if nothing had been: with one point and two, and of
-   circles. */
+/* The step is refused at once, and the next is as if nothing had been: with one point and two, and
+   of circles. */
 static void test_unsound_law(void **state) {
     (void)state;
     for (int kind = 0; kind < 3; kind++) {
