@@ -30178,10 +30178,15 @@ DEM2D_API dem2d_result dem2d_world_write_csv(const dem2d_world *world, const dem
             A cell whose held stress nothing resists ends with a result: it shrank until the memory
             was used up. When a sheared cell takes another vector b, the step no longer costs the
             square of the number of particles.
+            Files for ParaView have the images that cross the border, with image, shift_a and
+            shift_b, and the border itself (DEM2D_VTP_CELL); SVG pictures draw cells with one
+            period.
             Samples: inlets that replace what has left (dem2d_inlet_desc.replaced).
             dem2d_world_grow takes a time step of its own, near the safe one, and gives the world
             its own back: a tenth of the steps.
             Examples: periodic_biaxial; mu_of_i also with real grains; hopper refills itself.
+            Mended: a step is refused when a caller's law gives a viscous part that is not finite; the
+            next one was, and a snapshot could not be loaded.
             Mended in a cell: the list read outside of its arrays when the discs of a contact were
             more than one unit of length apart a step later; a change of groups after which a
             particle no longer meets itself kept its contacts with its images; a snapshot taken
