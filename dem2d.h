@@ -30185,8 +30185,8 @@ DEM2D_API dem2d_result dem2d_world_write_csv(const dem2d_world *world, const dem
             dem2d_world_grow takes a time step of its own, near the safe one, and gives the world
             its own back: a tenth of the steps.
             Examples: periodic_biaxial; mu_of_i also with real grains; hopper refills itself.
-            Mended: a step is refused when a caller's law gives a viscous part that is not finite; the
-            next one was, and a snapshot could not be loaded.
+            Mended: a step is refused when a caller's law gives a viscous part that is not finite;
+            the next one was, and a snapshot could not be loaded.
             Mended in a cell: the list read outside of its arrays when the discs of a contact were
             more than one unit of length apart a step later; a change of groups after which a
             particle no longer meets itself kept its contacts with its images; a snapshot taken
