@@ -1422,7 +1422,8 @@ typedef void dem2d_loads_fn(void *user, dem2d_world *world);
 /// walls where both directions are periodic (OUT_OF_RANGE). The cell may be small: a particle can
 /// touch several images of another one, and images of itself. Centroids are kept in the cell:
 /// positions that you give are moved by whole cell vectors. Queries of space see all images, and
-/// tell which one they have found.
+/// tell which one they have found. OUT_OF_RANGE if b leans by more than 1024 a.x, or if one side is
+/// above 2^30 times the other.
 typedef struct dem2d_cell {
     dem2d_vec a;      ///< m, along x: a.x >= 0, a.y = 0; zero: not periodic along x
     dem2d_vec b;      ///< m, b.y > 0; zero: not periodic along b
@@ -1456,9 +1457,9 @@ typedef struct dem2d_cell {
 /// stress is not reached: it stays true where a stress can't be held, as a shear stress above the
 /// friction of the packing, or a tension. A cell that is narrower or lower than an eighth of the
 /// greatest radius may not shrink further: steps are refused with OUT_OF_RANGE until it is deformed
-/// in another way. So a cell ends whose particles do not meet. A sample with a stress of 0 in one
-/// direction and a pressure in the other spreads: nothing holds it there. The control takes energy
-/// out of the cell.
+/// in another way; likewise where a side above 2^29 times the other one grows. So a cell ends whose
+/// particles do not meet. A sample with a stress of 0 in one direction and a pressure in the other
+/// spreads: nothing holds it there. The control takes energy out of the cell.
 typedef struct dem2d_deformation_desc {
     double xx;        ///< 1/s, rate of extension along x; 0 where xx is held
     double xy;        ///< 1/s, simple shear: change of the velocity along x with y; 0 if held
@@ -13890,6 +13891,9 @@ static inline dem2d_vec dem2di_cell_shift(const dem2d_cell *cell, int along_a, i
 /* No position is more cells away: whole numbers stay exact in doubles, and their sums in ints. */
 #define DEM2DI_CELLS_MOST 1073741824.0
 
+/* Cells along a box at most, and along b as it leans: a million images of each particle. */
+#define DEM2DI_CELLS_ALONG 1024
+
 /* Points by fractions s, t of the cell vectors; 0 along one that is zero. */
 typedef struct dem2di_fractions {
     dem2d_vec origin;
@@ -13922,6 +13926,12 @@ static dem2d_vec dem2di_wrapped(const dem2d_world *world, dem2d_vec x) {
     return dem2di_sub(x, dem2di_cell_shift(&world->cell, out[0], out[1]));
 }
 
+/* A side so much greater than the other that its rounding errors come near to that one: positions
+   along it would be many cells. */
+static bool dem2di_cell_long(double width, double height, double most) {
+    return width > 0 && height > 0 && (width / height > most || height / width > most);
+}
+
 static dem2d_result dem2di_check_cell(const dem2d_env *env, const dem2d_cell *cell) {
     const bool along = cell->a.y == 0 && cell->a.x >= 0;
     const bool up = cell->b.y > 0 || (cell->b.x == 0 && cell->b.y == 0);
@@ -13931,6 +13941,14 @@ static dem2d_result dem2di_check_cell(const dem2d_env *env, const dem2d_cell *ce
     if (!up)
         return dem2di_fail(env, DEM2D_OUT_OF_RANGE, -1, "cell.b = (%g, %g): y is not above 0",
                            cell->b.x, cell->b.y);
+    if (cell->a.x > 0 && fabs(cell->b.x) > DEM2DI_CELLS_ALONG * cell->a.x)
+        return dem2di_fail(env, DEM2D_OUT_OF_RANGE, -1,
+                           "cell.b = (%g, %g) leans by more than 1024 times a.x = %g", cell->b.x,
+                           cell->b.y, cell->a.x);
+    if (dem2di_cell_long(cell->a.x, cell->b.y, DEM2DI_CELLS_MOST))
+        return dem2di_fail(env, DEM2D_OUT_OF_RANGE, -1,
+                           "cell of %g by %g: one side is above 2^30 times the other", cell->a.x,
+                           cell->b.y);
     if (dem2di_finite(1 / (cell->a.x > 0 ? cell->a.x : 1)) &&
         dem2di_finite(1 / (cell->b.y > 0 ? cell->b.y : 1)))
         return DEM2D_OK;
@@ -14127,9 +14145,6 @@ static bool dem2di_shifts_next(dem2di_shifts *at) {
 static dem2d_vec dem2di_shifts_point(const dem2di_shifts *at) {
     return dem2di_add(at->x, dem2di_cell_shift(at->cell, at->along_a, at->along_b));
 }
-
-/* Cells along a box at most: a million images of each particle. */
-#define DEM2DI_CELLS_ALONG 1024
 
 /* A box in which images are looked for: not too many, and none too far away for whole numbers. */
 static dem2d_result dem2di_check_cells(const dem2d_env *env, const char *name,
@@ -22113,6 +22128,11 @@ static dem2d_result dem2di_check_flow(const dem2d_world *world) {
         return dem2di_fail(&world->env, DEM2D_STATE, -1,
                            "the cell of %g by %g would get an area that is not finite, or 0", width,
                            height);
+    if (dem2di_cell_long(width, height, DEM2DI_CELLS_MOST / 2) &&
+        (width > height ? xx > yy : yy > xx))
+        return dem2di_fail(&world->env, DEM2D_OUT_OF_RANGE, -1,
+                           "the cell of %g by %g grows: one side is above 2^29 times the other",
+                           width, height);
     for (int i = 0; i < world->body_count && (xx < 0 || yy < 0); i++)
         if (world->bodies[i].shape_index >= 0) radius = dem2di_max(radius, world->now[i].radius);
     radius *= DEM2DI_CELL_LEAST;
@@ -30176,8 +30196,9 @@ DEM2D_API dem2d_result dem2d_world_write_csv(const dem2d_world *world, const dem
             the periods of the cell, dem2d_world_remove_in and dem2d_world_flow.
             dem2d_world_fill and dem2d_world_feed work in a cell; a box without extent is all of it.
             A cell whose held stress nothing resists ends with a result: it shrank until the memory
-            was used up. When a sheared cell takes another vector b, the step no longer costs the
-            square of the number of particles.
+            was used up, or grew long until a step took for ever. Cells with a side above 2^30 times
+            the other, or with a b that leans by more than 1024 a, are refused. When a sheared cell
+            takes another vector b, the step no longer costs the square of the number of particles.
             Files for ParaView have the images that cross the border, with image, shift_a and
             shift_b, and the border itself (DEM2D_VTP_CELL); SVG pictures draw cells with one
             period.

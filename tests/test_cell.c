@@ -544,6 +544,8 @@ static void test_refused(void **state) {
     expect_refused_cell(vec(1, 0), vec(0, -1), "b");
     expect_refused_cell(vec(1, 0), vec(1, 0), "b");
     expect_refused_cell(vec(1, 0), vec(0, 1e-320), "cell");
+    expect_refused_cell(vec(1, 0), vec(-1025, 1), "leans");
+    expect_refused_cell(vec(2, 0), vec(0, 2.2e9), "2^30");
     for (int k = 0; k < 3; k++) { /* periodic along x, along b, along both */
         const dem2d_material_desc soft = soft_desc(false);
         dem2d_world_desc desc = {0};

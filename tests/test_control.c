@@ -274,6 +274,34 @@ static void test_endless(void **state) {
     close_scene(&p.s);
 }
 
+/* A tension along y alone makes the cell long until a step is refused. It is saved and loaded, and
+   a pressure makes it short again. */
+static void test_stretched(void **state) {
+    (void)state;
+    static cell p;
+    test_env env;
+    dem2d_world_desc desc = {0};
+    dem2d_deformation_desc by = {0};
+    int done;
+    test_env_init(&env);
+    desc.env = &env.env;
+    fill(&p, &desc, 1e3, 0.4, 0.2, true);
+    by.hold_yy = true, by.stress_yy = -P, by.max_rate = 0.1 / p.dt;
+    deform(&p, &by);
+    assert_result(dem2d_world_step(p.s.world, 5000, &done), DEM2D_OUT_OF_RANGE);
+    assert_logged(&env, DEM2D_OUT_OF_RANGE, -1, "2^29");
+    const dem2d_cell_info info = cell_of(&p);
+    assert_between(info.cell.b.y / info.cell.a.x, 536870912.0, 1.11 * 536870912.0);
+    scene_bytes bytes = scene_save(p.s.world);
+    const scene loaded = scene_load(&p.s, &bytes);
+    assert_true(dem2d_world_hash(loaded.world) == dem2d_world_hash(p.s.world));
+    by.stress_yy = P;
+    assert_ok(dem2d_world_deform(loaded.world, &by));
+    step(&loaded, 100);
+    close_scene(&loaded), close_scene(&p.s), free(bytes.bytes);
+    assert_clean(&env);
+}
+
 /* A shear stress above what friction bears: it flows at the greatest rate, and says so. */
 static void test_too_much_shear(void **state) {
     (void)state;
@@ -365,7 +393,7 @@ int main(void) {
         cmocka_unit_test(test_shear_stress),    cmocka_unit_test(test_limited),
         cmocka_unit_test(test_refused),         cmocka_unit_test(test_bits),
         cmocka_unit_test(test_nothing_resists), cmocka_unit_test(test_endless),
-        cmocka_unit_test(test_too_much_shear),
+        cmocka_unit_test(test_stretched),       cmocka_unit_test(test_too_much_shear),
     };
     return cmocka_run_group_tests_name("stress control of a periodic cell", tests, NULL, NULL);
 }
