@@ -1371,7 +1371,7 @@ typedef struct dem2d_law_batch {
 /// A contact law: writes the forces of all rows. Each closed contact is in one call of each force
 /// pass, by the threads of parallel_for; results must not depend on which contacts share a call.
 /// When the shapes separate, force and state are dropped. A step is refused (DEM2D_STATE) when a
-/// force, a moment, or a viscous part of them is not finite.
+/// force, a moment, or the viscous part of one is not finite.
 typedef void dem2d_law_fn(void *user, dem2d_law_batch *batch);
 
 /// The built-in law for all rows of a batch, for a law that begins or ends with it: springs,
@@ -2224,14 +2224,14 @@ typedef struct dem2d_hit {
 /// with the logarithm of the number of these. All half-planes are looked at. Results do not depend
 /// on the order in memory.
 ///
-/// In a periodic cell the queries see all images, however far from the cell: each is a find of its
-/// own, whose shift says which it is. A box that is larger than the cell finds some particles
-/// several times, and a particle can overlap images of itself. Images of one particle are sorted by
-/// shift[1], then shift[0]. Half-planes have no images: dem2d_world_wall_overlaps finds a particle
-/// once at a half-plane. The time also grows with the number of cells that a region or ray crosses.
-/// A ray needs a length in a cell. Errors: NULL_ARGUMENT, NOT_FINITE, OUT_OF_RANGE (upper below
-/// lower, capacity below 0, a region that crosses 2^30 cells or is 2^30 cells away, a ray without a
-/// length in a cell), OUT_OF_MEMORY.
+/// In a periodic cell the queries see all images, however far from the cell. Each image has its own
+/// entry in found, and its shift tells which image it is. A box that is larger than the cell finds
+/// some particles several times, and a particle can overlap images of itself. Images of one
+/// particle are sorted by shift[1], then shift[0]. Half-planes have no images:
+/// dem2d_world_wall_overlaps finds a particle once at a half-plane. The time also grows with the
+/// number of cells that a region or ray crosses. A ray needs a length in a cell. Errors:
+/// NULL_ARGUMENT, NOT_FINITE, OUT_OF_RANGE (upper below lower, capacity below 0, a region that
+/// crosses 2^30 cells or is 2^30 cells away, a ray without a length in a cell), OUT_OF_MEMORY.
 DEM2D_API dem2d_result dem2d_world_query_box(dem2d_world *world, const dem2d_box *box,
                                              const dem2d_query_desc *desc, dem2d_found *found,
                                              int capacity, int *count);
@@ -2507,8 +2507,8 @@ typedef struct dem2d_filling {
 /// walls that they meet, in a periodic cell also with images: contacts are evaluated exactly. All
 /// grains are added, or none (NOT_REACHED, the log tells the number and the solid fraction that
 /// were reached), unless desc->partial. ids (may be NULL if capacity is 0) gets the first
-/// `capacity` ids, in the order of the grains given or drawn; generation 0 for a grain that found
-/// no room. Errors: also those of dem2d_world_add_particle, of dem2d_world_draw, and of
+/// `capacity` ids, in the order of the grains given or drawn. The id of a grain that had no room
+/// has generation 0. Errors: also those of dem2d_world_add_particle, of dem2d_world_draw, and of
 /// dem2d_outline_measure; OUT_OF_RANGE (a region that is greater than the periodic cell along x or
 /// y).
 DEM2D_API dem2d_result dem2d_world_fill(dem2d_world *world, const dem2d_fill_desc *desc,
@@ -2842,8 +2842,8 @@ DEM2D_API dem2d_result dem2d_world_write_csv(const dem2d_world *world, const dem
 #define DEM2DI_PRINTF(text, first)
 #endif
 
-/* For loops that are written once and compiled for several sets of features. Not without
-   optimisation: g++ would then add tables for exceptions, which callbacks might throw. */
+/* For loops that are written once and compiled for several sets of features. Only with
+   optimisation: without it, g++ would add tables for the exceptions that callbacks might throw. */
 #if defined(__GNUC__) && defined(__OPTIMIZE__)
 #define DEM2DI_INLINE inline __attribute__((always_inline))
 #else
@@ -2861,8 +2861,8 @@ DEM2D_API dem2d_result dem2d_world_write_csv(const dem2d_world *world, const dem
 #define DEM2DI_VECTORS_END
 #endif
 
-/* Arrays of a function that have nothing in common. gcc forgets it where it inlines: before a loop
-   over them, whose iterations then do not depend on each other. */
+/* APART: arrays of a function that do not overlap. gcc forgets this where it inlines the function;
+   INDEPENDENT before a loop says that its iterations do not depend on each other. */
 #if defined(__clang__)
 #define DEM2DI_APART __restrict
 #define DEM2DI_INDEPENDENT
@@ -2993,10 +2993,14 @@ static bool dem2di_vec_finite(dem2d_vec a) {
     return dem2di_finite(a.x) && dem2di_finite(a.y);
 }
 
+/* Least square of a length whose parts lose nothing to underflow: a part that is lost is below
+   DBL_MIN = 2e-308, and DBL_EPSILON 1e-280 = 2e-296. */
+#define DEM2DI_LEAST_SQUARE 1e-280
+
 /* v / |v| for any finite v but 0, without intermediate overflow or underflow; else false. */
 static bool dem2di_unit(dem2d_vec v, dem2d_vec *unit) {
     double square = dem2di_dot(v, v);
-    if (square > 1e-280 && square < 1e280) {
+    if (square > DEM2DI_LEAST_SQUARE && square < 1 / DEM2DI_LEAST_SQUARE) {
         double length = sqrt(square);
         *unit = dem2di_vec(v.x / length, v.y / length);
         return true;
@@ -9729,9 +9733,9 @@ typedef struct dem2di_corners {
     double corner_x[DEM2DI_BATCH], corner_y[DEM2DI_BATCH];
     double before_x[DEM2DI_BATCH], before_y[DEM2DI_BATCH]; /* the neighbours of the corner */
     double after_x[DEM2DI_BATCH], after_y[DEM2DI_BATCH];
-    double leading_x[DEM2DI_BATCH], leading_y[DEM2DI_BATCH]; /* tangents before and after it */
+    double leading_x[DEM2DI_BATCH], leading_y[DEM2DI_BATCH]; /* tangents of its two edges */
     double leaving_x[DEM2DI_BATCH], leaving_y[DEM2DI_BATCH];
-    double radius_a[DEM2DI_BATCH], radius_b[DEM2DI_BATCH]; /* by which the cores are grown */
+    double radius_a[DEM2DI_BATCH], radius_b[DEM2DI_BATCH]; /* of the rounded corners */
     double inner[DEM2DI_BATCH];                            /* sum of the inscribed radii */
 } dem2di_corners;
 
@@ -12809,8 +12813,8 @@ typedef struct dem2di_block_result {
     int64_t spread;         /* sum of the distances in memory of the partners found */
     int64_t images;         /* that may be needed for particles that have left the cell */
     int changes;            /* contacts that close or open */
-    /* Of a block of contacts of circles: the first block of particles that has no contacts of
-       circles behind it; of a block of particles: the next one of the same. -1: none. */
+    /* Some blocks of particles have their last contact of circles in this block of contacts:
+       complete is the first of them. Of a block of particles, next is the next one. -1: none. */
     int complete, next;
 } dem2di_block_result;
 
@@ -13046,8 +13050,8 @@ struct dem2d_world {
     bool wrap_due;                      /* no memory was left to move particles into the cell */
     int image_first, image_count;       /* slots of images: from the first on, so many */
     dem2di_image *images, *images_next; /* those, and what the search for the next list finds */
-    int *images_of; /* of each particle: 1 + the number of one of its images, or 0; that has the
-                       number of the next */
+    int *images_of; /* of each particle: the number of its first image + 1; 0: it has none. The
+                       others follow by dem2di_image.next */
 
     dem2di_list list;
     dem2di_touch *touches;                 /* of contacts */
@@ -13926,8 +13930,8 @@ static dem2d_vec dem2di_wrapped(const dem2d_world *world, dem2d_vec x) {
     return dem2di_sub(x, dem2di_cell_shift(&world->cell, out[0], out[1]));
 }
 
-/* A side so much greater than the other that its rounding errors come near to that one: positions
-   along it would be many cells. */
+/* Is one side more than `most` times the other? From DEM2DI_CELLS_MOST on, the longer side is more
+   cells of the shorter one than ints can count. */
 static bool dem2di_cell_long(double width, double height, double most) {
     return width > 0 && height > 0 && (width / height > most || height / width > most);
 }
@@ -14999,7 +15003,7 @@ static double dem2di_equivalent(const dem2d_world *world, int slot) {
  */
 static DEM2DI_INLINE dem2d_vec dem2di_disc_line(const dem2di_state *a, const dem2di_state *b) {
     dem2d_vec d = dem2di_centre_line(a->x, b->x), u;
-    if (dem2di_dot(d, d) > 1e-280) return d;
+    if (dem2di_dot(d, d) > DEM2DI_LEAST_SQUARE) return d;
     return dem2di_scale(dem2di_unit(d, &u) ? u : dem2di_vec(1, 0), 1e-139);
 }
 
@@ -17961,7 +17965,7 @@ static void dem2di_find_lost(const dem2di_build *build, dem2di_finds *finds) {
     for (int i = build->all.strayed ? 0 : list->pairs; i < list->count; i++) {
         int a = list->keys[i].a, b = list->keys[i].b;
         const double depth = list->contacts.depth[i];
-        if (!(depth > 0 || (i >= list->pairs && depth < -1))) continue; /* of pairs a gap */
+        if (!(depth > 0 || (i >= list->pairs && depth < -1))) continue; /* of pairs: gaps */
         const dem2di_disc *one = dem2di_disc_at(build, a);
         if (i >= list->pairs) {
             if (!dem2di_number_is_near(world, one, b)) dem2di_find(finds, ~a, b);
@@ -18954,7 +18958,8 @@ DEM2DI_AVX2_INLINE void dem2di_fours_fetch(const dem2di_state *now, const dem2di
         dem2di_four_put(batch->vy + k, s[1]);
         dem2di_four_put(batch->wa + k, s[2]);
         dem2di_four_put(batch->radius_a + k, s[3]);
-        dem2di_four square = p[0] * p[0] + p[1] * p[1], least = square - square + 1e-280;
+        dem2di_four square = p[0] * p[0] + p[1] * p[1];
+        dem2di_four least = square - square + DEM2DI_LEAST_SQUARE;
         dem2di_four_bits far = (dem2di_four_bits)(square > least);
         if ((far[0] & far[1] & far[2] & far[3]) != 0) continue;
         for (int j = k; j < k + 4; j++) { /* as in dem2di_disc_line: nearly never */
