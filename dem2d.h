@@ -26700,7 +26700,10 @@ static dem2di_shifts dem2di_filler_images(const dem2di_filler *filler, int i, co
 
 /* Is grain i, or one of its images, nearer than the gap to one that has a place, or to itself? */
 static bool dem2di_filler_blocked(const dem2di_filler *filler, int i) {
+    const dem2d_cell *cell = &filler->world->cell;
     dem2d_pose image = filler->poses[i];
+    if (cell->a.x > 0 && filler->gap >= cell->a.x) return true; /* of itself, from its image */
+    if (cell->b.y > 0 && filler->gap >= dem2di_length(cell->b)) return true;
     const dem2d_box own = {image.position, image.position};
     double reach = dem2di_filler_radius(filler, i) + filler->gap;
     dem2di_shifts at = dem2di_filler_images(filler, i, &filler->area.box, reach + filler->cell / 2);

@@ -856,7 +856,7 @@ static void test_fill_in_cell(void **state) {
 }
 
 /* What a cell refuses, and a box of one period: all of each grain is inside. A grain that would
-   overlap its own image finds no room. */
+   overlap its own image finds no room, nor one with a gap as wide as the cell. */
 static void test_fill_refused(void **state) {
     test_env env;
     (void)state;
@@ -886,6 +886,8 @@ static void test_fill_refused(void **state) {
     grains[0].scale = 0.26; /* 1.04 long, in a cell 1 high */
     grains[0].angle = (double)TEST_PI / 2;
     fill.count = 1, fill.keep_angles = true, fill.region.box.lower = fill.region.box.upper;
+    assert_result(dem2d_world_fill(b.s.world, &fill, NULL, 0, &done), DEM2D_NOT_REACHED);
+    fill.gap = 1e6, grains[0].scale = 0.1; /* of a million cells */
     assert_result(dem2d_world_fill(b.s.world, &fill, NULL, 0, &done), DEM2D_NOT_REACHED);
     close_scene(&b.s);
     assert_clean(&env);
