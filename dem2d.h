@@ -13913,13 +13913,30 @@ static dem2di_fractions dem2di_fractions_make(const dem2d_cell *cell) {
     return f;
 }
 
+static inline dem2d_vec dem2di_fractions_at(const dem2di_fractions *f, dem2d_vec x) {
+    const double t = (x.y - f->origin.y) * f->per_y;
+    return dem2di_vec((x.x - f->origin.x) * f->per_x - t * f->slope, t);
+}
+
 /* Whole cells from the cell to the one that a point is in; false when it is in the cell. */
 static inline bool dem2di_cells_out(const dem2di_fractions *f, dem2d_vec x, int out[2]) {
-    double t = (x.y - f->origin.y) * f->per_y, s = (x.x - f->origin.x) * f->per_x - t * f->slope;
-    if (s >= 0 && s < 1 && t >= 0 && t < 1) return false;
-    out[0] = (int)dem2di_max(-DEM2DI_CELLS_MOST, dem2di_min(DEM2DI_CELLS_MOST, floor(s)));
-    out[1] = (int)dem2di_max(-DEM2DI_CELLS_MOST, dem2di_min(DEM2DI_CELLS_MOST, floor(t)));
+    const dem2d_vec at = dem2di_fractions_at(f, x);
+    if (at.x >= 0 && at.x < 1 && at.y >= 0 && at.y < 1) return false;
+    out[0] = (int)dem2di_max(-DEM2DI_CELLS_MOST, dem2di_min(DEM2DI_CELLS_MOST, floor(at.x)));
+    out[1] = (int)dem2di_max(-DEM2DI_CELLS_MOST, dem2di_min(DEM2DI_CELLS_MOST, floor(at.y)));
     return true;
+}
+
+/* Is a centre out of the cell? By the least and the greatest fraction: without a branch for each
+   particle. */
+static bool dem2di_some_out(const dem2di_fractions *f, const dem2di_state *states, int count) {
+    double least = 0, most = 0;
+    for (int i = 0; i < count; i++) {
+        const dem2d_vec at = dem2di_fractions_at(f, states[i].x);
+        least = dem2di_min(least, dem2di_min(at.x, at.y));
+        most = dem2di_max(most, dem2di_max(at.x, at.y));
+    }
+    return !(least >= 0 && most < 1);
 }
 
 /* A position in the cell. */
@@ -14321,6 +14338,7 @@ static void dem2di_cells_out_task(void *context, int begin, int end) {
     for (int block = begin; block < end; block++) {
         int i = block * DEM2DI_BLOCK, last = dem2di_block_end(i, DEM2DI_BLOCK, world->body_count);
         int64_t needed = 0;
+        if (!dem2di_some_out(&f, world->now + i, last - i)) i = last;
         for (; i < last; i++)
             if (dem2di_cells_out(&f, world->now[i].x, out) && world->bodies[i].shape_index >= 0)
                 needed += first[i + 1] - first[i] + 1;
@@ -17098,7 +17116,10 @@ static inline int dem2di_adjacency_rank(const dem2d_world *world, int slot, int 
     return wall ? (1 << 30) + key->b : rank;
 }
 
-/* An entry of adjacent on its way, in scratch memory: by this rank, then by the contact. */
+/* An entry of adjacent on its way, in scratch memory: by this rank, then by the contact. That of a
+   pair with an image has a bit for it, which is above the bits of all contacts. */
+#define DEM2DI_ENTRY_IMAGE ((uint64_t)1 << 31)
+
 static inline uint64_t dem2di_entry_make(int rank, int contact) {
     return (uint64_t)rank << 32 | (uint64_t)contact;
 }
@@ -17194,12 +17215,13 @@ static void dem2di_adjacency_sort_task(void *context, int begin, int end) {
             int *run = list->adjacent + list->first[slot];
             int count = list->first[slot + 1] - list->first[slot], as_b = 0;
             const uint64_t own = dem2di_entry_make(world->bodies[slot].rank, 0);
-            for (int i = 0; i < count; i++) as_b += entries[i] < own;
+            uint64_t bits = 0;
+            for (int i = 0; i < count; i++) as_b += entries[i] < own, bits |= entries[i];
             if (count <= DEM2DI_FEW_CONTACTS)
                 dem2di_entries_sort_few(entries, count, run);
             else
                 dem2di_entries_sort_many(entries, count, run);
-            if (world->image_count > 0)
+            if (bits & DEM2DI_ENTRY_IMAGE)
                 as_b = dem2di_adjacency_images(world, slot, run, count, as_b);
             list->own[slot] = list->first[slot] + as_b;
             walls |= dem2di_has_walls(list, slot);
@@ -17225,10 +17247,14 @@ static void dem2di_adjacency_fill_task(void *context, int begin, int end) {
     for (int i = 0; i < list->count; i++) {
         const int a = list->keys[i].a, b = list->keys[i].b;
         if (a < 0) continue;
-        const int rank_b = i < list->pairs ? world->bodies[b].rank : (1 << 30) + b;
-        entries[last[a]++] = dem2di_entry_make(rank_b, i);
-        if (i < list->pairs)
-            entries[last[dem2di_owner(world, b)]++] = dem2di_entry_make(world->bodies[a].rank, i);
+        if (i >= list->pairs) {
+            entries[last[a]++] = dem2di_entry_make((1 << 30) + b, i);
+            continue;
+        }
+        const int owner = dem2di_owner(world, b);
+        const uint64_t image = b == owner ? 0 : DEM2DI_ENTRY_IMAGE;
+        entries[last[a]++] = dem2di_entry_make(world->bodies[b].rank, i) | image;
+        entries[last[owner]++] = dem2di_entry_make(world->bodies[a].rank, i) | image;
     }
 }
 
@@ -17843,6 +17869,15 @@ static bool dem2di_build_lost_images(dem2di_build *build) {
     return true;
 }
 
+/* Is a particle farther than `reach` from where its images may meet the box, in each direction in
+   which there are any? Most are, and their images need not be counted. */
+static inline bool dem2di_is_inner(const dem2d_cell *cell, const dem2d_box *box, dem2d_vec x,
+                                   double reach) {
+    const double across = cell->a.x - reach, along = cell->b.y - reach;
+    return (!(cell->a.x > 0) || (x.x > box->upper.x - across && x.x < box->lower.x + across)) &&
+           (!(cell->b.y > 0) || (x.y > box->upper.y - along && x.y < box->lower.y + along));
+}
+
 /* All images that the list may need, and room for them. Numbers of cells are rounded: the box is a
    little larger. */
 static bool dem2di_build_images(dem2di_build *build) {
@@ -17853,6 +17888,7 @@ static bool dem2di_build_images(dem2di_build *build) {
         const double far = dem2di_size_of(grid->box.lower) + dem2di_size_of(grid->box.upper);
         const double reach = build->reach[i] + grid->size / 2 + DEM2DI_ROUNDOFF * far;
         dem2d_box box = grid->box;
+        if (dem2di_is_inner(&world->cell, &box, world->now[i].x, reach)) continue;
         box.lower = dem2di_sub(box.lower, dem2di_vec(reach, reach));
         box.upper = dem2di_add(box.upper, dem2di_vec(reach, reach));
         dem2di_shifts at = dem2di_shifts_start(&world->cell, world->now[i].x, &box);
@@ -18151,9 +18187,10 @@ static void dem2di_fill_task(void *context, int begin, int end) {
             const int owner = dem2di_build_owner(build, b);
             const bool turned = bodies[a].rank > bodies[owner].rank;
             const dem2di_key key = {turned ? b : a, turned ? a : b};
-            build->old[result->starts[kind]++] =
-                world->periodic ? dem2di_listed_image(build, &key)
-                                : dem2di_listed(world, &key, false, &last[kind]);
+            int listed = -1;
+            if (key.b < build->image_base) listed = dem2di_listed(world, &key, false, &last[kind]);
+            if (listed < 0 && world->image_count > 0) listed = dem2di_listed_image(build, &key);
+            build->old[result->starts[kind]++] = listed;
             finds[k].a = key.a;
             finds[k].b = kind == DEM2DI_OTHERS ? ~key.b : key.b;
             spread += a < owner ? owner - a : a - owner;
