@@ -79,8 +79,9 @@ static void close_bench(bench *b) {
 
 /* OPEN: heaped in a box without a lid. SQUEEZED: without weight, under a lid that holds 100 kPa.
    GAS: flying about in a closed box, area fraction 0.6. CHAIN: heaped on 1,000 segments that go up
-   and down; the neighbour list is made anew every RENEWAL steps, as if the heap moved. */
-typedef enum place { OPEN, SQUEEZED, GAS, CHAIN } place;
+   and down; the neighbour list is made anew every RENEWAL steps, as if the heap moved. CELL: in a
+   periodic cell, shrunk to 100 kPa and then kept. */
+typedef enum place { OPEN, SQUEEZED, GAS, CHAIN, CELL } place;
 
 enum { SEGMENTS = 1000, RENEWAL = 50 };
 #define SEGMENT_LENGTH 0.01 /* m, along x; they rise and fall by half of that */
@@ -109,6 +110,7 @@ static const scene scenes[] = {
     {"mixed", MIXED, OPEN, 800, FRICTION, 0, 0, 0, false},
     {"moving discs", DISCS, GAS, 1000, 0, 0, 0, 0, false},
     {"segments", MIXED, CHAIN, 200, FRICTION, 0, 0, 0, false},
+    {"cell", DISCS, CELL, 800, FRICTION, 0, 0, 0, false},
 };
 
 static const scene *find_scene(const char *name) {
@@ -132,7 +134,7 @@ static void spring_law(void *user, dem2d_law_batch *b) {
     }
 }
 
-/* On a square lattice, in a box that holds them at area fraction 0.6. */
+/* On a square lattice, in a box or cell that holds them at area fraction 0.6. */
 static void lay_gas(bed *b) {
     const int columns = (int)sqrt(b->count);
     double area = 0;
@@ -161,7 +163,8 @@ static void add_chain(bench *b) {
 }
 
 static void add_box(bench *b, place place) {
-    static const bool there[][WALLS] = {{1, 1, 1, 0}, {1, 1, 1, 1}, {1, 1, 1, 1}, {0, 1, 1, 0}};
+    static const bool there[][WALLS] = {
+        {1, 1, 1, 0}, {1, 1, 1, 1}, {1, 1, 1, 1}, {0, 1, 1, 0}, {0, 0, 0, 0}};
     for (int i = 0; i < WALLS; i++) {
         const bool servo = i == LID && place == SQUEEZED;
         if (there[place][i]) add_wall(b, i, servo ? DEM2D_WALL_SERVO : DEM2D_WALL_STILL);
@@ -177,16 +180,18 @@ static void stir(bench *b, double speed) {
 }
 
 static bench open_scene(const scene *s, uint64_t seed) {
-    static const double widths[] = {3.2, 1.3, 2, SEGMENTS * SEGMENT_LENGTH};
+    static const double widths[] = {3.2, 1.3, 2, SEGMENTS * SEGMENT_LENGTH, 2};
+    const bool square = s->place == GAS || s->place == CELL;
     bench b = {0};
     dem2d_world_desc desc = {0};
     desc.time_step = TIME_STEP;
     desc.gravity.y = s->place == OPEN || s->place == CHAIN ? -GRAVITY : 0;
     if (s->law) desc.law = spring_law;
     bed grains = draw_bed(s->grains, s->count, seed, widths[s->place]);
-    if (s->place == GAS) lay_gas(&grains);
+    if (square) lay_gas(&grains);
     b.width = grains.right;
-    b.height = s->place == GAS ? grains.top : grains.grains[s->count - 1].y + 0.06;
+    b.height = square ? grains.top : grains.grains[s->count - 1].y + 0.06;
+    if (s->place == CELL) desc.cell.a.x = b.width, desc.cell.b.y = b.height;
     open_bench(&b, &desc, s->friction);
     dem2d_pair_desc pair = pair_desc(STIFFNESS, s->friction > 0 ? STIFFNESS : 0, s->friction);
     pair.damping_ratio = s->damping_ratio, pair.tangential_damping_ratio = s->tangential;
@@ -220,6 +225,17 @@ static void settle_heap(bench *b, int fall) {
     }
 }
 
+/* Held at a stress, then as large as it is. */
+static void settle_cell(bench *b, int steps) {
+    dem2d_deformation_desc deform = {0};
+    deform.hold_xx = deform.hold_yy = true, deform.stress_xx = deform.stress_yy = 1e5;
+    expect_ok(dem2d_world_deform(b->world, &deform), "stress");
+    rest(b, steps);
+    memset(&deform, 0, sizeof deform);
+    expect_ok(dem2d_world_deform(b->world, &deform), "cell");
+    rest(b, steps / 2);
+}
+
 static void settle(bench *b, const scene *s) {
     enum { MIXING = 2000, SQUEEZING = 25000, HIGH_FALL = 4000, LOW_FALL = 2000 };
     if (s->place == GAS) {
@@ -228,6 +244,9 @@ static void settle(bench *b, const scene *s) {
     } else if (s->place == SQUEEZED) {
         stir(b, 0.5);
         rest(b, SQUEEZING);
+    } else if (s->place == CELL) {
+        stir(b, 0.5);
+        settle_cell(b, SQUEEZING);
     } else {
         settle_heap(b, s->place == OPEN ? HIGH_FALL : LOW_FALL);
     }

@@ -131,6 +131,7 @@ figures() {
     instructions 'mixed' 300
     instructions 'moving discs' 2000
     instructions 'segments' 300
+    instructions 'cell' 500
     text 'text: one pair query' << 'END'
 #define DEM2D_STATIC
 #define DEM2D_IMPLEMENTATION
