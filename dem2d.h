@@ -12330,12 +12330,13 @@ static void dem2di_law_all_dashpots(dem2di_law_rows *rows, double time_step) {
 }
 
 /* What the normal dashpots add to the springs. */
-static void dem2di_law_viscous(dem2di_law_rows *rows) {
-    for (int k = 0; k < rows->count; k++) {
-        const double weight = rows->weight[k];
-        const double spring = rows->stiffness[k] * weight * rows->depth[k];
-        rows->viscous[k] =
-            dem2di_damped(spring, weight * rows->dashpot[k], rows->approach[k]) - spring;
+static void dem2di_law_viscous(dem2d_law_batch *batch) {
+    DEM2DI_INDEPENDENT
+    for (int k = 0; k < batch->count; k++) {
+        const double weight = batch->weight[k];
+        const double spring = batch->stiffness[k] * weight * batch->depth[k];
+        batch->viscous_normal[k] =
+            dem2di_damped(spring, weight * batch->dashpot[k], batch->approach[k]) - spring;
     }
 }
 DEM2DI_VECTORS_END
@@ -18885,7 +18886,9 @@ typedef struct dem2di_batch {
 static void dem2di_batch_begin(const dem2d_world *world, int first, int count,
                                dem2di_batch *batch) {
     const dem2di_contacts *to = &world->list.contacts;
-    const int terms = world->plan.terms;
+    const int terms = world->plan.terms,
+              all = DEM2DI_ROLLING | DEM2DI_TANGENTIAL_DASHPOT | DEM2DI_ROLLING_DASHPOT;
+    const int sliders = terms & all;
     batch->count = count;
     batch->normal_x = to->normal_x + first;
     batch->normal_y = to->normal_y + first;
@@ -18896,7 +18899,7 @@ static void dem2di_batch_begin(const dem2d_world *world, int first, int count,
     batch->moment = batch->unused[0];
     batch->viscous_shear = batch->unused[1];
     batch->viscous_moment = batch->unused[2];
-    if ((terms & ~DEM2DI_DASHPOT) != 0) memset(batch->unused, 0, sizeof batch->unused);
+    if (sliders != 0 && sliders != all) memset(batch->unused, 0, sizeof batch->unused);
     if (terms & DEM2DI_ROLLING) batch->moment = to->moment + first;
     if (terms & DEM2DI_TANGENTIAL_DASHPOT) batch->viscous_shear = to->viscous_shear + first;
     if (terms & DEM2DI_ROLLING_DASHPOT) batch->viscous_moment = to->viscous_moment + first;
@@ -19771,7 +19774,7 @@ static void dem2di_law_ask(const dem2d_world *world, dem2di_law_rows *rows) {
     double *const zero[] = {rows->force,  rows->shear,         rows->moment,
                             rows->energy, rows->viscous_shear, rows->viscous_moment};
     for (int z = 0; z < 6; z++) memset(zero[z], 0, bytes);
-    dem2di_law_viscous(rows);
+    dem2di_law_viscous(&batch);
     world->law(world->law_user, &batch);
     for (int k = 0; k < rows->count; k++) /* a viscous part that is not finite: no step is made */
         if (!dem2di_finite(rows->viscous[k] + rows->viscous_shear[k] + rows->viscous_moment[k]))
@@ -21044,8 +21047,9 @@ static void dem2di_others_range(dem2d_world *world, int begin, int end, dem2di_c
 
 /* --- circles and a caller's law ------------------------------------------------------------------
    A loop over a batch computes what the law reads, of closed contacts and of those that are apart,
-   as in the passes over circles. The rows of closed contacts are moved together, and the law is
-   called once for them. They get the same bits as from dem2di_law_add. */
+   as in the passes over circles. Nothing is moved then: the law is called for each run of closed
+   contacts, with rows that begin where the run does, and writes into the columns of the contacts
+   themselves. Another loop makes the actions. Contacts get the same bits as from dem2di_law_add. */
 
 /* Has a law dashpots? */
 static DEM2DI_INLINE bool dem2di_has_dampers(const dem2d_pair_desc *law) {
@@ -21054,14 +21058,16 @@ static DEM2DI_INLINE bool dem2di_has_dampers(const dem2d_pair_desc *law) {
 }
 
 DEM2DI_VECTORS_BEGIN
-/* Geometry of all contacts of a batch into the columns, and all that the law reads into the rows of
-   the same places. Without dampers the law has no dashpots. */
+/* Geometry of all contacts of a batch into the columns, with the stiffness and the dashpot that the
+   law may change, and all else that it reads into the rows of the same places. Without dampers the
+   law has no dashpots. */
 static DEM2DI_INLINE void
 dem2di_batch_rows(const dem2di_batch *b, const dem2d_pair_desc *law, bool one_law, bool dampers,
                   double *DEM2DI_APART normal_x, double *DEM2DI_APART normal_y,
                   double *DEM2DI_APART depth, const double *DEM2DI_APART shear,
                   const double *DEM2DI_APART viscous_shear, const double *DEM2DI_APART moment,
-                  const double *DEM2DI_APART viscous_moment, dem2di_law_rows *DEM2DI_APART rows) {
+                  const double *DEM2DI_APART viscous_moment, double *DEM2DI_APART stiffness,
+                  double *DEM2DI_APART dashpot, dem2di_law_rows *DEM2DI_APART rows) {
     const int count = b->count;
     const double mu = dem2di_slides(law, law->friction);
     const double mu_r = dem2di_slides(law, law->rolling_friction);
@@ -21080,7 +21086,7 @@ dem2di_batch_rows(const dem2di_batch *b, const dem2d_pair_desc *law, bool one_la
         rows->radius[k] = radius;
         rows->last_shear[k] = shear[k] - viscous_shear[k];
         rows->last_moment[k] = moment[k] - viscous_moment[k];
-        rows->stiffness[k] = kn;
+        stiffness[k] = r.depth > 0 ? kn : 0;
         rows->tangential_stiffness[k] = kt;
         rows->friction[k] = one_law ? mu : b->mu[k];
         rows->rolling_stiffness[k] = rolling;
@@ -21090,11 +21096,12 @@ dem2di_batch_rows(const dem2di_batch *b, const dem2d_pair_desc *law, bool one_la
             const double along = one_law ? law->tangential_damping_ratio : b->zeta_t[k];
             const double spin = one_law ? law->rolling_damping_ratio : b->zeta_r[k];
             const double inverse = b->inverse_a[k] + b->inverse_b[k];
-            rows->dashpot[k] = 2 * normal * sqrt(1 / b->inverse[k] * kn);
+            const double own = 2 * normal * sqrt(1 / b->inverse[k] * kn);
+            dashpot[k] = r.depth > 0 ? own : 0;
             rows->tangential_dashpot[k] = dem2di_batch_dashpot(b, k, kt, along, &r);
             rows->rolling_dashpot[k] = 2 * spin * sqrt(1 / inverse * rolling);
         } else {
-            rows->dashpot[k] = rows->tangential_dashpot[k] = rows->rolling_dashpot[k] = 0;
+            dashpot[k] = rows->tangential_dashpot[k] = rows->rolling_dashpot[k] = 0;
         }
         normal_x[k] = rows->normal_x[k] = r.normal.x;
         normal_y[k] = rows->normal_y[k] = r.normal.y;
@@ -21103,13 +21110,28 @@ dem2di_batch_rows(const dem2di_batch *b, const dem2d_pair_desc *law, bool one_la
     }
 }
 
+/* A force whose viscous part is not finite is not either: no step is made. */
+static DEM2DI_INLINE void dem2di_law_refuse(int count, const double *DEM2DI_APART viscous,
+                                            const double *DEM2DI_APART viscous_shear,
+                                            const double *DEM2DI_APART viscous_moment,
+                                            double *DEM2DI_APART force) {
+    DEM2DI_INDEPENDENT
+    for (int k = 0; k < count; k++) {
+        const double sum = viscous[k] + viscous_shear[k] + viscous_moment[k], made = force[k];
+        force[k] = sum - sum == 0 ? made : HUGE_VAL;
+    }
+}
+
 /* The loop for the laws that the scene has. */
-static DEM2DI_INLINE void dem2di_batch_rows_of(const dem2di_batch *b, const dem2d_pair_desc *law,
-                                               bool one_law, dem2di_law_rows *rows) {
-    const bool dampers = dem2di_has_dampers(law);
+static DEM2DI_INLINE void dem2di_rows_make(const dem2d_world *world, const dem2di_batch *b,
+                                           const dem2d_pair_desc *law, int first,
+                                           dem2di_law_rows *rows) {
+    const dem2di_contacts *to = &world->list.contacts;
+    const bool one_law = world->plan.one_law, dampers = dem2di_has_dampers(law);
 #define DEM2DI_ROWS(one_law, dampers)                                                         \
     dem2di_batch_rows(b, law, one_law, dampers, b->normal_x, b->normal_y, b->depth, b->shear, \
-                      b->viscous_shear, b->moment, b->viscous_moment, rows)
+                      b->viscous_shear, b->moment, b->viscous_moment, to->stiffness + first,  \
+                      to->dashpot + first, rows)
     if (!one_law)
         DEM2DI_ROWS(false, true);
     else if (dampers)
@@ -21119,119 +21141,141 @@ static DEM2DI_INLINE void dem2di_batch_rows_of(const dem2di_batch *b, const dem2
 #undef DEM2DI_ROWS
 }
 
-static void dem2di_batch_rows_plain(const dem2di_batch *batch, const dem2d_pair_desc *law,
-                                    bool one_law, dem2di_law_rows *rows) {
-    dem2di_batch_rows_of(batch, law, one_law, rows);
+/* What acts on the two of each contact, by what the law has written. */
+static DEM2DI_INLINE void dem2di_rows_end(const dem2d_world *world, const dem2di_batch *b,
+                                          int first) {
+    dem2di_law_refuse(b->count, world->list.contacts.viscous + first, b->viscous_shear,
+                      b->viscous_moment, b->force);
+    dem2di_batch_actions(b, true, b->normal_x, b->normal_y, b->depth, b->force, b->shear, b->moment,
+                         b->actions);
+}
+
+static void dem2di_rows_make_plain(const dem2d_world *world, const dem2di_batch *batch,
+                                   const dem2d_pair_desc *law, int first, dem2di_law_rows *rows) {
+    dem2di_rows_make(world, batch, law, first, rows);
+}
+
+static void dem2di_rows_end_plain(const dem2d_world *world, const dem2di_batch *batch, int first) {
+    dem2di_rows_end(world, batch, first);
 }
 
 #if DEM2DI_FOURS
-static DEM2DI_AVX2 void dem2di_batch_rows_fours(const dem2di_batch *batch,
-                                                const dem2d_pair_desc *law, bool one_law,
-                                                dem2di_law_rows *rows) {
-    dem2di_batch_rows_of(batch, law, one_law, rows);
+static DEM2DI_AVX2 void dem2di_rows_make_fours(const dem2d_world *world, const dem2di_batch *batch,
+                                               const dem2d_pair_desc *law, int first,
+                                               dem2di_law_rows *rows) {
+    dem2di_rows_make(world, batch, law, first, rows);
+}
+
+static DEM2DI_AVX2 void dem2di_rows_end_fours(const dem2d_world *world, const dem2di_batch *batch,
+                                              int first) {
+    dem2di_rows_end(world, batch, first);
 }
 #endif
 DEM2DI_VECTORS_END
 
-/* Rows `from` to `count`: that of place at[j] becomes row j. Coefficients that are the same in all
-   rows stay. */
-static void dem2di_rows_pack(dem2di_law_rows *rows, const int at[DEM2DI_BATCH], int from, int count,
-                             bool same) {
-    for (int j = from; j < count; j++) {
-        const int k = at[j];
-        rows->depth[j] = rows->depth[k];
-        rows->approach[j] = rows->approach[k];
-        rows->sliding[j] = rows->sliding[k];
-        rows->spin[j] = rows->spin[k];
-        rows->rolling_stiffness[j] = rows->rolling_stiffness[k];
-        rows->rolling_friction[j] = rows->rolling_friction[k];
-        rows->last_shear[j] = rows->last_shear[k];
-        rows->last_moment[j] = rows->last_moment[k];
-        rows->normal_x[j] = rows->normal_x[k];
-        rows->normal_y[j] = rows->normal_y[k];
-        rows->compression[j] = rows->compression[k];
-        rows->mass[j] = rows->mass[k];
-        rows->radius[j] = rows->radius[k];
-    }
-    for (int j = from; j < count && !same; j++) {
-        const int k = at[j];
-        rows->stiffness[j] = rows->stiffness[k];
-        rows->dashpot[j] = rows->dashpot[k];
-        rows->friction[j] = rows->friction[k];
-        rows->tangential_stiffness[j] = rows->tangential_stiffness[k];
-        rows->tangential_dashpot[j] = rows->tangential_dashpot[k];
-        rows->rolling_dashpot[j] = rows->rolling_dashpot[k];
-    }
-}
-
-/* The rest of the rows of closed contacts of a batch from `first` on, which are at these places. */
-static void dem2di_rows_name(const dem2d_world *world, int first, const int at[DEM2DI_BATCH],
-                             dem2di_law_rows *rows) {
-    const bool one_law = world->plan.one_law;
-    for (int j = 0; j < rows->count; j++) {
-        const int i = first + at[j];
-        rows->contact[j] = i;
-        rows->a[j] = dem2di_particle_id(world, world->list.keys[i].a);
-        rows->b[j] = dem2di_particle_id(world, world->list.keys[i].b);
-        memcpy(rows->state[j], world->list.contacts.state[i].at, sizeof rows->state[j]);
-        if (!one_law) rows->pair[j] = dem2di_law_with(world, i, false);
-    }
-}
-
-/* What the law has made of the rows into the columns of a batch from `first` on. */
-static void dem2di_rows_put(dem2d_world *world, int first, const dem2di_batch *batch,
-                            const dem2di_law_rows *rows, dem2di_count *count) {
+/* The rows of a batch as the law gets them; what it writes is in the columns. */
+static dem2d_law_batch dem2di_rows_batch(const dem2d_world *world, int first,
+                                         const dem2di_batch *batch, dem2di_law_rows *rows) {
     const dem2di_contacts *to = &world->list.contacts;
-    for (int j = 0; j < rows->count; j++) {
-        const int i = rows->contact[j], k = i - first;
-        const dem2d_vec normal = {rows->normal_x[j], rows->normal_y[j]};
-        const double half = rows->depth[j] / 2, moment = rows->moment[j];
-        dem2di_action action;
-        to->force[i] = rows->force[j];
-        to->shear[i] = rows->shear[j];
-        to->moment[i] = moment;
-        to->viscous_shear[i] = rows->viscous_shear[j];
-        to->viscous_moment[i] = rows->viscous_moment[j];
-        dem2di_law_put_callers(world, i, false, j, rows);
-        dem2di_batch_act(&action, normal, rows->force[j], rows->shear[j], batch->radius_a[k] - half,
-                         batch->radius_b[k] - half);
-        action.a -= moment;
-        action.b += moment;
-        const double sum = dem2di_action_size(&action);
-        world->actions[i] = action;
-        count->unsound += !dem2di_finite(sum);
-        if (!world->bounded) count->load = dem2di_max(count->load, sum);
-    }
+    dem2d_law_batch law = dem2di_law_batch_of(world, rows);
+    law.stiffness = to->stiffness + first;
+    law.dashpot = to->dashpot + first;
+    law.normal_force = batch->force;
+    law.viscous_normal = to->viscous + first;
+    law.tangential_force = batch->shear;
+    law.viscous_tangential = batch->viscous_shear;
+    law.moment = batch->moment;
+    law.viscous_moment = batch->viscous_moment;
+    law.energy = to->energy + first;
+    law.state = &to->state[first].at;
+    return law;
 }
 
-/* The closed contacts of a batch from `first` on through the law; the others have no force. */
-static void dem2di_rows_solve(dem2d_world *world, int first, bool same, const dem2di_batch *batch,
-                              dem2di_law_rows *rows, dem2di_count *count) {
-    int at[DEM2DI_BATCH], closed = 0, gap = batch->count;
-    for (int k = batch->count - 1; k >= 0; k--) {
-        if (batch->depth[k] > 0) continue;
-        dem2di_contact_clear(world, first + k);
-        dem2di_no_load(world, first + k);
-        gap = k;
+/* Rows from `by` on. */
+static void dem2di_law_batch_skip(dem2d_law_batch *law, int by) {
+    law->pair += by;
+    law->a += by;
+    law->b += by;
+    law->wall += by;
+    law->point += by;
+    law->normal_x += by;
+    law->normal_y += by;
+    law->depth += by;
+    law->weight += by;
+    law->sign += by;
+    law->compression += by;
+    law->approach += by;
+    law->sliding += by;
+    law->spin += by;
+    law->mass += by;
+    law->radius += by;
+    law->last_tangential += by;
+    law->last_moment += by;
+    law->stiffness += by;
+    law->dashpot += by;
+    law->tangential_stiffness += by;
+    law->tangential_dashpot += by;
+    law->friction += by;
+    law->rolling_stiffness += by;
+    law->rolling_dashpot += by;
+    law->rolling_friction += by;
+    law->normal_force += by;
+    law->viscous_normal += by;
+    law->tangential_force += by;
+    law->viscous_tangential += by;
+    law->moment += by;
+    law->viscous_moment += by;
+    law->energy += by;
+    law->state += by;
+}
+
+/* Who is in the rows of the contacts from `first` on, and in rows from row k on. */
+static void dem2di_rows_name(const dem2d_world *world, int first, int begin, int end,
+                             dem2di_law_rows *rows) {
+    const dem2di_key *keys = world->list.keys + first;
+    for (int k = begin; k < end; k++) {
+        rows->a[k] = dem2di_particle_id(world, keys[k].a);
+        rows->b[k] = dem2di_particle_id(world, keys[k].b);
     }
-    for (int k = 0; k < batch->count; k++) {
-        at[closed] = k;
-        closed += batch->depth[k] > 0 ? 1 : 0;
+    for (int k = begin; k < end && !world->plan.one_law; k++)
+        rows->pair[k] = dem2di_law_with(world, first + k, false);
+}
+
+/* Calls the law for all runs of closed contacts of a batch from `first` on; returns how many
+   contacts are closed. */
+static int dem2di_rows_ask(const dem2d_world *world, int first, bool dampers,
+                           const dem2di_batch *batch, dem2di_law_rows *rows) {
+    const size_t bytes = (size_t)batch->count * sizeof(double);
+    dem2di_two *state = world->list.contacts.state + first;
+    dem2d_law_batch law = dem2di_rows_batch(world, first, batch, rows);
+    double *const zero[] = {law.normal_force,
+                            law.viscous_normal,
+                            law.tangential_force,
+                            law.viscous_tangential,
+                            law.moment,
+                            law.viscous_moment,
+                            law.energy};
+    int closed = 0, at = 0;
+    for (int z = 0; z < 7; z++) memset(zero[z], 0, bytes);
+    for (int begin = 0, end; begin < batch->count; begin = end + 1) {
+        for (end = begin; end < batch->count && batch->depth[end] > 0; end++) continue;
+        if (end < batch->count) state[end].at[0] = state[end].at[1] = 0;
+        if (end == begin) continue;
+        dem2di_law_batch_skip(&law, begin - at);
+        at = begin;
+        law.count = end - begin;
+        dem2di_rows_name(world, first, begin, end, rows);
+        if (dampers) dem2di_law_viscous(&law);
+        world->law(world->law_user, &law);
+        closed += end - begin;
     }
-    rows->count = closed;
-    if (closed == 0) return;
-    dem2di_rows_pack(rows, at, gap, closed, same);
-    dem2di_rows_name(world, first, at, rows);
-    dem2di_law_ask(world, rows);
-    dem2di_rows_put(world, first, batch, rows, count);
-    count->collisions += closed;
-    count->proofs[DEM2D_BY_FORM] += closed;
+    return closed;
 }
 
 /* Contacts of circles from begin to end, for a caller's law. */
 static void dem2di_discs_by_rows(dem2d_world *world, int begin, int end, dem2di_count *count) {
     const dem2d_pair_desc *law = dem2di_law(world, world->plan.material, world->plan.material);
-    const bool same = world->plan.one_law && !dem2di_has_dampers(law);
+    const bool dampers = !world->plan.one_law || dem2di_has_dampers(law);
     dem2di_batch batch;
     dem2di_law_rows rows;
     memset(rows.wall, 0, sizeof rows.wall);
@@ -21244,11 +21288,18 @@ static void dem2di_discs_by_rows(dem2d_world *world, int begin, int end, dem2di_
         dem2di_batch_make(world, first, end, &batch);
 #if DEM2DI_FOURS
         if (world->fours)
-            dem2di_batch_rows_fours(&batch, law, world->plan.one_law, &rows);
+            dem2di_rows_make_fours(world, &batch, law, first, &rows);
         else
 #endif
-            dem2di_batch_rows_plain(&batch, law, world->plan.one_law, &rows);
-        dem2di_rows_solve(world, first, same, &batch, &rows, count);
+            dem2di_rows_make_plain(world, &batch, law, first, &rows);
+        const int closed = dem2di_rows_ask(world, first, dampers, &batch, &rows);
+#if DEM2DI_FOURS
+        if (world->fours)
+            dem2di_rows_end_fours(world, &batch, first);
+        else
+#endif
+            dem2di_rows_end_plain(world, &batch, first);
+        dem2di_batch_end(world, &batch, closed, count);
     }
 }
 
