@@ -12743,6 +12743,16 @@ typedef struct dem2di_touch {
     double speed, impulse, greatest;
 } dem2di_touch;
 
+/* What dashpots and resistance to rolling need of each listed contact and what stays from step to
+   step: it follows from laws, masses and radii, see dem2di_dampers_make. Where terms of the law are
+   not in use, their columns have no room. */
+typedef struct dem2di_dampers {
+    double *normal;                          /* dashpot, N s/m, of a point of weight 1 */
+    double *inverse, *inverse_a, *inverse_b; /* of the tangential one: 1/m, reduced; 1/I of both */
+    double *radius;                          /* m, reduced: against rolling, */
+    double *rolling;                         /* and the dashpot of that, N m s */
+} dem2di_dampers;
+
 /* The listed pairs: of two circles, of two other particles, of particles and parts of walls (in the
    order of the part, then of the particle's rank), and their contacts as the last force pass left
    them. */
@@ -12751,6 +12761,7 @@ typedef struct dem2di_list {
     int discs, pairs, count;  /* where the kinds end */
     dem2di_contacts contacts; /* at the last force pass; a force pass writes the next over them */
     dem2di_contacts last;     /* what they were before a step that looks back: in scratch */
+    dem2di_dampers dampers;
     int *adjacent; /* the contacts of each particle by the partner's rank, walls last: first those
                       of which it is B, as A has the lower rank, then as A */
     int *first;    /* of a slot's in adjacent; bodies + 1 */
@@ -12925,7 +12936,8 @@ typedef enum dem2di_group {
     DEM2DI_WALLS,
     DEM2DI_PARTS,
     DEM2DI_KEYS,
-    DEM2DI_MOMENTS,              /* of all contacts, where plan.terms has DEM2DI_ROLLING, */
+    DEM2DI_DASHPOTS,             /* of all contacts, where plan.terms has anything, */
+    DEM2DI_MOMENTS,              /* DEM2DI_ROLLING, */
     DEM2DI_VISCOUS_SHEARS,       /* DEM2DI_TANGENTIAL_DASHPOT, */
     DEM2DI_VISCOUS_MOMENTS,      /* DEM2DI_ROLLING_DASHPOT, */
     DEM2DI_CALLERS,              /* or DEM2DI_CALLERS_LAW */
@@ -12981,6 +12993,7 @@ struct dem2d_world {
     bool check_time_step;
     bool check_due;    /* an edit since the last check of the time step and the speeds can matter */
     int plan_due;      /* steps for which the features in use are found anew, see dem2di_prepare */
+    bool dampers_due;  /* an edit may have changed what list.dampers follow from */
     bool immovable;    /* some listed pair is: see dem2di_immovable */
     bool list_stale;   /* the list must be built before the next force pass */
     bool list_used_up; /* because something has left its skin */
@@ -13569,9 +13582,15 @@ static const dem2di_column dem2di_columns[] = {
     DEM2DI_CONTACT_COLUMN("depth", KEYS, depth, finite_field),
     DEM2DI_CONTACT_COLUMN("normal_force", KEYS, force, finite_field),
     DEM2DI_CONTACT_COLUMN("shear_force", KEYS, shear, finite_field),
+    DEM2DI_UNSAVED(DASHPOTS, list.dampers.normal, 0),
     DEM2DI_CONTACT_COLUMN("moment", MOMENTS, moment, finite_field),
+    DEM2DI_UNSAVED(MOMENTS, list.dampers.radius, 0),
     DEM2DI_CONTACT_COLUMN("viscous_shear", VISCOUS_SHEARS, viscous_shear, finite_field),
+    DEM2DI_UNSAVED(VISCOUS_SHEARS, list.dampers.inverse, 0),
+    DEM2DI_UNSAVED(VISCOUS_SHEARS, list.dampers.inverse_a, 0),
+    DEM2DI_UNSAVED(VISCOUS_SHEARS, list.dampers.inverse_b, 0),
     DEM2DI_CONTACT_COLUMN("viscous_moment", VISCOUS_MOMENTS, viscous_moment, finite_field),
+    DEM2DI_UNSAVED(VISCOUS_MOMENTS, list.dampers.rolling, 0),
     DEM2DI_CONTACT_COLUMN("law_viscous_force", CALLERS, viscous, any_field),
     DEM2DI_CONTACT_COLUMN("law_stiffness", CALLERS, stiffness, any_field),
     DEM2DI_CONTACT_COLUMN("law_dashpot", CALLERS, dashpot, any_field),
@@ -13732,6 +13751,7 @@ static bool dem2di_reserve_bodies(dem2d_world *world, int count) {
 /* Does the scene need the columns of a group of contacts? */
 static bool dem2di_plan_needs(const dem2di_plan *plan, dem2di_group group) {
     const int terms = plan->terms;
+    if (group == DEM2DI_DASHPOTS) return terms != 0;
     if (group == DEM2DI_MOMENTS) return (terms & DEM2DI_ROLLING) != 0;
     if (group == DEM2DI_VISCOUS_SHEARS) return (terms & DEM2DI_TANGENTIAL_DASHPOT) != 0;
     if (group == DEM2DI_VISCOUS_MOMENTS) return (terms & DEM2DI_ROLLING_DASHPOT) != 0;
@@ -14503,10 +14523,11 @@ DEM2D_API dem2d_result dem2d_world_create(const dem2d_world_desc *desc, dem2d_wo
     return DEM2D_OK;
 }
 
-/* An edit may change the features in use, or bounds of the motion: see dem2di_plan_make for why
-   they are found anew in two steps. */
+/* An edit may change the features in use, bounds of the motion, or dampers: see dem2di_plan_make for
+   why the features are found anew in two steps. */
 static void dem2di_edited(dem2d_world *world) {
     world->plan_due = 2;
+    world->dampers_due = true;
 }
 
 /* Ids: an index in range whose slot is in use with this generation. */
@@ -18635,24 +18656,59 @@ static dem2d_result dem2di_build_list(dem2d_world *world, const dem2di_plan *pla
     return DEM2D_OK;
 }
 
-/* What a step needs beforehand: the features in use, when an edit may have changed them, and the
-   list, when it is used up or when arrays or kinds of pairs change. */
-static dem2d_result dem2di_prepare(dem2d_world *world, bool *listed) {
-    dem2d_result result = dem2di_join(world);
-    if (result != DEM2D_OK) return result;
-    const dem2di_plan plan = world->plan_due > 0 ? dem2di_plan_make(world) : world->plan;
-    *listed = world->list_stale || !dem2di_plan_fits(&plan, &world->plan);
-    if (*listed) return dem2di_build_list(world, &plan);
-    if (world->plan_due == 0) return DEM2D_OK;
-    if (world->plan.friction && !plan.friction) dem2di_loads_clear(world); /* torques of circles */
-    world->plan = plan;
+/* Other features in use, for which the list may stay. */
+static void dem2di_plan_set(dem2d_world *world, const dem2di_plan *plan) {
+    if (world->plan.friction && !plan->friction) dem2di_loads_clear(world); /* torques of circles */
+    world->plan = *plan;
     world->immovable = dem2di_some_immovable(world);
     dem2di_extremes most;
     memset(&most, 0, sizeof most);
     for (int i = 0; i < world->body_count; i++)
         if (world->bodies[i].shape_index >= 0) dem2di_extremes_add(world, i, &most);
-    world->bounded = dem2di_bounded(world, &plan, world->list.count, &most);
-    return DEM2D_OK;
+    world->bounded = dem2di_bounded(world, plan, world->list.count, &most);
+}
+
+/* Columns of dampers for the terms of the law in use. */
+static void dem2di_dampers_task(void *context, int begin, int end) {
+    dem2d_world *world = (dem2d_world *)context;
+    const dem2di_list *list = &world->list;
+    const dem2di_dampers *to = &list->dampers;
+    const int terms = world->plan.terms;
+    int last = dem2di_block_end((end - 1) * DEM2DI_BLOCK, DEM2DI_BLOCK, list->count);
+    for (int i = begin * DEM2DI_BLOCK; i < last; i++) {
+        const dem2di_key *key = &list->keys[i];
+        to->normal[i] = dem2di_pair_dashpot(world, i);
+        if (terms & DEM2DI_TANGENTIAL_DASHPOT) {
+            to->inverse[i] = dem2di_reduced_inverse(world, i);
+            to->inverse_a[i] = world->inverse[key->a].inertia;
+            to->inverse_b[i] = i < list->pairs ? world->inverse[key->b].inertia : 0;
+        }
+        if (terms & DEM2DI_ROLLING) to->radius[i] = dem2di_reduced_radius(world, i);
+        if (terms & DEM2DI_ROLLING_DASHPOT) to->rolling[i] = dem2di_rolling_dashpot(world, i);
+    }
+}
+
+/* Dampers of a new list, or after an edit. No pair is forgotten: the list is stale then. */
+static void dem2di_dampers_make(dem2d_world *world) {
+    if (world->plan.terms != 0)
+        dem2di_run(world, DEM2D_PHASE_LIST, dem2di_blocks(world->list.count, DEM2DI_BLOCK),
+                   dem2di_dampers_task, world);
+    world->dampers_due = false;
+}
+
+/* What a step needs beforehand: the features in use, when an edit may have changed them; the list,
+   when it is used up or when arrays or kinds of pairs change; what follows from both. */
+static dem2d_result dem2di_prepare(dem2d_world *world, bool *listed) {
+    dem2d_result result = dem2di_join(world);
+    if (result != DEM2D_OK) return result;
+    const dem2di_plan plan = world->plan_due > 0 ? dem2di_plan_make(world) : world->plan;
+    *listed = world->list_stale || !dem2di_plan_fits(&plan, &world->plan);
+    if (*listed)
+        result = dem2di_build_list(world, &plan);
+    else if (world->plan_due > 0)
+        dem2di_plan_set(world, &plan);
+    if (result == DEM2D_OK && (*listed || world->dampers_due)) dem2di_dampers_make(world);
+    return result;
 }
 
 /* ============================================================================================
@@ -18872,13 +18928,11 @@ typedef struct dem2di_batch {
     double vx[DEM2DI_BATCH], vy[DEM2DI_BATCH]; /* of B against A */
     double wa[DEM2DI_BATCH], wb[DEM2DI_BATCH];
     double kn[DEM2DI_BATCH], kt[DEM2DI_BATCH], mu[DEM2DI_BATCH];
-    double inverse[DEM2DI_BATCH];                            /* 1/m, reduced */
-    double inverse_a[DEM2DI_BATCH], inverse_b[DEM2DI_BATCH]; /* 1/I */
-    double zeta[DEM2DI_BATCH], mu_r[DEM2DI_BATCH], zeta_t[DEM2DI_BATCH], zeta_r[DEM2DI_BATCH];
-    /* in the columns: the last contacts, then the next; of terms that are not in use in `unused` */
+    double mu_r[DEM2DI_BATCH], zeta_t[DEM2DI_BATCH];
+    /* in the columns: the last contacts, then the next; dampers; not of terms that are not in use */
     double *normal_x, *normal_y, *depth, *force, *shear, *moment, *viscous_shear, *viscous_moment;
+    dem2di_dampers dampers;
     dem2di_action *actions;
-    double unused[3][DEM2DI_BATCH];
     double own[DEM2DI_BATCH]; /* see dem2di_batch_slider */
 } dem2di_batch;
 
@@ -18886,9 +18940,8 @@ typedef struct dem2di_batch {
 static void dem2di_batch_begin(const dem2d_world *world, int first, int count,
                                dem2di_batch *batch) {
     const dem2di_contacts *to = &world->list.contacts;
-    const int terms = world->plan.terms,
-              all = DEM2DI_ROLLING | DEM2DI_TANGENTIAL_DASHPOT | DEM2DI_ROLLING_DASHPOT;
-    const int sliders = terms & all;
+    const dem2di_dampers *from = &world->list.dampers;
+    const int terms = world->plan.terms;
     batch->count = count;
     batch->normal_x = to->normal_x + first;
     batch->normal_y = to->normal_y + first;
@@ -18896,13 +18949,23 @@ static void dem2di_batch_begin(const dem2d_world *world, int first, int count,
     batch->force = to->force + first;
     batch->shear = to->shear + first;
     batch->actions = world->actions + first;
-    batch->moment = batch->unused[0];
-    batch->viscous_shear = batch->unused[1];
-    batch->viscous_moment = batch->unused[2];
-    if (sliders != 0 && sliders != all) memset(batch->unused, 0, sizeof batch->unused);
-    if (terms & DEM2DI_ROLLING) batch->moment = to->moment + first;
-    if (terms & DEM2DI_TANGENTIAL_DASHPOT) batch->viscous_shear = to->viscous_shear + first;
-    if (terms & DEM2DI_ROLLING_DASHPOT) batch->viscous_moment = to->viscous_moment + first;
+    batch->moment = batch->viscous_shear = batch->viscous_moment = NULL;
+    if (terms == 0) return;
+    batch->dampers.normal = from->normal + first;
+    if (terms & DEM2DI_ROLLING) {
+        batch->moment = to->moment + first;
+        batch->dampers.radius = from->radius + first;
+    }
+    if (terms & DEM2DI_TANGENTIAL_DASHPOT) {
+        batch->viscous_shear = to->viscous_shear + first;
+        batch->dampers.inverse = from->inverse + first;
+        batch->dampers.inverse_a = from->inverse_a + first;
+        batch->dampers.inverse_b = from->inverse_b + first;
+    }
+    if (terms & DEM2DI_ROLLING_DASHPOT) {
+        batch->viscous_moment = to->viscous_moment + first;
+        batch->dampers.rolling = from->rolling + first;
+    }
 }
 
 /* Contacts from `first` on of a batch whose contact 0 has these keys: places and motions. */
@@ -18923,25 +18986,12 @@ static DEM2DI_INLINE void dem2di_batch_fetch(const dem2di_state *now, const dem2
     }
 }
 
-/* What the terms of the law need of the two of each contact, from contact `from` of a batch on. */
-static DEM2DI_INLINE void dem2di_batch_inverse(const dem2di_inverse *inverse,
-                                               const dem2di_key *keys, int from,
-                                               dem2di_batch *batch) {
-    for (int k = from; k < batch->count; k++) {
-        const dem2di_inverse *a = &inverse[keys[k].a], *b = &inverse[keys[k].b];
-        batch->inverse[k] = a->mass + b->mass;
-        batch->inverse_a[k] = a->inertia;
-        batch->inverse_b[k] = b->inertia;
-    }
-}
-
 static void dem2di_batch_fetch_plain(const dem2d_world *world, int first, dem2di_batch *batch) {
     const dem2di_key *keys = world->list.keys + first;
     if (world->plan.friction || world->plan.terms != 0)
         dem2di_batch_fetch(world->now, keys, 0, true, batch);
     else
         dem2di_batch_fetch(world->now, keys, 0, false, batch);
-    if (world->plan.terms != 0) dem2di_batch_inverse(world->inverse, keys, 0, batch);
 }
 
 #if DEM2DI_FOURS
@@ -19011,33 +19061,12 @@ DEM2DI_AVX2_INLINE void dem2di_fours_fetch(const dem2di_state *now, const dem2di
     dem2di_batch_fetch(now, keys, k, true, batch);
 }
 
-/* dem2di_batch_inverse for all contacts, four at a time. */
-DEM2DI_AVX2_INLINE void dem2di_fours_inverse(const dem2di_inverse *inverse, const dem2di_key *keys,
-                                             dem2di_batch *batch) {
-    int k = 0;
-    for (; k + 4 <= batch->count; k += 4) {
-        dem2di_four rows[4];
-        for (int j = 0; j < 4; j++) {
-            const dem2di_inverse *a = &inverse[keys[k + j].a], *b = &inverse[keys[k + j].b];
-            rows[j] =
-                DEM2DI_SHUFFLE(dem2di_lanes_at(&a->mass), dem2di_lanes_at(&b->mass), 0, 1, 2, 3);
-        }
-        dem2di_four_turn(rows);
-        dem2di_four_put(batch->inverse + k, rows[0] + rows[2]);
-        dem2di_four_put(batch->inverse_a + k, rows[1]);
-        dem2di_four_put(batch->inverse_b + k, rows[3]);
-    }
-    dem2di_batch_inverse(inverse, keys, k, batch);
-}
-
 /* All that the law needs of the two of each contact. A function of its own, as all that use vectors
    of four and are called in a loop: it leaves the upper halves of the registers zero. Other code
    waits for them where they are not. */
 static DEM2DI_AVX2 void dem2di_batch_fetch_fours(const dem2d_world *world, int first,
                                                  dem2di_batch *batch) {
-    const dem2di_key *keys = world->list.keys + first;
-    dem2di_fours_fetch(world->now, keys, batch);
-    if (world->plan.terms != 0) dem2di_fours_inverse(world->inverse, keys, batch);
+    dem2di_fours_fetch(world->now, world->list.keys + first, batch);
 }
 #endif
 
@@ -19055,10 +19084,8 @@ static void dem2di_batch_laws(const dem2d_world *world, int first, dem2di_batch 
         batch->kt[k] = law->tangential_stiffness;
         batch->mu[k] = dem2di_slides(law, law->friction);
         if (!terms) continue;
-        batch->zeta[k] = law->damping_ratio;
         batch->mu_r[k] = dem2di_slides(law, law->rolling_friction);
         batch->zeta_t[k] = law->tangential_damping_ratio;
-        batch->zeta_r[k] = law->rolling_damping_ratio;
     }
 }
 
@@ -19103,10 +19130,8 @@ static DEM2DI_INLINE dem2di_round dem2di_batch_normal(const dem2di_batch *batch,
     d.y = batch->dy[k];
     dem2di_round r = dem2di_round_make(d, batch->radius_a[k], batch->radius_b[k], kn);
     if (!(terms & DEM2DI_DASHPOT)) return r;
-    double zeta = one_law ? law->damping_ratio : batch->zeta[k];
     double approach = -(r.normal.x * batch->vx[k] + r.normal.y * batch->vy[k]);
-    double dashpot = 2 * zeta * sqrt(1 / batch->inverse[k] * kn);
-    double damped = dem2di_damped(r.force, dashpot, approach);
+    double damped = dem2di_damped(r.force, batch->dampers.normal[k], approach);
     r.force = r.depth > 0 ? damped : 0;
     return r;
 }
@@ -19133,8 +19158,9 @@ static DEM2DI_INLINE double dem2di_batch_slider(dem2di_batch *batch, int k, doub
 /* Coefficient of the tangential dashpot. */
 static DEM2DI_INLINE double dem2di_batch_dashpot(const dem2di_batch *batch, int k, double kt,
                                                  double ratio, const dem2di_round *r) {
-    double inverse = batch->inverse[k] + r->arm_a * r->arm_a * batch->inverse_a[k] +
-                     r->arm_b * r->arm_b * batch->inverse_b[k];
+    const dem2di_dampers *dampers = &batch->dampers;
+    double inverse = dampers->inverse[k] + r->arm_a * r->arm_a * dampers->inverse_a[k] +
+                     r->arm_b * r->arm_b * dampers->inverse_b[k];
     return 2 * ratio * sqrt(1 / inverse * kt);
 }
 
@@ -19192,20 +19218,16 @@ static DEM2DI_INLINE void dem2di_batch_rolling(dem2di_batch *batch, double time_
     DEM2DI_INDEPENDENT
     for (int k = 0; k < count; k++) {
         const double kt = one_law ? law->tangential_stiffness : batch->kt[k];
-        const double radius_a = batch->radius_a[k], radius_b = batch->radius_b[k];
-        const double radius = radius_a * (radius_b / (radius_a + radius_b));
+        const double radius = batch->dampers.radius[k];
         const double limit = (one_law ? law->rolling_friction : batch->mu_r[k]) * radius * force[k];
         const double spin = batch->wb[k] - batch->wa[k], stiffness = kt * radius * radius;
         if (!dashpots) {
             moment[k] = dem2di_held(limit, moment[k] - stiffness * spin * time_step);
             continue;
         }
-        double ratio = one_law ? law->rolling_damping_ratio : batch->zeta_r[k];
-        double inverse = batch->inverse_a[k] + batch->inverse_b[k];
-        double dashpot = 2 * ratio * sqrt(1 / inverse * stiffness);
         double viscous, last = moment[k] - viscous_moment[k];
-        moment[k] = dem2di_batch_slider(batch, k, stiffness, dashpot, spin, time_step, limit, last,
-                                        &viscous);
+        moment[k] = dem2di_batch_slider(batch, k, stiffness, batch->dampers.rolling[k], spin,
+                                        time_step, limit, last, &viscous);
         viscous_moment[k] = viscous;
     }
 }
@@ -19266,7 +19288,7 @@ static DEM2DI_INLINE void dem2di_batch_solve(dem2di_batch *b, double time_step,
 #define DEM2DI_ACTIONS(rolls)                                                              \
     dem2di_batch_actions(b, rolls, b->normal_x, b->normal_y, b->depth, b->force, b->shear, \
                          b->moment, b->actions)
-    if (sliders)
+    if (terms & DEM2DI_TANGENTIAL_DASHPOT)
         DEM2DI_POINTS(true, both);
     else if (terms & DEM2DI_ROLLING)
         DEM2DI_POINTS(true, DEM2DI_DASHPOT | DEM2DI_ROLLING);
@@ -19278,7 +19300,8 @@ static DEM2DI_INLINE void dem2di_batch_solve(dem2di_batch *b, double time_step,
         DEM2DI_POINTS(false, 0);
     if (sliders) {
         dem2di_batch_part(b->count, b->depth, b->shear);
-        dem2di_batch_part(b->count, b->depth, b->viscous_shear);
+        if (terms & DEM2DI_TANGENTIAL_DASHPOT)
+            dem2di_batch_part(b->count, b->depth, b->viscous_shear);
     }
     if (terms & DEM2DI_ROLLING_DASHPOT) {
         DEM2DI_ROLLING_OF(true);
@@ -19558,7 +19581,8 @@ static void dem2di_law_add_terms(const dem2d_world *world, int i, const dem2di_l
                                  dem2di_law_rows *rows) {
     const dem2d_pair_desc *law = dem2di_law_of(world, i);
     const double spin = motion->wb - motion->wa, approach = -dem2di_velocity_n(contact, motion);
-    const double dashpot = law->damping_ratio > 0 ? dem2di_pair_dashpot(world, i) : 0;
+    const dem2di_dampers *dampers = &world->list.dampers;
+    const double dashpot = dampers->normal[i];
     rows->approach[first] = approach;
     rows->dashpot[first] = dashpot;
     rows->tangential_dashpot[first] = dem2di_tangential_dashpot(world, i, &contact->arms);
@@ -19573,15 +19597,14 @@ static void dem2di_law_add_terms(const dem2d_world *world, int i, const dem2di_l
     }
     if (!(world->plan.terms & DEM2DI_ROLLING)) return;
     bool rolls = law->rolling_friction > 0 || world->law != NULL;
-    double radius = rolls ? dem2di_reduced_radius(world, i) : 0;
+    double radius = rolls ? dampers->radius[i] : 0;
     rows->spin[first] = spin;
     rows->rolling_stiffness[first] = dem2di_rolling_stiffness(law, radius);
     rows->rolling_friction[first] = law->rolling_friction * radius;
     rows->last_moment[first] =
         last->from->moment[last->at] - dem2di_viscous_moment_of(world, last->from, last->at);
     if (world->plan.terms & DEM2DI_ROLLING_DASHPOT)
-        rows->rolling_dashpot[first] =
-            rolls && law->rolling_damping_ratio > 0 ? dem2di_rolling_dashpot(world, i) : 0;
+        rows->rolling_dashpot[first] = rolls ? dampers->rolling[i] : 0;
     if (world->law == NULL) return;
     dem2di_law_row_callers(world, i, law, contact, radius, &last->from->state[last->at], first,
                            rows);
@@ -21075,14 +21098,13 @@ dem2di_batch_rows(const dem2di_batch *b, const dem2d_pair_desc *law, bool one_la
     for (int k = 0; k < count; k++) {
         const double kn = one_law ? law->normal_stiffness : b->kn[k];
         const double kt = one_law ? law->tangential_stiffness : b->kt[k];
-        const double radius = b->radius_a[k] * (b->radius_b[k] / (b->radius_a[k] + b->radius_b[k]));
-        const double rolling = kt * radius * radius;
+        const double radius = b->dampers.radius[k], rolling = kt * radius * radius;
         const dem2d_vec last = {normal_x[k], normal_y[k]};
         const dem2di_round r = dem2di_batch_normal(b, k, law, one_law, 0);
         rows->sliding[k] = dem2di_batch_slip(b, k, &r, last, depth[k]);
         rows->approach[k] = -(r.normal.x * b->vx[k] + r.normal.y * b->vy[k]);
         rows->spin[k] = b->wb[k] - b->wa[k];
-        rows->mass[k] = 1 / b->inverse[k];
+        rows->mass[k] = 1 / b->dampers.inverse[k];
         rows->radius[k] = radius;
         rows->last_shear[k] = shear[k] - viscous_shear[k];
         rows->last_moment[k] = moment[k] - viscous_moment[k];
@@ -21092,14 +21114,11 @@ dem2di_batch_rows(const dem2di_batch *b, const dem2d_pair_desc *law, bool one_la
         rows->rolling_stiffness[k] = rolling;
         rows->rolling_friction[k] = (one_law ? mu_r : b->mu_r[k]) * radius;
         if (dampers) {
-            const double normal = one_law ? law->damping_ratio : b->zeta[k];
             const double along = one_law ? law->tangential_damping_ratio : b->zeta_t[k];
-            const double spin = one_law ? law->rolling_damping_ratio : b->zeta_r[k];
-            const double inverse = b->inverse_a[k] + b->inverse_b[k];
-            const double own = 2 * normal * sqrt(1 / b->inverse[k] * kn);
+            const double own = b->dampers.normal[k];
             dashpot[k] = r.depth > 0 ? own : 0;
             rows->tangential_dashpot[k] = dem2di_batch_dashpot(b, k, kt, along, &r);
-            rows->rolling_dashpot[k] = 2 * spin * sqrt(1 / inverse * rolling);
+            rows->rolling_dashpot[k] = b->dampers.rolling[k];
         } else {
             dashpot[k] = rows->tangential_dashpot[k] = rows->rolling_dashpot[k] = 0;
         }
@@ -27558,7 +27577,7 @@ static void dem2di_sizes_multiply(dem2d_world *world, double factor) {
     }
     dem2di_images_make(world);
     world->tree.made = world->sums_fresh = false;
-    world->ledger.edited = true;
+    world->ledger.edited = world->dampers_due = true;
     if (world->list_stale) return;
     world->list_displacement += most;
     world->list_stale = world->list_used_up =
@@ -28784,11 +28803,13 @@ static void dem2di_finish_list(dem2di_loader *loader) {
     size_t step = dem2di_step_cut(w, NULL, list->discs, list->pairs, list->count, &w->plan, false);
     dem2di_load_room(loader, dem2di_adjacency_reserve(w, list->pairs, list->count) &&
                                  dem2di_block_results_reserve(w, list->discs, list->count) &&
+                                 dem2di_list_reserve(w, &w->plan, list->discs, list->count) &&
                                  dem2di_scratch_reserve(w, step) && dem2di_order_names(w));
     if (!dem2di_load_good(loader)) return;
     dem2di_adjacency_make(w);
     dem2di_loads_clear(w);
     w->immovable = dem2di_some_immovable(w);
+    w->dampers_due = true;
 }
 
 static void dem2di_finish_world(dem2di_loader *loader) {
