@@ -309,8 +309,10 @@ HOW TO
                          changes from step to step (drag, magnets, motors, a spring to the mouse) is
                          set by dem2d_world_desc.loads (examples/drag.c, examples/game.c). The work
                          is in the ledger.
-    leave out the walls  dem2d_world_desc.cell makes the world periodic. dem2d_world_stress with the
-                         area of the cell is then the stress of a sample without any border.
+    leave out the walls  dem2d_world_desc.cell makes the world periodic. A rough floor, or bodies in
+                         a stream: chains, which have copies as grains have images. Without walls,
+                         dem2d_world_stress with the area of the cell is the stress of a sample
+                         without any border.
     deform a cell        dem2d_world_deform: shear and compression at given rates, or at stresses
                          that are held, changed at any time; from a gas to a packing: hold xx and
                          yy. Then dem2d_world_get_cell for the cell, its rates and its stress.
@@ -408,7 +410,7 @@ HOW TO
                          they predict; dem2d_world_histogram for polar diagrams.
     look in ParaView     dem2d_world_write_vtp, a file for each part and time; dem2d_pvd_write
                          makes a series of them. Colour grains by any of their arrays. In a
-                         periodic cell the file of particles has images as well (array image:
+                         periodic cell particles and walls have images as well (array image:
                          Threshold takes them out), and the part CELL is the border.
     plot fields          dem2d_grid_write_csv for tables and plots, dem2d_grid_write_vti for
                          ParaView.
@@ -1417,10 +1419,11 @@ typedef dem2d_result dem2d_commit_fn(void *user, dem2d_result result);
 typedef void dem2d_loads_fn(void *user, dem2d_world *world);
 
 /// A periodic cell: what leaves it on one side comes back on the other. All zero: no cell. If only
-/// one vector is not zero, the world is periodic along it, and walls can bound the other direction:
-/// half-planes that are parallel to this vector and do not turn. Other walls are refused, and all
-/// walls where both directions are periodic (OUT_OF_RANGE). The cell may be small: a particle can
-/// touch several images of another one, and images of itself. Centroids are kept in the cell:
+/// one vector is not zero, the world is periodic along it, and half-planes can bound the other
+/// direction: those that are parallel to this vector and do not turn; others are refused, and all
+/// where both directions are periodic (OUT_OF_RANGE). Segments and chains may be anywhere, and move
+/// and turn: see dem2d_wall_desc. The cell may be small: a particle can touch several images of
+/// another one, and images of itself. Centroids are kept in the cell:
 /// positions that you give are moved by whole cell vectors. Queries of space see all images, and
 /// tell which one they have found. OUT_OF_RANGE if b leans by more than 1024 a.x, or if one side is
 /// above 2^30 times the other.
@@ -1459,7 +1462,8 @@ typedef struct dem2d_cell {
 /// greatest radius may not shrink further: steps are refused with OUT_OF_RANGE until it is deformed
 /// in another way; likewise where a side above 2^29 times the other one grows. So a cell ends whose
 /// particles do not meet. A sample with a stress of 0 in one direction and a pressure in the other
-/// spreads: nothing holds it there. The control takes energy out of the cell.
+/// spreads: nothing holds it there. The control takes energy out of the cell. Walls in the cell
+/// keep their velocities in the plane: see dem2d_wall_desc.
 typedef struct dem2d_deformation_desc {
     double xx;        ///< 1/s, rate of extension along x; 0 where xx is held
     double xy;        ///< 1/s, simple shear: change of the velocity along x with y; 0 if held
@@ -1586,6 +1590,17 @@ typedef enum dem2d_wall_mode {
 /// free end, has no contact until it has passed; nor has a grain that is put where the shorter way
 /// out is to the right. Queries of space see both sides.
 ///
+/// In a periodic cell a segment or chain is met at all cell vectors: it has copies there, which
+/// move and turn as it does, and its force and torque are those of all of them. Its place is not
+/// moved into the cell; it may be up to 2^26 cells away (else OUT_OF_RANGE, or STATE when it moves
+/// there). Segments are joined to copies as to others: a chain whose end is its start one cell
+/// vector further is a floor that goes round, without a step at the border. A wall that crosses a
+/// copy of itself as it is set is refused (OUT_OF_RANGE); copies that meet as the wall turns, or as
+/// the cell gets smaller, do not notice each other. The copies of a one-sided wall count as one
+/// wall for grains that pass. While the cell deforms, the wall has its own velocity in the plane,
+/// also 0, and its copies have that of the flow between their places and its own beside it; servo
+/// walls are refused then, and stresses are not held in a cell with walls.
+///
 /// A MOVING wall turns about its pivot, which moves with it: a drum is a closed chain with an
 /// angular_velocity. Its parts are placed by the angle, so that its shape stays the same to
 /// rounding however long it turns. A step may turn it by less than half a turn.
@@ -1642,7 +1657,8 @@ typedef struct dem2d_wall_info {
     bool segment;               ///< from point to end
     dem2d_vec end;              ///< m, now, of the last segment; of a half-plane the point
     dem2d_vec velocity;         ///< m/s, of a servo wall half a step before the point; else as set
-    dem2d_vec force;            ///< N/m, of the particles on the wall in the last force pass
+    dem2d_vec force;            ///< N/m, of the particles on the wall in the last force pass, in a
+                                ///< cell on all its copies
     double length;              ///< m, at the last force pass; 0 when neither length nor spans
     double stress;              ///< Pa, -force . normal / length; 0 when there is no length. Of a
                                 ///< chain the sum over its parts, each with its own normal
@@ -1684,7 +1700,8 @@ typedef struct dem2d_contact_info {
     double moment;           ///< N, on B, against rolling
     int part_a;              ///< part of A in contact: 0, since every particle has one part
     int part_b;              ///< part of B: of a wall by its number, of a particle 0
-    int shift[2]; ///< in a periodic cell: A touches the image of B at shift[0] a + shift[1] b
+    int shift[2]; ///< in a periodic cell: A touches the image of B at shift[0] a + shift[1] b, or
+                  ///< the copy of a segment there
     /// 0: with a particle, a half-plane, or a face of segments, listed with the segment at the foot
     /// of A's centre. 1 or 2: with the vertex at the start or end of a segment where A overlaps two
     /// faces; its force is taken from theirs, which count the vertex twice.
@@ -1823,7 +1840,9 @@ DEM2D_API dem2d_result dem2d_world_set_gravity(dem2d_world *world, dem2d_vec gra
 DEM2D_API dem2d_result dem2d_world_set_damping(dem2d_world *world, double local, double global);
 /// Let the cell deform from the next step on. Errors: NOT_FINITE, OUT_OF_RANGE (a rate times the
 /// time step above 0.1; a rate or stress of a component of the other kind; all held stresses 0; a
-/// world that is not periodic along a and b), OUT_OF_MEMORY.
+/// world that is not periodic along a and b; a held stress in a cell with walls, a servo wall),
+/// OUT_OF_MEMORY. Steps are refused (OUT_OF_RANGE) when the flow parts segments that are joined
+/// across the border.
 DEM2D_API dem2d_result dem2d_world_deform(dem2d_world *world, const dem2d_deformation_desc *desc);
 /// Change the time step (s, > 0) from the next move on.
 DEM2D_API dem2d_result dem2d_world_set_time_step(dem2d_world *world, double time_step);
@@ -2763,7 +2782,9 @@ DEM2D_API dem2d_result dem2d_world_write_svg(const dem2d_world *world, const dem
 /// cell, images of particles are written as well, if their bounding circle meets the box of all
 /// particles and the cell. An image has the values of its particle. Three more arrays tell them
 /// apart: image (1; 0 for the particle), shift_a and shift_b (the image is at shift_a a + shift_b b
-/// from the particle). To count or sum, take those whose image is 0. A contact is written once:
+/// from the particle). To count or sum, take those whose image is 0. Segments of walls have the
+/// same arrays for their copies: those whose boxes meet this box are written. A contact is written
+/// once:
 /// from the centre of A to that of the image of B at shift_a a + shift_b b. desc may be NULL: all
 /// zero.
 DEM2D_API dem2d_result dem2d_world_write_vtp(const dem2d_world *world, const dem2d_vtp_desc *desc,
@@ -12681,6 +12702,10 @@ typedef struct dem2di_wall_joint {
     int partner[2];   /* at start and end: a part of another face that meets this one, or -1 */
     int away[2][2];   /* where they meet: which way along it this face, and the partner's, leaves;
                          0 where it goes on to both sides */
+    /* in a cell, in cell vectors from the places of parts in their walls' states: */
+    int first_at[2];  /* where the lowest part is, seen from this one */
+    int beyond[2][2]; /* where the partners are */
+    int round[2];     /* a face that goes round meets itself after so many; 0: it has ends */
 } dem2di_wall_joint;
 
 /* What a servo wall pushes against: sums over its closed contacts. */
@@ -13367,6 +13392,16 @@ static const dem2di_field dem2di_part_fields[] = {
     DEM2DI_SAVED("along", dem2di_part, along, DEM2DI_VECTOR),
     DEM2DI_SAVED("extent", dem2di_part, extent, DEM2DI_FROM_0)};
 
+/* Ends of segments this near meet, as part of the shorter segment; and vertices of a face are off
+   its line by so much at most: a gap that no grain can tell, far above the rounding of walls that
+   move together. */
+#define DEM2DI_JOINT 1e-6
+
+/* Parts that are joined are at most so many cells apart: sums of such numbers and of shifts of
+   images are ints. */
+#define DEM2DI_WALL_CELLS_MOST (1 << 28)
+#define DEM2DI_WALL_CELLS DEM2DI_WHOLE(-DEM2DI_WALL_CELLS_MOST, DEM2DI_WALL_CELLS_MOST)
+
 static const dem2di_field dem2di_joint_fields[] = {
     DEM2DI_SAVED("start", dem2di_wall_joint, face.start, DEM2DI_VECTOR),
     DEM2DI_SAVED("along", dem2di_wall_joint, face.along, DEM2DI_VECTOR),
@@ -13376,7 +13411,10 @@ static const dem2di_field dem2di_joint_fields[] = {
     DEM2DI_SAVED("from", dem2di_wall_joint, from, DEM2DI_ANY_NUMBER),
     DEM2DI_SAVED("to", dem2di_wall_joint, to, DEM2DI_ANY_NUMBER),
     DEM2DI_SAVED("partners", dem2di_wall_joint, partner, DEM2DI_WHOLE(-1, 1 << 30)),
-    DEM2DI_SAVED("away", dem2di_wall_joint, away, DEM2DI_WHOLE(-1, 1))};
+    DEM2DI_SAVED("away", dem2di_wall_joint, away, DEM2DI_WHOLE(-1, 1)),
+    DEM2DI_SAVED("first_shift", dem2di_wall_joint, first_at, DEM2DI_WALL_CELLS),
+    DEM2DI_SAVED("partner_shifts", dem2di_wall_joint, beyond, DEM2DI_WALL_CELLS),
+    DEM2DI_SAVED("round", dem2di_wall_joint, round, DEM2DI_WALL_CELLS)};
 
 static const dem2di_field dem2di_wall_state_fields[] = {
     DEM2DI_SAVED("point", dem2di_wall_state, point, DEM2DI_VECTOR),
@@ -14043,6 +14081,12 @@ static inline dem2d_vec dem2di_flow_at(const dem2di_flow *flow, dem2d_vec v) {
     return dem2di_vec(flow->xx * v.x + flow->xy * v.y, flow->yy * v.y);
 }
 
+/* Does the flow move two points against each other that are so many cell vectors apart? */
+static bool dem2di_flow_moves(const dem2di_flow *flow, const dem2d_cell *cell, const int shift[2]) {
+    dem2d_vec v = dem2di_flow_at(flow, dem2di_cell_shift(cell, shift[0], shift[1]));
+    return v.x != 0 || v.y != 0;
+}
+
 /* The w of (1 + h L) w = v. */
 static inline dem2d_vec dem2di_flow_solve(const dem2di_flow *flow, double h, dem2d_vec v) {
     dem2d_vec w;
@@ -14116,6 +14160,17 @@ static dem2d_result dem2di_check_deformation(const dem2d_env *env,
     if (!control.holds || control.scale > 0) return DEM2D_OK;
     return dem2di_fail(env, DEM2D_OUT_OF_RANGE, -1,
                        "all stresses that are held are 0: a cell has none without contacts");
+}
+
+/* Walls and the deformation of a cell. Stresses are not held: that of the particles depends on
+   where the walls are, which carry a part. A servo wall does not know of the flow. */
+static dem2d_result dem2di_check_wall_and_flow(const dem2d_env *env, bool servo, bool flows,
+                                               bool holds) {
+    if (holds)
+        return dem2di_fail(env, DEM2D_OUT_OF_RANGE, -1, "a wall in a cell whose stress is held");
+    if (servo && flows)
+        return dem2di_fail(env, DEM2D_OUT_OF_RANGE, -1, "a servo wall in a cell that deforms");
+    return DEM2D_OK;
 }
 
 /* A position that is given, of a particle or of an object like it. */
@@ -14279,6 +14334,12 @@ static bool dem2di_images_reserve(dem2d_world *world, int more) {
     return true;
 }
 
+/* The slot in the key of contact i that may be an image: B of a pair, the particle at a wall. */
+static inline int *dem2di_imaged(const dem2d_world *world, int i) {
+    dem2di_key *key = &world->list.keys[i];
+    return i < world->list.pairs ? &key->b : &key->a;
+}
+
 /* Slots that are at most free between those of particles and of images. */
 static int dem2di_images_gap(int bodies) {
     return 64 + bodies / 4;
@@ -14290,9 +14351,10 @@ static bool dem2di_images_make_way(dem2d_world *world) {
     if (world->image_count == 0 || world->body_count < first) return true;
     if (!dem2di_images_reserve(world, more)) return false;
     world->image_first += more;
-    for (int i = 0; i < world->list.pairs; i++)
-        if (world->list.keys[i].a >= 0 && world->list.keys[i].b >= first)
-            world->list.keys[i].b += more;
+    for (int i = 0; i < world->list.count; i++) {
+        int *slot = dem2di_imaged(world, i);
+        if (world->list.keys[i].a >= 0 && *slot >= first) *slot += more;
+    }
     dem2di_images_make(world);
     return true;
 }
@@ -14338,7 +14400,13 @@ static void dem2di_wrap(dem2d_world *world, int slot, const int out[2]) {
         const int i = list->adjacent[k];
         dem2di_key *key = &list->keys[i];
         int shift[2];
-        if (i >= list->pairs || key->a < 0) continue;
+        if (key->a < 0) continue;
+        if (i >= list->pairs) { /* a half-plane is the same all along the period */
+            const int part = dem2di_part_of(key->b);
+            if (key->a == slot && world->parts[part].extent > 0)
+                key->a = dem2di_image_slot(world, slot, out[0], out[1]);
+            continue;
+        }
         if (k < list->own[slot]) {
             if (key->b == slot) key->b = dem2di_image_slot(world, slot, out[0], out[1]);
             continue;
@@ -14418,6 +14486,7 @@ static void dem2di_cell_commit(dem2d_world *world) {
         for (int k = 0; k < world->image_count; k++)
             world->images[k].shift[0] += lean * world->images[k].shift[1];
         world->list_stale = world->list_stale || lean != 0; /* there will be many images */
+        world->joints_due = world->joints_due || (lean != 0 && world->part_count > 0);
     }
     dem2di_cell_wrap(world);
 }
@@ -14648,6 +14717,14 @@ static void dem2di_law_set(dem2d_world *world, int a, int b, const dem2d_pair_de
 /* The wall whose part a listed contact is with. */
 static inline int dem2di_wall_of(const dem2d_world *world, int contact) {
     return world->parts[dem2di_part_of(world->list.keys[contact].b)].wall;
+}
+
+/* Is the arm of a contact with a wall from the wall's point? It turns about this; in a cell the
+   arms tell which copy of a segment was touched, see dem2di_shift_seen. */
+static inline bool dem2di_has_pivot(const dem2d_world *world, int contact) {
+    const int part = dem2di_part_of(world->list.keys[contact].b);
+    return world->walls[world->parts[part].wall].turns ||
+           (world->periodic && world->parts[part].extent > 0);
 }
 
 /* How the two of a listed contact meet; B is a wall or a particle. */
@@ -15637,6 +15714,11 @@ DEM2D_API dem2d_result dem2d_world_deform(dem2d_world *world, const dem2d_deform
     if ((!still || control.holds) && !(world->cell.a.x > 0 && world->cell.b.y > 0))
         return dem2di_fail(&world->env, DEM2D_OUT_OF_RANGE, -1,
                            "a world that is not periodic along a and b can't be deformed");
+    for (int j = 0; j < world->wall_count && result == DEM2D_OK; j++)
+        if (world->walls[j].alive)
+            result = dem2di_check_wall_and_flow(
+                &world->env, world->walls[j].desc.mode == DEM2D_WALL_SERVO, !still, control.holds);
+    if (result != DEM2D_OK) return result;
     if (starts && !dem2di_group_reserve(world, DEM2DI_MADE, dem2di_slots(world)))
         return dem2di_out_of_memory(world, "velocities");
     if (starts) dem2di_momentum_clear(world);
@@ -15645,6 +15727,7 @@ DEM2D_API dem2d_result dem2d_world_deform(dem2d_world *world, const dem2d_deform
     if (!control.hold[1]) world->flow.xy = desc->xy, world->drift.xy = 0;
     if (!control.hold[2]) world->flow.yy = desc->yy, world->drift.yy = 0;
     world->limited = false;
+    world->joints_due = world->joints_due || world->part_count > 0;
     dem2di_edited(world);
     return DEM2D_OK;
 }
@@ -15791,7 +15874,7 @@ DEM2D_API dem2d_result dem2d_world_get_particle_desc(const dem2d_world *world, d
 
 /* ============================================================================================
    >>walls  Walls: their descs, parts and places
-   uses: config, math, memory, fields, shapes, broad, law, world, objects
+   uses: config, math, memory, fields, shapes, broad, law, world, cell, objects
    ============================================================================================ */
 
 static dem2d_result dem2di_check_spans(const dem2d_world *world, const dem2d_wall_desc *desc) {
@@ -15931,24 +16014,126 @@ static dem2d_result dem2di_check_segment(const dem2d_world *world, const dem2d_w
     return dem2di_fail(env, DEM2D_OUT_OF_RANGE, -1, "end: segment of length %g", length);
 }
 
-/* In a cell a wall is a half-plane along the periodic direction, and stays so. */
-static dem2d_result dem2di_check_wall_in_cell(const dem2d_world *world,
-                                              const dem2d_wall_desc *desc) {
+/* --- walls in a cell ---------------------------------------------------------------------------
+   A wall is there once, where its state puts it, and is met by the images of particles: a particle
+   in the cell meets the copies of the wall at all cell vectors. Forces and torque of a wall are
+   those of all its copies. The key of a contact has the slot of the image, and the part. While the
+   cell deforms a wall has its own velocity in the plane, and a copy at cell vectors H n has L H n
+   beside it. */
+
+/* A half-plane lies along the periodic direction, and stays so: its copies are itself. */
+static dem2d_result dem2di_check_plane_in_cell(const dem2d_world *world,
+                                               const dem2d_wall_desc *desc) {
     const dem2d_cell *cell = &world->cell;
     const dem2d_env *env = &world->env;
     dem2d_vec normal, along = cell->a.x > 0 ? dem2di_vec(1, 0) : cell->b;
-    if (!world->periodic) return DEM2D_OK;
     if (cell->a.x > 0 && cell->b.y > 0)
-        return dem2di_fail(env, DEM2D_OUT_OF_RANGE, -1, "a wall in a cell periodic along a and b");
-    if (desc->points != NULL || desc->segment || desc->angular_velocity != 0)
         return dem2di_fail(env, DEM2D_OUT_OF_RANGE, -1,
-                           "a wall in a cell has an end or turns: only half-planes are possible");
+                           "a half-plane in a cell periodic along a and b");
+    if (desc->angular_velocity != 0)
+        return dem2di_fail(env, DEM2D_OUT_OF_RANGE, -1,
+                           "angular_velocity = %g of a half-plane in a cell",
+                           desc->angular_velocity);
     if (!dem2di_unit(desc->normal, &normal)) return DEM2D_OK; /* an error of all half-planes */
     (void)dem2di_unit(along, &along);
     if (fabs(dem2di_dot(normal, along)) <= 4 * DBL_EPSILON) return DEM2D_OK; /* two roundings */
     return dem2di_fail(env, DEM2D_OUT_OF_RANGE, -1,
                        "normal (%g, %g) of a wall that is not along the periodic direction",
                        desc->normal.x, desc->normal.y);
+}
+
+/* Is a point of a wall so near the cell that the numbers of cells between walls are ints, also when
+   each has moved? */
+static bool dem2di_wall_is_near(const dem2d_world *world, dem2d_vec point) {
+    const dem2di_fractions f = dem2di_fractions_make(&world->cell);
+    int out[2];
+    return !dem2di_cells_out(&f, point, out) ||
+           (abs(out[0]) < DEM2DI_WALL_CELLS_MOST / 4 && abs(out[1]) < DEM2DI_WALL_CELLS_MOST / 4);
+}
+
+static dem2d_result dem2di_check_wall_in_cell(const dem2d_world *world,
+                                              const dem2d_wall_desc *desc) {
+    const int points = desc->points != NULL ? desc->count : desc->segment ? 2 : 0;
+    if (!world->periodic) return DEM2D_OK;
+    for (int k = 0; k < points; k++) {
+        dem2d_vec point = k == 0 ? desc->point : desc->end;
+        if (desc->points != NULL) point = desc->points[k];
+        if (!dem2di_wall_is_near(world, point))
+            return dem2di_fail(&world->env, DEM2D_OUT_OF_RANGE, k,
+                               "a wall at (%g, %g) is 2^26 cells or more away", point.x, point.y);
+    }
+    if (points == 0) return dem2di_check_plane_in_cell(world, desc);
+    return dem2di_check_wall_and_flow(&world->env, desc->mode == DEM2D_WALL_SERVO,
+                                      dem2di_flows(&world->flow),
+                                      dem2di_control_make(&world->control).holds);
+}
+
+/* Have a segment and a copy of one more than an end in common? */
+static bool dem2di_copies_cross(const dem2d_vec a[2], const dem2d_vec b[2]) {
+    const dem2d_vec u = dem2di_sub(a[1], a[0]), v = dem2di_sub(b[1], b[0]);
+    const double one = dem2di_length(u), other = dem2di_length(v);
+    const double near = DEM2DI_JOINT * dem2di_min(one, other);
+    for (int k = 0; k < 4; k++) {
+        const int p = k & 1, q = k >> 1;
+        if (dem2di_length(dem2di_sub(a[p], b[q])) > near) continue;
+        const double turn = p == q ? dem2di_dot(u, v) : -dem2di_dot(u, v); /* both from there */
+        return turn > 0 && fabs(dem2di_cross(u, v)) <= 1e-8 * one * other;
+    }
+    return dem2di_min(a[0].x, a[1].x) <= dem2di_max(b[0].x, b[1].x) &&
+           dem2di_min(b[0].x, b[1].x) <= dem2di_max(a[0].x, a[1].x) && dem2di_segments_cross(a, b);
+}
+
+/* The ends of segment k of a segment or chain. */
+static void dem2di_segment_ends(const dem2d_wall_desc *desc, int k, dem2d_vec ends[2]) {
+    ends[0] = desc->point;
+    ends[1] = desc->end;
+    if (desc->points != NULL) dem2di_chain_ends(desc, k, ends);
+}
+
+/* Does a wall cross its copy that is moved by a vector? */
+static dem2d_result dem2di_check_copy(const dem2d_env *env, const dem2d_wall_desc *desc,
+                                      dem2d_vec way) {
+    const int parts = dem2di_parts_described(desc);
+    for (int i = 0; i < parts; i++)
+        for (int j = 0; j < parts; j++) {
+            dem2d_vec one[2], other[2];
+            dem2di_segment_ends(desc, i, one);
+            dem2di_segment_ends(desc, j, other);
+            for (int k = 0; k < 2; k++) other[k] = dem2di_add(other[k], way);
+            if (!dem2di_copies_cross(one, other)) continue;
+            if (desc->points == NULL)
+                return dem2di_fail(env, DEM2D_OUT_OF_RANGE, -1,
+                                   "end: the segment meets its copy across the border of the cell");
+            return dem2di_fail(env, DEM2D_OUT_OF_RANGE, i,
+                               "points: the segment from points[%d] meets the copy of that from "
+                               "points[%d] across the border of the cell",
+                               i, j);
+        }
+    return DEM2D_OK;
+}
+
+/* A segment or chain that is given must not cross its copies; they may be joined at ends. Of two
+   copies on opposite sides one is enough. */
+static dem2d_result dem2di_check_copies(const dem2d_world *world, const dem2d_wall_desc *desc) {
+    dem2d_result result = DEM2D_OK;
+    if (!world->periodic || (desc->points == NULL && !desc->segment)) return DEM2D_OK;
+    dem2d_box box = {{HUGE_VAL, HUGE_VAL}, {-HUGE_VAL, -HUGE_VAL}};
+    for (int k = 0; k < dem2di_parts_described(desc); k++) {
+        dem2d_vec ends[2];
+        dem2di_segment_ends(desc, k, ends);
+        for (int end = 0; end < 2; end++) dem2di_box_add(&box, ends[end]);
+    }
+    const dem2d_vec from = box.lower, size = dem2di_sub(box.upper, box.lower);
+    const dem2d_vec margin =
+        dem2di_scale(dem2di_vec(size.x + size.y, size.x + size.y), DEM2DI_JOINT);
+    box.lower = dem2di_sub(dem2di_sub(from, size), margin);
+    box.upper = dem2di_add(box.upper, margin);
+    dem2di_shifts at = dem2di_shifts_start(&world->cell, from, &box);
+    while (result == DEM2D_OK && dem2di_shifts_next(&at))
+        if (at.along_b > 0 || (at.along_b == 0 && at.along_a > 0))
+            result = dem2di_check_copy(&world->env, desc,
+                                       dem2di_cell_shift(&world->cell, at.along_a, at.along_b));
+    return result;
 }
 
 static dem2d_result dem2di_check_wall(const dem2d_world *world, const dem2d_wall_desc *desc) {
@@ -15964,12 +16149,13 @@ static dem2d_result dem2di_check_wall(const dem2d_world *world, const dem2d_wall
         return dem2di_fail(env, DEM2D_OUT_OF_RANGE, -1, "angular_velocity = %g of a servo wall",
                            desc->angular_velocity);
     if (desc->points == NULL && desc->count != 0) return dem2di_fail_null(env, "points");
-    result = dem2di_check_wall_in_cell(world, desc);
-    if (result != DEM2D_OK) return result;
     if (desc->points != NULL) {
         result = dem2di_check_chain(world, desc);
+        if (result == DEM2D_OK) result = dem2di_check_wall_in_cell(world, desc);
         return result == DEM2D_OK ? dem2di_check_spans(world, desc) : result;
     }
+    result = dem2di_check_wall_in_cell(world, desc);
+    if (result != DEM2D_OK) return result;
     if (desc->segment) result = dem2di_check_segment(world, desc);
     if (result != DEM2D_OK) return result;
     if (desc->one_sided && !desc->segment)
@@ -16308,6 +16494,7 @@ DEM2D_API dem2d_result dem2d_world_add_wall(dem2d_world *world, const dem2d_wall
                                             dem2d_wall_id *id) {
     if (world == NULL || desc == NULL || id == NULL) return DEM2D_NULL_ARGUMENT;
     dem2d_result result = dem2di_check_wall(world, desc);
+    if (result == DEM2D_OK) result = dem2di_check_copies(world, desc);
     if (result != DEM2D_OK) return result;
     int slot = 0;
     while (slot < world->wall_count && world->walls[slot].alive) slot++;
@@ -16388,6 +16575,7 @@ DEM2D_API dem2d_result dem2d_world_set_wall(dem2d_world *world, dem2d_wall_id id
     if (world == NULL || desc == NULL) return DEM2D_NULL_ARGUMENT;
     if (!dem2di_wall_lives(world, id)) return dem2di_stale(world, "wall", id.index);
     dem2d_result result = dem2di_check_wall(world, desc);
+    if (result == DEM2D_OK) result = dem2di_check_copies(world, desc);
     if (result != DEM2D_OK) return result;
     if (!dem2di_line_make(world, desc)) return DEM2D_OUT_OF_MEMORY;
     int slot = (int)id.index, parts = dem2di_parts_described(desc);
@@ -16446,7 +16634,7 @@ DEM2D_API dem2d_result dem2d_world_drive_wall(dem2d_world *world, dem2d_wall_id 
     if (result != DEM2D_OK) return result;
     const dem2di_wall old = *wall;
     for (int j = 0; j < world->wall_count; j++) /* it may have rested beside them */
-        if (j != slot && world->walls[j].alive && world->walls[j].desc.segment)
+        if ((j != slot || world->periodic) && world->walls[j].alive && world->walls[j].desc.segment)
             world->joints_due = wall->desc.segment || world->joints_due;
     wall->quiet = false;
     wall->desc.mode = DEM2D_WALL_MOVING;
@@ -16514,6 +16702,8 @@ static dem2di_load dem2di_part_load(const dem2d_world *world, int part) {
         if (!dem2di_contact_get(world, contacts, i, &contact)) continue;
         dem2d_vec force = dem2di_contact_force(&contact);
         dem2d_vec point = dem2di_add(world->before[list->keys[i].a].x, dem2di_arm_a(&contact));
+        if (world->periodic && world->parts[part].extent > 0) /* near the wall, not its copy */
+            point = dem2di_add(before->point, dem2di_arm_b(&contact));
         load.force = dem2di_add(load.force, force);
         load.torque += dem2di_cross(dem2di_sub(point, pivot), force);
         load.torque += dem2di_moment_of(world, contacts, i);
@@ -16603,7 +16793,7 @@ DEM2D_API dem2d_result dem2d_world_get_wall(const dem2d_world *world, dem2d_wall
 
 /* ============================================================================================
    >>joints  Walls whose segments are joined: faces and vertices
-   uses: config, math, memory, broad, world, objects, walls
+   uses: config, math, memory, broad, world, cell, objects, walls
    ============================================================================================ */
 
 /* Segments that meet and are at rest relative to each other are joined: the energy of a particle A
@@ -16633,12 +16823,12 @@ DEM2D_API dem2d_result dem2d_world_get_wall(const dem2d_world *world, dem2d_wall
 
    A chain's parts are always joined. Of other walls those are that stand still, or move at the same
    velocity and do not turn. What follows is found when walls have changed, from their places then.
- */
 
-/* Ends this near meet, as part of the shorter segment; and vertices of a face are off its line by
-   so much at most: a gap that no grain can tell, far above the rounding of walls that move
-   together. */
-#define DEM2DI_JOINT 1e-6
+   Across the border. In a cell a segment is joined to the copies of others, or to its own, that
+   meet it: ends are compared where they are in the cell. A joint says how many cell vectors lie
+   between its parts. Where a face meets its own copy in line, it goes round: it has no ends. Copies
+   of a wall that turns are not at rest relative to each other; a step is refused where the flow of
+   the cell would part a joint. */
 
 /* The start (0) or end (1) whose vertex a number is of; -1: that of the part. */
 static inline int dem2di_vertex_of(int number) {
@@ -16647,38 +16837,50 @@ static inline int dem2di_vertex_of(int number) {
 
 /* An end of a segment, and what becomes of it. */
 typedef struct dem2di_segment_end {
-    dem2d_vec at;
-    double near; /* the ends it meets are this near */
+    dem2d_vec at, home; /* where it is; the same in the cell */
+    int out[2];         /* cell vectors from home to at */
+    int cells[2];       /* the ends of a ring meet where they are moved by as many */
+    double near;        /* the ends it meets are this near */
     int part, which;
-    int next;     /* in the ring of ends that meet */
-    int straight; /* the end that goes on in line, or -1 */
-    int inside;   /* the part inside of which it ends, or -1 */
-    bool done;    /* its face has its vertex */
+    int next;         /* in the ring of ends that meet */
+    int straight;     /* the end that goes on in line, or -1 */
+    int inside;       /* the part inside of which it ends, or -1; */
+    int inside_at[2]; /* as many cell vectors from this one's */
+    bool done;        /* its face has its vertex */
 } dem2di_segment_end;
 
-/* All ends in the order of x; of[] is the place of each one by 2 part + which. */
+/* All ends in the order of x in the cell; of[] is the place of each one by 2 part + which. */
 typedef struct dem2di_joining {
     dem2di_segment_end *ends;
     int *of;
     int count;
+    int parted; /* a part that meets a copy from which the flow of the cell moves it away, or -1 */
 } dem2di_joining;
 
 static int dem2di_compare_ends(const void *a, const void *b) {
     const dem2di_segment_end *p = (const dem2di_segment_end *)a, *q = (const dem2di_segment_end *)b;
-    if (p->at.x != q->at.x) return p->at.x < q->at.x ? -1 : 1;
+    if (p->home.x != q->home.x) return p->home.x < q->home.x ? -1 : 1;
     if (p->part != q->part) return p->part < q->part ? -1 : 1;
     return p->which - q->which;
 }
 
-/* Are the walls of two parts at rest relative to each other? */
-static bool dem2di_rest_together(const dem2d_world *world, int a, int b) {
-    if (world->parts[a].wall == world->parts[b].wall) return true;
+/* Are the walls of two parts at rest relative to each other, with the one of b moved by as many
+   cell vectors? */
+static bool dem2di_rest_together(const dem2d_world *world, int a, int b, const int shift[2]) {
+    const bool copied = shift[0] != 0 || shift[1] != 0;
     const dem2d_wall_desc *one = &world->walls[world->parts[a].wall].desc;
     const dem2d_wall_desc *other = &world->walls[world->parts[b].wall].desc;
+    if (world->parts[a].wall == world->parts[b].wall) return !copied || dem2di_wall_spin(one) == 0;
     if (one->mode != other->mode || one->mode == DEM2D_WALL_SERVO) return false;
     if (dem2di_wall_spin(one) != 0 || dem2di_wall_spin(other) != 0) return false;
     return one->mode == DEM2D_WALL_STILL ||
            (one->velocity.x == other->velocity.x && one->velocity.y == other->velocity.y);
+}
+
+/* An end moved by cell vectors. */
+static dem2d_vec dem2di_end_moved(const dem2d_world *world, const dem2di_segment_end *end,
+                                  int along_a, int along_b) {
+    return dem2di_add(end->at, dem2di_cell_shift(&world->cell, along_a, along_b));
 }
 
 /* Away from an end along its segment, a unit vector. */
@@ -16689,6 +16891,7 @@ static dem2d_vec dem2di_end_away(const dem2d_world *world, const dem2di_segment_
 
 /* Ends in order, each alone. */
 static void dem2di_ends_list(const dem2d_world *world, dem2di_joining *joining) {
+    const dem2di_fractions f = dem2di_fractions_make(&world->cell);
     joining->count = 0;
     for (int k = 0; k < world->part_count; k++) {
         double extent = world->parts[k].extent;
@@ -16696,6 +16899,12 @@ static void dem2di_ends_list(const dem2d_world *world, dem2di_joining *joining) 
             dem2di_segment_end *end = &joining->ends[joining->count++];
             end->at = world->surfaces[k].point;
             if (which == 1) end->at = dem2di_surface_end(&world->surfaces[k], extent);
+            end->home = end->at;
+            end->out[0] = end->out[1] = 0;
+            if (dem2di_cells_out(&f, end->at, end->out))
+                end->home = dem2di_end_moved(world, end, -end->out[0], -end->out[1]);
+            end->cells[0] = -end->out[0];
+            end->cells[1] = -end->out[1];
             end->near = DEM2DI_JOINT * extent;
             end->part = k;
             end->which = which;
@@ -16716,28 +16925,12 @@ static bool dem2di_in_ring(const dem2di_joining *joining, int i, int j) {
     return false;
 }
 
-/* Rings of the ends that meet. */
-static void dem2di_ends_meet(const dem2d_world *world, dem2di_joining *joining) {
-    dem2di_segment_end *ends = joining->ends;
-    for (int i = 0; i < joining->count; i++)
-        for (int j = i + 1; j < joining->count && ends[j].at.x - ends[i].at.x <= ends[i].near;
-             j++) {
-            double near = dem2di_min(ends[i].near, ends[j].near);
-            if (!(dem2di_length(dem2di_sub(ends[i].at, ends[j].at)) <= near)) continue;
-            if (!dem2di_rest_together(world, ends[i].part, ends[j].part)) continue;
-            if (dem2di_in_ring(joining, i, j)) continue;
-            int next = ends[i].next; /* two rings become one */
-            ends[i].next = ends[j].next;
-            ends[j].next = next;
-        }
-}
-
 /* The first end whose x is not below a value. */
 static int dem2di_ends_from(const dem2di_joining *joining, double x) {
     int low = 0, high = joining->count;
     while (low < high) {
         int middle = low + (high - low) / 2;
-        if (joining->ends[middle].at.x < x)
+        if (joining->ends[middle].home.x < x)
             low = middle + 1;
         else
             high = middle;
@@ -16745,24 +16938,96 @@ static int dem2di_ends_from(const dem2di_joining *joining, double x) {
     return low;
 }
 
+/* Two rings become one: that of i, whose part is so many cell vectors from that of j where the two
+   meet, and that of j. */
+static void dem2di_rings_join(dem2di_joining *joining, int i, int j, const int between[2]) {
+    dem2di_segment_end *ends = joining->ends;
+    const int by[2] = {between[0] + ends[j].cells[0] - ends[i].cells[0],
+                       between[1] + ends[j].cells[1] - ends[i].cells[1]};
+    int k = i;
+    do {
+        ends[k].cells[0] += by[0];
+        ends[k].cells[1] += by[1];
+        k = ends[k].next;
+    } while (k != i);
+    int next = ends[i].next;
+    ends[i].next = ends[j].next;
+    ends[j].next = next;
+}
+
+/* The ends that one end meets when it is moved by cell vectors; without, those behind it. */
+static void dem2di_end_meet(const dem2d_world *world, dem2di_joining *joining, int i,
+                            const int shift[2]) {
+    dem2di_segment_end *ends = joining->ends;
+    const bool moved = shift[0] != 0 || shift[1] != 0;
+    const dem2d_vec at =
+        dem2di_add(ends[i].home, dem2di_cell_shift(&world->cell, shift[0], shift[1]));
+    int j = moved ? dem2di_ends_from(joining, at.x - ends[i].near) : i + 1;
+    for (; j < joining->count && ends[j].home.x - at.x <= ends[i].near; j++) {
+        double near = dem2di_min(ends[i].near, ends[j].near);
+        if (!(dem2di_length(dem2di_sub(at, ends[j].home)) <= near) || i == j) continue;
+        const int between[2] = {shift[0] - ends[i].out[0] + ends[j].out[0],
+                                shift[1] - ends[i].out[1] + ends[j].out[1]};
+        if (!dem2di_rest_together(world, ends[j].part, ends[i].part, between)) continue;
+        if (dem2di_flow_moves(&world->flow, &world->cell, between)) joining->parted = ends[i].part;
+        if (!dem2di_in_ring(joining, i, j)) dem2di_rings_join(joining, i, j, between);
+    }
+}
+
+/* Rings of the ends that meet. */
+static void dem2di_ends_meet(const dem2d_world *world, dem2di_joining *joining) {
+    const int a = world->cell.a.x > 0, b = world->cell.b.y > 0;
+    for (int i = 0; i < joining->count; i++)
+        for (int k = 0; k < 9; k++) {
+            const int shift[2] = {(k + 1) % 3 - 1, (k / 3 + 1) % 3 - 1}; /* first 0, 0 */
+            if (abs(shift[0]) <= a && abs(shift[1]) <= b) dem2di_end_meet(world, joining, i, shift);
+        }
+}
+
+/* Ends that lie inside of a segment that is moved by cell vectors. */
+static void dem2di_ends_inside_of(const dem2d_world *world, dem2di_joining *joining, int k,
+                                  const int shift[2]) {
+    dem2di_surface moved = world->surfaces[k], *surface = &moved;
+    double extent = world->parts[k].extent, near = DEM2DI_JOINT * extent;
+    dem2d_vec along = dem2di_vec(surface->along.c, surface->along.s);
+    moved.point = dem2di_add(moved.point, dem2di_cell_shift(&world->cell, shift[0], shift[1]));
+    double x = surface->point.x, last = dem2di_surface_end(surface, extent).x;
+    double right = dem2di_max(x, last) + near;
+    int i = dem2di_ends_from(joining, dem2di_min(x, last) - near);
+    for (; i < joining->count && joining->ends[i].home.x <= right; i++) {
+        dem2di_segment_end *end = &joining->ends[i];
+        dem2d_vec from = dem2di_sub(end->home, surface->point);
+        const int between[2] = {shift[0] + end->out[0], shift[1] + end->out[1]};
+        double place = dem2di_dot(from, along), close = dem2di_min(near, end->near);
+        if (end->part == k || end->inside >= 0 ||
+            !dem2di_rest_together(world, end->part, k, between))
+            continue;
+        if (!(place > close && place < extent - close && fabs(dem2di_cross(along, from)) <= close))
+            continue;
+        if (dem2di_flow_moves(&world->flow, &world->cell, between)) joining->parted = k;
+        end->inside = k;
+        end->inside_at[0] = between[0];
+        end->inside_at[1] = between[1];
+    }
+}
+
 /* Ends that lie inside of another segment: of several the part of lowest number. */
 static void dem2di_ends_inside(const dem2d_world *world, dem2di_joining *joining) {
+    const dem2d_cell *cell = &world->cell;
     for (int k = 0; k < world->part_count; k++) {
         const dem2di_surface *surface = &world->surfaces[k];
-        double extent = world->parts[k].extent, near = DEM2DI_JOINT * extent;
-        if (!(extent > 0)) continue;
+        const double half = world->parts[k].extent / 2, far = half * (1 + 2 * DEM2DI_JOINT);
+        if (!(half > 0)) continue;
+        dem2d_box box = {cell->origin, cell->origin}; /* of the cell, where it is periodic */
+        box.lower = dem2di_add(box.lower, dem2di_vec(dem2di_min(0, cell->b.x) - far, -far));
+        box.upper = dem2di_add(
+            box.upper, dem2di_vec(cell->a.x + dem2di_max(0, cell->b.x) + far, cell->b.y + far));
         dem2d_vec along = dem2di_vec(surface->along.c, surface->along.s);
-        double x = surface->point.x, last = dem2di_surface_end(surface, extent).x;
-        double right = dem2di_max(x, last) + near;
-        int i = dem2di_ends_from(joining, dem2di_min(x, last) - near);
-        for (; i < joining->count && joining->ends[i].at.x <= right; i++) {
-            dem2di_segment_end *end = &joining->ends[i];
-            dem2d_vec from = dem2di_sub(end->at, surface->point);
-            double place = dem2di_dot(from, along), close = dem2di_min(near, end->near);
-            if (end->part == k || end->inside >= 0 || !dem2di_rest_together(world, end->part, k))
-                continue;
-            if (place > close && place < extent - close && fabs(dem2di_cross(along, from)) <= close)
-                end->inside = k;
+        dem2di_shifts at =
+            dem2di_shifts_start(cell, dem2di_along(surface->point, half, along), &box);
+        while (dem2di_shifts_next(&at)) {
+            const int shift[2] = {at.along_a, at.along_b};
+            dem2di_ends_inside_of(world, joining, k, shift);
         }
     }
 }
@@ -16784,7 +17049,8 @@ static void dem2di_end_continue(const dem2d_world *world, dem2di_joining *joinin
     for (int k = ends[i].next; k != i && ends[i].straight < 0; k = ends[k].next) {
         const dem2d_vec other = dem2di_end_away(world, &ends[k]);
         const dem2di_wall *second = &world->walls[world->parts[ends[k].part].wall];
-        if (ends[k].straight >= 0 || ends[k].part == ends[i].part) continue;
+        const bool same = ends[k].part == ends[i].part && !world->periodic;
+        if (ends[k].straight >= 0 || same) continue; /* in a cell it may meet its own copy */
         if (wall->desc.one_sided && ends[k].which == ends[i].which) continue;
         if (dem2di_one_face(wall, second) && dem2di_dot(away, other) < 0 &&
             fabs(dem2di_cross(away, other)) <= DEM2DI_JOINT) {
@@ -16836,43 +17102,95 @@ static int dem2di_other_end(const dem2di_joining *joining, int end) {
     return joining->of[2 * e->part + 1 - e->which];
 }
 
-/* The face that begins at an end: as long as its vertices are on a line. */
-static void dem2di_face_join(const dem2d_world *world, dem2di_joining *joining, int begin) {
+/* A row of ends in line on its way: an end, and how many cell vectors its part is from where the
+   row began. */
+typedef struct dem2di_row_end {
+    int end, at[2];
+} dem2di_row_end;
+
+/* From the far end of a part on to the near end of the next one. */
+static dem2di_row_end dem2di_row_on(const dem2di_joining *joining, const dem2di_row_end *row) {
+    const dem2di_segment_end *ends = joining->ends;
+    const dem2di_segment_end *from = &ends[row->end], *to = &ends[from->straight];
+    dem2di_row_end next;
+    next.end = from->straight;
+    for (int k = 0; k < 2; k++) next.at[k] = row->at[k] + to->cells[k] - from->cells[k];
+    return next;
+}
+
+static dem2d_vec dem2di_row_place(const dem2d_world *world, const dem2di_joining *joining, int end,
+                                  const int at[2]) {
+    return dem2di_end_moved(world, &joining->ends[end], at[0], at[1]);
+}
+
+/* Where the face ends that begins at an end: as long as its vertices are on a line, or where it
+   comes round to the end where it began. The joint gets its lowest part, seen from the first. */
+static dem2di_row_end dem2di_face_grow(const dem2d_world *world, dem2di_joining *joining, int begin,
+                                       dem2di_wall_joint *face) {
     dem2di_segment_end *ends = joining->ends;
-    dem2di_growing_face face = {ends[begin].at, dem2di_end_away(world, &ends[begin]), -1, 1};
-    int end = dem2di_other_end(joining, begin), first = ends[begin].part;
-    while (ends[end].straight >= 0) {
-        int next = ends[end].straight, last = dem2di_other_end(joining, next);
-        double near = dem2di_min(ends[end].near, ends[next].near);
-        if (last == begin || !dem2di_face_grows(&face, ends[end].at, near, ends[last].at)) {
-            ends[end].straight = ends[next].straight = -1;
+    dem2di_growing_face growing = {ends[begin].at, dem2di_end_away(world, &ends[begin]), -1, 1};
+    dem2di_row_end row = {dem2di_other_end(joining, begin), {0, 0}};
+    face->first = ends[begin].part;
+    while (ends[row.end].straight >= 0) {
+        const dem2di_row_end next = dem2di_row_on(joining, &row);
+        if (next.end == begin && (next.at[0] != 0 || next.at[1] != 0)) {
+            memcpy(face->round, next.at, sizeof face->round);
+            return row;
+        }
+        const int last = dem2di_other_end(joining, next.end);
+        double near = dem2di_min(ends[row.end].near, ends[next.end].near);
+        if (last == begin ||
+            !dem2di_face_grows(&growing, dem2di_row_place(world, joining, row.end, row.at), near,
+                               dem2di_row_place(world, joining, last, next.at))) {
+            ends[row.end].straight = ends[next.end].straight = -1;
             break;
         }
-        end = last;
-        first = ends[end].part < first ? ends[end].part : first;
+        row = next;
+        row.end = last;
+        if (ends[last].part >= face->first) continue;
+        face->first = ends[last].part;
+        memcpy(face->first_at, row.at, sizeof face->first_at);
     }
-    const dem2d_vec from = ends[begin].at, to = ends[end].at;
-    double place = -HUGE_VAL;
-    for (int k = begin;; k = ends[dem2di_other_end(joining, k)].straight) {
-        int part = ends[k].part, other = dem2di_other_end(joining, k);
+    return row;
+}
+
+/* The face that begins at an end. */
+static void dem2di_face_join(const dem2d_world *world, dem2di_joining *joining, int begin) {
+    const dem2di_segment_end *ends = joining->ends;
+    dem2di_wall_joint face;
+    memset(&face, 0, sizeof face);
+    const dem2di_row_end last = dem2di_face_grow(world, joining, begin, &face);
+    const bool round = face.round[0] != 0 || face.round[1] != 0;
+    const dem2d_vec from = ends[begin].at;
+    const dem2d_vec to = dem2di_row_place(world, joining, last.end, last.at);
+    dem2di_row_end row = {begin, {0, 0}};
+    double place = round ? 0 : -HUGE_VAL;
+    for (;;) {
+        int part = ends[row.end].part, other = dem2di_other_end(joining, row.end);
         dem2di_wall_joint *joint = &world->joints[part];
-        if (begin == k && other == end) { /* alone: its own, bit by bit */
+        if (begin == row.end && last.end == other && !round) { /* alone: its own, bit by bit */
             joint->face = world->parts[part];
             joint->from = -HUGE_VAL;
             joint->to = HUGE_VAL;
             joint->first = part;
             return;
         }
-        dem2di_joint_place(world, part, from, to);
-        joint->first = first;
+        const dem2d_vec way = dem2di_cell_shift(&world->cell, row.at[0], row.at[1]);
+        dem2di_joint_place(world, part, dem2di_sub(from, way), dem2di_sub(to, way));
+        joint->first = face.first;
+        for (int k = 0; k < 2; k++) joint->first_at[k] = face.first_at[k] - row.at[k];
+        memcpy(joint->round, face.round, sizeof joint->round);
         joint->from = place;
         place = HUGE_VAL;
-        if (other != end) {
+        if (other != last.end || round) {
             dem2d_rot along = joint->face.along;
-            place = dem2di_dot(dem2di_sub(ends[other].at, from), dem2di_vec(along.c, along.s));
+            dem2d_vec end = dem2di_row_place(world, joining, other, row.at);
+            place = dem2di_dot(dem2di_sub(end, from), dem2di_vec(along.c, along.s));
         }
         joint->to = place;
-        if (other == end) return;
+        if (other == last.end) return;
+        row.end = other;
+        row = dem2di_row_on(joining, &row);
     }
 }
 
@@ -16896,12 +17214,14 @@ static int dem2di_face_leaves(const dem2d_world *world, const dem2di_joining *jo
     return dem2di_dot(dem2di_end_away(world, e), dem2di_vec(along.c, along.s)) > 0 ? 1 : -1;
 }
 
-/* A vertex at an end, of its face and that of another part there. */
+/* A vertex at an end, of its face and that of another part there, which is moved by cell vectors to
+   meet in the ring. */
 static void dem2di_vertex_join(dem2d_world *world, const dem2di_joining *joining, int end,
-                               int partner, int away) {
+                               int partner, const int cells[2], int away) {
     const dem2di_segment_end *e = &joining->ends[end];
     dem2di_wall_joint *joint = &world->joints[e->part];
     joint->partner[e->which] = partner;
+    for (int k = 0; k < 2; k++) joint->beyond[e->which][k] = cells[k] - e->cells[k];
     joint->away[e->which][0] = dem2di_face_leaves(world, joining, end);
     joint->away[e->which][1] = away;
 }
@@ -16937,20 +17257,27 @@ static void dem2di_ring_done(const dem2d_world *world, dem2di_joining *joining, 
    of the last one and a face inside of which the ring lies. */
 static void dem2di_ring_join(dem2d_world *world, dem2di_joining *joining, int ring) {
     const dem2di_segment_end *ends = joining->ends;
-    int inside = -1;
+    int inside = -1, inside_cells[2] = {0, 0};
     for (int k = ends[ring].next, i = ring; k != i; k = ends[k].next)
         if (!ends[k].done && ends[k].part < ends[ring].part) ring = k;
     int last = ring;
     for (int next = ring; next >= 0; next = dem2di_ring_next(world, joining, last)) {
         if (next != ring)
-            dem2di_vertex_join(world, joining, last, ends[next].part,
+            dem2di_vertex_join(world, joining, last, ends[next].part, ends[next].cells,
                                dem2di_face_leaves(world, joining, next));
         dem2di_ring_done(world, joining, next);
+        for (int k = 0; k < 2 && ends[next].inside >= 0; k++)
+            inside_cells[k] = ends[next].cells[k] + ends[next].inside_at[k];
         inside = ends[next].inside >= 0 ? ends[next].inside : inside;
         last = next;
     }
     if (inside >= 0 && world->joints[inside].first != world->joints[ends[last].part].first)
-        dem2di_vertex_join(world, joining, last, inside, 0);
+        dem2di_vertex_join(world, joining, last, inside, inside_cells, 0);
+}
+
+/* Has a face no ends, as it meets its own copy? */
+static inline bool dem2di_goes_round(const dem2di_wall_joint *joint) {
+    return joint->round[0] != 0 || joint->round[1] != 0;
 }
 
 /* The partner at an end; of a part that is new, or no segment, none. */
@@ -16982,7 +17309,7 @@ static bool dem2di_joints_find(dem2d_world *world, dem2di_joining *joining) {
     for (int k = 0; k < world->part_count && !joined; k++) {
         const dem2di_wall_joint *joint = &world->joints[k];
         joined = dem2di_partner_of(joint, 0) >= 0 || dem2di_partner_of(joint, 1) >= 0 ||
-                 (joint->face.extent > 0 && joint->first != k);
+                 (joint->face.extent > 0 && (joint->first != k || dem2di_goes_round(joint)));
     }
     return joined;
 }
@@ -16996,13 +17323,22 @@ static void dem2di_forget_vertices(dem2d_world *world) {
     world->list_stale = true;
 }
 
+/* The joints that were found are those of the next step; the vertices may be the same. */
+static void dem2di_joints_set(dem2d_world *world, bool joined, bool same) {
+    if (!same) dem2di_forget_vertices(world);
+    for (int k = 0; k < world->part_count; k++) dem2di_face_place(world, k);
+    if (joined != world->plan.joints) dem2di_edited(world);
+    world->joined = joined;
+    world->joints_due = false;
+}
+
 /* Join the segments, where walls have changed since this was last done. */
 static dem2d_result dem2di_join(dem2d_world *world) {
     int parts = world->part_count;
     size_t ends = 2 * (size_t)parts;
     if (!world->joints_due) return DEM2D_OK;
     const size_t size = sizeof(dem2di_segment_end) + sizeof(int), old = sizeof(dem2di_wall_joint);
-    dem2di_joining joining = {NULL, NULL, 0};
+    dem2di_joining joining = {NULL, NULL, 0, -1};
     dem2di_wall_joint *before =
         (dem2di_wall_joint *)dem2di_allocate(&world->env, (size_t)parts + 1, old);
     joining.ends = (dem2di_segment_end *)dem2di_allocate(&world->env, ends + 1, size);
@@ -17011,18 +17347,20 @@ static dem2d_result dem2di_join(dem2d_world *world) {
         joining.of = (int *)(void *)(joining.ends + ends);
         if (parts > 0) memcpy(before, world->joints, (size_t)parts * old);
         bool joined = dem2di_joints_find(world, &joining), same = true;
-        for (int k = 0; k < 2 * parts; k++)
+        if (joining.parted >= 0 && parts > 0) memcpy(world->joints, before, (size_t)parts * old);
+        for (int k = 0; k < 2 * parts && joining.parted < 0; k++)
             same = same && dem2di_partner_of(&before[k / 2], k % 2) ==
                                dem2di_partner_of(&world->joints[k / 2], k % 2);
-        if (!same) dem2di_forget_vertices(world);
-        for (int k = 0; k < parts; k++) dem2di_face_place(world, k);
-        if (joined != world->plan.joints) dem2di_edited(world);
-        world->joined = joined;
-        world->joints_due = false;
+        if (joining.parted < 0) dem2di_joints_set(world, joined, same);
     }
     dem2di_release(&world->env, before, (size_t)parts + 1, old);
     dem2di_release(&world->env, joining.ends, ends + 1, size);
-    return room ? DEM2D_OK : dem2di_out_of_memory(world, "joints");
+    if (!room) return dem2di_out_of_memory(world, "joints");
+    if (joining.parted < 0) return DEM2D_OK;
+    return dem2di_fail(&world->env, DEM2D_OUT_OF_RANGE, world->parts[joining.parted].wall,
+                       "the cell deforms and parts wall %d from what it is joined to across the "
+                       "border",
+                       world->parts[joining.parted].wall);
 }
 
 /* Where the vertex of a number is. */
@@ -17186,13 +17524,14 @@ static void dem2di_entries_sort_many(uint64_t *entries, int count, int *run) {
 /* Is contact i of a pair before contact k of the same two, by the shifts of their images? */
 static bool dem2di_shift_precedes(const dem2d_world *world, int i, int k) {
     int one[2], other[2];
-    dem2di_shift_of(world, world->list.keys[i].b, one);
-    dem2di_shift_of(world, world->list.keys[k].b, other);
+    dem2di_shift_of(world, *dem2di_imaged(world, i), one);
+    dem2di_shift_of(world, *dem2di_imaged(world, k), other);
     return one[1] != other[1] ? one[1] < other[1] : one[0] < other[0];
 }
 
-/* Contacts of a particle, sorted by ranks, in a cell: those with images of one partner by shifts,
-   those with itself as B and then as A. Returns of how many it is B; so far without itself. */
+/* Contacts of a particle, sorted by ranks, in a cell: those with images of one partner, or of its
+   own images with one part of a wall, by shifts, those with itself as B and then as A. Returns of
+   how many it is B; so far without itself. */
 static int dem2di_adjacency_images(const dem2d_world *world, int slot, int *run, int count,
                                    int as_b) {
     const dem2di_key *keys = world->list.keys;
@@ -17200,7 +17539,6 @@ static int dem2di_adjacency_images(const dem2d_world *world, int slot, int *run,
     for (int i = 1; i < count; i++) {
         const int contact = run[i];
         int k = i;
-        if (contact >= world->list.pairs) break; /* walls are behind */
         for (; k > 0 &&
                dem2di_adjacency_rank(world, slot, run[k - 1]) ==
                    dem2di_adjacency_rank(world, slot, contact) &&
@@ -17262,20 +17600,22 @@ static void dem2di_adjacency_fill_task(void *context, int begin, int end) {
     memset(first, 0, ((size_t)slots + 1) * sizeof *first);
     for (int i = 0; i < list->count; i++) {
         if (list->keys[i].a < 0) continue;
-        last[list->keys[i].a]++;
+        last[dem2di_owner(world, list->keys[i].a)]++;
         if (i < list->pairs) last[dem2di_owner(world, list->keys[i].b)]++;
     }
     (void)dem2di_starts(last, slots);
     for (int i = 0; i < list->count; i++) {
         const int a = list->keys[i].a, b = list->keys[i].b;
         if (a < 0) continue;
+        const int slot = dem2di_owner(world, a);
         if (i >= list->pairs) {
-            entries[last[a]++] = dem2di_entry_make((1 << 30) + b, i);
+            const uint64_t image = a == slot ? 0 : DEM2DI_ENTRY_IMAGE;
+            entries[last[slot]++] = dem2di_entry_make((1 << 30) + b, i) | image;
             continue;
         }
         const int owner = dem2di_owner(world, b);
         const uint64_t image = b == owner ? 0 : DEM2DI_ENTRY_IMAGE;
-        entries[last[a]++] = dem2di_entry_make(world->bodies[b].rank, i) | image;
+        entries[last[slot]++] = dem2di_entry_make(world->bodies[b].rank, i) | image;
         entries[last[owner]++] = dem2di_entry_make(world->bodies[a].rank, i) | image;
     }
 }
@@ -17355,7 +17695,7 @@ static void dem2di_arrange_task(void *context, int begin, int end) {
     for (int i = 0; i < w->list.count; i++) {
         dem2di_key *key = &w->list.keys[i];
         if (key->a < 0) continue;
-        key->a = to[key->a];
+        if (dem2di_owner(w, key->a) == key->a) key->a = to[key->a];
         if (i < w->list.pairs && dem2di_owner(w, key->b) == key->b) key->b = to[key->b];
     }
     for (int k = 0; k < w->image_count; k++)
@@ -17454,8 +17794,12 @@ typedef struct dem2di_build {
     bool bounded, back;      /* as in the world; whether the next step may look back on contacts */
     double softness;         /* as in the world */
     int image_base;          /* an image that was found has this plus its number for a slot, */
-    int images, lost_images; /* so many are in world->images_next: near ones, then those of contacts
-                                whose partners are out of reach */
+    int images;              /* so many are in world->images_next: those near other particles, */
+    int wall_images;         /* those near segments alone, */
+    int lost_images;         /* those of contacts that are out of reach */
+    int *image_of;           /* where there are segments, of each particle: as world->images_of, but
+                                without the last ones */
+    bool failed;             /* there was no memory for an image */
 } dem2di_build;
 
 /* The particle that a slot in the keys of the next list shows. */
@@ -17723,14 +18067,14 @@ static bool dem2di_number_is_near(const dem2d_world *world, const dem2di_disc *d
            (number < DEM2DI_VERTEX || dem2di_vertex_is_near(world, disc, number));
 }
 
-/* A part that is near a particle, and its vertices that are. */
-static void dem2di_find_part(const dem2d_world *world, const dem2di_disc *disc, int part,
+/* A part that is near a disc, and its vertices that are: the disc is of a particle, or of an image
+   of it, whose slot this is. */
+static void dem2di_find_part(const dem2d_world *world, const dem2di_disc *disc, int slot, int part,
                              dem2di_finds *finds) {
-    if (!dem2di_meets_part(world, disc->slot, part)) return;
-    dem2di_find(finds, ~disc->slot, part);
+    dem2di_find(finds, ~slot, part);
     for (int k = 1; k <= 2 && world->joined; k++)
         if (dem2di_vertex_is_near(world, disc, part + k * DEM2DI_VERTEX))
-            dem2di_find(finds, ~disc->slot, part + k * DEM2DI_VERTEX);
+            dem2di_find(finds, ~slot, part + k * DEM2DI_VERTEX);
 }
 
 /* Partners of the particles of a block, and those near half-planes, most blocks being far from them
@@ -17752,24 +18096,103 @@ static void dem2di_search_particles(const dem2di_build *build, int block, dem2di
             continue;
         for (int i = first; i < last; i++) {
             const dem2di_disc *disc = dem2di_disc_at(build, i);
-            if (dem2di_part_is_near(world, disc, part)) dem2di_find_part(world, disc, part, finds);
+            if (dem2di_part_is_near(world, disc, part) && dem2di_meets_part(world, i, part))
+                dem2di_find_part(world, disc, i, part, finds);
         }
     }
 }
 
-/* Particles near a segment among the discs of some cells, from begin to end in sorted. A head of
-   the hash table may have discs of other cells, which a segment meets elsewhere or not at all. */
-static void dem2di_search_cells(const dem2di_build *build, int part, int begin, int end, int level,
-                                const dem2di_cell cells[2], dem2di_finds *finds) {
-    const dem2d_world *world = build->world;
-    const dem2di_grid *grid = &build->grid;
+/* --- images ------------------------------------------------------------------------------------
+   Found before the blocks search: the images of each particle that come within reach of the box of
+   all centres, and those near segments of walls. A block then looks for the particles near each of
+   the first, and for the images near each segment. */
+
+static bool dem2di_build_image(dem2di_build *build, int owner, int along_a, int along_b) {
+    dem2d_world *world = build->world;
+    const int k = build->images + build->wall_images + build->lost_images;
+    if (k == 1 << 28 || !dem2di_group_reserve(world, DEM2DI_IMAGES, k + 1)) return false;
+    dem2di_image *image = &world->images_next[k];
+    image->owner = owner;
+    image->shift[0] = along_a;
+    image->shift[1] = along_b;
+    image->next = 0;
+    image->row = -1;
+    return true;
+}
+
+/* An image that was found becomes the first of its owner's, where segments need them. */
+static void dem2di_build_link(dem2di_build *build, int k) {
+    dem2di_image *image = &build->world->images_next[k];
+    if (build->image_of == NULL) return;
+    image->next = build->image_of[image->owner];
+    build->image_of[image->owner] = k + 1;
+}
+
+/* The slot in the keys of the next list of an image of a particle, or -1. */
+static int dem2di_build_slot(const dem2di_build *build, int owner, const int shift[2]) {
+    if (shift[0] == 0 && shift[1] == 0) return owner;
+    for (int k = build->image_of[owner] - 1; k >= 0; k = build->world->images_next[k].next - 1) {
+        const int *own = build->world->images_next[k].shift;
+        if (own[0] == shift[0] && own[1] == shift[1]) return build->image_base + k;
+    }
+    return -1;
+}
+
+/* The disc of an image, with that for its slot. */
+static dem2di_disc dem2di_image_disc(const dem2di_build *build, const dem2di_image *image,
+                                     int slot) {
+    dem2di_disc disc = *dem2di_disc_at(build, image->owner);
+    dem2d_vec way = dem2di_cell_shift(&build->world->cell, image->shift[0], image->shift[1]);
+    disc.centre = dem2di_add(disc.centre, way);
+    disc.slot = slot;
+    return disc;
+}
+
+/* An image near a segment, before the search: it needs a slot. */
+static void dem2di_build_wall_image(dem2di_build *build, int owner, const int shift[2]) {
+    if (build->failed || dem2di_build_slot(build, owner, shift) >= 0) return;
+    build->failed = !dem2di_build_image(build, owner, shift[0], shift[1]);
+    if (build->failed) return;
+    dem2di_build_link(build, build->images + build->wall_images);
+    build->wall_images++;
+}
+
+/* The search for what is near a segment: images of one shift. They go into finds, or where this is
+   NULL get slots. */
+typedef struct dem2di_near_segment {
+    dem2di_build *build;
+    int part, shift[2];
+    dem2d_vec way; /* to the image */
+    dem2di_finds *finds;
+} dem2di_near_segment;
+
+/* Particles whose images are near a segment among the discs of some cells, from begin to end in
+   sorted. A head of the hash table may have discs of other cells, which a segment meets elsewhere
+   or not at all. */
+static void dem2di_search_cells(const dem2di_near_segment *near, int begin, int end, int level,
+                                const dem2di_cell cells[2]) {
+    const dem2d_world *world = near->build->world;
+    const dem2di_grid *grid = &near->build->grid;
+    const int part = near->part;
     for (int k = begin; k < end; k++) {
-        const dem2di_disc *disc = &grid->sorted[k];
-        if (disc->level != level || !dem2di_part_is_near(world, disc, part)) continue;
-        dem2di_cell at = dem2di_cell_at(grid, disc->centre, level);
+        const dem2di_disc *own = &grid->sorted[k], *disc = own;
+        dem2di_disc image;
+        if (own->level != level) continue;
+        if (world->periodic) {
+            image = *own;
+            image.centre = dem2di_add(own->centre, near->way);
+            disc = &image;
+        }
+        if (!dem2di_part_is_near(world, disc, part)) continue;
+        dem2di_cell at = dem2di_cell_at(grid, own->centre, level);
         if (at.x < cells[0].x || at.x > cells[1].x || at.y < cells[0].y || at.y > cells[1].y)
             continue;
-        dem2di_find_part(world, disc, part, finds);
+        if (!dem2di_meets_part(world, own->slot, part)) continue;
+        if (near->finds == NULL)
+            dem2di_build_wall_image(near->build, own->slot, near->shift);
+        else
+            dem2di_find_part(world, disc, dem2di_build_slot(near->build, own->slot, near->shift),
+                             part, near->finds);
     }
 }
 
@@ -17791,10 +18214,12 @@ static bool dem2di_around_piece(const dem2d_box *box, const dem2di_surface *surf
 /* Particles near a segment, row by row of the cells along it. The reach of discs is below half a
    cell, the rest of 0.51 is for the rounding of cell numbers. A segment that crosses more rows and
    columns than there are particles is compared with all of them. */
-static void dem2di_search_segment(const dem2di_build *build, int part, dem2di_finds *finds) {
-    const dem2d_world *world = build->world;
-    const dem2di_grid *grid = &build->grid;
-    const dem2di_surface *surface = &world->surfaces[part];
+static void dem2di_search_segment(const dem2di_near_segment *near) {
+    const dem2d_world *world = near->build->world;
+    const dem2di_grid *grid = &near->build->grid;
+    const int part = near->part;
+    dem2di_surface moved = world->surfaces[part], *surface = &moved;
+    moved.point = dem2di_sub(moved.point, near->way);
     double extent = world->parts[part].extent, way = surface->along.s;
     double from = surface->point.y - grid->box.lower.y;
     for (int level = 0; level < DEM2DI_LEVELS; level++) {
@@ -17810,7 +18235,7 @@ static void dem2di_search_segment(const dem2di_build *build, int part, dem2di_fi
             cells[k].y = dem2di_cell_of(corner[k].y * grid->inverse[level]);
         }
         if (cells[1].x - cells[0].x >= grid->count - (cells[1].y - cells[0].y)) {
-            dem2di_search_cells(build, part, 0, grid->count, level, cells, finds);
+            dem2di_search_cells(near, 0, grid->count, level, cells);
             continue;
         }
         for (int64_t y = cells[0].y; y <= cells[1].y; y++) {
@@ -17826,45 +18251,62 @@ static void dem2di_search_segment(const dem2di_build *build, int part, dem2di_fi
                 dem2di_cell run[2] = {{x, y}, {0, y}};
                 x = dem2di_grid_run(grid, x, last, y, level, &begin, &end);
                 run[1].x = x - 1;
-                dem2di_search_cells(build, part, begin, end, level, run, finds);
+                dem2di_search_cells(near, begin, end, level, run);
             }
         }
     }
 }
 
-/* --- images that particles may meet -------------------------------------------------------------
-   Found before the blocks search: the images of each particle that come within reach of the box of
-   all centres. A block then looks for the particles near each of them. */
-
-static bool dem2di_build_image(dem2di_build *build, int owner, int along_a, int along_b) {
-    dem2d_world *world = build->world;
-    const int k = build->images + build->lost_images;
-    if (k == 1 << 28 || !dem2di_group_reserve(world, DEM2DI_IMAGES, k + 1)) return false;
-    world->images_next[k].owner = owner;
-    world->images_next[k].shift[0] = along_a;
-    world->images_next[k].shift[1] = along_b;
-    world->images_next[k].row = -1;
-    return true;
+/* The same for all images: those for which the segment, moved back by their shifts, comes near the
+   box of all centres. */
+static void dem2di_search_part(dem2di_build *build, int part, dem2di_finds *finds) {
+    const dem2d_world *world = build->world;
+    const dem2di_surface *surface = &world->surfaces[part];
+    const double half = world->parts[part].extent / 2;
+    const double reach =
+        0.51 * build->grid.size + world->walls[world->parts[part].wall].skin; /* as above */
+    const dem2d_vec along = dem2di_vec(surface->along.c, surface->along.s);
+    const dem2d_vec far = dem2di_vec(half * fabs(along.x) + reach, half * fabs(along.y) + reach);
+    dem2di_near_segment near = {build, part, {0, 0}, {0, 0}, finds};
+    dem2d_box box = build->grid.box;
+    if (!world->periodic) {
+        dem2di_search_segment(&near);
+        return;
+    }
+    box.lower = dem2di_sub(box.lower, far);
+    box.upper = dem2di_add(box.upper, far);
+    dem2di_shifts at =
+        dem2di_shifts_start(&world->cell, dem2di_along(surface->point, half, along), &box);
+    while (dem2di_shifts_next(&at)) {
+        near.shift[0] = -at.along_a;
+        near.shift[1] = -at.along_b;
+        near.way = dem2di_cell_shift(&world->cell, near.shift[0], near.shift[1]);
+        dem2di_search_segment(&near);
+    }
 }
 
-/* The disc of an image, with that for its slot. */
-static dem2di_disc dem2di_image_disc(const dem2di_build *build, const dem2di_image *image,
-                                     int slot) {
-    dem2di_disc disc = *dem2di_disc_at(build, image->owner);
-    dem2d_vec way = dem2di_cell_shift(&build->world->cell, image->shift[0], image->shift[1]);
-    disc.centre = dem2di_add(disc.centre, way);
-    disc.slot = slot;
-    return disc;
-}
+/* --- contacts out of reach --------------------------------------------------------------------
+   Contacts of the last force pass, and passages of one-sided walls, whose partners are out of reach
+   by now stay listed for the queries, the hash and the ledger. Particles only get there when some
+   have strayed or have been fixed since (then the features in use are due). */
 
-/* Is the B of a listed pair out of reach? */
-static bool dem2di_listed_far(const dem2di_build *build, const dem2di_key *key) {
+/* The disc of a slot in the keys of the old list. */
+static dem2di_disc dem2di_listed_disc(const dem2di_build *build, int slot) {
     dem2di_image image;
-    image.owner = dem2di_owner(build->world, key->b);
-    dem2di_shift_of(build->world, key->b, image.shift);
-    const dem2di_disc two = dem2di_image_disc(build, &image, key->b);
-    const dem2di_disc *one = dem2di_disc_at(build, key->a);
-    return !dem2di_discs_meet(one, &two) || (one->fixed && two.fixed);
+    image.owner = dem2di_owner(build->world, slot);
+    dem2di_shift_of(build->world, slot, image.shift);
+    return dem2di_image_disc(build, &image, slot);
+}
+
+static bool dem2di_is_lost(const dem2di_build *build, int i) {
+    const dem2di_list *list = &build->world->list;
+    const dem2di_key *key = &list->keys[i];
+    const double depth = list->contacts.depth[i];
+    if (!(depth > 0 || (i >= list->pairs && depth < -1))) return false; /* of pairs: gaps */
+    const dem2di_disc one = dem2di_listed_disc(build, key->a);
+    if (i >= list->pairs) return !dem2di_number_is_near(build->world, &one, key->b);
+    const dem2di_disc two = dem2di_listed_disc(build, key->b);
+    return !dem2di_discs_meet(&one, &two) || (one.fixed && two.fixed);
 }
 
 /* Is B of a listed pair an image with a shift? One with the shift 0 is as good as its owner. */
@@ -17874,18 +18316,17 @@ static bool dem2di_is_shifted(const dem2d_world *world, int slot) {
     return shift[0] != 0 || shift[1] != 0;
 }
 
-/* Images of closed contacts that are out of reach; false when there is no memory. */
+/* Images of contacts that are out of reach; false when there is no memory. */
 static bool dem2di_build_lost_images(dem2di_build *build) {
     const dem2d_world *world = build->world;
     const dem2di_list *list = &world->list;
-    for (int i = 0; i < list->pairs && build->all.strayed; i++) {
-        const dem2di_key *key = &list->keys[i];
+    for (int i = build->all.strayed ? 0 : list->pairs; i < list->count && world->periodic; i++) {
+        const int slot = *dem2di_imaged(world, i);
         int shift[2];
-        if (!(list->contacts.depth[i] > 0) || !dem2di_is_shifted(world, key->b)) continue;
-        if (!dem2di_listed_far(build, key)) continue;
-        dem2di_shift_of(world, key->b, shift);
-        if (!dem2di_build_image(build, dem2di_owner(world, key->b), shift[0], shift[1]))
-            return false;
+        if (list->keys[i].a < 0 || !dem2di_is_shifted(world, slot) || !dem2di_is_lost(build, i))
+            continue;
+        dem2di_shift_of(world, slot, shift);
+        if (!dem2di_build_image(build, dem2di_owner(world, slot), shift[0], shift[1])) return false;
         build->lost_images++;
     }
     return true;
@@ -17906,6 +18347,8 @@ static bool dem2di_build_images(dem2di_build *build) {
     dem2d_world *world = build->world;
     const dem2di_grid *grid = &build->grid;
     build->image_base = world->body_count;
+    if (build->image_of != NULL)
+        memset(build->image_of, 0, (size_t)grid->count * sizeof *build->image_of);
     for (int i = 0; i < world->body_count && world->periodic; i++) {
         const double far = dem2di_size_of(grid->box.lower) + dem2di_size_of(grid->box.upper);
         const double reach = build->reach[i] + grid->size / 2 + DEM2DI_ROUNDOFF * far;
@@ -17917,11 +18360,13 @@ static bool dem2di_build_images(dem2di_build *build) {
         while (dem2di_shifts_next(&at)) {
             if (at.along_a == 0 && at.along_b == 0) continue;
             if (!dem2di_build_image(build, i, at.along_a, at.along_b)) return false;
-            build->images++;
+            dem2di_build_link(build, build->images++);
         }
     }
-    if (!dem2di_build_lost_images(build)) return false;
-    const int slots = world->body_count + build->images + build->lost_images;
+    for (int k = 0; k < world->part_count && build->image_of != NULL; k++)
+        if (world->parts[k].extent > 0) dem2di_search_part(build, k, NULL);
+    if (build->failed || !dem2di_build_lost_images(build)) return false;
+    const int slots = world->body_count + build->images + build->wall_images + build->lost_images;
     return !world->periodic ||
            (dem2di_reserve_bodies(world, slots) &&
             (!build->plan.turns || dem2di_group_reserve(world, DEM2DI_DISPLACEMENTS, slots)));
@@ -17992,18 +18437,22 @@ static void dem2di_image_partners(const dem2di_build *build, int k, dem2di_finds
 
 /* Images of the same owners as in the list that are needed, in their order; the keys of the
    next list, which are in place, get their slots. */
-static void dem2di_build_images_keep(dem2di_build *build, int pairs) {
+static void dem2di_build_images_keep(dem2di_build *build) {
     dem2d_world *world = build->world;
     dem2di_image *images = world->images_next;
-    dem2di_key *keys = world->list.keys;
-    const int base = build->image_base, found = build->images + build->lost_images;
+    const int base = build->image_base;
+    const int found = build->images + build->wall_images + build->lost_images;
     int used = 0;
-    for (int i = 0; i < pairs; i++)
-        if (keys[i].b >= base) images[keys[i].b - base].row = 0;
+    for (int i = 0; i < world->list.count; i++) {
+        const int slot = *dem2di_imaged(world, i);
+        if (slot >= base) images[slot - base].row = 0;
+    }
     for (int k = 0; k < found; k++)
         if (images[k].row == 0) images[k].row = used++;
-    for (int i = 0; i < pairs; i++)
-        if (keys[i].b >= base) keys[i].b = base + images[keys[i].b - base].row;
+    for (int i = 0; i < world->list.count; i++) {
+        int *slot = dem2di_imaged(world, i);
+        if (*slot >= base) *slot = base + images[*slot - base].row;
+    }
     for (int k = 0; k < found; k++)
         if (images[k].row >= 0) images[images[k].row] = images[k];
     world->images_next = world->images;
@@ -18013,25 +18462,22 @@ static void dem2di_build_images_keep(dem2di_build *build, int pairs) {
     dem2di_images_link(world);
 }
 
-/* Contacts of the last force pass, and passages of one-sided walls, whose partners are out of reach
-   by now stay listed for the queries, the hash and the ledger. Particles only get there when some
-   have strayed or have been fixed since (then the features in use are due). */
+/* What is out of reach, for the next list; images in the order in which they were found. */
 static void dem2di_find_lost(const dem2di_build *build, dem2di_finds *finds) {
     const dem2d_world *world = build->world;
     const dem2di_list *list = &world->list;
-    int image = build->image_base + build->images;
+    int image = build->image_base + build->images + build->wall_images;
     for (int i = build->all.strayed ? 0 : list->pairs; i < list->count; i++) {
-        int a = list->keys[i].a, b = list->keys[i].b;
-        const double depth = list->contacts.depth[i];
-        if (!(depth > 0 || (i >= list->pairs && depth < -1))) continue; /* of pairs: gaps */
-        const dem2di_disc *one = dem2di_disc_at(build, a);
-        if (i >= list->pairs) {
-            if (!dem2di_number_is_near(world, one, b)) dem2di_find(finds, ~a, b);
-        } else if (dem2di_listed_far(build, &list->keys[i])) {
-            const int owner = dem2di_owner(world, b);
-            b = dem2di_is_shifted(world, b) ? image++ : owner;
-            dem2di_find(finds, a, b ^ (one->other | dem2di_disc_at(build, owner)->other));
-        }
+        const dem2di_key *key = &list->keys[i];
+        if (key->a < 0 || !dem2di_is_lost(build, i)) continue;
+        const int slot = *dem2di_imaged(world, i), owner = dem2di_owner(world, slot);
+        const int listed = dem2di_is_shifted(world, slot) ? image++ : owner;
+        if (i >= list->pairs)
+            dem2di_find(finds, ~listed, key->b);
+        else
+            dem2di_find(finds, key->a,
+                        listed ^ (dem2di_disc_at(build, key->a)->other |
+                                  dem2di_disc_at(build, owner)->other));
     }
 }
 
@@ -18049,7 +18495,7 @@ static void dem2di_kinds_count(const dem2di_finds *finds, int numbers[DEM2DI_KIN
 }
 
 static void dem2di_search_task(void *context, int begin, int end) {
-    const dem2di_build *build = (const dem2di_build *)context;
+    dem2di_build *build = (dem2di_build *)context;
     const dem2d_world *world = build->world;
     int bodies = dem2di_blocks(world->body_count, DEM2DI_BLOCK);
     int blocks = dem2di_search_blocks(world);
@@ -18067,27 +18513,34 @@ static void dem2di_search_task(void *context, int begin, int end) {
         else
             for (int j = first; j < dem2di_block_end(first, DEM2DI_BLOCK_OTHERS, world->part_count);
                  j++)
-                if (world->parts[j].extent > 0) dem2di_search_segment(build, j, &finds);
+                if (world->parts[j].extent > 0) dem2di_search_part(build, j, &finds);
         result->found = finds.count;
         dem2di_kinds_count(&finds, result->starts);
     }
 }
 
-/* The contact that a particle had in the old list, as A, with an image of another; or -1. */
-static int dem2di_listed_image(const dem2di_build *build, const dem2di_key *key) {
+/* From a particle to what a slot in the keys of the next list shows, in cell vectors. */
+static void dem2di_build_shift(const dem2di_build *build, int slot, int shift[2]) {
+    shift[0] = shift[1] = 0;
+    if (slot >= build->image_base)
+        memcpy(shift, build->world->images_next[slot - build->image_base].shift, 2 * sizeof *shift);
+}
+
+/* In a cell: the contact that a particle had in the old list, as A, with an image of another; or
+   one of its images with a part of a wall; or -1. */
+static int dem2di_listed_image(const dem2di_build *build, const dem2di_key *key, bool wall) {
     const dem2d_world *world = build->world;
     const dem2di_list *list = &world->list;
-    const int owner = dem2di_build_owner(build, key->b);
-    int shift[2] = {0, 0};
-    if (key->b >= build->image_base)
-        memcpy(shift, world->images_next[key->b - build->image_base].shift, sizeof shift);
-    for (int k = list->own[key->a]; k < list->first[key->a + 1]; k++) {
+    const int a = dem2di_build_owner(build, key->a);
+    const int b = wall ? key->b : dem2di_build_owner(build, key->b);
+    int shift[2], listed[2];
+    dem2di_build_shift(build, wall ? key->a : key->b, shift);
+    for (int k = list->own[a]; k < list->first[a + 1]; k++) {
         const int contact = list->adjacent[k];
         const dem2di_key *old = &list->keys[contact];
-        int listed[2];
-        if (contact >= list->pairs || old->a != key->a || dem2di_owner(world, old->b) != owner)
-            continue;
-        dem2di_shift_of(world, old->b, listed);
+        if (old->a < 0 || (contact >= list->pairs) != wall) continue;
+        if (wall ? old->b != b : old->a != a || dem2di_owner(world, old->b) != b) continue;
+        dem2di_shift_of(world, *dem2di_imaged(world, contact), listed);
         if (listed[0] == shift[0] && listed[1] == shift[1]) return contact;
     }
     return -1;
@@ -18108,6 +18561,18 @@ static int dem2di_listed(const dem2d_world *world, const dem2di_key *key, bool w
             return *last = contact;
     }
     return -1;
+}
+
+/* The contact of a key of the next list in the old one, or -1. In a cell one of the two may have been
+   an image, or is one now. */
+static int dem2di_listed_before(const dem2di_build *build, const dem2di_key *key, bool wall,
+                                int *last) {
+    int listed = -1;
+    if ((wall ? key->a : key->b) < build->image_base)
+        listed = dem2di_listed(build->world, key, wall, last);
+    if (listed < 0 && build->world->image_count > 0)
+        listed = dem2di_listed_image(build, key, wall);
+    return listed;
 }
 
 /* A column of contacts on its way from the old list to the new one. */
@@ -18201,7 +18666,8 @@ static void dem2di_fill_task(void *context, int begin, int end) {
             int a = finds[k].a, b = finds[k].b, kind = b < 0 ? DEM2DI_OTHERS : DEM2DI_DISCS;
             if (a < 0) {
                 dem2di_order *item = &build->wall_contacts[result->starts[DEM2DI_WALL_CONTACTS]++];
-                item->key = (uint64_t)b << 32 | (uint64_t)bodies[~a].rank;
+                item->key =
+                    (uint64_t)b << 32 | (uint64_t)bodies[dem2di_build_owner(build, ~a)].rank;
                 item->value = ~a;
                 continue;
             }
@@ -18209,15 +18675,28 @@ static void dem2di_fill_task(void *context, int begin, int end) {
             const int owner = dem2di_build_owner(build, b);
             const bool turned = bodies[a].rank > bodies[owner].rank;
             const dem2di_key key = {turned ? b : a, turned ? a : b};
-            int listed = -1;
-            if (key.b < build->image_base) listed = dem2di_listed(world, &key, false, &last[kind]);
-            if (listed < 0 && world->image_count > 0) listed = dem2di_listed_image(build, &key);
-            build->old[result->starts[kind]++] = listed;
+            build->old[result->starts[kind]++] =
+                dem2di_listed_before(build, &key, false, &last[kind]);
             finds[k].a = key.a;
             finds[k].b = kind == DEM2DI_OTHERS ? ~key.b : key.b;
             spread += a < owner ? owner - a : a - owner;
         }
         result->spread = spread;
+    }
+}
+
+/* Images of one particle at one part of a wall in the order of their shifts. */
+static void dem2di_wall_images_sort(const dem2di_build *build, dem2di_order *items, int count) {
+    for (int i = 1; i < count; i++) {
+        const dem2di_order own = items[i];
+        int k = i, one[2], other[2];
+        dem2di_build_shift(build, own.value, one);
+        for (; k > 0 && items[k - 1].key == own.key; k--) {
+            dem2di_build_shift(build, items[k - 1].value, other);
+            if (other[1] != one[1] ? other[1] < one[1] : other[0] < one[0]) break;
+            items[k] = items[k - 1];
+        }
+        items[k] = own;
     }
 }
 
@@ -18229,10 +18708,11 @@ static void dem2di_wall_contacts_task(void *context, int begin, int end) {
     (void)begin;
     (void)end;
     dem2di_sort(build->wall_contacts, build->spare, count);
+    if (build->world->periodic) dem2di_wall_images_sort(build, build->wall_contacts, count);
     for (int i = 0; i < count; i++) {
         const dem2di_order *item = &build->wall_contacts[i];
         const dem2di_key key = {item->value, (int)(item->key >> 32)};
-        build->old[pairs + i] = dem2di_listed(build->world, &key, true, &last);
+        build->old[pairs + i] = dem2di_listed_before(build, &key, true, &last);
     }
 }
 
@@ -18368,7 +18848,8 @@ static double dem2di_build_softness(const dem2di_build *build) {
     for (int block = 0; block < dem2di_search_blocks(world); block++) {
         const dem2di_key *finds = build->finds + world->block_results[block].finds;
         for (int k = 0; k < world->block_results[block].found; k++) {
-            numbers[finds[k].a < 0 ? ~finds[k].a : finds[k].a]++;
+            const int a = finds[k].a < 0 ? ~finds[k].a : finds[k].a;
+            numbers[dem2di_build_owner(build, a)]++;
             if (finds[k].a >= 0) numbers[dem2di_build_owner(build, finds[k].b)]++;
         }
     }
@@ -18490,6 +18971,9 @@ static bool dem2di_build_cut(dem2di_build *build) {
         grid->place = (int *)dem2di_cut(&cutter, n, sizeof *grid->place);
         build->planes = (int *)dem2di_cut(&cutter, (size_t)world->part_count, sizeof(int));
         grid->heads = (int *)dem2di_cut(&cutter, (size_t)grid->cells + 1, sizeof *grid->heads);
+        build->image_of = NULL;
+        if (world->periodic && world->line != NULL)
+            build->image_of = (int *)dem2di_cut(&cutter, n, sizeof *build->image_of);
         build->finds = (dem2di_key *)dem2di_cut(&cutter, (size_t)build->room, sizeof(dem2di_key));
         size_t column = dem2di_contacts_largest(&build->plan, discs, count);
         if (column > cutter.used) (void)dem2di_cut(&cutter, column - cutter.used, 1);
@@ -18588,7 +19072,7 @@ static void dem2di_build_finish(dem2di_build *build) {
     list->discs = discs;
     list->pairs = pairs;
     list->count = count;
-    if (world->periodic) dem2di_build_images_keep(build, pairs);
+    if (world->periodic) dem2di_build_images_keep(build);
     if (world->plan.turns != build->plan.turns) dem2di_reorient(world, build->plan.turns);
     world->plan = build->plan;
     if (world->plan.turns)
@@ -19843,14 +20327,14 @@ static inline void dem2di_law_room(dem2d_world *world, dem2di_law_rows *rows, de
 /* Where contact i has its points, beside it when there are two; B's centre is at d. A circle has
    its point on the line of the normal: at the middle of an overlap, and on a wall at the foot. Both
    arms are of one point, so that the two torques and the forces' moment add up to nothing. The
-   centre of a wall that turns is its pivot; that of others is not asked for. */
+   centre of a wall is its point, a pivot if it turns; where nobody asks for it the arm is 0. */
 static DEM2DI_INLINE void dem2di_contact_place(dem2d_world *world, int i, bool wall, int count,
                                                const dem2d_contact_point points[2], dem2d_vec d,
                                                dem2di_contact *contact) {
     const dem2di_list *list = &world->list;
     const dem2di_key *key = &list->keys[i];
     const bool turns = world->plan.turns; /* circles have a lever of 0 */
-    const bool pinned = wall && !world->walls[dem2di_wall_of(world, i)].turns;
+    const bool pinned = wall && !dem2di_has_pivot(world, i);
     const bool circle_a = !turns || world->lever[key->a] == 0;
     const bool circle_b = !wall && (!turns || world->lever[key->b] == 0);
     const double depth = contact->depth;
@@ -19961,13 +20445,15 @@ static int dem2di_collide_segment(const dem2d_world *world, int a, int part,
     const dem2di_body *body = &world->bodies[a];
     const dem2di_state *state = &world->now[a];
     const dem2d_rot none = {1, 0};
-    const double extent = world->joints[part].face.extent, reach = 3 * state->radius;
+    const bool round = dem2di_goes_round(&world->joints[part]);
+    const double low = round ? -HUGE_VAL : 0, reach = 3 * state->radius;
+    const double extent = round ? HUGE_VAL : world->joints[part].face.extent;
     dem2d_vec along = dem2di_vec(surface.along.c, surface.along.s);
     dem2d_vec start = dem2di_sub(surface.point, state->x);
     double foot = -dem2di_dot(start, along), gap;
-    double nearest = dem2di_max(0, dem2di_min(extent, foot));
+    double nearest = dem2di_max(low, dem2di_min(extent, foot));
     if (!(dem2di_length(dem2di_along(start, nearest, along)) < state->radius)) return 0;
-    double from = dem2di_max(0, foot - reach), to = dem2di_min(extent, foot + reach);
+    double from = dem2di_max(low, foot - reach), to = dem2di_min(extent, foot + reach);
     dem2di_pair pair;
     pair.a = dem2di_shape_of(world, body);
     pair.b = world->line;
@@ -20041,8 +20527,7 @@ static void dem2di_arms_deepen(dem2di_arms *arms, double by, bool turns) {
    the middle. */
 static inline void dem2di_wall_deepen(const dem2d_world *world, int i, dem2di_contact *contact) {
     if (world->faces == DEM2D_ONE_POINT)
-        dem2di_arms_deepen(&contact->arms, contact->depth / 2,
-                           world->walls[dem2di_wall_of(world, i)].turns);
+        dem2di_arms_deepen(&contact->arms, contact->depth / 2, dem2di_has_pivot(world, i));
 }
 
 /* The rows of a contact with a wall whose geometry is known. */
@@ -20054,13 +20539,17 @@ static DEM2DI_INLINE void dem2di_wall_add(dem2d_world *world, int i, const dem2d
     dem2di_geometry_put(&world->list, i, contact);
 }
 
-/* Is a particle over the part of a number, and not over another one of its face? */
+/* Is a particle over the part of a number, and not over another one of its face? In a cell, where
+   copies have their places with other roundings, it may be over two of them: see
+   dem2di_resolve_copies. */
 static bool dem2di_over_part(const dem2d_world *world, int a, int number) {
     const dem2di_wall_joint *joint = &world->joints[number];
     const dem2di_surface *face = &world->face_surfaces[number];
     dem2d_vec along = dem2di_vec(face->along.c, face->along.s);
-    double foot = dem2di_dot(dem2di_sub(world->now[a].x, face->point), along);
-    return foot >= joint->from && foot < joint->to;
+    double foot = dem2di_dot(dem2di_sub(world->now[a].x, face->point), along), margin = 0;
+    if (world->periodic)
+        margin = DEM2DI_ROUNDOFF * (dem2di_size_of(world->now[a].x) + joint->face.extent);
+    return foot >= joint->from - margin && foot < joint->to + margin;
 }
 
 /* Contact i is apart, as if it had never been searched. One that an edit has ended is so, but for
@@ -20165,30 +20654,74 @@ static dem2di_wall_rows dem2di_closed_rows_of(const dem2d_world *world,
     return closed;
 }
 
-/* The lowest part of the face that a contact with a part is with; -1 of a half-plane. */
-static int dem2di_face_of(const dem2d_world *world, int contact) {
-    int number = world->list.keys[contact].b;
-    return world->parts[number].extent > 0 ? world->joints[number].first : -1;
+/* A face that a particle meets: its lowest part, -1 of a half-plane; in a cell the copy of it that
+   is so many cell vectors from where that part is. */
+typedef struct dem2di_wall_face {
+    int first, at[2];
+} dem2di_wall_face;
+
+/* The face of the copy of a part that is as many cell vectors from the part. */
+static dem2di_wall_face dem2di_face_at(const dem2d_world *world, int part, int along_a,
+                                       int along_b) {
+    const dem2di_wall_joint *joint = &world->joints[part];
+    dem2di_wall_face face;
+    face.first = world->parts[part].extent > 0 ? joint->first : -1;
+    face.at[0] = along_a + joint->first_at[0];
+    face.at[1] = along_b + joint->first_at[1];
+    return face;
+}
+
+/* The face that a contact with a part is with: the particle is in the cell, an image of it meets
+   the part, so that itself meets the copy as far on the other side. */
+static dem2di_wall_face dem2di_face_of(const dem2d_world *world, int contact) {
+    const dem2di_key *key = &world->list.keys[contact];
+    int shift[2];
+    dem2di_shift_of(world, key->a, shift);
+    return dem2di_face_at(world, key->b, -shift[0], -shift[1]);
+}
+
+/* Are two faces one? All copies are of a face that goes round that are whole rounds apart. */
+static bool dem2di_same_face(const dem2d_world *world, const dem2di_wall_face *one,
+                             const dem2di_wall_face *other) {
+    if (one->first != other->first || one->first < 0) return false;
+    const int64_t a = (int64_t)one->at[0] - other->at[0], b = (int64_t)one->at[1] - other->at[1];
+    const int *round = world->joints[one->first].round;
+    if (a == 0 && b == 0) return true;
+    if ((round[0] == 0 && round[1] == 0) || a * round[1] != b * round[0]) return false;
+    return (round[0] != 0 ? a % round[0] : b % round[1]) == 0;
 }
 
 /* The contact with a face that overlaps, whether it counts or has been left out (depth 0); or -1.
  */
-static int dem2di_row_of_face(const dem2d_world *world, const dem2di_wall_rows *rows, int face) {
-    for (int k = 0; k < rows->parts; k++)
-        if (world->list.contacts.depth[rows->contact[k]] >= 0 &&
-            dem2di_face_of(world, rows->contact[k]) == face)
-            return rows->contact[k];
+static int dem2di_row_of_face(const dem2d_world *world, const dem2di_wall_rows *rows,
+                              const dem2di_wall_face *face) {
+    for (int k = 0; k < rows->parts; k++) {
+        if (!(world->list.contacts.depth[rows->contact[k]] >= 0)) continue;
+        const dem2di_wall_face own = dem2di_face_of(world, rows->contact[k]);
+        if (dem2di_same_face(world, &own, face)) return rows->contact[k];
+    }
     return -1;
+}
+
+/* The faces of a contact with a vertex: its own, and that of its partner. */
+static void dem2di_faces_of_vertex(const dem2d_world *world, int vertex,
+                                   dem2di_wall_face faces[2]) {
+    const dem2di_key *key = &world->list.keys[vertex];
+    const int part = dem2di_part_of(key->b), end = dem2di_vertex_of(key->b);
+    const dem2di_wall_joint *joint = &world->joints[part];
+    int shift[2];
+    dem2di_shift_of(world, key->a, shift);
+    faces[0] = dem2di_face_at(world, part, -shift[0], -shift[1]);
+    faces[1] = dem2di_face_at(world, joint->partner[end], joint->beyond[end][0] - shift[0],
+                              joint->beyond[end][1] - shift[1]);
 }
 
 /* The same with both faces of a vertex. */
 static void dem2di_rows_of_vertex(const dem2d_world *world, const dem2di_wall_rows *rows,
                                   int vertex, int row[2]) {
-    int number = world->list.keys[vertex].b;
-    const dem2di_wall_joint *joint = &world->joints[dem2di_part_of(number)];
-    int other = joint->partner[dem2di_vertex_of(number)];
-    row[0] = dem2di_row_of_face(world, rows, joint->first);
-    row[1] = dem2di_row_of_face(world, rows, world->joints[other].first);
+    dem2di_wall_face faces[2];
+    dem2di_faces_of_vertex(world, vertex, faces);
+    for (int k = 0; k < 2; k++) row[k] = dem2di_row_of_face(world, rows, &faces[k]);
 }
 
 /* Component of the normal of a contact along the face of a part. */
@@ -20345,9 +20878,10 @@ static void dem2di_resolve_vertex(dem2d_world *world, const dem2di_wall_rows *ro
 static void dem2di_pools_follow(dem2d_world *world, const dem2di_wall_rows *rows) {
     const dem2di_list *list = &world->list;
     for (int k = 0; k < rows->parts; k++) {
-        int old = rows->contact[k], face = dem2di_face_of(world, old);
-        if (!(list->last.depth[old] > 0) || list->contacts.depth[old] >= 0 || face < 0) continue;
-        int now = dem2di_row_of_face(world, rows, face);
+        int old = rows->contact[k];
+        const dem2di_wall_face face = dem2di_face_of(world, old);
+        if (!(list->last.depth[old] > 0) || list->contacts.depth[old] >= 0) continue;
+        int now = dem2di_row_of_face(world, rows, &face); /* of a half-plane none */
         if (now >= 0) dem2di_pools_join(world, rows, old, now);
     }
 }
@@ -20458,15 +20992,17 @@ static bool dem2di_was_held(const dem2d_world *world, int contact) {
 
 /* Was some contact with a face closed in the last force pass? */
 static bool dem2di_face_was_closed(const dem2d_world *world, const dem2di_wall_rows *rows,
-                                   int face) {
-    for (int k = 0; k < rows->parts; k++)
-        if (dem2di_was_held(world, rows->contact[k]) &&
-            dem2di_face_of(world, rows->contact[k]) == face)
-            return true;
+                                   const dem2di_wall_face *face) {
+    for (int k = 0; k < rows->parts; k++) {
+        if (!dem2di_was_held(world, rows->contact[k])) continue;
+        const dem2di_wall_face own = dem2di_face_of(world, rows->contact[k]);
+        if (dem2di_same_face(world, &own, face)) return true;
+    }
     return false;
 }
 
-/* Had a particle contacts with a wall in the last force pass (1), was it passing (-1), or none? */
+/* Had a particle contacts with a wall in the last force pass (1), was it passing (-1), or none? The
+   copies of a wall count as one: a floor goes on in them. */
 static int dem2di_wall_was(const dem2d_world *world, const dem2di_wall_rows *rows, int wall) {
     int was = 0;
     for (int k = 0; k < rows->parts; k++) {
@@ -20477,25 +21013,38 @@ static int dem2di_wall_was(const dem2d_world *world, const dem2di_wall_rows *row
     return was;
 }
 
+/* Where a particle or an image was in the last force pass. A particle that has gone back into the
+   cell since was there before: it is looked for next to where it is now. */
+static dem2d_vec dem2di_place_before(const dem2d_world *world, int slot) {
+    const dem2d_vec before = world->before[dem2di_owner(world, slot)].x;
+    if (!world->periodic) return before;
+    const dem2di_fractions f = dem2di_fractions_make(&world->cell_before);
+    const dem2d_vec way = dem2di_sub(world->now[slot].x, before);
+    const double t = way.y * f.per_y, s = way.x * f.per_x - t * f.slope;
+    return dem2di_add(
+        before, dem2di_cell_shift(&world->cell_before, (int)floor(s + 0.5), (int)floor(t + 0.5)));
+}
+
 /* Was the centre of a particle at the left of a part in the last force pass? */
 static bool dem2di_was_left(const dem2d_world *world, int a, int part) {
     const dem2di_surface surface = dem2di_surface_of(world, world->wall_before, part);
-    dem2d_vec from = dem2di_sub(world->before[a].x, surface.point);
+    dem2d_vec from = dem2di_sub(dem2di_place_before(world, a), surface.point);
     return dem2di_dot(from, dem2di_surface_normal(&surface)) > 0;
 }
 
 /* How a contact with a one-sided face lies. */
 typedef struct dem2di_sidedness {
-    bool right;  /* pushes to the right, at a vertex seen from both faces together */
-    int end;     /* of the face at which it is, or -1 */
-    int partner; /* reflex vertex: the part of the other face, else -1 */
+    bool right;            /* pushes to the right, at a vertex seen from both faces together */
+    int end;               /* of the face at which it is, or -1 */
+    int partner;           /* reflex vertex: the part of the other face, else -1; */
+    dem2di_wall_face face; /* that face */
 } dem2di_sidedness;
 
-/* A part of the other face at the vertex at an end of the face of a contact, and which way that
-   face leaves the vertex; or -1. */
+/* A part of the other face at the vertex at an end of the face of a contact, that face, and which
+   way it leaves the vertex; or -1. */
 static int dem2di_part_beyond(const dem2d_world *world, const dem2di_wall_rows *rows, int i,
-                              int end, int *away) {
-    const int face = dem2di_face_of(world, i);
+                              int end, dem2di_wall_face *beyond, int *away) {
+    const dem2di_wall_face face = dem2di_face_of(world, i);
     for (int k = rows->parts; k < rows->count; k++) {
         const int number = world->list.keys[rows->contact[k]].b, at = dem2di_vertex_of(number);
         const int part = dem2di_part_of(number);
@@ -20503,9 +21052,13 @@ static int dem2di_part_beyond(const dem2d_world *world, const dem2di_wall_rows *
         const int other = joint->partner[at];
         if (other < 0) continue; /* in a damaged snapshot */
         const int parts[2] = {part, other};
+        dem2di_wall_face faces[2];
+        dem2di_faces_of_vertex(world, rows->contact[k], faces);
         for (int own = 0; own < 2; own++)
-            if (world->joints[parts[own]].first == face && joint->away[at][own] == 1 - 2 * end) {
+            if (dem2di_same_face(world, &faces[own], &face) &&
+                joint->away[at][own] == 1 - 2 * end) {
                 *away = joint->away[at][1 - own];
+                *beyond = faces[1 - own];
                 return parts[1 - own];
             }
     }
@@ -20518,7 +21071,7 @@ static int dem2di_end_touched(const dem2d_world *world, int i) {
     const dem2di_surface surface = world->face_surfaces[part];
     const double along = -dem2di_normal_along(world, i, part);
     dem2di_contact contact;
-    if (fabs(along) <= DEM2DI_CORNER) return -1;
+    if (fabs(along) <= DEM2DI_CORNER || dem2di_goes_round(&world->joints[part])) return -1;
     (void)dem2di_contact_get(world, &world->list.contacts, i, &contact);
     dem2d_vec from = dem2di_sub(dem2di_add(world->now[a].x, dem2di_arm_a(&contact)), surface.point);
     double place = dem2di_dot(from, dem2di_vec(surface.along.c, surface.along.s));
@@ -20535,8 +21088,10 @@ static dem2di_sidedness dem2di_side_of(const dem2d_world *world, const dem2di_wa
     dem2d_vec left = dem2di_surface_normal(own);
     dem2di_sidedness side;
     int away = 0;
+    memset(&side.face, 0, sizeof side.face);
     side.end = dem2di_end_touched(world, i);
-    side.partner = side.end >= 0 ? dem2di_part_beyond(world, rows, i, side.end, &away) : -1;
+    side.partner =
+        side.end >= 0 ? dem2di_part_beyond(world, rows, i, side.end, &side.face, &away) : -1;
     if (side.partner >= 0) { /* the other face as if it had the direction of this one */
         dem2di_surface other = world->face_surfaces[side.partner];
         if (away == 1 - 2 * side.end)
@@ -20576,7 +21131,7 @@ static void dem2di_push_back(dem2d_world *world, int i, dem2di_count *count) {
    other face: one that is at its side, or of two at the vertex the first? */
 static bool dem2di_side_yields(const dem2d_world *world, const dem2di_wall_rows *rows,
                                const dem2di_sidedness *side) {
-    const int other = dem2di_row_of_face(world, rows, world->joints[side->partner].first);
+    const int other = dem2di_row_of_face(world, rows, &side->face);
     if (other < 0 || !(world->list.contacts.depth[other] > 0)) return false;
     return side->end == 0 || dem2di_end_touched(world, other) < 0;
 }
@@ -20592,11 +21147,12 @@ static void dem2di_resolve_sides(dem2d_world *world, const dem2di_wall_rows *row
         const dem2di_sidedness side = dem2di_side_of(world, rows, i);
         const int was = dem2di_wall_was(world, rows, dem2di_wall_of(world, i));
         const bool vertex = side.partner >= 0;
+        const dem2di_wall_face face = dem2di_face_of(world, i);
         const dem2d_vec normal = dem2di_vec(list->contacts.normal_x[i], list->contacts.normal_y[i]);
         if (!side.right && was >= 0) continue;
         if (side.right && was >= 0 && (side.end < 0 || vertex) &&
-            (dem2di_face_was_closed(world, rows, world->joints[part].first) ||
-             (vertex && dem2di_face_was_closed(world, rows, world->joints[side.partner].first)) ||
+            (dem2di_face_was_closed(world, rows, &face) ||
+             (vertex && dem2di_face_was_closed(world, rows, &side.face)) ||
              dem2di_was_left(world, a, part))) {
             list->contacts.relief[i - list->discs] = -1;
             if (!vertex || !dem2di_side_yields(world, rows, &side)) continue;
@@ -20616,12 +21172,27 @@ static void dem2di_resolve_sides(dem2d_world *world, const dem2di_wall_rows *row
     }
 }
 
+/* In a cell a particle at a joint may be found over two parts of one face, or over two copies of
+   one: the first of them counts. */
+static void dem2di_resolve_copies(dem2d_world *world, const dem2di_wall_rows *rows) {
+    const dem2di_contacts *contacts = &world->list.contacts;
+    for (int k = 1; k < rows->parts; k++) {
+        const int i = rows->contact[k];
+        const dem2di_wall_rows before = {rows->contact, k, k};
+        const dem2di_wall_face face = dem2di_face_of(world, i);
+        const dem2d_vec normal = dem2di_vec(contacts->normal_x[i], contacts->normal_y[i]);
+        if (contacts->depth[i] > 0 && dem2di_row_of_face(world, &before, &face) >= 0)
+            dem2di_contact_apart(world, i, normal);
+    }
+}
+
 /* A particle's contacts with joined segments: which count. Vertices do where two of them overlap:
    returns the number of rows that may have a force. */
 static int dem2di_resolve_joined(dem2d_world *world, const dem2di_wall_rows *rows,
                                  dem2di_count *count) {
     const dem2di_list *list = &world->list;
     int closed = 0;
+    if (world->periodic) dem2di_resolve_copies(world, rows);
     if (world->one_sided) dem2di_resolve_sides(world, rows, count);
     for (int k = 0; k < rows->parts; k++) {
         int i = rows->contact[k];
@@ -21582,7 +22153,7 @@ static dem2di_push dem2di_push_make(const dem2d_world *world, int i, const dem2d
     if (world->plan.terms & DEM2DI_DASHPOT)
         spring -= dem2di_viscous_of(world, &list->contacts, i, 0) +
                   dem2di_viscous_of(world, &list->contacts, i, 1);
-    dem2di_state next = dem2di_foresee(world, a);
+    dem2di_state next = dem2di_foresee(world, dem2di_owner(world, a));
     double leaves = dem2di_dot(contact->normal, next.v) - arms.a_t * next.w;
     dem2di_push push;
     push.along = -dem2di_dot(contact->normal, normal);
@@ -22255,7 +22826,9 @@ static dem2d_result dem2di_check_flow(const dem2d_world *world) {
                        width, height, radius);
 }
 
-/* The stress times the area: of the contacts, and of the fluctuations at the last force pass. */
+/* The stress times the area: of the contacts, and of the fluctuations at the last force pass. A
+   wall has its own velocity, with which the work of walls is found: what is left of the power of
+   the contact's force is f.L x of the particle at x from the corner, as if the wall were there. */
 static void dem2di_cell_work(const dem2d_world *world, double power[2][DEM2DI_HALVES]) {
     const dem2di_list *list = &world->list;
     const dem2di_flow *flow[2];
@@ -22275,8 +22848,10 @@ static void dem2di_cell_work(const dem2d_world *world, double power[2][DEM2DI_HA
         for (int k = list->own[slot]; k < list->first[slot + 1]; k++) {
             dem2di_contact contact;
             if (!dem2di_contact_get(world, &list->contacts, list->adjacent[k], &contact)) continue;
+            const int i = list->adjacent[k];
             const dem2d_vec f = dem2di_contact_force(&contact);
-            const dem2d_vec d = dem2di_branch_of(&contact, false);
+            dem2d_vec d = dem2di_branch_of(&contact, false);
+            if (i >= list->pairs) d = dem2di_sub(world->cell.origin, world->now[list->keys[i].a].x);
             xx += d.x * f.x;
             yx += d.y * f.x;
             yy += d.y * f.y;
@@ -22675,13 +23250,14 @@ static void dem2di_touches_follow(dem2d_world *world) {
     const dem2di_list *list = &world->list;
     for (int i = list->pairs; i < list->count && world->plan.joints; i++) {
         if (!(list->contacts.depth[i] > 0) || !dem2di_touch_changes(world, i)) continue;
-        const dem2di_wall_rows rows = dem2di_wall_rows_of(world, list->keys[i].a);
-        for (int k = 0; k < rows.count; k++) {
+        const dem2di_wall_rows rows =
+            dem2di_wall_rows_of(world, dem2di_owner(world, list->keys[i].a));
+        const dem2di_wall_face face = dem2di_face_of(world, i);
+        for (int k = 0; k < rows.parts; k++) {
             int other = rows.contact[k];
-            if (world->touches[other].since == 0 || list->contacts.depth[other] > 0 ||
-                dem2di_face_of(world, other) < 0 ||
-                dem2di_face_of(world, other) != dem2di_face_of(world, i))
-                continue;
+            if (world->touches[other].since == 0 || list->contacts.depth[other] > 0) continue;
+            const dem2di_wall_face old = dem2di_face_of(world, other);
+            if (!dem2di_same_face(world, &old, &face)) continue;
             world->touches[i] = world->touches[other];
             memset(&world->touches[other], 0, sizeof *world->touches);
             break;
@@ -22730,7 +23306,8 @@ static void dem2di_touch_change(dem2d_world *world, int i) {
     }
     const dem2di_relative_motion motion = dem2di_motion_of(world, i);
     touch->since = world->steps + 1;
-    touch->point = dem2di_add(world->now[world->list.keys[i].a].x, dem2di_arm_a(&contact));
+    const int slot = dem2di_owner(world, world->list.keys[i].a);
+    touch->point = dem2di_add(world->now[slot].x, dem2di_arm_a(&contact));
     touch->normal = contact.normal;
     touch->speed = -dem2di_velocity_n(&contact, &motion);
     touch->impulse = touch->greatest = 0;
@@ -22874,6 +23451,11 @@ static dem2d_result dem2di_check_states(const dem2d_world *world, const dem2di_c
               (!free_hand || dem2di_vec_finite(world->wall_next[j].force))))
             return dem2di_fail(&world->env, DEM2D_STATE, j,
                                "wall %d would get a place or a speed that is not finite", j);
+    for (int j = 0; j < world->wall_count && world->periodic; j++)
+        if (world->walls[j].alive && world->walls[j].desc.segment &&
+            !dem2di_wall_is_near(world, world->wall_next[j].point))
+            return dem2di_fail(&world->env, DEM2D_STATE, j,
+                               "wall %d would get 2^26 cells away, or more", j);
     return DEM2D_OK;
 }
 
@@ -23163,15 +23745,19 @@ DEM2D_API dem2d_result dem2d_world_materials(const dem2d_world *world, dem2d_mat
     return DEM2D_OK;
 }
 
-/* The shift of the B of a pair in the last force pass, from the branch vector that it had then: the
-   particles may have gone back into the cell since. */
-static void dem2di_shift_seen(const dem2d_world *world, const dem2di_key *key, dem2d_vec branch,
+/* The shift of B in the last force pass, from the line that the contact's arms made then, to the
+   centre of a particle or to the point of a wall: the particles may have gone back into the cell
+   since. */
+static void dem2di_shift_seen(const dem2d_world *world, const dem2di_contact_iterator *iterator,
                               int shift[2]) {
+    const dem2di_key *key = &world->list.keys[iterator->number];
     const dem2di_fractions f = dem2di_fractions_make(&world->cell_before);
-    if (!world->periodic) return;
-    const int owner = dem2di_owner(world, key->b);
-    dem2d_vec apart = dem2di_sub(world->before[owner].x, world->before[key->a].x);
-    dem2d_vec way = dem2di_sub(branch, apart);
+    if (!world->periodic || (iterator->walls && !dem2di_has_pivot(world, iterator->number))) return;
+    const dem2d_vec b = iterator->walls
+                            ? world->wall_before[dem2di_wall_of(world, iterator->number)].point
+                            : world->before[dem2di_owner(world, key->b)].x;
+    dem2d_vec apart = dem2di_sub(b, world->before[dem2di_owner(world, key->a)].x);
+    dem2d_vec way = dem2di_sub(dem2di_branch_of(&iterator->contact, false), apart);
     double t = way.y * f.per_y, s = way.x * f.per_x - t * f.slope;
     shift[0] = (int)floor(s + 0.5);
     shift[1] = (int)floor(t + 0.5);
@@ -23191,11 +23777,11 @@ static dem2d_contact_info dem2di_contact_of(const dem2d_world *world,
         info.feature = key->b / DEM2DI_VERTEX;
     } else {
         info.b = dem2di_particle_id(world, key->b);
-        dem2di_shift_seen(world, key, iterator->branch, info.shift);
     }
+    dem2di_shift_seen(world, iterator, info.shift);
     info.sign = info.feature > 0 ? -1 : 1;
     info.normal = contact->normal;
-    info.point = dem2di_add(world->before[key->a].x, dem2di_arm_a(contact));
+    info.point = dem2di_add(world->before[dem2di_owner(world, key->a)].x, dem2di_arm_a(contact));
     info.branch = iterator->branch;
     info.points =
         dem2di_point_pair_of(world, &world->list.contacts, iterator->number) != NULL ? 2 : 1;
@@ -24154,8 +24740,9 @@ static void dem2di_coarse_add_contacts(dem2d_grid *grid, const dem2d_world *worl
     while (dem2di_next_contact(world, &iterator)) {
         const dem2di_key *key = &world->list.keys[iterator.number];
         const dem2di_contact *contact = &iterator.contact;
-        dem2d_vec force = dem2di_contact_force(contact), start = world->before[key->a].x;
-        bool a = dem2di_coarse_counts(grid, world, key->a);
+        const int slot = dem2di_owner(world, key->a);
+        dem2d_vec force = dem2di_contact_force(contact), start = world->before[slot].x;
+        bool a = dem2di_coarse_counts(grid, world, slot);
         bool b = !iterator.walls && dem2di_coarse_counts(grid, world, key->b);
         if (a && b)
             dem2di_coarse_add_line(grid, &cell, start, iterator.branch, force, &contact->normal,
@@ -28763,11 +29350,15 @@ static void dem2di_finish_images(dem2di_loader *loader) {
 static bool dem2di_key_sound(const dem2d_world *w, int contact) {
     const dem2di_key *key = &w->list.keys[contact];
     if (key->a < 0) return w->list_stale && w->list.contacts.depth[contact] == 0;
-    if (key->a >= w->body_count || w->bodies[key->a].shape_index < 0) return false;
+    if (key->a >= dem2di_slots(w)) return false;
+    const int slot = dem2di_owner(w, key->a);
+    if (slot < 0 || slot >= w->body_count || w->bodies[slot].shape_index < 0) return false;
     if (contact >= w->list.pairs) {
         int end = dem2di_vertex_of(key->b), part = dem2di_part_of(key->b);
-        return part < w->part_count && end < 2 && (end < 0 || w->parts[part].extent > 0);
+        return part < w->part_count && end < 2 && (end < 0 || w->parts[part].extent > 0) &&
+               (slot == key->a || w->parts[part].extent > 0);
     }
+    if (slot != key->a) return false; /* A of a pair is no image */
     if (key->b >= dem2di_slots(w)) return false;
     const int owner = dem2di_owner(w, key->b);
     if (owner < 0 || owner >= w->body_count || w->bodies[owner].shape_index < 0) return false;
@@ -29108,6 +29699,20 @@ static void dem2di_box_fill(const dem2d_cell *cell, dem2d_box *all) {
     }
 }
 
+/* Extend the box to a segment: in a cell to the copies of its ends that are there. */
+static void dem2di_box_segment(const dem2d_world *world, int part, dem2d_box *all) {
+    const dem2di_surface surface = dem2di_surface_of(world, world->wall_before, part);
+    const dem2di_fractions f = dem2di_fractions_make(&world->cell_before);
+    for (int k = 0; k < 2; k++) {
+        dem2d_vec end = surface.point;
+        int out[2];
+        if (k == 1) end = dem2di_surface_end(&surface, world->parts[part].extent);
+        if (world->periodic && dem2di_cells_out(&f, end, out))
+            end = dem2di_sub(end, dem2di_cell_shift(&world->cell_before, out[0], out[1]));
+        dem2di_box_add(all, end);
+    }
+}
+
 /* The bounding box of particles, segments and the cell's border and, if `beside`, of half-planes
    beside them; a unit square if there are none. The margin is a twentieth of the larger side. In a
    direction with a period it is a twentieth of the side in that direction: a cell that is much
@@ -29115,12 +29720,8 @@ static void dem2di_box_fill(const dem2d_cell *cell, dem2d_box *all) {
 static dem2d_box dem2di_scene_box(const dem2d_world *world, bool beside) {
     const dem2d_cell *cell = &world->cell_before;
     dem2d_box all = dem2di_particle_box(world);
-    for (int k = 0; k < world->part_count; k++) {
-        const dem2di_surface surface = dem2di_surface_of(world, world->wall_before, k);
-        if (!(world->parts[k].extent > 0)) continue;
-        dem2di_box_add(&all, surface.point);
-        dem2di_box_add(&all, dem2di_surface_end(&surface, world->parts[k].extent));
-    }
+    for (int k = 0; k < world->part_count; k++)
+        if (world->parts[k].extent > 0) dem2di_box_segment(world, k, &all);
     dem2di_box_cell(cell, &all);
     dem2di_box_fill(cell, &all);
     dem2d_vec size = dem2di_sub(all.upper, all.lower);
@@ -29259,6 +29860,45 @@ static bool dem2di_part_line(const dem2d_world *world, int part, const dem2d_box
     ends[0] = dem2di_along(foot, inside ? cut[0] : -reach, along);
     ends[1] = dem2di_along(foot, inside ? cut[1] : reach, along);
     return inside;
+}
+
+/* An iterator over the parts of walls: in a cell of segments the copies whose boxes meet a box. */
+typedef struct dem2di_copies {
+    dem2d_box box;
+    int part;         /* -1 at first */
+    bool whole;       /* it is there once */
+    dem2di_shifts at; /* of the copy, in cell vectors */
+    dem2d_vec way;    /* the same in metres */
+} dem2di_copies;
+
+static dem2di_copies dem2di_copies_start(const dem2d_box *box) {
+    dem2di_copies copies;
+    memset(&copies, 0, sizeof copies);
+    copies.box = *box;
+    copies.part = -1;
+    copies.whole = true;
+    return copies;
+}
+
+static bool dem2di_copies_next(const dem2d_world *world, dem2di_copies *copies) {
+    while (copies->whole || !dem2di_shifts_next(&copies->at)) {
+        if (++copies->part >= world->part_count) return false;
+        const double half = world->parts[copies->part].extent / 2;
+        copies->whole = !world->periodic || !(half > 0);
+        copies->at.along_a = copies->at.along_b = 0;
+        copies->way = dem2di_vec(0, 0);
+        if (copies->whole) return true;
+        const dem2di_surface surface = dem2di_surface_of(world, world->wall_before, copies->part);
+        const dem2d_vec far =
+            dem2di_vec(half * fabs(surface.along.c), half * fabs(surface.along.s));
+        dem2d_box box = copies->box;
+        box.lower = dem2di_sub(box.lower, far);
+        box.upper = dem2di_add(box.upper, far);
+        copies->at =
+            dem2di_shifts_start(&world->cell_before, dem2di_surface_end(&surface, half), &box);
+    }
+    copies->way = dem2di_cell_shift(copies->at.cell, copies->at.along_a, copies->at.along_b);
+    return true;
 }
 
 /* --- pictures -----------------------------------------------------------------------------------
@@ -29464,11 +30104,12 @@ static void dem2di_draw_line(dem2d_vec p, dem2d_vec q, double width, dem2di_writ
 static void dem2di_draw_walls(const dem2d_world *world, const dem2di_view *view,
                               dem2di_writer *writer) {
     dem2di_print(writer, "<g stroke=\"#444\">\n");
-    for (int k = 0; k < world->part_count; k++) {
+    for (dem2di_copies k = dem2di_copies_start(&view->box); dem2di_copies_next(world, &k);) {
         dem2d_vec ends[2];
-        if (dem2di_part_line(world, k, &view->box, ends))
-            dem2di_draw_line(dem2di_pixel(view, ends[0]), dem2di_pixel(view, ends[1]),
-                             view->width / 400, writer);
+        if (!dem2di_part_line(world, k.part, &view->box, ends)) continue;
+        for (int end = 0; end < 2 && !k.whole; end++) ends[end] = dem2di_add(ends[end], k.way);
+        dem2di_draw_line(dem2di_pixel(view, ends[0]), dem2di_pixel(view, ends[1]),
+                         view->width / 400, writer);
     }
     dem2di_print(writer, "</g>\n");
 }
@@ -29504,15 +30145,16 @@ static void dem2di_draw_chains(const dem2d_world *world, const dem2di_view *view
     while (dem2di_next_contact(world, &iterator)) {
         const dem2di_key *key = &world->list.keys[iterator.number];
         const dem2d_vec none = dem2di_vec(0, 0);
+        const int slot = dem2di_owner(world, key->a);
         double most = dem2di_smaller_radius(world, &iterator) * view->factor;
         if (!world->periodic && dem2di_unseen(world, &view->box, key->a, none) &&
             (iterator.walls || dem2di_unseen(world, &view->box, key->b, none)))
             continue;
-        double far = dem2di_length(iterator.branch) + world->now[key->a].radius;
-        dem2di_shifts at = dem2di_seen_start(world, &view->box, key->a, far);
+        double far = dem2di_length(iterator.branch) + world->now[slot].radius;
+        dem2di_shifts at = dem2di_seen_start(world, &view->box, slot, far);
         while (dem2di_shifts_next(&at)) {
             dem2d_vec way = dem2di_cell_shift(&world->cell_before, at.along_a, at.along_b);
-            dem2d_vec start = dem2di_add(world->before[key->a].x, way);
+            dem2d_vec start = dem2di_add(world->before[slot].x, way);
             dem2d_vec end = dem2di_add(start, iterator.branch);
             dem2di_draw_line(dem2di_pixel(view, start), dem2di_pixel(view, end),
                              dem2di_min(iterator.contact.force * unit, most), writer);
@@ -29690,9 +30332,10 @@ typedef struct dem2di_item {
     dem2d_vtp_part part;
     int outline_points;
     dem2d_box box;                    /* of the scene, for walls */
-    int index;                        /* the next part of a wall or line of the border */
+    int index;                        /* the next line of the border */
     int slot;                         /* of the particle, or number of the part or line */
     dem2di_images images;             /* particles and their images */
+    dem2di_copies copies;             /* parts of walls and their copies */
     dem2di_border border;             /* of the cell */
     dem2di_contact_iterator iterator; /* contacts of particles, then with walls */
 } dem2di_item;
@@ -29705,11 +30348,12 @@ static dem2di_item dem2di_item_start(const dem2d_world *world, const dem2d_vtp_d
     if (desc->part == DEM2D_VTP_WALLS || desc->part == DEM2D_VTP_CELL)
         item.box = dem2di_scene_box(world, false);
     if (desc->part == DEM2D_VTP_CELL) item.border = dem2di_border_make(world, &item.box);
-    if (desc->part == DEM2D_VTP_PARTICLES) {
+    if (desc->part == DEM2D_VTP_PARTICLES || desc->part == DEM2D_VTP_WALLS) {
         dem2d_box seen = {{-HUGE_VAL, -HUGE_VAL}, {HUGE_VAL, HUGE_VAL}};
         if (world->periodic) seen = dem2di_particle_box(world);
         dem2di_box_cell(&world->cell_before, &seen);
         item.images = dem2di_images_start(&seen);
+        item.copies = dem2di_copies_start(&seen);
     }
     item.iterator = dem2di_contacts_start(false);
     return item;
@@ -29722,8 +30366,13 @@ static bool dem2di_item_next(const dem2d_world *world, dem2di_item *item) {
         return more;
     }
     if (item->part == DEM2D_VTP_CONTACTS) return dem2di_next_contact(world, &item->iterator);
+    if (item->part == DEM2D_VTP_WALLS) {
+        const bool more = dem2di_copies_next(world, &item->copies);
+        item->slot = item->copies.part;
+        return more;
+    }
     item->slot = item->index++;
-    return item->slot < (item->part == DEM2D_VTP_CELL ? item->border.count : world->part_count);
+    return item->slot < item->border.count;
 }
 
 static int dem2di_item_points(const dem2d_world *world, const dem2di_item *item) {
@@ -29767,8 +30416,8 @@ static const char *const *dem2di_arrays_of(dem2d_vtp_part part) {
                                            "I shift_a",
                                            "I shift_b",
                                            NULL};
-    static const char *const walls[] = {"i id",    "i mode",   "v velocity",
-                                        "v force", "d stress", NULL};
+    static const char *const walls[] = {"i id",    "i mode",    "v velocity", "v force", "d stress",
+                                        "I image", "I shift_a", "I shift_b",  NULL};
     static const char *const cell[] = {"i id", "v period", NULL};
     static const char *const *const arrays[] = {particles, contacts, walls, cell};
     return arrays[part];
@@ -29833,7 +30482,9 @@ static void dem2di_contact_numbers(const dem2d_world *world,
     memcpy(numbers, all, sizeof all);
 }
 
-static void dem2di_wall_numbers(const dem2d_world *world, int part, double *numbers) {
+static void dem2di_wall_numbers(const dem2d_world *world, const dem2di_copies *copies,
+                                double *numbers) {
+    const int part = copies->part, a = copies->at.along_a, b = copies->at.along_b;
     int j = world->parts[part].wall;
     dem2d_wall_info info;
     (void)dem2d_world_get_wall(world, dem2di_wall_id(world, j), &info);
@@ -29845,8 +30496,10 @@ static void dem2di_wall_numbers(const dem2d_world *world, int part, double *numb
         info.stress = own.stress;
     }
     dem2d_vec v = dem2di_add(world->wall_before[j].velocity, world->wall_now[j].velocity);
-    const double all[] = {(double)j,    (double)info.mode, v.x / 2, v.y / 2,    0,
-                          info.force.x, info.force.y,      0,       info.stress};
+    const double all[] = {
+        (double)j,    (double)info.mode, v.x / 2, v.y / 2,     0,
+        info.force.x, info.force.y,      0,       info.stress, a != 0 || b != 0 ? 1.0 : 0.0,
+        (double)a,    (double)b};
     memcpy(numbers, all, sizeof all);
 }
 
@@ -29864,7 +30517,7 @@ static void dem2di_item_numbers(const dem2d_world *world, const dem2di_item *ite
     else if (item->part == DEM2D_VTP_CELL)
         dem2di_border_numbers(&item->border, item->slot, numbers);
     else
-        dem2di_wall_numbers(world, item->slot, numbers);
+        dem2di_wall_numbers(world, &item->copies, numbers);
 }
 
 /* Write doubles in a line. Subnormal numbers become 0: some readers reject them. */
@@ -29899,12 +30552,15 @@ static void dem2di_item_put_points(const dem2d_world *world, const dem2di_item *
         return;
     }
     if (item->part == DEM2D_VTP_CONTACTS) {
-        ends[0] = world->before[world->list.keys[item->iterator.number].a].x;
+        const int slot = world->list.keys[item->iterator.number].a;
+        ends[0] = world->before[dem2di_owner(world, slot)].x;
         ends[1] = dem2di_add(ends[0], item->iterator.branch);
     } else if (item->part == DEM2D_VTP_CELL) {
         memcpy(ends, item->border.ends[item->slot], sizeof ends);
     } else {
         (void)dem2di_part_line(world, item->slot, &item->box, ends);
+        for (int i = 0; i < 2; i++)
+            if (!item->copies.whole) ends[i] = dem2di_add(ends[i], item->copies.way);
     }
     for (int i = 0; i < 2; i++) dem2di_vtp_point(writer, ends[i]);
 }

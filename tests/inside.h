@@ -329,9 +329,13 @@ static bool inside_contact_holds(const dem2d_world *w, int i) {
     dem2di_contact contact;
     if (key->a < 0)
         return (w->list_stale && !closed) || inside_fail("a forgotten contact is closed", i);
-    if (!inside_lives(w, key->a)) return inside_fail("A of a contact is gone", i);
     if (i >= list->pairs && !(key->b >= 0 && key->b % DEM2DI_VERTEX < w->part_count))
         return inside_fail("a wall of a contact is gone", i);
+    const int owner = dem2di_owner(w, key->a);
+    if (owner != key->a && (i < list->pairs || key->a >= dem2di_slots(w) ||
+                            !(w->parts[key->b % DEM2DI_VERTEX].extent > 0)))
+        return inside_fail("A of a contact is an image", i);
+    if (!inside_lives(w, owner)) return inside_fail("A of a contact is gone", i);
     if (i < list->pairs && !inside_is_b(w, key))
         return inside_fail("B of a contact is gone, or has the lower rank", i);
     (void)dem2di_contact_get(w, &list->contacts, i, &contact);
@@ -362,7 +366,7 @@ static bool inside_adjacency_holds(const dem2d_world *w) {
             if (list->keys[i].a < 0) continue;
             const bool as_b = k < list->own[slot];
             const int who =
-                as_b && i < list->pairs ? dem2di_owner(w, list->keys[i].b) : list->keys[i].a;
+                dem2di_owner(w, as_b && i < list->pairs ? list->keys[i].b : list->keys[i].a);
             if (who != slot || (as_b && i >= list->pairs))
                 return inside_fail("a contact of another particle", slot);
             entries++;
