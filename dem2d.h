@@ -18563,8 +18563,8 @@ static int dem2di_listed(const dem2d_world *world, const dem2di_key *key, bool w
     return -1;
 }
 
-/* The contact of a key of the next list in the old one, or -1. In a cell one of the two may have been
-   an image, or is one now. */
+/* The contact of a key of the next list in the old one, or -1. In a cell one of the two may have
+   been an image, or is one now. */
 static int dem2di_listed_before(const dem2di_build *build, const dem2di_key *key, bool wall,
                                 int *last) {
     int listed = -1;
