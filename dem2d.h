@@ -13033,7 +13033,8 @@ struct dem2d_world {
     dem2d_box box;                /* holds all centres while the list lasts */
     bool bounded;                 /* no state can become infinite while the list lasts */
     double softness; /* of the list: times the stiffness of a contact it bounds all eigenvalues; 0
-                        until a check of the time step asks for it */
+                        until a check of the time step asks for it. HUGE_VAL: it tells nothing */
+    double limit_softness; /* the same for those of the limit: also beside dashpots and rolling */
     double spread;   /* mean distance in memory of two partners when last sorted */
     int64_t steps, rebuilds, slow_time_step, fast_motion, listed_at;
     int64_t timed_at; /* steps when the time step was last changed */
@@ -14599,6 +14600,11 @@ static void dem2di_edited(dem2d_world *world) {
     world->dampers_due = true;
 }
 
+/* Masses or radii have changed: softness is not known any more. */
+static void dem2di_softness_forget(dem2d_world *world) {
+    world->softness = world->limit_softness = 0;
+}
+
 /* Ids: an index in range whose slot is in use with this generation. */
 static bool dem2di_shape_lives(const dem2d_world *w, dem2d_shape_id id) {
     return (int64_t)id.index < w->template_count && w->templates[id.index].shape != NULL &&
@@ -15750,6 +15756,7 @@ DEM2D_API dem2d_result dem2d_world_set_material(dem2d_world *world, dem2d_partic
     world->inverse[slot] = dem2di_inverse_of(world, &changed);
     dem2di_images_follow(world, slot);
     world->check_due = world->ledger.edited = true;
+    dem2di_softness_forget(world);
     dem2di_edited(world);
     return DEM2D_OK;
 }
@@ -15802,6 +15809,7 @@ DEM2D_API dem2d_result dem2d_world_set_shape(dem2d_world *world, dem2d_particle_
         dem2di_forget(world, slot);
     world->tree.made = false;
     world->check_due = true;
+    dem2di_softness_forget(world);
     dem2di_edited(world);
     return DEM2D_OK;
 }
@@ -17792,7 +17800,7 @@ typedef struct dem2di_build {
     dem2di_order *wall_contacts, *spare; /* part, rank of particle; slot */
     char *column;                        /* room for a column of contacts, where the search was */
     bool bounded, back;      /* as in the world; whether the next step may look back on contacts */
-    double softness;         /* as in the world */
+    double softness, limit_softness; /* as in the world */
     int image_base;          /* an image that was found has this plus its number for a slot, */
     int images;              /* so many are in world->images_next: those near other particles, */
     int wall_images;         /* those near segments alone, */
@@ -18834,13 +18842,19 @@ static double dem2di_softness_of(const dem2d_world *world, const int *numbers) {
     return most;
 }
 
-/* May softness tell anything? */
+/* May softness tell anything of the limit? Of the safe bound it does if there are only springs and
+   friction: see dem2di_stiffness_sum. */
 static bool dem2di_softness_holds(const dem2di_plan *plan, int others) {
-    return others == 0 && plan->terms == 0 && !plan->turns;
+    return others == 0 && !(plan->terms & DEM2DI_CALLERS_LAW) && !plan->turns;
+}
+
+/* Softness for both, once it is known for the limit. */
+static double dem2di_softness_for_safe(const dem2di_plan *plan, double limit_softness) {
+    return plan->terms == 0 ? limit_softness : HUGE_VAL;
 }
 
 /* Softness of the contacts that were found, whose numbers come over what the search needed. */
-static double dem2di_build_softness(const dem2di_build *build) {
+static double dem2di_found_softness(const dem2di_build *build) {
     const dem2d_world *world = build->world;
     int *numbers = (int *)(void *)build->reach;
     if (!dem2di_softness_holds(&build->plan, build->total[DEM2DI_OTHERS])) return HUGE_VAL;
@@ -18854,6 +18868,11 @@ static double dem2di_build_softness(const dem2di_build *build) {
         }
     }
     return dem2di_softness_of(world, numbers);
+}
+
+static void dem2di_build_softness(dem2di_build *build) {
+    build->limit_softness = dem2di_found_softness(build);
+    build->softness = dem2di_softness_for_safe(&build->plan, build->limit_softness);
 }
 
 /* Scratch memory of a step with so many contacts, or its size where there is none yet: `back` if it
@@ -18934,25 +18953,29 @@ static bool dem2di_is_soft(const dem2d_world *world, double softness) {
     return dem2di_greatest_stiffness(world) * softness * square <= 4;
 }
 
-/* May the check of the time step refuse the next step? */
-static bool dem2di_stiffness_matters(const dem2d_world *world, double softness) {
-    return world->check_time_step && dem2di_check_is_due(world) && !dem2di_is_soft(world, softness);
+/* May the check of the time step refuse the next step? Only the limit does. */
+static bool dem2di_stiffness_matters(const dem2d_world *world, double limit_softness) {
+    return world->check_time_step && dem2di_check_is_due(world) &&
+           !dem2di_is_soft(world, limit_softness);
 }
 
 /* May the next step look back on the contacts of the last force pass once those of its own are
    there? The ledger does, and a step that may be refused: by the caller, for a time step that some
    particle may not stand, or a state that may become infinite. Joints look back on contacts with
    walls. */
-static bool dem2di_looks_back(const dem2d_world *world, bool bounded, double softness) {
+static bool dem2di_looks_back(const dem2d_world *world, bool bounded, double limit_softness) {
     return world->ledger.kept || !bounded || world->gather != NULL || world->commit != NULL ||
-           dem2di_stiffness_matters(world, softness);
+           dem2di_stiffness_matters(world, limit_softness);
 }
 
 /* Softness is found for the steps with a check alone; that of the list as it is now. */
 static void dem2di_softness_set(dem2d_world *world) {
-    if (!world->check_time_step || !dem2di_check_is_due(world) || world->softness > 0) return;
+    if (!world->check_time_step || !dem2di_check_is_due(world)) return;
+    if (world->softness > 0 && world->limit_softness > 0) return;
     const bool holds = dem2di_softness_holds(&world->plan, world->list.pairs - world->list.discs);
-    world->softness = holds ? dem2di_softness_of(world, NULL) : HUGE_VAL;
+    world->limit_softness = holds ? dem2di_softness_of(world, NULL) : HUGE_VAL;
+    if (!(world->softness > 0))
+        world->softness = dem2di_softness_for_safe(&world->plan, world->limit_softness);
 }
 
 /* Scratch memory for the search and for what it finds, as far as is known. Contacts on their way
@@ -19085,6 +19108,7 @@ static void dem2di_build_finish(dem2di_build *build) {
     dem2di_extent_set(world, &build->all);
     world->bounded = build->bounded;
     world->softness = build->softness;
+    world->limit_softness = build->limit_softness;
     for (int j = 0; j < world->wall_count; j++)
         if (world->walls[j].alive) dem2di_wall_listed(world, j);
     world->listed_at = world->steps;
@@ -19131,9 +19155,8 @@ static dem2d_result dem2di_build_list(dem2d_world *world, const dem2di_plan *pla
                                    build.total[DEM2DI_DISCS] + build.total[DEM2DI_OTHERS] +
                                        build.total[DEM2DI_WALL_CONTACTS],
                                    &build.all.extremes);
-    if (world->check_time_step && dem2di_check_is_due(world))
-        build.softness = dem2di_build_softness(&build);
-    build.back = build.plan.joints || dem2di_looks_back(world, build.bounded, build.softness);
+    if (world->check_time_step && dem2di_check_is_due(world)) dem2di_build_softness(&build);
+    build.back = build.plan.joints || dem2di_looks_back(world, build.bounded, build.limit_softness);
     if (!dem2di_build_cut(&build)) return dem2di_list_failed(world, skin, interval);
     dem2di_build_finish(&build);
     dem2di_watch_spread(world, sorted);
@@ -23483,7 +23506,7 @@ static dem2d_result dem2di_step_try(dem2d_world *world, dem2di_trial *trial) {
         return dem2di_out_of_memory(world, "velocities in the cell");
     bool due = dem2di_check_is_due(world);
     dem2di_softness_set(world);
-    bool back = dem2di_looks_back(world, world->bounded, world->softness);
+    bool back = dem2di_looks_back(world, world->bounded, world->limit_softness);
     if ((back || world->plan.joints) && !dem2di_keep_last(world))
         return dem2di_out_of_memory(world, "contacts");
     world->keeps_last = trial->back = back;
@@ -28165,6 +28188,7 @@ static void dem2di_sizes_multiply(dem2d_world *world, double factor) {
     dem2di_images_make(world);
     world->tree.made = world->sums_fresh = false;
     world->ledger.edited = world->dampers_due = true;
+    dem2di_softness_forget(world);
     if (world->list_stale) return;
     world->list_displacement += most;
     world->list_stale = world->list_used_up =

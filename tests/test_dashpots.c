@@ -366,12 +366,126 @@ static void test_refused(void **state) {
     close_scene(&s);
 }
 
+/* --- what follows from laws, masses and radii, after they have changed ------------------------- */
+
+/* Two discs, and a disc and a wall, near each other: a list is made, something is edited, and then
+   they meet. */
+typedef struct near_discs {
+    scene s;
+    dem2d_shape_id shape;
+    dem2d_particle_id id[3];
+    double radius, density, zeta, zeta_t, zeta_r; /* of all that are edited */
+    bool held;                                    /* the first */
+} near_discs;
+
+#define NEAR_STEP 2e-5 /* s */
+
+enum { NO_EDIT, EDIT_PAIR, EDIT_SIZE, EDIT_MATERIAL, EDIT_MOTION, EDIT_LOAD, NEAR_EDITS };
+
+static near_discs make_near(void) {
+    const double gap = 5e-6;
+    dem2d_world_desc desc = {0};
+    near_discs n = {0};
+    n.radius = RADIUS, n.density = 2700, n.zeta = 0.3, n.zeta_t = 0.2, n.zeta_r = 0.1;
+    dem2d_material_desc stone = stone_desc(0.8 * KN, 1e3);
+    stone.damping_ratio = n.zeta, stone.tangential_damping_ratio = n.zeta_t;
+    stone.rolling_friction = 1e3, stone.rolling_damping_ratio = n.zeta_r;
+    desc.time_step = NEAR_STEP, desc.skin = 0.5;
+    n.s = open_scene(&desc, &stone);
+    n.shape = give_shape(&n.s, make_disc(1));
+    add_plane(&n.s, 5, 0, -1, 0);
+    const double x[] = {0, 2 * RADIUS + gap, 5 - RADIUS - gap};
+    for (int i = 0; i < 3; i++) {
+        const dem2d_particle_desc grain = grain_desc(&n.s, n.shape, RADIUS, vec(x[i], 0));
+        n.id[i] = add_grain(&n.s, &grain);
+    }
+    step(&n.s, 1);
+    return n;
+}
+
+static void edit_near(near_discs *n, int which) {
+    dem2d_world *w = n->s.world;
+    dem2d_material_desc light = stone_desc(0.8 * KN, 1e3);
+    dem2d_material_id other;
+    dem2d_pair_desc pair = pair_desc(KN, 0.8 * KN, 1e3);
+    if (which == EDIT_PAIR) {
+        n->zeta = 0.7, n->zeta_t = 0.05, n->zeta_r = 0.4;
+        pair.damping_ratio = n->zeta, pair.tangential_damping_ratio = n->zeta_t;
+        pair.rolling_friction = 1e3, pair.rolling_damping_ratio = n->zeta_r;
+        assert_ok(dem2d_world_set_pair(w, n->s.material, n->s.material, &pair));
+    } else if (which == EDIT_SIZE) {
+        n->radius = RADIUS * (1 - 1e-5);
+        assert_ok(dem2d_world_set_shape(w, n->id[0], n->shape, n->radius));
+        assert_ok(dem2d_world_set_shape(w, n->id[2], n->shape, n->radius));
+    } else if (which == EDIT_MATERIAL) {
+        n->density = light.density = 900;
+        light.rolling_friction = 1e3;
+        assert_ok(dem2d_world_add_material(w, &light, &other));
+        assert_ok(dem2d_world_set_material(w, n->id[0], other));
+        assert_ok(dem2d_world_set_material(w, n->id[2], other));
+    } else if (which == EDIT_LOAD) {
+        scene_bytes bytes = scene_save(w);
+        dem2d_world_destroy(w);
+        n->s = scene_load(&n->s, &bytes);
+        free(bytes.bytes);
+    }
+    n->held = which == EDIT_MOTION;
+}
+
+/* Velocities x, y and spin at which they meet. */
+static const double meeting[3][3] = {{0.5, 0.2, 1}, {-0.5, -0.1, -3}, {0.5, 0.3, 2}};
+
+/* The forces of a contact that has just closed, in closed form. */
+static void check_first_forces(const near_discs *n, const dem2d_contact_info *c, bool wall) {
+    static const double still[3] = {0, 0, 0};
+    const double *a = meeting[wall ? 2 : 0], *b = wall ? still : meeting[1];
+    const double kt = 0.8 * KN, ra = n->radius, rb = RADIUS, vx = b[0] - a[0], vy = b[1] - a[1];
+    const double arm_a = ra - (wall ? c->depth : c->depth / 2);
+    const double arm_b = wall ? 0 : rb - c->depth / 2, r = wall ? ra : ra * rb / (ra + rb);
+    /* 1/m, then 1/I */
+    const double la = n->held && !wall ? 0 : 1 / (n->density * (double)TEST_PI * ra * ra);
+    const double lb = wall ? 0 : 1 / mass, ia = 2 * la / (ra * ra), ib = 2 * lb / (rb * rb);
+    const double sliding = la + lb + arm_a * arm_a * ia + arm_b * arm_b * ib;
+    const double approach = -(c->normal.x * vx + c->normal.y * vy), spin = b[2] - a[2];
+    const double slip = c->normal.x * vy - c->normal.y * vx - (arm_a * a[2] + arm_b * b[2]);
+    const double normal = KN * c->depth + 2 * n->zeta * sqrt(KN / (la + lb)) * approach;
+    const double shear = -(kt * NEAR_STEP + 2 * n->zeta_t * sqrt(kt / sliding)) * slip;
+    const double moment =
+        -(kt * r * r * NEAR_STEP + 2 * n->zeta_r * sqrt(kt * r * r / (ia + ib))) * spin;
+    assert_true(c->depth > 1e-6);
+    assert_true(fabs(c->normal_force - normal) <= 1e-12 * normal);
+    assert_true(fabs(c->tangential_force - shear) <= 1e-12 * fabs(shear));
+    assert_true(fabs(c->moment - moment) <= 1e-12 * fabs(moment));
+}
+
+static void test_edited(void **state) {
+    (void)state;
+    for (int which = 0; which < NEAR_EDITS; which++) {
+        near_discs n = make_near();
+        const int64_t lists = stats_of(&n.s).list_rebuilds;
+        dem2d_contact_info found[3];
+        edit_near(&n, which);
+        for (int i = 0; i < 3; i++)
+            set_velocity(&n.s, n.id[i], n.held && i == 0 ? DEM2D_DRIVEN : DEM2D_FREE,
+                         vec(meeting[i][0], meeting[i][1]), meeting[i][2]);
+        step(&n.s, 1);
+        assert_int_equal(contacts_of(&n.s, NULL, 0), 0);
+        step(&n.s, 1);
+        /* what is apart leaves the list with a new size */
+        assert_int_equal(stats_of(&n.s).list_rebuilds - lists, which == EDIT_SIZE);
+        assert_int_equal(contacts_of(&n.s, found, 3), 2);
+        for (int k = 0; k < 2; k++) check_first_forces(&n, &found[k], found[k].wall.generation > 0);
+        close_scene(&n.s);
+    }
+}
+
 int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(test_impacts),   cmocka_unit_test(test_energies),
         cmocka_unit_test(test_bounds),    cmocka_unit_test(test_bounds_at_once),
         cmocka_unit_test(test_safe_step), cmocka_unit_test(test_nothing_to_damp),
         cmocka_unit_test(test_snapshots), cmocka_unit_test(test_refused),
+        cmocka_unit_test(test_edited),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -291,11 +291,43 @@ static void test_immovable(void **state) {
             }
 }
 
+/* Two discs on a floor, with and without a dashpot. One that becomes too light for the time step is
+   found at once, in a list that stays, and nothing changes. */
+static void test_lighter(void **state) {
+    (void)state;
+    for (int damped = 0; damped < 2; damped++) {
+        dem2d_world_desc desc = {0};
+        dem2d_material_desc stone = stone_desc(1e7, 0.5), light = stone;
+        dem2d_material_id other;
+        stone.damping_ratio = light.damping_ratio = damped ? 0.01 : 0;
+        light.density = 0.27;
+        desc.time_step = 5e-5, desc.gravity.y = -9.81, desc.skin = 0.5;
+        desc.local_damping = 0.7;
+        scene s = open_scene(&desc, &stone);
+        assert_ok(dem2d_world_add_material(s.world, &light, &other));
+        (void)add_floor(&s);
+        (void)add_shape(&s, make_disc(0.05), DEM2D_FREE, vec(0, 0.0499), 0, vec(0, 0), 0);
+        const dem2d_particle_id id =
+            add_shape(&s, make_disc(0.05), DEM2D_FREE, vec(0, 0.1496), 0, vec(0, 0), 0);
+        step(&s, 200);
+        const dem2d_stats before = stats_of(&s);
+        assert_int_equal(before.slow_time_step, 0);
+        assert_ok(dem2d_world_set_material(s.world, id, other));
+        const uint64_t hash = dem2d_world_hash(s.world);
+        assert_result(dem2d_world_step(s.world, 1, NULL), DEM2D_TIME_STEP);
+        assert_true(dem2d_world_hash(s.world) == hash);
+        assert_int_equal(stats_of(&s).list_rebuilds, before.list_rebuilds);
+        assert_ok(dem2d_world_set_material(s.world, id, s.material));
+        step(&s, 1);
+        close_scene(&s);
+    }
+}
+
 int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(test_rebuilds),  cmocka_unit_test(test_rebuilt),
         cmocka_unit_test(test_slope),     cmocka_unit_test(test_moved),
-        cmocka_unit_test(test_immovable),
+        cmocka_unit_test(test_immovable), cmocka_unit_test(test_lighter),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }
