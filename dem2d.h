@@ -1317,12 +1317,23 @@ typedef struct dem2d_pair_desc {
     double rolling_damping_ratio;
 } dem2d_pair_desc;
 
+/// Parts of dem2d_law_batch that a law may do without: what it names in dem2d_world_desc.law_omits
+/// is neither computed nor stored, and its arrays are NULL.
+typedef enum dem2d_law_part {
+    DEM2D_LAW_IDS = 1,      ///< a, b, wall
+    DEM2D_LAW_DASHPOTS = 2, ///< mass, and dashpot, tangential_dashpot, rolling_dashpot,
+                            ///< viscous_normal, viscous_tangential, viscous_moment
+    DEM2D_LAW_ROLLING = 4,  ///< spin, last_moment, rolling_stiffness, rolling_dashpot,
+                            ///< rolling_friction, moment, viscous_moment
+    DEM2D_LAW_STATE = 8     ///< state
+} dem2d_law_part;
+
 /// Contact points of closed contacts as a caller's law gets them: arrays of `count` elements, one
 /// of each array for a row. A contact of two points has two rows, one after the other; what is of
 /// the contact as a whole is in both, unless said otherwise. Velocities are those of the last step,
 /// half a step before the positions, whatever has been set since. There is no row for a contact
 /// across a gap: a later version may add the reach of a law, and whether it wants to keep a
-/// contact.
+/// contact. Arrays that dem2d_world_desc.law_omits names are NULL.
 typedef struct dem2d_law_batch {
     int count;        ///< rows, > 0
     double time_step; ///< s, of the last step: sliding times it is the distance slid
@@ -1378,7 +1389,8 @@ typedef void dem2d_law_fn(void *user, dem2d_law_batch *batch);
 
 /// The built-in law for all rows of a batch, for a law that begins or ends with it: springs,
 /// dashpots, friction, rolling friction and their energies by the coefficients of the batch. Writes
-/// all forces and energies; leaves state as it is. NULL is allowed.
+/// all forces and energies; leaves state as it is. It has no dashpots and no rolling friction where
+/// the batch has no arrays for them. NULL is allowed.
 DEM2D_API void dem2d_law_builtin(dem2d_law_batch *batch);
 
 /// Sums of the contact forces of a step, for a callback that may change them. Rows of particles are
@@ -1496,6 +1508,7 @@ typedef struct dem2d_world_desc {
     dem2d_law_fn *law;
     void *law_user;                  ///< passed to law
     int law_tag;                     ///< identifies law in snapshots
+    int law_omits; ///< sum of DEM2D_LAW_IDS ...: what law does without; 0: nothing
     dem2d_parallel_fn *parallel_for; ///< distributes the work of a step; NULL: the calling thread
     void *parallel_user;             ///< passed to parallel_for
     const dem2d_env *env;            ///< memory and log, copied; NULL for malloc, free, silence
@@ -12045,15 +12058,33 @@ typedef struct dem2di_two {
 } dem2di_two;
 
 /* Terms of the law beside springs and friction, which some pair of materials in use has. With a
-   caller's law all of them are in use. */
+   caller's law all are in use that it does not omit. */
 enum {
     DEM2DI_DASHPOT = 1,
     DEM2DI_ROLLING = 2,
     DEM2DI_TANGENTIAL_DASHPOT = 4,
     DEM2DI_ROLLING_DASHPOT = 8,
     DEM2DI_CALLERS_LAW = 16,
-    DEM2DI_TERMS = 32
+    DEM2DI_STATELESS_LAW = 32, /* the caller's law has no state */
+    DEM2DI_TERMS = 64,
+    DEM2DI_ALL_DASHPOTS = DEM2DI_DASHPOT | DEM2DI_TANGENTIAL_DASHPOT | DEM2DI_ROLLING_DASHPOT
 };
+
+/* All of dem2d_law_part. */
+#define DEM2DI_LAW_PARTS (DEM2D_LAW_IDS | DEM2D_LAW_DASHPOTS | DEM2D_LAW_ROLLING | DEM2D_LAW_STATE)
+
+/* The terms of a caller's law that omits these parts. */
+static int dem2di_callers_terms(int omits) {
+    int terms = DEM2DI_CALLERS_LAW | DEM2DI_ALL_DASHPOTS | DEM2DI_ROLLING;
+    if (omits & DEM2D_LAW_DASHPOTS) terms &= ~DEM2DI_ALL_DASHPOTS;
+    if (omits & DEM2D_LAW_ROLLING) terms &= ~(DEM2DI_ROLLING | DEM2DI_ROLLING_DASHPOT);
+    return omits & DEM2D_LAW_STATE ? terms | DEM2DI_STATELESS_LAW : terms;
+}
+
+/* Has the caller's law a state? */
+static inline bool dem2di_has_state(int terms) {
+    return (terms & (DEM2DI_CALLERS_LAW | DEM2DI_STATELESS_LAW)) == DEM2DI_CALLERS_LAW;
+}
 
 /* How the two of a contact moved against each other in the step that was made, half a step before
    its force. */
@@ -12379,34 +12410,48 @@ static double dem2di_spring_energy_of(double stiffness, double force) {
     return stiffness > 0 ? force * (force / stiffness) / 2 : 0;
 }
 
-/* As dem2di_law_points and dem2di_law_rolling, for one row and the next. */
+/* As dem2di_law_points, for one row. */
 static void dem2di_law_builtin_row(dem2d_law_batch *b, int k) {
+    const bool damps = b->dashpot != NULL;
     const double weight = b->weight[k], dt = b->time_step;
     const double spring = b->stiffness[k] * weight * b->depth[k];
-    const double force = dem2di_damped(spring, weight * b->dashpot[k], b->approach[k]);
+    const double normal = damps ? b->dashpot[k] : 0;
+    const double tangential = damps ? b->tangential_dashpot[k] : 0;
+    const double force = dem2di_damped(spring, weight * normal, b->approach[k]);
     const double kt = b->tangential_stiffness[k] * weight;
+    double viscous;
+    const double shear = dem2di_slider(kt, weight * tangential, b->sliding[k], dt,
+                                       b->friction[k] * force, b->last_tangential[k], &viscous);
     b->normal_force[k] = force;
+    b->tangential_force[k] = shear;
+    b->energy[k] =
+        b->stiffness[k] * b->compression[k] + dem2di_spring_energy_of(kt, shear - viscous);
+    if (!damps) return;
     b->viscous_normal[k] = force - spring;
-    b->tangential_force[k] =
-        dem2di_slider(kt, weight * b->tangential_dashpot[k], b->sliding[k], dt,
-                      b->friction[k] * force, b->last_tangential[k], &b->viscous_tangential[k]);
-    b->energy[k] = b->stiffness[k] * b->compression[k] +
-                   dem2di_spring_energy_of(kt, b->tangential_force[k] - b->viscous_tangential[k]);
+    b->viscous_tangential[k] = viscous;
+}
+
+/* As dem2di_law_rolling, for the first row of a contact. */
+static void dem2di_law_builtin_roll(dem2d_law_batch *b, int k) {
+    const bool damps = b->rolling_dashpot != NULL;
+    const bool two = k + 1 < b->count && b->point[k + 1] > 0;
+    const double force = two ? b->normal_force[k] + b->normal_force[k + 1] : b->normal_force[k];
+    double viscous;
+    const double moment =
+        dem2di_slider(b->rolling_stiffness[k], damps ? b->rolling_dashpot[k] : 0, b->spin[k],
+                      b->time_step, b->rolling_friction[k] * force, b->last_moment[k], &viscous);
+    b->moment[k] = moment;
+    if (damps) b->viscous_moment[k] = viscous;
+    b->energy[k] += dem2di_spring_energy_of(b->rolling_stiffness[k], moment - viscous);
 }
 
 DEM2D_API void dem2d_law_builtin(dem2d_law_batch *b) {
     if (b == NULL) return;
     for (int k = 0; k < b->count; k++) dem2di_law_builtin_row(b, k);
-    for (int k = 0; k < b->count; k++) {
-        b->moment[k] = b->viscous_moment[k] = 0;
-        if (b->point[k] > 0) continue;
-        bool two = k + 1 < b->count && b->point[k + 1] > 0;
-        double force = two ? b->normal_force[k] + b->normal_force[k + 1] : b->normal_force[k];
-        b->moment[k] =
-            dem2di_slider(b->rolling_stiffness[k], b->rolling_dashpot[k], b->spin[k], b->time_step,
-                          b->rolling_friction[k] * force, b->last_moment[k], &b->viscous_moment[k]);
-        b->energy[k] +=
-            dem2di_spring_energy_of(b->rolling_stiffness[k], b->moment[k] - b->viscous_moment[k]);
+    for (int k = 0; k < b->count && b->moment != NULL; k++) {
+        b->moment[k] = 0;
+        if (b->viscous_moment != NULL) b->viscous_moment[k] = 0;
+        if (b->point[k] == 0) dem2di_law_builtin_roll(b, k);
     }
 }
 
@@ -12965,13 +13010,15 @@ typedef enum dem2di_group {
     DEM2DI_MOMENTS,              /* DEM2DI_ROLLING, */
     DEM2DI_VISCOUS_SHEARS,       /* DEM2DI_TANGENTIAL_DASHPOT, */
     DEM2DI_VISCOUS_MOMENTS,      /* DEM2DI_ROLLING_DASHPOT, */
-    DEM2DI_CALLERS,              /* or DEM2DI_CALLERS_LAW */
+    DEM2DI_CALLERS,              /* DEM2DI_CALLERS_LAW, */
+    DEM2DI_CALLERS_VISCOUS,      /* with DEM2DI_DASHPOT, */
+    DEM2DI_CALLERS_STATE,        /* or with a state */
     DEM2DI_TOUCHES,              /* of all contacts, where plan.events */
     DEM2DI_GENERAL,              /* of all but circles */
     DEM2DI_POINT_PAIRS,          /* of these, where plan.faces, */
     DEM2DI_POINT_VISCOUS,        /* and plan.terms has DEM2DI_DASHPOT, */
     DEM2DI_POINT_VISCOUS_SHEARS, /* DEM2DI_TANGENTIAL_DASHPOT, */
-    DEM2DI_POINT_CALLERS,        /* or DEM2DI_CALLERS_LAW */
+    DEM2DI_POINT_CALLERS,        /* or a caller's law with a state */
     DEM2DI_JOINED,               /* where plan.joints */
     DEM2DI_ADJACENCY,
     DEM2DI_BLOCK_RESULTS,
@@ -12992,7 +13039,8 @@ struct dem2d_world {
     dem2d_law_fn *law;
     void *law_user;
     int law_tag;
-    bool has_law; /* law is not NULL: for snapshots, which can't have the function */
+    int law_omits; /* DEM2D_LAW_IDS ... */
+    bool has_law;  /* law is not NULL: for snapshots, which can't have the function */
     dem2d_parallel_fn *parallel_for;
     void *parallel_user;
     dem2d_gather_fn *gather;
@@ -13238,6 +13286,7 @@ static const dem2di_field dem2di_setting_fields[] = {
 static const dem2di_field dem2di_progress_fields[] = {
     DEM2DI_SAVED("has_law", dem2d_world, has_law, DEM2DI_SWITCH),
     DEM2DI_SAVED("law_tag", dem2d_world, law_tag, DEM2DI_TAG),
+    DEM2DI_SAVED("law_omits", dem2d_world, law_omits, DEM2DI_WHOLE(0, DEM2DI_LAW_PARTS)),
     DEM2DI_SAVED("redirected", dem2d_world, redirected, DEM2DI_SWITCH),
     DEM2DI_SAVED("named", dem2d_world, named, DEM2DI_SWITCH),
     DEM2DI_SAVED("loaded", dem2d_world, loaded, DEM2DI_SWITCH),
@@ -13630,11 +13679,11 @@ static const dem2di_column dem2di_columns[] = {
     DEM2DI_UNSAVED(VISCOUS_SHEARS, list.dampers.inverse_b, 0),
     DEM2DI_CONTACT_COLUMN("viscous_moment", VISCOUS_MOMENTS, viscous_moment, finite_field),
     DEM2DI_UNSAVED(VISCOUS_MOMENTS, list.dampers.rolling, 0),
-    DEM2DI_CONTACT_COLUMN("law_viscous_force", CALLERS, viscous, any_field),
+    DEM2DI_CONTACT_COLUMN("law_viscous_force", CALLERS_VISCOUS, viscous, any_field),
     DEM2DI_CONTACT_COLUMN("law_stiffness", CALLERS, stiffness, any_field),
-    DEM2DI_CONTACT_COLUMN("law_dashpot", CALLERS, dashpot, any_field),
+    DEM2DI_CONTACT_COLUMN("law_dashpot", CALLERS_VISCOUS, dashpot, any_field),
     DEM2DI_CONTACT_COLUMN("law_energy", CALLERS, energy, any_field), /* the caller's: anything */
-    DEM2DI_CONTACT_COLUMN("law_state", CALLERS, state, any_two),
+    DEM2DI_CONTACT_COLUMN("law_state", CALLERS_STATE, state, any_two),
     DEM2DI_CONTACT_COLUMN("arms", GENERAL, arms, arms_fields),
     DEM2DI_COLUMN("histories", GENERAL, list.contacts.history, DEM2DI_STORED | DEM2DI_KEPT,
                   history_fields),
@@ -13790,15 +13839,20 @@ static bool dem2di_reserve_bodies(dem2d_world *world, int count) {
 /* Does the scene need the columns of a group of contacts? */
 static bool dem2di_plan_needs(const dem2di_plan *plan, dem2di_group group) {
     const int terms = plan->terms;
+    if (group == DEM2DI_DASHPOTS && (terms & DEM2DI_CALLERS_LAW))
+        return (terms & DEM2DI_DASHPOT) != 0;
     if (group == DEM2DI_DASHPOTS) return terms != 0;
     if (group == DEM2DI_MOMENTS) return (terms & DEM2DI_ROLLING) != 0;
     if (group == DEM2DI_VISCOUS_SHEARS) return (terms & DEM2DI_TANGENTIAL_DASHPOT) != 0;
     if (group == DEM2DI_VISCOUS_MOMENTS) return (terms & DEM2DI_ROLLING_DASHPOT) != 0;
     if (group == DEM2DI_CALLERS) return (terms & DEM2DI_CALLERS_LAW) != 0;
+    if (group == DEM2DI_CALLERS_VISCOUS)
+        return (terms & DEM2DI_CALLERS_LAW) && (terms & DEM2DI_DASHPOT);
+    if (group == DEM2DI_CALLERS_STATE) return dem2di_has_state(terms);
     if (group == DEM2DI_TOUCHES) return plan->events;
     if (group == DEM2DI_POINT_PAIRS) return plan->faces;
     if (group == DEM2DI_POINT_VISCOUS) return plan->faces && (terms & DEM2DI_DASHPOT);
-    if (group == DEM2DI_POINT_CALLERS) return plan->faces && (terms & DEM2DI_CALLERS_LAW);
+    if (group == DEM2DI_POINT_CALLERS) return plan->faces && dem2di_has_state(terms);
     if (group == DEM2DI_POINT_VISCOUS_SHEARS)
         return plan->faces && (terms & DEM2DI_TANGENTIAL_DASHPOT);
     if (group == DEM2DI_JOINED) return plan->joints;
@@ -14524,6 +14578,7 @@ static const dem2di_field dem2di_world_fields[] = {
     DEM2DI_ROW(dem2d_world_desc, law, DEM2DI_OPTIONAL, "- NULL; springs and friction"),
     DEM2DI_ROW(dem2d_world_desc, law_user, DEM2DI_OPTIONAL, "- NULL"),
     DEM2DI_ROW(dem2d_world_desc, law_tag, DEM2DI_TAG, "- 0"),
+    DEM2DI_ROW(dem2d_world_desc, law_omits, DEM2DI_WHOLE(0, DEM2DI_LAW_PARTS), "- 0; with law"),
     DEM2DI_ROW(dem2d_world_desc, parallel_for, DEM2DI_OPTIONAL, "- NULL; one thread does all"),
     DEM2DI_ROW(dem2d_world_desc, parallel_user, DEM2DI_OPTIONAL, "- NULL"),
     DEM2DI_ROW(dem2d_world_desc, env, DEM2DI_OPTIONAL, "- NULL; copied"),
@@ -14543,6 +14598,9 @@ DEM2D_API dem2d_result dem2d_world_create(const dem2d_world_desc *desc, dem2d_wo
     if (world == NULL) return dem2di_fail_null(desc->env, "world");
     dem2d_result result = dem2di_check_fields(desc->env, DEM2DI_ALL(dem2di_world_fields), desc);
     if (result == DEM2D_OK) result = dem2di_check_cell(desc->env, &desc->cell);
+    if (result == DEM2D_OK && desc->law == NULL && desc->law_omits != 0)
+        result = dem2di_fail(desc->env, DEM2D_OUT_OF_RANGE, -1, "law_omits = %d: there is no law",
+                             desc->law_omits);
     if (result != DEM2D_OK) return result;
     dem2d_world *made = (dem2d_world *)dem2di_allocate(desc->env, 1, sizeof *made);
     if (made == NULL) return dem2di_fail(desc->env, DEM2D_OUT_OF_MEMORY, -1, "no memory for world");
@@ -14561,6 +14619,7 @@ DEM2D_API dem2d_result dem2d_world_create(const dem2d_world_desc *desc, dem2d_wo
     made->law = desc->law;
     made->law_user = desc->law_user;
     made->law_tag = desc->law_tag;
+    made->law_omits = desc->law_omits;
     made->has_law = desc->law != NULL;
     made->parallel_for = desc->parallel_for;
     made->parallel_user = desc->parallel_user;
@@ -15014,15 +15073,15 @@ static void dem2di_terms_clear(dem2d_world *world, int i) {
     if (terms & DEM2DI_TANGENTIAL_DASHPOT) contacts->viscous_shear[i] = 0;
     if (terms & DEM2DI_ROLLING_DASHPOT) contacts->viscous_moment[i] = 0;
     if (terms & DEM2DI_CALLERS_LAW) {
-        contacts->energy[i] = contacts->viscous[i] = 0;
-        contacts->stiffness[i] = contacts->dashpot[i] = 0;
-        memset(&contacts->state[i], 0, sizeof *contacts->state);
+        contacts->energy[i] = contacts->stiffness[i] = 0;
+        if (terms & DEM2DI_DASHPOT) contacts->viscous[i] = contacts->dashpot[i] = 0;
     }
+    if (dem2di_has_state(terms)) memset(&contacts->state[i], 0, sizeof *contacts->state);
     if (!world->plan.faces || at < 0) return;
     memset(&contacts->point_pairs[at], 0, sizeof *contacts->point_pairs);
     if (terms & DEM2DI_DASHPOT)
         memset(&contacts->point_viscous[at], 0, sizeof *contacts->point_viscous);
-    if (terms & DEM2DI_CALLERS_LAW)
+    if (dem2di_has_state(terms))
         memset(&contacts->point_state[at], 0, sizeof *contacts->point_state);
     if (terms & DEM2DI_TANGENTIAL_DASHPOT)
         memset(&contacts->point_viscous_shear[at], 0, sizeof *contacts->point_viscous_shear);
@@ -15196,8 +15255,9 @@ static double dem2di_pair_dashpot(const dem2d_world *world, int i) {
 }
 
 static double dem2di_normal_dashpot(const dem2d_world *world, int i) {
-    if (world->law != NULL) return dem2di_max(0, world->list.contacts.dashpot[i]);
-    return dem2di_pair_dashpot(world, i);
+    if (world->law == NULL) return dem2di_pair_dashpot(world, i);
+    if (!(world->plan.terms & DEM2DI_DASHPOT)) return 0;
+    return dem2di_max(0, world->list.contacts.dashpot[i]);
 }
 
 static double dem2di_tangential_dashpot(const dem2d_world *world, int i, const dem2di_arms *arms) {
@@ -15831,6 +15891,7 @@ DEM2D_API dem2d_result dem2d_world_get_desc(const dem2d_world *world, dem2d_worl
     desc->law = world->law;
     desc->law_user = world->law_user;
     desc->law_tag = world->law_tag;
+    desc->law_omits = world->law_omits;
     desc->parallel_for = world->parallel_for;
     desc->parallel_user = world->parallel_user;
     desc->gather = world->gather;
@@ -17863,7 +17924,7 @@ static dem2di_plan dem2di_plan_make(const dem2d_world *world) {
             plan.friction = plan.friction || law->friction > 0;
             plan.terms_now |= dem2di_terms_of(law);
         }
-    if (world->law != NULL) plan.terms_now = DEM2DI_TERMS - 1;
+    if (world->law != NULL) plan.terms_now = dem2di_callers_terms(world->law_omits);
     plan.joints = world->joined;
     plan.terms_made = world->plan.terms_made;
     plan.terms = plan.terms_now | plan.terms_made;
@@ -19184,7 +19245,7 @@ static void dem2di_dampers_task(void *context, int begin, int end) {
     int last = dem2di_block_end((end - 1) * DEM2DI_BLOCK, DEM2DI_BLOCK, list->count);
     for (int i = begin * DEM2DI_BLOCK; i < last; i++) {
         const dem2di_key *key = &list->keys[i];
-        to->normal[i] = dem2di_pair_dashpot(world, i);
+        if (to->normal != NULL) to->normal[i] = dem2di_pair_dashpot(world, i);
         if (terms & DEM2DI_TANGENTIAL_DASHPOT) {
             to->inverse[i] = dem2di_reduced_inverse(world, i);
             to->inverse_a[i] = world->inverse[key->a].inertia;
@@ -19457,8 +19518,9 @@ static void dem2di_batch_begin(const dem2d_world *world, int first, int count,
     batch->shear = to->shear + first;
     batch->actions = world->actions + first;
     batch->moment = batch->viscous_shear = batch->viscous_moment = NULL;
+    batch->dampers.rolling = NULL;
     if (terms == 0) return;
-    batch->dampers.normal = from->normal + first;
+    if (from->normal != NULL) batch->dampers.normal = from->normal + first;
     if (terms & DEM2DI_ROLLING) {
         batch->moment = to->moment + first;
         batch->dampers.radius = from->radius + first;
@@ -19750,12 +19812,14 @@ static DEM2DI_INLINE void dem2di_batch_part(int count, const double *DEM2DI_APAR
 }
 
 /* Actions where dem2di_batch_points does not write them: they are written once, moments included.
-   To add a moment to one that has just been stored would wait for that. */
+   To add a moment to one that has just been stored would wait for that. Writes their sizes where
+   size is not NULL. */
 static DEM2DI_INLINE void
 dem2di_batch_actions(const dem2di_batch *batch, bool rolls, const double *DEM2DI_APART normal_x,
                      const double *DEM2DI_APART normal_y, const double *DEM2DI_APART depth,
                      const double *DEM2DI_APART force, const double *DEM2DI_APART shear,
-                     const double *DEM2DI_APART moment, dem2di_action *DEM2DI_APART actions) {
+                     const double *DEM2DI_APART moment, double *DEM2DI_APART size,
+                     dem2di_action *DEM2DI_APART actions) {
     const int count = batch->count;
     DEM2DI_INDEPENDENT
     for (int k = 0; k < count; k++) {
@@ -19767,6 +19831,7 @@ dem2di_batch_actions(const dem2di_batch *batch, bool rolls, const double *DEM2DI
             action.a -= moment[k];
             action.b += moment[k];
         }
+        if (size != NULL) size[k] = dem2di_action_size(&action);
         actions[k].x = action.x;
         actions[k].y = action.y;
         actions[k].a = action.a;
@@ -19794,7 +19859,7 @@ static DEM2DI_INLINE void dem2di_batch_solve(dem2di_batch *b, double time_step,
                                           b->viscous_moment))
 #define DEM2DI_ACTIONS(rolls)                                                              \
     dem2di_batch_actions(b, rolls, b->normal_x, b->normal_y, b->depth, b->force, b->shear, \
-                         b->moment, b->actions)
+                         b->moment, NULL, b->actions)
     if (terms & DEM2DI_TANGENTIAL_DASHPOT)
         DEM2DI_POINTS(true, both);
     else if (terms & DEM2DI_ROLLING)
@@ -20027,16 +20092,9 @@ static inline void dem2di_last_get(const dem2d_world *world, const dem2di_contac
         last->pair.shear[k] -= from->point_viscous_shear[at].at[k];
 }
 
-/* The rest of what a caller's law reads, of row k. Without a tangential spring the built-in law has
-   no friction. */
-static DEM2DI_INLINE void dem2di_law_row_callers(const dem2d_world *world, int i,
-                                                 const dem2d_pair_desc *law,
-                                                 const dem2di_contact *contact, double radius,
-                                                 const dem2di_two *state, int k,
-                                                 dem2di_law_rows *rows) {
+/* Who is in row k. */
+static void dem2di_law_row_name(const dem2d_world *world, int i, int k, dem2di_law_rows *rows) {
     const dem2di_key *key = &world->list.keys[i];
-    const double inverse = dem2di_reduced_inverse(world, i);
-    rows->pair[k] = law;
     rows->a[k] = dem2di_particle_id(world, key->a);
     if (i < world->list.pairs) {
         rows->b[k] = dem2di_particle_id(world, key->b);
@@ -20045,6 +20103,18 @@ static DEM2DI_INLINE void dem2di_law_row_callers(const dem2d_world *world, int i
         rows->b[k].index = rows->b[k].generation = 0;
         rows->wall[k] = dem2di_wall_id(world, dem2di_wall_of(world, i));
     }
+}
+
+/* The rest of what a caller's law reads, of row k; state is NULL where the law has none. Without a tangential spring the built-in law has
+   no friction. */
+static DEM2DI_INLINE void dem2di_law_row_callers(const dem2d_world *world, int i,
+                                                 const dem2d_pair_desc *law,
+                                                 const dem2di_contact *contact, double radius,
+                                                 const dem2di_two *state, int k,
+                                                 dem2di_law_rows *rows) {
+    const double inverse = dem2di_reduced_inverse(world, i);
+    if (!(world->law_omits & DEM2D_LAW_IDS)) dem2di_law_row_name(world, i, k, rows);
+    rows->pair[k] = law;
     rows->point[k] = 0;
     rows->normal_x[k] = contact->normal.x;
     rows->normal_y[k] = contact->normal.y;
@@ -20052,9 +20122,14 @@ static DEM2DI_INLINE void dem2di_law_row_callers(const dem2d_world *world, int i
     rows->mass[k] = inverse > 0 ? 1 / inverse : 0;
     rows->radius[k] = radius;
     rows->compression[k] = contact->depth * contact->depth / 2;
-    rows->state[k][0] = state->at[0];
-    rows->state[k][1] = state->at[1];
+    if (state != NULL) memcpy(rows->state[k], state->at, sizeof rows->state[k]);
     if (!(law->tangential_stiffness > 0)) rows->friction[k] = rows->rolling_friction[k] = 0;
+}
+
+/* The state of a contact in the step before, or NULL. */
+static inline const dem2di_two *dem2di_law_state(const dem2d_world *world,
+                                                 const dem2di_last *last) {
+    return dem2di_has_state(world->plan.terms) ? &last->from->state[last->at] : NULL;
 }
 
 /* The same for the second of two points, in row k. */
@@ -20062,13 +20137,13 @@ static void dem2di_law_row_second(const dem2d_world *world, int i, const dem2di_
                                   const dem2di_contact *contact, int k, dem2di_law_rows *rows) {
     const int at = i - world->list.discs, last_at = last->at - world->list.discs, first = k - 1;
     const dem2di_point_pair *pair = &world->list.contacts.point_pairs[at];
-    const dem2di_two *state = &last->from->state[last->at], *second = state;
+    const dem2di_two *state = dem2di_law_state(world, last), *second = state;
     rows->spin[k] = rows->spin[first];
     rows->rolling_stiffness[k] = rows->rolling_stiffness[first];
     rows->rolling_dashpot[k] = rows->rolling_dashpot[first];
     rows->rolling_friction[k] = rows->rolling_friction[first];
     rows->last_moment[k] = 0;
-    if (dem2di_has_two_points(&last->pair)) {
+    if (state != NULL && dem2di_has_two_points(&last->pair)) {
         const bool crossed = dem2di_has_crossed(&last->pair, pair);
         second = crossed ? state : &last->from->point_state[last_at];
         if (crossed) memcpy(rows->state[first], last->from->point_state[last_at].at, sizeof *state);
@@ -20089,10 +20164,12 @@ static void dem2di_law_add_terms(const dem2d_world *world, int i, const dem2di_l
     const dem2d_pair_desc *law = dem2di_law_of(world, i);
     const double spin = motion->wb - motion->wa, approach = -dem2di_velocity_n(contact, motion);
     const dem2di_dampers *dampers = &world->list.dampers;
-    const double dashpot = dampers->normal[i];
+    const int terms = world->plan.terms;
+    const double dashpot = dampers->normal != NULL ? dampers->normal[i] : 0;
     rows->approach[first] = approach;
     rows->dashpot[first] = dashpot;
-    rows->tangential_dashpot[first] = dem2di_tangential_dashpot(world, i, &contact->arms);
+    rows->tangential_dashpot[first] =
+        terms & DEM2DI_ALL_DASHPOTS ? dem2di_tangential_dashpot(world, i, &contact->arms) : 0;
     if (rows->count - first == 2) {
         const dem2di_point_pair *pair = &world->list.contacts.point_pairs[i - world->list.discs];
         double sliding = rows->tangential_dashpot[first];
@@ -20102,18 +20179,20 @@ static void dem2di_law_add_terms(const dem2d_world *world, int i, const dem2di_l
             rows->tangential_dashpot[first + k] = sliding;
         }
     }
-    if (!(world->plan.terms & DEM2DI_ROLLING)) return;
+    if (!(terms & (DEM2DI_ROLLING | DEM2DI_CALLERS_LAW))) return;
     bool rolls = law->rolling_friction > 0 || world->law != NULL;
-    double radius = rolls ? dampers->radius[i] : 0;
+    double radius = 0;
+    if (rolls)
+        radius = terms & DEM2DI_ROLLING ? dampers->radius[i] : dem2di_reduced_radius(world, i);
     rows->spin[first] = spin;
     rows->rolling_stiffness[first] = dem2di_rolling_stiffness(law, radius);
     rows->rolling_friction[first] = law->rolling_friction * radius;
-    rows->last_moment[first] =
-        last->from->moment[last->at] - dem2di_viscous_moment_of(world, last->from, last->at);
-    if (world->plan.terms & DEM2DI_ROLLING_DASHPOT)
-        rows->rolling_dashpot[first] = rolls ? dampers->rolling[i] : 0;
+    rows->last_moment[first] = dem2di_moment_of(world, last->from, last->at) -
+                               dem2di_viscous_moment_of(world, last->from, last->at);
+    rows->rolling_dashpot[first] =
+        rolls && (terms & DEM2DI_ROLLING_DASHPOT) ? dampers->rolling[i] : 0;
     if (world->law == NULL) return;
-    dem2di_law_row_callers(world, i, law, contact, radius, &last->from->state[last->at], first,
+    dem2di_law_row_callers(world, i, law, contact, radius, dem2di_law_state(world, last), first,
                            rows);
     if (rows->count - first == 2) dem2di_law_row_second(world, i, last, contact, first + 1, rows);
 }
@@ -20185,8 +20264,10 @@ static void dem2di_law_put_two(dem2d_world *world, int i, const dem2di_law_rows 
     if (world->plan.terms & DEM2DI_TANGENTIAL_DASHPOT)
         for (int p = 0; p < 2; p++)
             world->list.contacts.point_viscous_shear[at].at[p] = rows->viscous_shear[k + p];
-    if (!(world->plan.terms & DEM2DI_DASHPOT)) return;
-    for (int p = 0; p < 2; p++) world->list.contacts.point_viscous[at].at[p] = rows->viscous[k + p];
+    if (!(world->plan.terms & (DEM2DI_DASHPOT | DEM2DI_CALLERS_LAW))) return;
+    if (world->plan.terms & DEM2DI_DASHPOT)
+        for (int p = 0; p < 2; p++)
+            world->list.contacts.point_viscous[at].at[p] = rows->viscous[k + p];
     if (contact->force == 0 || dem2di_is_elastic(rows, k)) return;
     double move =
         force[0] / contact->force * pair->offset[0] + force[1] / contact->force * pair->offset[1];
@@ -20215,17 +20296,21 @@ static DEM2DI_INLINE void dem2di_force_put(dem2d_world *world, int i, const dem2
 static DEM2DI_INLINE void dem2di_law_put_callers(dem2d_world *world, int i, bool two, int k,
                                                  const dem2di_law_rows *rows) {
     const dem2di_contacts *to = &world->list.contacts;
-    const int first = two && !(rows->weight[k] > 0) ? k + 1 : k;
-    to->viscous[i] = rows->viscous[k];
+    const int terms = world->plan.terms, first = two && !(rows->weight[k] > 0) ? k + 1 : k;
     to->stiffness[i] = rows->stiffness[first];
-    to->dashpot[i] = rows->dashpot[first];
     to->energy[i] = rows->energy[k];
-    memcpy(to->state[i].at, rows->state[k], sizeof to->state[i].at);
+    if (terms & DEM2DI_DASHPOT) {
+        to->viscous[i] = rows->viscous[k];
+        to->dashpot[i] = rows->dashpot[first];
+    }
+    if (dem2di_has_state(terms)) memcpy(to->state[i].at, rows->state[k], sizeof to->state[i].at);
     if (!two) return;
     to->energy[i] += rows->energy[k + 1];
-    to->moment[i] += rows->moment[k + 1];
-    to->viscous_moment[i] += rows->viscous_moment[k + 1];
-    memcpy(to->point_state[i - world->list.discs].at, rows->state[k + 1], sizeof to->state[i].at);
+    if (terms & DEM2DI_ROLLING) to->moment[i] += rows->moment[k + 1];
+    if (terms & DEM2DI_ROLLING_DASHPOT) to->viscous_moment[i] += rows->viscous_moment[k + 1];
+    if (dem2di_has_state(terms))
+        memcpy(to->point_state[i - world->list.discs].at, rows->state[k + 1],
+               sizeof to->state[i].at);
 }
 
 /* Forces of the contact of row k into the columns, and its loads. Returns the number of its rows.
@@ -20249,10 +20334,30 @@ static DEM2DI_INLINE int dem2di_law_put(dem2d_world *world, const dem2di_law_row
         contacts->viscous_moment[i] = rows->viscous_moment[k];
     if (world->law != NULL) {
         dem2di_law_put_callers(world, i, two, k, rows);
-        moment = contacts->moment[i];
+        moment = dem2di_moment_of(world, contacts, i);
     }
     dem2di_force_put(world, i, &contact, moment, count);
     return two ? 2 : 1;
+}
+
+/* The arrays that a caller's law does without are NULL. */
+static void dem2di_law_batch_omit(int omits, dem2d_law_batch *b) {
+    if (omits & DEM2D_LAW_IDS) {
+        b->a = b->b = NULL;
+        b->wall = NULL;
+    }
+    if (omits & DEM2D_LAW_DASHPOTS) {
+        b->mass = NULL;
+        b->dashpot = b->tangential_dashpot = NULL;
+        b->viscous_normal = b->viscous_tangential = NULL;
+    }
+    if (omits & DEM2D_LAW_ROLLING) {
+        b->spin = b->last_moment = NULL;
+        b->rolling_stiffness = b->rolling_friction = b->moment = NULL;
+    }
+    if (omits & (DEM2D_LAW_DASHPOTS | DEM2D_LAW_ROLLING))
+        b->rolling_dashpot = b->viscous_moment = NULL;
+    if (omits & DEM2D_LAW_STATE) b->state = NULL;
 }
 
 /* The rows as a caller's law gets them. */
@@ -20305,6 +20410,7 @@ static void dem2di_law_ask(const dem2d_world *world, dem2di_law_rows *rows) {
                             rows->energy, rows->viscous_shear, rows->viscous_moment};
     for (int z = 0; z < 6; z++) memset(zero[z], 0, bytes);
     dem2di_law_viscous(&batch);
+    dem2di_law_batch_omit(world->law_omits, &batch);
     world->law(world->law_user, &batch);
     for (int k = 0; k < rows->count; k++) /* a viscous part that is not finite: no step is made */
         if (!dem2di_finite(rows->viscous[k] + rows->viscous_shear[k] + rows->viscous_moment[k]))
@@ -20989,7 +21095,8 @@ static void dem2di_joined_subtract(dem2d_world *world, int i, dem2di_contact *co
         dem2di_law_ask(world, &rows);
         contact->force = -rows.force[0];
         contacts->energy[i] = -rows.energy[0];
-        memcpy(contacts->state[i].at, rows.state[0], sizeof contacts->state[i].at);
+        if (dem2di_has_state(world->plan.terms))
+            memcpy(contacts->state[i].at, rows.state[0], sizeof contacts->state[i].at);
     }
     dem2di_force_put(world, i, contact, 0, count);
 }
@@ -21676,10 +21783,10 @@ static DEM2DI_INLINE bool dem2di_has_dampers(const dem2d_pair_desc *law) {
 
 DEM2DI_VECTORS_BEGIN
 /* Geometry of all contacts of a batch into the columns, with the stiffness and the dashpot that the
-   law may change, and all else that it reads into the rows of the same places. Without dampers the
-   law has no dashpots. */
+   law may change, and all else that it reads into the rows of the same places. Dashpots are 0 where
+   the law does without them, 1 where they are 0, and 2 otherwise. */
 static DEM2DI_INLINE void
-dem2di_batch_rows(const dem2di_batch *b, const dem2d_pair_desc *law, bool one_law, bool dampers,
+dem2di_batch_rows(const dem2di_batch *b, const dem2d_pair_desc *law, bool one_law, int dashpots,
                   double *DEM2DI_APART normal_x, double *DEM2DI_APART normal_y,
                   double *DEM2DI_APART depth, const double *DEM2DI_APART shear,
                   const double *DEM2DI_APART viscous_shear, const double *DEM2DI_APART moment,
@@ -21692,13 +21799,14 @@ dem2di_batch_rows(const dem2di_batch *b, const dem2d_pair_desc *law, bool one_la
     for (int k = 0; k < count; k++) {
         const double kn = one_law ? law->normal_stiffness : b->kn[k];
         const double kt = one_law ? law->tangential_stiffness : b->kt[k];
-        const double radius = b->dampers.radius[k], rolling = kt * radius * radius;
+        const double radius = b->radius_a[k] * (b->radius_b[k] / (b->radius_a[k] + b->radius_b[k]));
+        const double rolling = kt * radius * radius;
         const dem2d_vec last = {normal_x[k], normal_y[k]};
         const dem2di_round r = dem2di_batch_normal(b, k, law, one_law, 0);
         rows->sliding[k] = dem2di_batch_slip(b, k, &r, last, depth[k]);
         rows->approach[k] = -(r.normal.x * b->vx[k] + r.normal.y * b->vy[k]);
         rows->spin[k] = b->wb[k] - b->wa[k];
-        rows->mass[k] = 1 / b->dampers.inverse[k];
+        if (dashpots > 0) rows->mass[k] = 1 / b->dampers.inverse[k];
         rows->radius[k] = radius;
         rows->last_shear[k] = shear[k] - viscous_shear[k];
         rows->last_moment[k] = moment[k] - viscous_moment[k];
@@ -21707,13 +21815,13 @@ dem2di_batch_rows(const dem2di_batch *b, const dem2d_pair_desc *law, bool one_la
         rows->friction[k] = one_law ? mu : b->mu[k];
         rows->rolling_stiffness[k] = rolling;
         rows->rolling_friction[k] = (one_law ? mu_r : b->mu_r[k]) * radius;
-        if (dampers) {
+        if (dashpots == 2) {
             const double along = one_law ? law->tangential_damping_ratio : b->zeta_t[k];
             const double own = b->dampers.normal[k];
             dashpot[k] = r.depth > 0 ? own : 0;
             rows->tangential_dashpot[k] = dem2di_batch_dashpot(b, k, kt, along, &r);
             rows->rolling_dashpot[k] = b->dampers.rolling[k];
-        } else {
+        } else if (dashpots == 1) {
             dashpot[k] = rows->tangential_dashpot[k] = rows->rolling_dashpot[k] = 0;
         }
         normal_x[k] = rows->normal_x[k] = r.normal.x;
@@ -21721,6 +21829,38 @@ dem2di_batch_rows(const dem2di_batch *b, const dem2d_pair_desc *law, bool one_la
         depth[k] = rows->depth[k] = r.depth;
         rows->compression[k] = r.depth * r.depth / 2;
     }
+}
+
+/* What a caller's law needs for a range of contacts: the rows, and an array of zeros that stands in
+   for the columns of parts that it omits. */
+typedef struct dem2di_law_range {
+    const dem2d_pair_desc *law; /* of two particles of the first material */
+    int dashpots;               /* see dem2di_batch_rows */
+    double zero[DEM2DI_BATCH];
+    dem2di_law_rows rows;
+} dem2di_law_range;
+
+/* The loop for the laws that the scene has. */
+static DEM2DI_INLINE void dem2di_rows_make(const dem2d_world *world, const dem2di_batch *b,
+                                           int first, dem2di_law_range *range) {
+    const dem2d_pair_desc *law = range->law;
+    double *stiffness = world->list.contacts.stiffness + first, *dashpot = range->rows.dashpot;
+    if (range->dashpots > 0) dashpot = world->list.contacts.dashpot + first;
+#define DEM2DI_ROWS(one_law, dashpots)                                                         \
+    dem2di_batch_rows(b, law, one_law, dashpots, b->normal_x, b->normal_y, b->depth, b->shear, \
+                      b->viscous_shear, b->moment, b->viscous_moment, stiffness, dashpot,      \
+                      &range->rows)
+    if (!world->plan.one_law && range->dashpots > 0)
+        DEM2DI_ROWS(false, 2);
+    else if (!world->plan.one_law)
+        DEM2DI_ROWS(false, 0);
+    else if (range->dashpots == 2)
+        DEM2DI_ROWS(true, 2);
+    else if (range->dashpots == 1)
+        DEM2DI_ROWS(true, 1);
+    else
+        DEM2DI_ROWS(true, 0);
+#undef DEM2DI_ROWS
 }
 
 /* A force whose viscous part is not finite is not either: no step is made. */
@@ -21735,118 +21875,124 @@ static DEM2DI_INLINE void dem2di_law_refuse(int count, const double *DEM2DI_APAR
     }
 }
 
-/* The loop for the laws that the scene has. */
-static DEM2DI_INLINE void dem2di_rows_make(const dem2d_world *world, const dem2di_batch *b,
-                                           const dem2d_pair_desc *law, int first,
-                                           dem2di_law_rows *rows) {
-    const dem2di_contacts *to = &world->list.contacts;
-    const bool one_law = world->plan.one_law, dampers = dem2di_has_dampers(law);
-#define DEM2DI_ROWS(one_law, dampers)                                                         \
-    dem2di_batch_rows(b, law, one_law, dampers, b->normal_x, b->normal_y, b->depth, b->shear, \
-                      b->viscous_shear, b->moment, b->viscous_moment, to->stiffness + first,  \
-                      to->dashpot + first, rows)
-    if (!one_law)
-        DEM2DI_ROWS(false, true);
-    else if (dampers)
-        DEM2DI_ROWS(true, true);
-    else
-        DEM2DI_ROWS(true, false);
-#undef DEM2DI_ROWS
-}
-
 /* What acts on the two of each contact, by what the law has written. */
-static DEM2DI_INLINE void dem2di_rows_end(const dem2d_world *world, const dem2di_batch *b,
-                                          int first) {
-    dem2di_law_refuse(b->count, world->list.contacts.viscous + first, b->viscous_shear,
-                      b->viscous_moment, b->force);
-    dem2di_batch_actions(b, true, b->normal_x, b->normal_y, b->depth, b->force, b->shear, b->moment,
-                         b->actions);
+static DEM2DI_INLINE void dem2di_rows_act(const dem2d_world *world, const dem2di_batch *b,
+                                          int first, double size[DEM2DI_BATCH]) {
+    if (world->plan.terms & DEM2DI_DASHPOT)
+        dem2di_law_refuse(b->count, world->list.contacts.viscous + first, b->viscous_shear,
+                          b->viscous_moment, b->force);
+    if (world->plan.terms & DEM2DI_ROLLING)
+        dem2di_batch_actions(b, true, b->normal_x, b->normal_y, b->depth, b->force, b->shear,
+                             b->moment, size, b->actions);
+    else
+        dem2di_batch_actions(b, false, b->normal_x, b->normal_y, b->depth, b->force, b->shear,
+                             b->moment, size, b->actions);
 }
 
-static void dem2di_rows_make_plain(const dem2d_world *world, const dem2di_batch *batch,
-                                   const dem2d_pair_desc *law, int first, dem2di_law_rows *rows) {
-    dem2di_rows_make(world, batch, law, first, rows);
+static void dem2di_rows_make_plain(const dem2d_world *world, const dem2di_batch *batch, int first,
+                                   dem2di_law_range *range) {
+    dem2di_rows_make(world, batch, first, range);
 }
 
-static void dem2di_rows_end_plain(const dem2d_world *world, const dem2di_batch *batch, int first) {
-    dem2di_rows_end(world, batch, first);
+static void dem2di_rows_act_plain(const dem2d_world *world, const dem2di_batch *batch, int first,
+                                  double size[DEM2DI_BATCH]) {
+    dem2di_rows_act(world, batch, first, size);
 }
 
 #if DEM2DI_FOURS
 static DEM2DI_AVX2 void dem2di_rows_make_fours(const dem2d_world *world, const dem2di_batch *batch,
-                                               const dem2d_pair_desc *law, int first,
-                                               dem2di_law_rows *rows) {
-    dem2di_rows_make(world, batch, law, first, rows);
+                                               int first, dem2di_law_range *range) {
+    dem2di_rows_make(world, batch, first, range);
 }
 
-static DEM2DI_AVX2 void dem2di_rows_end_fours(const dem2d_world *world, const dem2di_batch *batch,
-                                              int first) {
-    dem2di_rows_end(world, batch, first);
+static DEM2DI_AVX2 void dem2di_rows_act_fours(const dem2d_world *world, const dem2di_batch *batch,
+                                              int first, double size[DEM2DI_BATCH]) {
+    dem2di_rows_act(world, batch, first, size);
 }
 #endif
 DEM2DI_VECTORS_END
 
-/* The rows of a batch as the law gets them; what it writes is in the columns. */
-static dem2d_law_batch dem2di_rows_batch(const dem2d_world *world, int first,
-                                         const dem2di_batch *batch, dem2di_law_rows *rows) {
+/* The rows of a batch as the law gets them: what it writes is in the columns. */
+static void dem2di_rows_batch(const dem2d_world *world, int first, const dem2di_batch *batch,
+                              dem2di_law_rows *rows, dem2d_law_batch *law) {
     const dem2di_contacts *to = &world->list.contacts;
-    dem2d_law_batch law = dem2di_law_batch_of(world, rows);
-    law.stiffness = to->stiffness + first;
-    law.dashpot = to->dashpot + first;
-    law.normal_force = batch->force;
-    law.viscous_normal = to->viscous + first;
-    law.tangential_force = batch->shear;
-    law.viscous_tangential = batch->viscous_shear;
-    law.moment = batch->moment;
-    law.viscous_moment = batch->viscous_moment;
-    law.energy = to->energy + first;
-    law.state = &to->state[first].at;
-    return law;
+    const int terms = world->plan.terms;
+    *law = dem2di_law_batch_of(world, rows);
+    dem2di_law_batch_omit(world->law_omits, law);
+    law->stiffness = to->stiffness + first;
+    law->normal_force = batch->force;
+    law->tangential_force = batch->shear;
+    law->energy = to->energy + first;
+    if (terms & DEM2DI_DASHPOT) {
+        law->dashpot = to->dashpot + first;
+        law->viscous_normal = to->viscous + first;
+        law->viscous_tangential = batch->viscous_shear;
+    }
+    if (terms & DEM2DI_ROLLING) law->moment = batch->moment;
+    if (terms & DEM2DI_ROLLING_DASHPOT) law->viscous_moment = batch->viscous_moment;
+    if (dem2di_has_state(terms)) law->state = &to->state[first].at;
 }
 
-/* Rows from `by` on. */
-static void dem2di_law_batch_skip(dem2d_law_batch *law, int by) {
-    law->pair += by;
-    law->a += by;
-    law->b += by;
-    law->wall += by;
-    law->point += by;
-    law->normal_x += by;
-    law->normal_y += by;
-    law->depth += by;
-    law->weight += by;
-    law->sign += by;
-    law->compression += by;
-    law->approach += by;
-    law->sliding += by;
-    law->spin += by;
-    law->mass += by;
-    law->radius += by;
-    law->last_tangential += by;
-    law->last_moment += by;
-    law->stiffness += by;
-    law->dashpot += by;
-    law->tangential_stiffness += by;
-    law->tangential_dashpot += by;
-    law->friction += by;
-    law->rolling_stiffness += by;
-    law->rolling_dashpot += by;
-    law->rolling_friction += by;
-    law->normal_force += by;
-    law->viscous_normal += by;
-    law->tangential_force += by;
-    law->viscous_tangential += by;
-    law->moment += by;
-    law->viscous_moment += by;
-    law->energy += by;
-    law->state += by;
+/* The law has written nothing yet. */
+static void dem2di_rows_clear(int count, const dem2d_law_batch *law) {
+    double *const zero[] = {law->normal_force,      law->tangential_force, law->energy,
+                            law->viscous_normal,    law->moment,           law->viscous_moment,
+                            law->viscous_tangential};
+    for (int z = 0; z < 7; z++)
+        if (zero[z] != NULL) memset(zero[z], 0, (size_t)count * sizeof(double));
 }
 
-/* Who is in the rows of the contacts from `first` on, and in rows from row k on. */
+/* Leaves out the first rows. */
+static void dem2di_law_batch_skip(int omits, int rows, dem2d_law_batch *law) {
+    law->pair += rows;
+    law->point += rows;
+    law->normal_x += rows;
+    law->normal_y += rows;
+    law->depth += rows;
+    law->weight += rows;
+    law->sign += rows;
+    law->compression += rows;
+    law->approach += rows;
+    law->sliding += rows;
+    law->radius += rows;
+    law->last_tangential += rows;
+    law->stiffness += rows;
+    law->tangential_stiffness += rows;
+    law->friction += rows;
+    law->normal_force += rows;
+    law->tangential_force += rows;
+    law->energy += rows;
+    if (!(omits & DEM2D_LAW_IDS)) {
+        law->a += rows;
+        law->b += rows;
+        law->wall += rows;
+    }
+    if (!(omits & DEM2D_LAW_DASHPOTS)) {
+        law->mass += rows;
+        law->dashpot += rows;
+        law->tangential_dashpot += rows;
+        law->viscous_normal += rows;
+        law->viscous_tangential += rows;
+    }
+    if (!(omits & DEM2D_LAW_ROLLING)) {
+        law->spin += rows;
+        law->last_moment += rows;
+        law->rolling_stiffness += rows;
+        law->rolling_friction += rows;
+        law->moment += rows;
+    }
+    if (!(omits & (DEM2D_LAW_DASHPOTS | DEM2D_LAW_ROLLING))) {
+        law->rolling_dashpot += rows;
+        law->viscous_moment += rows;
+    }
+    if (!(omits & DEM2D_LAW_STATE)) law->state += rows;
+}
+
+/* The rows from begin to end, of the contacts from `first` on: who is in them, and by which law. */
 static void dem2di_rows_name(const dem2d_world *world, int first, int begin, int end,
                              dem2di_law_rows *rows) {
     const dem2di_key *keys = world->list.keys + first;
-    for (int k = begin; k < end; k++) {
+    for (int k = begin; k < end && !(world->law_omits & DEM2D_LAW_IDS); k++) {
         rows->a[k] = dem2di_particle_id(world, keys[k].a);
         rows->b[k] = dem2di_particle_id(world, keys[k].b);
     }
@@ -21854,65 +22000,92 @@ static void dem2di_rows_name(const dem2d_world *world, int first, int begin, int
         rows->pair[k] = dem2di_law_with(world, first + k, false);
 }
 
-/* Calls the law for all runs of closed contacts of a batch from `first` on; returns how many
-   contacts are closed. */
-static int dem2di_rows_ask(const dem2d_world *world, int first, bool dampers,
-                           const dem2di_batch *batch, dem2di_law_rows *rows) {
-    const size_t bytes = (size_t)batch->count * sizeof(double);
-    dem2di_two *state = world->list.contacts.state + first;
-    dem2d_law_batch law = dem2di_rows_batch(world, first, batch, rows);
-    double *const zero[] = {law.normal_force,
-                            law.viscous_normal,
-                            law.tangential_force,
-                            law.viscous_tangential,
-                            law.moment,
-                            law.viscous_moment,
-                            law.energy};
+/* Calls the law for each run of closed contacts of a batch from `first` on. Those that are apart
+   lose their state. Returns how many are closed. */
+static int dem2di_rows_ask(const dem2d_world *world, int first, const dem2di_batch *batch,
+                           dem2di_law_range *range) {
+    const bool stateful = dem2di_has_state(world->plan.terms);
+    dem2di_two *state = world->list.contacts.state;
     int closed = 0, at = 0;
-    for (int z = 0; z < 7; z++) memset(zero[z], 0, bytes);
+    dem2d_law_batch law;
+    dem2di_rows_batch(world, first, batch, &range->rows, &law);
+    dem2di_rows_clear(batch->count, &law);
     for (int begin = 0, end; begin < batch->count; begin = end + 1) {
         for (end = begin; end < batch->count && batch->depth[end] > 0; end++) continue;
-        if (end < batch->count) state[end].at[0] = state[end].at[1] = 0;
+        if (stateful && end < batch->count) memset(&state[first + end], 0, sizeof *state);
         if (end == begin) continue;
-        dem2di_law_batch_skip(&law, begin - at);
+        dem2di_law_batch_skip(world->law_omits, begin - at, &law);
         at = begin;
         law.count = end - begin;
-        dem2di_rows_name(world, first, begin, end, rows);
-        if (dampers) dem2di_law_viscous(&law);
+        closed += law.count;
+        dem2di_rows_name(world, first, begin, end, &range->rows);
+        if (range->dashpots == 2) dem2di_law_viscous(&law);
         world->law(world->law_user, &law);
-        closed += end - begin;
     }
     return closed;
 }
 
+/* The actions of a batch: are they finite, and which is the greatest? */
+static void dem2di_rows_check(int count, const double size[DEM2DI_BATCH], dem2di_count *to) {
+    double most = to->load, sum = 0;
+    for (int k = 0; k < count; k++) {
+        most = dem2di_max(size[k], most);
+        sum += size[k] - size[k];
+    }
+    to->load = most;
+    for (int k = 0; k < count && !(sum == 0); k++) to->unsound += !dem2di_finite(size[k]);
+}
+
+/* What does not change from batch to batch. */
+static void dem2di_law_range_begin(const dem2d_world *world, dem2di_law_range *range) {
+    const dem2di_plan *plan = &world->plan;
+    dem2di_law_rows *rows = &range->rows;
+    range->law = dem2di_law(world, plan->material, plan->material);
+    range->dashpots = !(plan->terms & DEM2DI_DASHPOT)                    ? 0
+                      : plan->one_law && !dem2di_has_dampers(range->law) ? 1
+                                                                         : 2;
+    memset(range->zero, 0, sizeof range->zero);
+    memset(rows->wall, 0, sizeof rows->wall);
+    memset(rows->point, 0, sizeof rows->point);
+    for (int k = 0; k < DEM2DI_BATCH; k++) {
+        rows->weight[k] = rows->sign[k] = 1;
+        rows->pair[k] = range->law;
+    }
+}
+
+/* Nothing writes into the columns of what the law omits. */
+static void dem2di_law_range_fill(dem2di_law_range *range, dem2di_batch *batch) {
+    if (batch->moment == NULL) batch->moment = range->zero;
+    if (batch->viscous_shear == NULL) batch->viscous_shear = range->zero;
+    if (batch->viscous_moment == NULL) batch->viscous_moment = range->zero;
+    if (batch->dampers.rolling == NULL) batch->dampers.rolling = range->zero;
+}
+
 /* Contacts of circles from begin to end, for a caller's law. */
 static void dem2di_discs_by_rows(dem2d_world *world, int begin, int end, dem2di_count *count) {
-    const dem2d_pair_desc *law = dem2di_law(world, world->plan.material, world->plan.material);
-    const bool dampers = !world->plan.one_law || dem2di_has_dampers(law);
     dem2di_batch batch;
-    dem2di_law_rows rows;
-    memset(rows.wall, 0, sizeof rows.wall);
-    memset(rows.point, 0, sizeof rows.point);
-    for (int k = 0; k < DEM2DI_BATCH; k++) {
-        rows.weight[k] = rows.sign[k] = 1;
-        rows.pair[k] = law;
-    }
+    dem2di_law_range range;
+    double size[DEM2DI_BATCH];
+    dem2di_law_range_begin(world, &range);
     for (int first = begin; first < end; first += DEM2DI_BATCH) {
         dem2di_batch_make(world, first, end, &batch);
+        dem2di_law_range_fill(&range, &batch);
 #if DEM2DI_FOURS
         if (world->fours)
-            dem2di_rows_make_fours(world, &batch, law, first, &rows);
+            dem2di_rows_make_fours(world, &batch, first, &range);
         else
 #endif
-            dem2di_rows_make_plain(world, &batch, law, first, &rows);
-        const int closed = dem2di_rows_ask(world, first, dampers, &batch, &rows);
+            dem2di_rows_make_plain(world, &batch, first, &range);
+        const int closed = dem2di_rows_ask(world, first, &batch, &range);
 #if DEM2DI_FOURS
         if (world->fours)
-            dem2di_rows_end_fours(world, &batch, first);
+            dem2di_rows_act_fours(world, &batch, first, size);
         else
 #endif
-            dem2di_rows_end_plain(world, &batch, first);
-        dem2di_batch_end(world, &batch, closed, count);
+            dem2di_rows_act_plain(world, &batch, first, size);
+        dem2di_rows_check(batch.count, size, count);
+        count->collisions += closed;
+        count->proofs[DEM2D_BY_FORM] += closed;
     }
 }
 
@@ -23071,8 +23244,8 @@ static void dem2di_damping_add(const dem2d_world *world, int i, const dem2di_con
     const dem2di_point_pair *pair = dem2di_point_pair_of(world, &world->list.contacts, i);
     const dem2di_arms *arms = &contact->arms;
     const int terms =
-        world->law != NULL ? DEM2DI_TERMS - 1 : dem2di_terms_of(dem2di_law_of(world, i));
-    if ((terms & ~DEM2DI_ROLLING) == 0) return;
+        world->law != NULL ? world->plan.terms : dem2di_terms_of(dem2di_law_of(world, i));
+    if ((terms & DEM2DI_ALL_DASHPOTS) == 0) return;
     const double normal = dem2di_normal_dashpot(world, i);
     const bool rubs = (terms & DEM2DI_TANGENTIAL_DASHPOT) != 0;
     const double sliding = rubs ? dem2di_tangential_dashpot(world, i, arms) : 0;
@@ -29127,7 +29300,7 @@ static void dem2di_check_settings(dem2di_loader *loader) {
     int terms = w->plan.terms;
     bool callers = (terms & DEM2DI_CALLERS_LAW) != 0;
     dem2di_load_expect(loader,
-                       callers ? w->has_law && terms == DEM2DI_TERMS - 1
+                       callers ? w->has_law && terms == dem2di_callers_terms(w->law_omits)
                                : !w->has_law || w->list.count == 0,
                        "terms of the law");
     if (!dem2di_load_good(loader) || !w->has_law) return;

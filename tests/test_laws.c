@@ -324,15 +324,17 @@ static void own_builtin_law(void *user, dem2d_law_batch *b) {
     }
 }
 
-static void set_dashpots(const snapshot_scene *s, double tangential, double rolling) {
+/* Dashpots by their ratios, of which the normal one has `normal` times some; rolling friction. */
+static void set_terms(const snapshot_scene *s, double normal, double tangential, double rolling,
+                      double rolling_friction) {
     const dem2d_material_id ids[2] = {s->stone, s->rubber};
     for (int i = 0; i < 2; i++)
         for (int j = i; j < 2; j++) {
             dem2d_pair_desc pair = {.normal_stiffness = 1e6 / (1 + i + j),
                                     .tangential_stiffness = 7e5 / (1 + i + j),
                                     .friction = 0.5,
-                                    .damping_ratio = 0.1 + 0.2 * i + 0.1 * j,
-                                    .rolling_friction = 0.0625,
+                                    .damping_ratio = normal * (0.1 + 0.2 * i + 0.1 * j),
+                                    .rolling_friction = rolling_friction,
                                     .tangential_damping_ratio = tangential * (1 + j),
                                     .rolling_damping_ratio = rolling * (1 + i)};
             assert_ok(dem2d_world_set_pair(s->world, ids[i], ids[j], &pair));
@@ -377,7 +379,7 @@ static void test_builtin_law(void **state) {
                 if (k == 1) desc.law = way == 2 ? own_builtin_law : builtin_law;
                 if (k == 1) desc.law_user = &seen;
                 scene_make(&s[k], kinds[i], GRAINS, &desc);
-                if (way > 0) set_dashpots(&s[k], way == 1 ? 0.2 : 0, way == 1 ? 0.1 : 0);
+                if (way > 0) set_terms(&s[k], 1, way == 1 ? 0.2 : 0, way == 1 ? 0.1 : 0, 0.0625);
             }
             for (int step = 0; step < 400; step++) {
                 dem2d_stats stats;
@@ -394,6 +396,125 @@ static void test_builtin_law(void **state) {
             assert_true(way == 2 || (points > 0) == flat);
             for (int k = 0; k < 2; k++) dem2d_world_destroy(s[k].world);
         }
+}
+
+/* --- a law that does without parts of its batch ---------------------------------------------- */
+
+typedef struct law_parts {
+    int omits;
+    double bad, states; /* states: greatest */
+} law_parts;
+
+/* The built-in law of what is there. Where there is a state it counts the steps of each contact. */
+static void partial_law(void *user, dem2d_law_batch *b) {
+    law_parts *seen = user;
+    const bool ids = !(seen->omits & DEM2D_LAW_IDS), state = !(seen->omits & DEM2D_LAW_STATE);
+    const bool dashpots = !(seen->omits & DEM2D_LAW_DASHPOTS);
+    const bool rolling = !(seen->omits & DEM2D_LAW_ROLLING);
+    if ((b->a != NULL) != ids || (b->b != NULL) != ids || (b->wall != NULL) != ids) seen->bad = 1;
+    if ((b->mass != NULL) != dashpots || (b->dashpot != NULL) != dashpots ||
+        (b->tangential_dashpot != NULL) != dashpots || (b->viscous_normal != NULL) != dashpots ||
+        (b->viscous_tangential != NULL) != dashpots)
+        seen->bad = 2;
+    if ((b->spin != NULL) != rolling || (b->last_moment != NULL) != rolling ||
+        (b->rolling_stiffness != NULL) != rolling || (b->rolling_friction != NULL) != rolling ||
+        (b->moment != NULL) != rolling)
+        seen->bad = 3;
+    if ((b->rolling_dashpot != NULL) != (rolling && dashpots) ||
+        (b->viscous_moment != NULL) != (rolling && dashpots))
+        seen->bad = 4;
+    if ((b->state != NULL) != state) seen->bad = 5;
+    for (int k = 0; k < b->count; k++) {
+        if (ids && (b->b[k].generation > 0) == (b->wall[k].generation > 0)) seen->bad = 6;
+        if (!(b->radius[k] > 0)) seen->bad = 7;
+        if (state) seen->states = fmax(seen->states, b->state[k][0] += 1);
+    }
+    dem2d_law_builtin(b);
+}
+
+static bool same_contacts(const dem2d_world *a, const dem2d_world *b) {
+    enum { MOST = 400 };
+    static dem2d_contact_info one[MOST], other[MOST];
+    int count, others;
+    assert_ok(dem2d_world_contacts(a, one, MOST, &count));
+    assert_ok(dem2d_world_contacts(b, other, MOST, &others));
+    if (count != others || count > MOST) return false;
+    for (int i = 0; i < count; i++)
+        if (one[i].normal_force != other[i].normal_force || one[i].moment != other[i].moment ||
+            one[i].tangential_force != other[i].tangential_force ||
+            one[i].point.x != other[i].point.x || one[i].point.y != other[i].point.y)
+            return false;
+    return true;
+}
+
+/* Goes on in a copy from a snapshot: to the same hash. */
+static void check_copy(snapshot_scene *s, law_parts *seen) {
+    scene_bytes bytes = scene_save(s->world);
+    dem2d_custom_desc custom;
+    dem2d_load_desc load = scene_load_desc(&bytes, &custom);
+    dem2d_world *copy;
+    dem2d_world_desc desc;
+    load.law = partial_law, load.law_user = seen, load.law_tag = SCENE_LAW_TAG;
+    assert_ok(dem2d_world_load(&load, NULL, &copy));
+    assert_ok(dem2d_world_get_desc(copy, &desc));
+    assert_int_equal(desc.law_omits, seen->omits);
+    for (int k = 0; k < 2; k++) assert_ok(dem2d_world_step(k == 0 ? s->world : copy, 20, NULL));
+    assert_true(dem2d_world_hash(copy) == dem2d_world_hash(s->world));
+    dem2d_world_destroy(copy);
+    free(bytes.bytes);
+}
+
+/* A law that omits parts is the built-in law without them, whatever the materials have: the same
+   bits for circles, other shapes, two points, walls, servo walls and joints. */
+static void test_omitted_parts(void **state) {
+    (void)state;
+    enum { GRAINS = 40, STEPS = 150 };
+    static const int kinds[] = {SCENE_CIRCLES, SCENE_MIXED, SCENE_GJK, SCENE_FULL, SCENE_CHAIN};
+    static const int omitted[] = {1, 2, 4, 8, 6, 9, 14, 15};
+    for (int i = 0; i < COUNT_OF(kinds); i++)
+        for (int j = 0; j < COUNT_OF(omitted); j++) {
+            snapshot_scene s[2];
+            law_parts seen = {omitted[j], 0, 0};
+            for (int k = 0; k < 2; k++) {
+                dem2d_world_desc desc = scene_desc(kinds[i]);
+                const bool dashpots = k == 1 || !(omitted[j] & DEM2D_LAW_DASHPOTS);
+                const bool rolling = k == 1 || !(omitted[j] & DEM2D_LAW_ROLLING);
+                if (k == 1) {
+                    desc.law = partial_law, desc.law_user = &seen;
+                    desc.law_tag = SCENE_LAW_TAG, desc.law_omits = omitted[j];
+                }
+                scene_make(&s[k], kinds[i], GRAINS, &desc);
+                set_terms(&s[k], dashpots, dashpots ? 0.2 : 0, dashpots && rolling ? 0.1 : 0,
+                          rolling ? 0.0625 : 0);
+            }
+            for (int step = 0; step < STEPS; step++) {
+                for (int k = 0; k < 2; k++) assert_ok(dem2d_world_step(s[k].world, 1, NULL));
+                assert_true(same_world(&s[0], &s[1], GRAINS));
+            }
+            assert_true(same_contacts(s[0].world, s[1].world));
+            check_copy(&s[1], &seen);
+            assert_true(seen.bad == 0);
+            assert_true((seen.states > 10) == !(omitted[j] & DEM2D_LAW_STATE));
+            for (int k = 0; k < 2; k++) dem2d_world_destroy(s[k].world);
+        }
+}
+
+/* Parts that there are not, and parts of no law. */
+static void test_omitted_wrongly(void **state) {
+    (void)state;
+    test_env env;
+    test_env_init(&env);
+    const int wrong[] = {-1, 16, 1};
+    for (int i = 0; i < COUNT_OF(wrong); i++) {
+        dem2d_world_desc desc = {0};
+        dem2d_world *world = NULL;
+        law_parts seen = {0, 0, 0};
+        desc.time_step = 1e-5, desc.env = &env.env, desc.law_omits = wrong[i];
+        if (i < 2) desc.law = partial_law, desc.law_user = &seen;
+        assert_result(dem2d_world_create(&desc, &world), DEM2D_OUT_OF_RANGE);
+        assert_logged(&env, DEM2D_OUT_OF_RANGE, -1, "law_omits");
+        assert_true(world == NULL);
+    }
 }
 
 /* A dashpot that may pull: e = exp(-pi zeta/s) at any speed. */
@@ -703,6 +824,7 @@ int main(void) {
         cmocka_unit_test(test_damping_ratio),    cmocka_unit_test(test_restitution),
         cmocka_unit_test(test_rolling),          cmocka_unit_test(test_callers_law),
         cmocka_unit_test(test_unsound_law),      cmocka_unit_test(test_builtin_law),
+        cmocka_unit_test(test_omitted_parts),    cmocka_unit_test(test_omitted_wrongly),
         cmocka_unit_test(test_tension),          cmocka_unit_test(test_ledger_order),
         cmocka_unit_test(test_ledger_closes),    cmocka_unit_test(test_ledger_edits),
         cmocka_unit_test(test_law_changes),      cmocka_unit_test(test_damped_time_step),
