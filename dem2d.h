@@ -324,6 +324,8 @@ HOW TO
     use a law of yours   dem2d_world_desc.law: it gets contact points in arrays (dem2d_law_batch),
                          and writes their forces. dem2d_law_builtin does what the world would do:
                          call it first and change what it wrote, or change its coefficients before.
+                         A law that does without ids, dashpots, rolling or a state is faster if
+                         law_omits says so.
     change how two       dem2d_world_set_pair: stiffnesses, friction, damping ratio and rolling
       materials meet     friction of a pair. With friction 0, for example, a wall is smooth.
     change a world       Between steps: dem2d_world_set_gravity, dem2d_world_set_damping,
@@ -20105,8 +20107,8 @@ static void dem2di_law_row_name(const dem2d_world *world, int i, int k, dem2di_l
     }
 }
 
-/* The rest of what a caller's law reads, of row k; state is NULL where the law has none. Without a tangential spring the built-in law has
-   no friction. */
+/* The rest of what a caller's law reads, of row k; state is NULL where the law has none. Without a
+   tangential spring the built-in law has no friction. */
 static DEM2DI_INLINE void dem2di_law_row_callers(const dem2d_world *world, int i,
                                                  const dem2d_pair_desc *law,
                                                  const dem2di_contact *contact, double radius,

@@ -124,6 +124,7 @@ figures() {
     instructions 'discs, dashpot' 500
     instructions 'discs, dashpot, rolling' 500
     instructions 'discs, law' 500
+    instructions 'discs, short law' 500
     instructions 'polygons' 300
     instructions 'ellipses' 300
     instructions 'polybeziers' 300
