@@ -3211,6 +3211,46 @@ static dem2d_principal dem2di_tensor_principal(dem2di_tensor t) {
     return principal;
 }
 
+#if defined(__GNUC__)
+/* Two doubles at once. */
+typedef double dem2di_two_lanes __attribute__((vector_size(16)));
+
+static DEM2DI_INLINE dem2di_two_lanes dem2di_lanes_at(const double *from) {
+    dem2di_two_lanes lanes;
+    memcpy(&lanes, from, sizeof lanes);
+    return lanes;
+}
+#endif
+
+#if DEM2DI_FOURS
+DEM2DI_AVX2_INLINE dem2di_four dem2di_four_at(const double *from) {
+    dem2di_four four;
+    memcpy(&four, from, sizeof four);
+    return four;
+}
+
+DEM2DI_AVX2_INLINE void dem2di_four_put(double *to, dem2di_four four) {
+    memcpy(to, &four, sizeof four);
+}
+
+DEM2DI_AVX2_INLINE dem2di_four dem2di_four_of(double a, double b, double c, double d) {
+    dem2di_four four = {a, b, c, d};
+    return four;
+}
+
+/* Rows become columns. */
+DEM2DI_AVX2_INLINE void dem2di_four_turn(dem2di_four rows[4]) {
+    dem2di_four a = DEM2DI_SHUFFLE(rows[0], rows[1], 0, 4, 2, 6);
+    dem2di_four b = DEM2DI_SHUFFLE(rows[0], rows[1], 1, 5, 3, 7);
+    dem2di_four c = DEM2DI_SHUFFLE(rows[2], rows[3], 0, 4, 2, 6);
+    dem2di_four d = DEM2DI_SHUFFLE(rows[2], rows[3], 1, 5, 3, 7);
+    rows[0] = DEM2DI_SHUFFLE(a, c, 0, 1, 4, 5);
+    rows[1] = DEM2DI_SHUFFLE(b, d, 0, 1, 4, 5);
+    rows[2] = DEM2DI_SHUFFLE(a, c, 2, 3, 6, 7);
+    rows[3] = DEM2DI_SHUFFLE(b, d, 2, 3, 6, 7);
+}
+#endif
+
 /* ============================================================================================
    >>memory  Allocation by the environment, results and the log
    uses: config
@@ -3989,15 +4029,6 @@ typedef struct dem2di_series_sums {
 } dem2di_series_sums;
 
 #if defined(__GNUC__)
-/* Two doubles at once. */
-typedef double dem2di_two_lanes __attribute__((vector_size(16)));
-
-static DEM2DI_INLINE dem2di_two_lanes dem2di_lanes_at(const double *from) {
-    dem2di_two_lanes lanes;
-    memcpy(&lanes, from, sizeof lanes);
-    return lanes;
-}
-
 /* {a0 + a1, b0 + b1} */
 static DEM2DI_INLINE dem2di_two_lanes dem2di_lanes_sums(dem2di_two_lanes a, dem2di_two_lanes b) {
     const dem2di_two_lanes first = {a[0], b[0]}, second = {a[1], b[1]};
@@ -5456,8 +5487,10 @@ DEM2D_API dem2d_result dem2d_shape_get(const dem2d_shape *shape, dem2d_shape_inf
 
 /* Is (x, y) a unit vector within rounding errors? It is then not normalised again, so that exact
    rotations stay exact. */
+#define DEM2DI_OFF_UNIT (4 * DBL_EPSILON) /* of the square of a unit vector, from 1 */
+
 static bool dem2di_is_unit(double x, double y) {
-    return fabs(x * x + y * y - 1) <= 4 * DBL_EPSILON;
+    return fabs(x * x + y * y - 1) <= DEM2DI_OFF_UNIT;
 }
 
 /* Check a caller's pose (finite, rotation not zero, scale above 0) and normalise its rotation. */
@@ -11261,10 +11294,12 @@ static DEM2DI_INLINE void dem2di_contact_solve(dem2di_pair *pair, dem2d_solver s
     search->state = dem2di_state_of(pair, search);
 }
 
+#define DEM2DI_LEAST_LINE 1e-140 /* of centres: its square is a normal number */
+
 /* Depth of two circles in closed form, with d from centre to centre. Concentric circles get the
    normal (1, 0). */
 static double dem2di_circle_contact(dem2d_vec d, double distance, double radii, dem2d_vec *normal) {
-    if (distance > 1e-140) { /* its square is a normal number */
+    if (distance > DEM2DI_LEAST_LINE) {
         normal->x = d.x / distance;
         normal->y = d.y / distance;
     } else if (!dem2di_unit(d, normal)) {
@@ -11477,7 +11512,7 @@ DEM2D_API dem2d_result dem2d_pair_contact(const dem2d_shape *a, dem2d_pose pose_
 #define DEM2DI_BODY_MOST 1e153
 
 /* Radius of the bounding circle of a body. */
-static inline double dem2di_body_radius(const dem2d_body *body) {
+static DEM2DI_INLINE double dem2di_body_radius(const dem2d_body *body) {
     return body->shape->circumscribed * body->pose.scale;
 }
 
@@ -11504,32 +11539,72 @@ static dem2d_result dem2di_check_body(const dem2d_env *env, const dem2d_body *bo
     return DEM2D_OK;
 }
 
-/* *unit: all rotations are of length 1. A body whose numbers are all in range needs no second
-   look. */
+/* What is found of many bodies, to be compared once, at the end. */
+typedef struct dem2di_bodies_found {
+    double sum;   /* of all numbers that must be finite and in range: if one is not, this is not */
+    double least; /* radius */
+    double off;   /* by which the square of a rotation is not 1, at most */
+    int kinds;    /* 0: all are circles */
+} dem2di_bodies_found;
+
+static DEM2DI_INLINE void dem2di_body_find(const dem2d_body *body, dem2di_bodies_found *found) {
+    const dem2d_rot q = body->pose.rotation;
+    const double radius = dem2di_body_radius(body), off = fabs(q.c * q.c + q.s * q.s - 1);
+    const double place = fabs(body->pose.position.x) + fabs(body->pose.position.y);
+    found->sum += place + (radius + off);
+    found->least = dem2di_min(radius, found->least);
+    found->off = dem2di_max(off, found->off);
+    found->kinds |= (int)body->shape->type ^ (int)DEM2D_CIRCLE;
+}
+
+/* Are all bodies in range, with rotations of length 1? If their sum is too great, each may still
+   be. Every other one is summed apart: sums of all would wait for each other. */
+static bool dem2di_bodies_good(const dem2d_body *bodies, int count, bool *round) {
+    dem2di_bodies_found one = {0, DEM2DI_BODY_MOST, 0, 0}, two = one;
+    int i = 0;
+    for (; i + 1 < count; i += 2) {
+        if ((bodies[i].shape == NULL) | (bodies[i + 1].shape == NULL)) return false;
+        dem2di_body_find(&bodies[i], &one);
+        dem2di_body_find(&bodies[i + 1], &two);
+    }
+    if (i < count) {
+        if (bodies[i].shape == NULL) return false;
+        dem2di_body_find(&bodies[i], &one);
+    }
+    *round = (one.kinds | two.kinds) == 0;
+    return one.sum + two.sum <= DEM2DI_BODY_MOST &&
+           dem2di_min(one.least, two.least) >= DEM2DI_BODY_LEAST &&
+           dem2di_max(one.off, two.off) <= DEM2DI_OFF_UNIT;
+}
+
+/* *unit: all rotations are of length 1; *round: it is known that all are circles. */
 static dem2d_result dem2di_check_bodies(const dem2d_env *env, const dem2d_body *bodies, int count,
-                                        bool *unit) {
+                                        bool *unit, bool *round) {
     *unit = true;
+    if (dem2di_bodies_good(bodies, count, round)) return DEM2D_OK;
+    *round = false;
     for (int i = 0; i < count; i++) {
-        const dem2d_rot *q = &bodies[i].pose.rotation;
-        const bool normalised = dem2di_is_unit(q->c, q->s);
-        if (bodies[i].shape != NULL && (normalised & (bodies[i].pose.scale > 0)) &&
-            dem2di_body_in_range(&bodies[i]))
-            continue;
         dem2d_result result = dem2di_check_body(env, &bodies[i], i);
         if (result != DEM2D_OK) return result;
-        *unit = *unit && normalised;
+        *unit = *unit && dem2di_is_unit(bodies[i].pose.rotation.c, bodies[i].pose.rotation.s);
     }
     return DEM2D_OK;
 }
 
+static inline bool dem2di_body_pair_good(const dem2d_body_pair *pair, int bodies) {
+    const unsigned a = (unsigned)pair->a, b = (unsigned)pair->b, all = (unsigned)bodies;
+    return (a < all) & (b < all) & (a != b);
+}
+
 static dem2d_result dem2di_check_body_pairs(const dem2d_env *env, const dem2d_body_pair *pairs,
                                             int count, int bodies) {
-    for (int i = 0; i < count; i++) {
-        const int a = pairs[i].a, b = pairs[i].b;
-        if (a < 0 || a >= bodies || b < 0 || b >= bodies || a == b)
+    bool bad = false;
+    for (int i = 0; i < count; i++) bad |= !dem2di_body_pair_good(&pairs[i], bodies);
+    for (int i = 0; i < count && bad; i++)
+        if (!dem2di_body_pair_good(&pairs[i], bodies))
             return dem2di_fail(env, DEM2D_OUT_OF_RANGE, i,
-                               "pairs[%d] = {%d, %d}: not two of %d bodies", i, a, b, bodies);
-    }
+                               "pairs[%d] = {%d, %d}: not two of %d bodies", i, pairs[i].a,
+                               pairs[i].b, bodies);
     return DEM2D_OK;
 }
 
@@ -11616,6 +11691,97 @@ static inline void dem2di_overlap_circles(const dem2d_body *a, const dem2d_body 
     overlap->point.y = ((pa.y + n.y * ra) + (pb.y - n.y * rb)) * 0.5;
 }
 
+static void dem2di_circles_plain(const dem2di_array_query *query, int begin, int end) {
+    for (int i = begin; i < end; i++) {
+        const dem2d_body_pair *pair = &query->pairs[i];
+        dem2di_overlap_circles(&query->bodies[pair->a], &query->bodies[pair->b],
+                               &query->overlaps[i]);
+    }
+}
+
+DEM2DI_VECTORS_BEGIN
+#if DEM2DI_FOURS
+/* Centres and radii of four circles, in columns. */
+typedef struct dem2di_four_circles {
+    dem2di_four x, y, r;
+} dem2di_four_circles;
+
+/* Written out for all four: gcc would make a loop that goes through memory. */
+DEM2DI_AVX2_INLINE dem2di_four_circles dem2di_circles_fetch(const dem2d_body *b0,
+                                                            const dem2d_body *b1,
+                                                            const dem2d_body *b2,
+                                                            const dem2d_body *b3) {
+    const dem2di_four even = DEM2DI_SHUFFLE(dem2di_lanes_at(&b0->pose.position.x),
+                                            dem2di_lanes_at(&b2->pose.position.x), 0, 1, 2, 3);
+    const dem2di_four odd = DEM2DI_SHUFFLE(dem2di_lanes_at(&b1->pose.position.x),
+                                           dem2di_lanes_at(&b3->pose.position.x), 0, 1, 2, 3);
+    dem2di_four_circles c;
+    c.x = DEM2DI_SHUFFLE(even, odd, 0, 4, 2, 6);
+    c.y = DEM2DI_SHUFFLE(even, odd, 1, 5, 3, 7);
+    c.r = dem2di_four_of(dem2di_body_radius(b0), dem2di_body_radius(b1), dem2di_body_radius(b2),
+                         dem2di_body_radius(b3));
+    return c;
+}
+
+/* One answer: the normal and the point are in a row. */
+DEM2DI_AVX2_INLINE void dem2di_circles_put(dem2di_four row, double depth, double error,
+                                           long long state, dem2d_overlap *overlap) {
+    dem2di_four_put(&overlap->normal.x, row);
+    overlap->depth = depth;
+    overlap->error = error;
+    overlap->state = (dem2d_contact_state)state;
+}
+
+/* dem2di_overlap_circles of four pairs. False: a line of centres is too short. */
+DEM2DI_AVX2_INLINE bool dem2di_overlap_fours(const dem2d_body *bodies, const dem2d_body_pair *p,
+                                             dem2d_overlap *to) {
+    const dem2di_four_circles a = dem2di_circles_fetch(&bodies[p[0].a], &bodies[p[1].a],
+                                                       &bodies[p[2].a], &bodies[p[3].a]);
+    const dem2di_four_circles b = dem2di_circles_fetch(&bodies[p[0].b], &bodies[p[1].b],
+                                                       &bodies[p[2].b], &bodies[p[3].b]);
+    const dem2di_four dx = b.x - a.x, dy = b.y - a.y, square = dx * dx + dy * dy, reach = a.r + b.r;
+    dem2di_four distance;
+    double roots[4];
+    dem2di_four_put(roots, square);
+    for (int k = 0; k < 4; k++) roots[k] = sqrt(roots[k]);
+    distance = dem2di_four_at(roots);
+    const dem2di_four least = square - square + DEM2DI_LEAST_LINE;
+    const dem2di_four_bits far = (dem2di_four_bits)(distance > least);
+    if ((far[0] & far[1] & far[2] & far[3]) == 0) return false;
+    const dem2di_four nx = dx / distance, ny = dy / distance, depth = reach - distance;
+    const dem2di_four error = DEM2DI_ROUNDOFF * (reach + distance);
+    const dem2di_four_bits deep = (dem2di_four_bits)(depth > error);
+    const dem2di_four_bits apart = (dem2di_four_bits)(depth < -error);
+    const dem2di_four_bits state = apart - deep + DEM2D_TOUCHING;
+    dem2di_four rows[4] = {nx, ny, ((a.x + nx * a.r) + (b.x - nx * b.r)) * 0.5,
+                           ((a.y + ny * a.r) + (b.y - ny * b.r)) * 0.5};
+    dem2di_four_turn(rows);
+    dem2di_circles_put(rows[0], depth[0], error[0], state[0], &to[0]);
+    dem2di_circles_put(rows[1], depth[1], error[1], state[1], &to[1]);
+    dem2di_circles_put(rows[2], depth[2], error[2], state[2], &to[2]);
+    dem2di_circles_put(rows[3], depth[3], error[3], state[3], &to[3]);
+    return true;
+}
+
+static DEM2DI_AVX2 void dem2di_circles_fours(const dem2di_array_query *query, int begin, int end) {
+    int i = begin;
+    for (; i + 4 <= end; i += 4)
+        if (!dem2di_overlap_fours(query->bodies, query->pairs + i, query->overlaps + i))
+            dem2di_circles_plain(query, i, i + 4);
+    dem2di_circles_plain(query, i, end);
+}
+#else
+#define dem2di_circles_fours dem2di_circles_plain
+#endif
+DEM2DI_VECTORS_END
+
+/* Is a pair one of two circles? */
+static inline bool dem2di_body_pair_round(const dem2di_array_query *query, int i) {
+    const dem2d_body_pair *pair = &query->pairs[i];
+    return query->bodies[pair->a].shape->type == DEM2D_CIRCLE &&
+           query->bodies[pair->b].shape->type == DEM2D_CIRCLE;
+}
+
 static void dem2di_pairs_query(const dem2di_array_query *query, int i, const dem2d_body *a,
                                const dem2d_body *b) {
     const dem2d_contact_desc *used = &query->used;
@@ -11653,16 +11819,21 @@ DEM2D_API dem2d_result dem2d_pairs_contact(const dem2d_env *env, const dem2d_bod
                            body_count < 0 ? body_count : pair_count);
     dem2di_array_query query = {bodies, pairs,    {0, 0, {0, 0}, DEM2D_CERTIFIED, false},
                                 memory, overlaps, contacts};
-    bool unit;
+    bool unit, round;
     dem2d_result result = dem2di_contact_desc_used(env, desc, &query.used);
-    if (result == DEM2D_OK) result = dem2di_check_bodies(env, bodies, body_count, &unit);
+    if (result == DEM2D_OK) result = dem2di_check_bodies(env, bodies, body_count, &unit, &round);
     if (result == DEM2D_OK) result = dem2di_check_body_pairs(env, pairs, pair_count, body_count);
     if (result != DEM2D_OK) return result;
     const bool circles = query.used.solver == DEM2D_CERTIFIED && contacts == NULL;
+    const bool fours = dem2di_has_fours();
     for (int i = 0; i < pair_count; i++) {
         const dem2d_body *a = &bodies[pairs[i].a], *b = &bodies[pairs[i].b];
-        if (circles && a->shape->type == DEM2D_CIRCLE && b->shape->type == DEM2D_CIRCLE) {
-            dem2di_overlap_circles(a, b, &overlaps[i]);
+        int end = i;
+        if (circles && round) end = pair_count;
+        while (circles && end < pair_count && dem2di_body_pair_round(&query, end)) end++;
+        if (end > i) {
+            (fours ? dem2di_circles_fours : dem2di_circles_plain)(&query, i, end);
+            i = end - 1;
         } else if (unit) {
             dem2di_pairs_query(&query, i, a, b);
         } else {
@@ -19566,33 +19737,6 @@ static void dem2di_batch_fetch_plain(const dem2d_world *world, int first, dem2di
 }
 
 #if DEM2DI_FOURS
-DEM2DI_AVX2_INLINE dem2di_four dem2di_four_at(const double *from) {
-    dem2di_four four;
-    memcpy(&four, from, sizeof four);
-    return four;
-}
-
-DEM2DI_AVX2_INLINE void dem2di_four_put(double *to, dem2di_four four) {
-    memcpy(to, &four, sizeof four);
-}
-
-DEM2DI_AVX2_INLINE dem2di_four dem2di_four_of(double a, double b, double c, double d) {
-    dem2di_four four = {a, b, c, d};
-    return four;
-}
-
-/* Rows become columns. */
-DEM2DI_AVX2_INLINE void dem2di_four_turn(dem2di_four rows[4]) {
-    dem2di_four a = DEM2DI_SHUFFLE(rows[0], rows[1], 0, 4, 2, 6);
-    dem2di_four b = DEM2DI_SHUFFLE(rows[0], rows[1], 1, 5, 3, 7);
-    dem2di_four c = DEM2DI_SHUFFLE(rows[2], rows[3], 0, 4, 2, 6);
-    dem2di_four d = DEM2DI_SHUFFLE(rows[2], rows[3], 1, 5, 3, 7);
-    rows[0] = DEM2DI_SHUFFLE(a, c, 0, 1, 4, 5);
-    rows[1] = DEM2DI_SHUFFLE(b, d, 0, 1, 4, 5);
-    rows[2] = DEM2DI_SHUFFLE(a, c, 2, 3, 6, 7);
-    rows[3] = DEM2DI_SHUFFLE(b, d, 2, 3, 6, 7);
-}
-
 /* dem2di_batch_fetch for all contacts, four at a time: the two halves of a state are a vector each,
    x, y and rotation, then v, w and radius. */
 DEM2DI_AVX2_INLINE void dem2di_fours_fetch(const dem2di_state *now, const dem2di_key *keys,
