@@ -10793,32 +10793,44 @@ static inline dem2di_demand dem2di_demand_of(const dem2di_pair *pair, double tol
     return demand;
 }
 
-/* Is an evaluation of a pair without edges at the minimum, with all that dem2di_descend,
-   dem2di_descend_finish and dem2di_certify would ask of it, and the radius as proof? True only if
-   these would end there with the same bits: the conditions are theirs, or imply them. With e the
-   angle and t the tolerance of the search, S the size, r the least and q the greatest radius, b the
-   curvature of h and s its slope, they are
+/* Would dem2di_descend and dem2di_descend_finish end at this evaluation of a pair without edges,
+   with the bits of *search? The conditions are theirs, or imply them. With e the angle, S the size,
+   q the greatest radius, r the least of shapes with parts, b the curvature of h and s its slope,
+   they are
      b > 0, |s| <= e b, s^2 <= e^2 b S, s^2 q <= 2 S e^2 b^2, s^2 <= 1e-10 r S,
-     r - h > 0, s^2 <= 2 t (r - h);
-   here r - h <= b and e^2 S <= t, so that s^2 <= e^2 (r - h) S is enough for three of them. Other
-   roundings than theirs are 1e-15, for which s^2 is taken 1e-9 greater. No short circuits: loops
-   over many pairs turn this into vector instructions. */
-static DEM2DI_INLINE bool dem2di_rest_found(double size, double least_a, double least_b,
-                                            double most, const dem2di_eval *eval,
-                                            const dem2di_demand *demand, dem2di_search *search) {
-    const double h = eval->h, slope = eval->slope[0], square = slope * slope;
+   of which `flat` times S is to be the least of e^2 b S and 1e-10 r S. Other roundings than theirs
+   are 1e-15, for which s^2 is taken 1e-9 greater. No short circuits: loops over many pairs turn
+   this into vector instructions. */
+static DEM2DI_INLINE bool dem2di_descent_ends(double size, double flat, double most,
+                                              const dem2di_eval *eval, const dem2di_demand *demand,
+                                              dem2di_search *search) {
+    const double h = eval->h, slope = eval->slope[0], above = slope * slope * (1 + 1e-9);
     const double bend = eval->rho[0] + eval->rho[1] - h, turn = demand->angle * bend;
-    const double room = least_a + least_b - h, roundoff = DEM2DI_ROUNDOFF * size;
-    const double above = square * (1 + 1e-9), least = least_a < least_b ? least_a : least_b;
-    const double by_room = demand->angle * demand->angle * room, by_step = 1e-10 * least;
-    const double flat = by_room < by_step ? by_room : by_step;
     const double e = -slope / bend, fall = e * e / 2;
     dem2di_step_on(eval, e, fall, search);
     search->upper = h + slope * e * 0.5;
-    search->lower = search->upper - square / (2 * room);
-    return (room > 0) & (room <= bend) & (bend * DEM2DI_ROUNDOFF < size) & (fabs(slope) <= turn) &
+    return (bend > 0) & (bend * DEM2DI_ROUNDOFF < size) & (fabs(slope) <= turn) &
            (above <= flat * size) & (above * most <= 2 * size * (turn * turn)) &
-           (fall <= DEM2DI_SMALL_FALL) & !((h >= -roundoff) & (search->lower < -roundoff)) &
+           (fall <= DEM2DI_SMALL_FALL);
+}
+
+/* Is an evaluation at the minimum, with all that dem2di_certify would ask of it, and the radius as
+   proof? True only if that would end there with the same bits: with t the tolerance of the search,
+   r the least radius, and e, S, b and s of dem2di_descent_ends, its conditions are
+     r - h > 0, s^2 <= 2 t (r - h);
+   here r - h <= b and e^2 S <= t, so that s^2 <= e^2 (r - h) S is enough for this and for the
+   first part of `flat`. least_part is the least radius of the shapes with parts, or greater. */
+static DEM2DI_INLINE bool dem2di_rest_found(double size, double least_a, double least_b,
+                                            double least_part, double most, const dem2di_eval *eval,
+                                            const dem2di_demand *demand, dem2di_search *search) {
+    const double h = eval->h, slope = eval->slope[0], square = slope * slope;
+    const double bend = eval->rho[0] + eval->rho[1] - h;
+    const double room = least_a + least_b - h, roundoff = DEM2DI_ROUNDOFF * size;
+    const double by_room = demand->angle * demand->angle * room, by_step = 1e-10 * least_part;
+    const bool still = dem2di_descent_ends(size, by_room < by_step ? by_room : by_step, most, eval,
+                                           demand, search);
+    search->lower = search->upper - square / (2 * room);
+    return (room > 0) & (room <= bend) & still & !((h >= -roundoff) & (search->lower < -roundoff)) &
            !(demand->detect & (h < -roundoff));
 }
 
@@ -10829,7 +10841,8 @@ static DEM2DI_INLINE bool dem2di_rests_by_radius(const dem2di_pair *pair, const 
     const dem2d_shape *a = pair->a, *b = pair->b;
     const double least_a = a->rho_min * pair->scale_a, least_b = b->rho_min * pair->scale_b;
     const double most = a->rho_max * pair->scale_a + b->rho_max * pair->scale_b;
-    return dem2di_rest_found(pair->size, least_a, least_b, most, eval, demand, search);
+    return dem2di_rest_found(pair->size, least_a, least_b, dem2di_min(least_a, least_b), most, eval,
+                             demand, search);
 }
 
 /* Try the direction of the last step for a pair without edges; false if it is not known to be the
@@ -11615,6 +11628,14 @@ static dem2d_body dem2di_body_normal(const dem2d_body *given) {
     return body;
 }
 
+static inline dem2di_feature dem2di_memory_feature(const dem2d_contact_memory *memory) {
+    dem2di_feature feature;
+    feature.own = memory->feature[0];
+    feature.corner[0] = memory->feature[1];
+    feature.corner[1] = memory->feature[2];
+    return feature;
+}
+
 /* The start of a search, and its feature or NULL, from the memory of the pair. */
 static inline dem2d_vec dem2di_memory_start(const dem2di_pair *pair,
                                             const dem2d_contact_memory *memory, dem2d_vec start,
@@ -11622,9 +11643,7 @@ static inline dem2d_vec dem2di_memory_start(const dem2di_pair *pair,
     feature->own = -1;
     if (memory == NULL || !dem2di_is_unit(memory->normal.x, memory->normal.y))
         return dem2di_start(pair, start);
-    feature->own = memory->feature[0];
-    feature->corner[0] = memory->feature[1];
-    feature->corner[1] = memory->feature[2];
+    *feature = dem2di_memory_feature(memory);
     return memory->normal;
 }
 
@@ -11782,11 +11801,25 @@ static inline bool dem2di_body_pair_round(const dem2di_array_query *query, int i
            query->bodies[pair->b].shape->type == DEM2D_CIRCLE;
 }
 
+/* What a search has found: memory and answers. */
+static void dem2di_pairs_report(const dem2di_array_query *query, int i, const dem2di_pair *pair,
+                                const dem2di_search *search, const dem2d_pose *a,
+                                const dem2d_pose *b) {
+    dem2d_overlap *overlap = query->overlaps != NULL ? &query->overlaps[i] : NULL;
+    if (query->memory != NULL) dem2di_memory_keep(search, &query->memory[i]);
+    if (query->contacts != NULL) {
+        dem2d_contact *contact = &query->contacts[i];
+        dem2di_contact_report(pair, search, a, b, query->used.skip_points, contact);
+        if (overlap != NULL) dem2di_overlap_of(contact, overlap);
+    } else {
+        dem2di_overlap_report(pair, search, a, b, overlap);
+    }
+}
+
 static void dem2di_pairs_query(const dem2di_array_query *query, int i, const dem2d_body *a,
                                const dem2d_body *b) {
     const dem2d_contact_desc *used = &query->used;
     dem2d_contact_memory *memory = query->memory != NULL ? &query->memory[i] : NULL;
-    dem2d_overlap *overlap = query->overlaps != NULL ? &query->overlaps[i] : NULL;
     dem2di_pair pair;
     dem2di_feature feature;
     dem2di_search search;
@@ -11794,14 +11827,303 @@ static void dem2di_pairs_query(const dem2di_array_query *query, int i, const dem
     dem2d_vec start = dem2di_memory_start(&pair, memory, used->start, &feature);
     dem2di_feature_clear(&search);
     dem2di_query_solve(&pair, used, &feature, start, &search);
-    if (memory != NULL) dem2di_memory_keep(&search, memory);
-    if (query->contacts != NULL) {
-        dem2d_contact *contact = &query->contacts[i];
-        dem2di_contact_report(&pair, &search, &a->pose, &b->pose, used->skip_points, contact);
-        if (overlap != NULL) dem2di_overlap_of(contact, overlap);
+    dem2di_pairs_report(query, i, &pair, &search, &a->pose, &b->pose);
+}
+
+/* Pairs whose memory may hold the answer, in arrays: of shapes without edges, whose support points
+   along the last normal are fetched, or of polygons and circles with the feature of the last query.
+   Loops that compilers turn into vector instructions find which of them go on, as
+   dem2di_smooth_last and dem2di_edge_last, with the same bits. Others are for the search. */
+typedef struct dem2di_array_tile {
+    dem2di_corners *corners; /* NULL for pairs without edges */
+    int count;
+    int pair[DEM2DI_BATCH];
+    double found[DEM2DI_BATCH]; /* 1: goes on, 0: does not */
+    double still[DEM2DI_BATCH]; /* without edges, 1: the search would end there, if it is proved */
+    double ax[DEM2DI_BATCH], ay[DEM2DI_BATCH], bx[DEM2DI_BATCH], by[DEM2DI_BATCH]; /* centres */
+    double reach[DEM2DI_BATCH];
+    double ux[DEM2DI_BATCH], uy[DEM2DI_BATCH]; /* last normal; support points along it: */
+    double sx_a[DEM2DI_BATCH], sy_a[DEM2DI_BATCH], sx_b[DEM2DI_BATCH], sy_b[DEM2DI_BATCH];
+    double rho_a[DEM2DI_BATCH], rho_b[DEM2DI_BATCH]; /* there; and bounds of it: */
+    double least_a[DEM2DI_BATCH], least_b[DEM2DI_BATCH], least_part[DEM2DI_BATCH];
+    double most[DEM2DI_BATCH];
+    double h[DEM2DI_BATCH], slope[DEM2DI_BATCH]; /* of the evaluation; and what follows: */
+    double x[DEM2DI_BATCH], y[DEM2DI_BATCH], upper[DEM2DI_BATCH], lower[DEM2DI_BATCH];
+    double wx_a[DEM2DI_BATCH], wy_a[DEM2DI_BATCH], wx_b[DEM2DI_BATCH], wy_b[DEM2DI_BATCH];
+    double px[DEM2DI_BATCH], py[DEM2DI_BATCH], error[DEM2DI_BATCH], state[DEM2DI_BATCH];
+} dem2di_array_tile;
+
+/* Support point of a body from its centre, and the radius of curvature. */
+static DEM2DI_INLINE dem2d_vec dem2di_body_support(const dem2d_body *body, dem2d_vec u,
+                                                   double *rho) {
+    const dem2d_pose *at = &body->pose;
+    dem2d_vec s = dem2di_support(body->shape, dem2di_turn_back(at->rotation, u), rho);
+    *rho *= at->scale;
+    return dem2di_scale(dem2di_turn(at->rotation, s), at->scale);
+}
+
+static DEM2DI_INLINE void dem2di_array_add_smooth(const dem2d_body *a, const dem2d_body *b,
+                                                  dem2d_vec u, dem2di_array_tile *t) {
+    const int k = t->count;
+    const dem2d_vec on_a = dem2di_body_support(a, u, &t->rho_a[k]);
+    const dem2d_vec on_b = dem2di_body_support(b, dem2di_negate(u), &t->rho_b[k]);
+    const double least_a = a->shape->rho_min * a->pose.scale;
+    const double least_b = b->shape->rho_min * b->pose.scale;
+    const bool parts = dem2di_has_parts(a->shape) || dem2di_has_parts(b->shape);
+    t->ux[k] = u.x;
+    t->uy[k] = u.y;
+    t->sx_a[k] = on_a.x;
+    t->sy_a[k] = on_a.y;
+    t->sx_b[k] = on_b.x;
+    t->sy_b[k] = on_b.y;
+    t->least_a[k] = least_a;
+    t->least_b[k] = least_b;
+    t->least_part[k] = parts ? dem2di_min(least_a, least_b) : HUGE_VAL;
+    t->most[k] = a->shape->rho_max * a->pose.scale + b->shape->rho_max * b->pose.scale;
+}
+
+static DEM2DI_INLINE void dem2di_array_add_corner(const dem2d_body *a, const dem2d_body *b,
+                                                  const dem2di_feature *feature,
+                                                  dem2di_array_tile *t) {
+    dem2di_pair pair; /* without places */
+    pair.a = a->shape;
+    pair.b = b->shape;
+    pair.ra = a->pose.rotation;
+    pair.rb = b->pose.rotation;
+    pair.scale_a = a->pose.scale;
+    pair.scale_b = b->pose.scale;
+    dem2di_corners_set(&pair, feature, t->count, t->corners);
+}
+
+/* Fetch a pair into its tile, which is returned; NULL if it is for the search. */
+static DEM2DI_INLINE dem2di_array_tile *dem2di_array_add(const dem2di_array_query *query, int i,
+                                                         dem2di_array_tile *smooth,
+                                                         dem2di_array_tile *corners) {
+    const dem2d_body *a = &query->bodies[query->pairs[i].a];
+    const dem2d_body *b = &query->bodies[query->pairs[i].b];
+    const dem2d_contact_memory *memory = &query->memory[i];
+    dem2di_array_tile *t = smooth;
+    if (!dem2di_is_unit(memory->normal.x, memory->normal.y)) return NULL;
+    if (dem2di_has_core(a->shape) && dem2di_has_core(b->shape)) {
+        const dem2di_feature feature = dem2di_memory_feature(memory);
+        if (!dem2di_is_feature(a->shape, b->shape, &feature)) return NULL;
+        t = corners;
+        dem2di_array_add_corner(a, b, &feature, t);
     } else {
-        dem2di_overlap_report(&pair, &search, &a->pose, &b->pose, overlap);
+        if (a->shape->flat || b->shape->flat || dem2di_edges_unknown(a->shape) ||
+            dem2di_edges_unknown(b->shape))
+            return NULL;
+        dem2di_array_add_smooth(a, b, memory->normal, t);
     }
+    const int k = t->count++;
+    t->pair[k] = i;
+    t->ax[k] = a->pose.position.x;
+    t->ay[k] = a->pose.position.y;
+    t->bx[k] = b->pose.position.x;
+    t->by[k] = b->pose.position.y;
+    t->reach[k] = dem2di_body_radius(a) + dem2di_body_radius(b);
+    return t;
+}
+
+DEM2DI_VECTORS_BEGIN
+/* What a search has found, as dem2di_overlap_report. */
+static DEM2DI_INLINE void dem2di_array_found(dem2di_array_tile *t, int k,
+                                             const dem2di_search *search, double size) {
+    const double upper = search->upper, roundoff = DEM2DI_ROUNDOFF * size;
+    const double range = upper - search->lower;
+    t->x[k] = search->normal.x;
+    t->y[k] = search->normal.y;
+    t->upper[k] = upper;
+    t->lower[k] = search->lower;
+    t->wx_a[k] = search->a.x;
+    t->wy_a[k] = search->a.y;
+    t->wx_b[k] = search->b.x;
+    t->wy_b[k] = search->b.y;
+    t->px[k] = ((t->ax[k] + search->a.x) + (t->bx[k] + search->b.x)) * 0.5;
+    t->py[k] = ((t->ay[k] + search->a.y) + (t->by[k] + search->b.y)) * 0.5;
+    t->error[k] = (range < 0 ? 0 : range) + roundoff;
+    t->state[k] = upper < -roundoff  ? (double)DEM2D_SEPARATED
+                  : upper > roundoff ? (double)DEM2D_PENETRATING
+                                     : (double)DEM2D_TOUCHING;
+}
+
+static DEM2DI_INLINE void dem2di_array_corners(dem2di_array_tile *DEM2DI_APART t,
+                                               const dem2di_corners *DEM2DI_APART corners) {
+    DEM2DI_INDEPENDENT
+    for (int k = 0; k < t->count; k++) {
+        const double dx = t->bx[k] - t->ax[k], dy = t->by[k] - t->ay[k];
+        const double distance = sqrt(dx * dx + dy * dy), size = t->reach[k] + distance;
+        dem2di_search search;
+        bool rests = dem2di_corner_rests(corners, k, dx, dy, distance, size, true, &search);
+        t->found[k] = rests ? 1 : 0;
+        t->still[k] = 0;
+        t->h[k] = search.alone ? 1 : 0;
+        dem2di_array_found(t, k, &search, size);
+    }
+}
+
+static DEM2DI_INLINE void dem2di_array_smooth(dem2di_array_tile *t, double tolerance) {
+    dem2di_demand demand;
+    demand.detect = false;
+    demand.tolerance = 0;
+    demand.angle = dem2di_rest_angle(tolerance, false);
+    for (int k = 0; k < t->count; k++) {
+        const double dx = t->bx[k] - t->ax[k], dy = t->by[k] - t->ay[k];
+        const double ux = t->ux[k], uy = t->uy[k];
+        const double distance = sqrt(dx * dx + dy * dy), size = t->reach[k] + distance;
+        const double wx = (t->sx_a[k] - t->sx_b[k]) - dx, wy = (t->sy_a[k] - t->sy_b[k]) - dy;
+        dem2di_eval eval;
+        dem2di_search search;
+        eval.u.x = ux;
+        eval.u.y = uy;
+        eval.v[0].a.x = t->sx_a[k];
+        eval.v[0].a.y = t->sy_a[k];
+        eval.v[0].b.x = t->sx_b[k];
+        eval.v[0].b.y = t->sy_b[k];
+        eval.rho[0] = t->rho_a[k];
+        eval.rho[1] = t->rho_b[k];
+        eval.h = wx * ux + wy * uy;
+        eval.slope[0] = ux * wy - uy * wx;
+        const double bend = eval.rho[0] + eval.rho[1] - eval.h;
+        const double by_bend = demand.angle * demand.angle * bend;
+        const double by_step = 1e-10 * t->least_part[k];
+        const bool still = dem2di_descent_ends(size, by_bend < by_step ? by_bend : by_step,
+                                               t->most[k], &eval, &demand, &search);
+        const bool rests = dem2di_rest_found(size, t->least_a[k], t->least_b[k], t->least_part[k],
+                                             t->most[k], &eval, &demand, &search);
+        t->found[k] = rests ? 1 : 0;
+        t->still[k] = still ? 1 : 0;
+        t->h[k] = eval.h;
+        t->slope[k] = eval.slope[0];
+        dem2di_array_found(t, k, &search, size);
+    }
+}
+
+static DEM2DI_INLINE void dem2di_array_solve(dem2di_array_tile *t, double tolerance) {
+    if (t->corners != NULL)
+        dem2di_array_corners(t, t->corners);
+    else
+        dem2di_array_smooth(t, tolerance);
+}
+
+static void dem2di_array_solve_plain(dem2di_array_tile *t, double tolerance) {
+    dem2di_array_solve(t, tolerance);
+}
+
+#if DEM2DI_FOURS
+static DEM2DI_AVX2 void dem2di_array_solve_fours(dem2di_array_tile *t, double tolerance) {
+    dem2di_array_solve(t, tolerance);
+}
+#else
+#define dem2di_array_solve_fours dem2di_array_solve_plain
+#endif
+DEM2DI_VECTORS_END
+
+/* The search of pair k of a tile, which has ended. */
+static void dem2di_array_search(const dem2di_array_tile *t, int k,
+                                const dem2d_contact_memory *memory, dem2di_search *search) {
+    const bool edges = t->corners != NULL;
+    search->state = (dem2d_contact_state)(int)t->state[k];
+    search->iterations = edges ? 0 : 1;
+    search->normal = dem2di_vec(t->x[k], t->y[k]);
+    search->upper = t->upper[k];
+    search->lower = t->lower[k];
+    search->residual = 0;
+    search->a = dem2di_vec(t->wx_a[k], t->wy_a[k]);
+    search->b = dem2di_vec(t->wx_b[k], t->wy_b[k]);
+    search->proof = edges ? DEM2D_BY_FORM : DEM2D_BY_RADIUS;
+    dem2di_feature_clear(search);
+    if (!edges) return;
+    search->feature = dem2di_memory_feature(memory);
+    search->alone = t->h[k] > 0;
+}
+
+/* Is the end of a search, of pair k of a tile, the answer, as dem2di_certified decides? */
+static bool dem2di_array_certify(const dem2di_array_tile *t, int k, const dem2di_pair *pair,
+                                 double tolerance, dem2di_search *search) {
+    const double roundoff = DEM2DI_ROUNDOFF * pair->size;
+    dem2di_eval eval;
+    eval.u = dem2di_vec(t->ux[k], t->uy[k]);
+    eval.edge = false;
+    eval.h = t->h[k];
+    eval.slope[0] = eval.slope[1] = t->slope[k];
+    return dem2di_certify(pair, &eval, tolerance * pair->size, search) &&
+           !(eval.h >= -roundoff && search->lower < -roundoff);
+}
+
+/* The answer to pair k of a tile. */
+static void dem2di_array_put(const dem2di_array_query *query, const dem2di_array_tile *t, int k) {
+    const int i = t->pair[k];
+    const dem2d_body *a = &query->bodies[query->pairs[i].a];
+    const dem2d_body *b = &query->bodies[query->pairs[i].b];
+    dem2d_contact_memory *memory = &query->memory[i];
+    if (t->found[k] > 0 && query->contacts == NULL &&
+        !(a->shape->deviation + b->shape->deviation > 0)) {
+        dem2d_overlap *overlap = &query->overlaps[i];
+        overlap->normal.x = memory->normal.x = t->x[k];
+        overlap->normal.y = memory->normal.y = t->y[k];
+        overlap->point.x = t->px[k];
+        overlap->point.y = t->py[k];
+        overlap->depth = t->upper[k];
+        overlap->error = t->error[k];
+        overlap->state = (dem2d_contact_state)(int)t->state[k];
+        if (t->corners == NULL) memory->feature[0] = memory->feature[1] = memory->feature[2] = -1;
+        return;
+    }
+    dem2di_pair pair;
+    dem2di_search search;
+    dem2di_pair_set(a->shape, &a->pose, b->shape, &b->pose, &pair);
+    dem2di_array_search(t, k, memory, &search);
+    pair.calls = 1;
+    if (t->found[k] > 0 ||
+        (t->still[k] > 0 && dem2di_array_certify(t, k, &pair, query->used.tolerance, &search)))
+        dem2di_pairs_report(query, i, &pair, &search, &a->pose, &b->pose);
+    else
+        dem2di_pairs_query(query, i, a, b);
+}
+
+/* All pairs of a tile. */
+static void dem2di_array_apply(const dem2di_array_query *query, dem2di_array_tile *t) {
+    if (t->count == 0) return;
+    (dem2di_has_fours() ? dem2di_array_solve_fours
+                        : dem2di_array_solve_plain)(t, query->used.tolerance);
+    for (int k = 0; k < t->count; k++) dem2di_array_put(query, t, k);
+    t->count = 0;
+}
+
+/* Pairs of bodies whose rotations are of length 1, each with its memory. */
+static void dem2di_array_tiles(const dem2di_array_query *query, int begin, int end) {
+    dem2di_corners features;
+    dem2di_array_tile smooth, corners;
+    smooth.corners = NULL;
+    corners.corners = &features;
+    smooth.count = corners.count = 0;
+    for (int i = begin; i < end; i++) {
+        dem2di_array_tile *t = dem2di_array_add(query, i, &smooth, &corners);
+        if (t == NULL)
+            dem2di_pairs_query(query, i, &query->bodies[query->pairs[i].a],
+                               &query->bodies[query->pairs[i].b]);
+        else if (t->count == DEM2DI_BATCH)
+            dem2di_array_apply(query, t);
+    }
+    dem2di_array_apply(query, &smooth);
+    dem2di_array_apply(query, &corners);
+}
+
+/* Pairs without memory, or whose rotations are of any length. */
+static void dem2di_array_singles(const dem2di_array_query *query, int begin, int end) {
+    for (int i = begin; i < end; i++) {
+        const dem2d_body a = dem2di_body_normal(&query->bodies[query->pairs[i].a]);
+        const dem2d_body b = dem2di_body_normal(&query->bodies[query->pairs[i].b]);
+        dem2di_pairs_query(query, i, &a, &b);
+    }
+}
+
+/* The end of a run of pairs that are all of two circles, or all not. */
+static int dem2di_array_run(const dem2di_array_query *query, int begin, int end, bool round) {
+    int i = begin;
+    while (i < end && dem2di_body_pair_round(query, i) == round) i++;
+    return i;
 }
 
 DEM2D_API dem2d_result dem2d_pairs_contact(const dem2d_env *env, const dem2d_body *bodies,
@@ -11824,22 +12146,19 @@ DEM2D_API dem2d_result dem2d_pairs_contact(const dem2d_env *env, const dem2d_bod
     if (result == DEM2D_OK) result = dem2di_check_bodies(env, bodies, body_count, &unit, &round);
     if (result == DEM2D_OK) result = dem2di_check_body_pairs(env, pairs, pair_count, body_count);
     if (result != DEM2D_OK) return result;
-    const bool circles = query.used.solver == DEM2D_CERTIFIED && contacts == NULL;
-    const bool fours = dem2di_has_fours();
-    for (int i = 0; i < pair_count; i++) {
-        const dem2d_body *a = &bodies[pairs[i].a], *b = &bodies[pairs[i].b];
-        int end = i;
-        if (circles && round) end = pair_count;
-        while (circles && end < pair_count && dem2di_body_pair_round(&query, end)) end++;
-        if (end > i) {
-            (fours ? dem2di_circles_fours : dem2di_circles_plain)(&query, i, end);
-            i = end - 1;
-        } else if (unit) {
-            dem2di_pairs_query(&query, i, a, b);
-        } else {
-            dem2d_body own_a = dem2di_body_normal(a), own_b = dem2di_body_normal(b);
-            dem2di_pairs_query(&query, i, &own_a, &own_b);
-        }
+    const bool certified = query.used.solver == DEM2D_CERTIFIED, short_only = contacts == NULL;
+    const bool tiles = certified && unit && memory != NULL;
+    for (int i = 0; i < pair_count;) {
+        int end = pair_count;
+        const bool circles =
+            certified && short_only && (round || dem2di_body_pair_round(&query, i));
+        if (certified && short_only && !round)
+            end = dem2di_array_run(&query, i, pair_count, circles);
+        if (circles)
+            (dem2di_has_fours() ? dem2di_circles_fours : dem2di_circles_plain)(&query, i, end);
+        else
+            (tiles ? dem2di_array_tiles : dem2di_array_singles)(&query, i, end);
+        i = end;
     }
     return DEM2D_OK;
 }
@@ -21736,8 +22055,10 @@ static DEM2DI_INLINE void dem2di_tile_place(dem2di_tile *t, double tolerance) {
         eval.rho[1] = t->rho_b[k];
         eval.h = wx * ux + wy * uy;
         eval.slope[0] = ux * wy - uy * wx;
-        bool rests = dem2di_rest_found(size, t->least_a[k], t->least_b[k], t->most[k], &eval,
-                                       &demand, &search);
+        const double least_a = t->least_a[k], least_b = t->least_b[k];
+        const double least = least_a < least_b ? least_a : least_b;
+        bool rests =
+            dem2di_rest_found(size, least_a, least_b, least, t->most[k], &eval, &demand, &search);
         dem2di_tile_found(t, k, &search, rests & (distance < t->reach[k]));
     }
 }

@@ -326,6 +326,109 @@ static bool same_vecs(dem2d_vec a, dem2d_vec b) {
     return same_bits(a.x, b.x) && same_bits(a.y, b.y);
 }
 
+/* The same query of one pair, not in a tile. */
+static dem2d_contact ask_apart(const pair *p, const dem2d_contact_memory *memory,
+                               const dem2d_contact_desc *used) {
+    dem2d_contact c;
+    dem2di_pair one = private_pair(p);
+    dem2di_feature feature;
+    dem2di_search search;
+    const dem2d_vec start = dem2di_memory_start(&one, memory, used->start, &feature);
+    dem2di_feature_clear(&search);
+    dem2di_query_solve(&one, used, &feature, start, &search);
+    dem2di_contact_report(&one, &search, &p->pose_a, &p->pose_b, used->skip_points, &c);
+    return c;
+}
+
+/* Pairs that go on are answered in tiles: with the bits of one pair alone, whatever is wanted. */
+static void test_tiles(void **state) {
+    static const double parts[] = {0, 1e-8, 1e-6, 1e-5, 1e-4};
+    static crowd c;
+    static dem2d_contact_memory before[PAIRS], after[PAIRS];
+    static dem2d_overlap overlaps[PAIRS];
+    int all_pairs = 0, calls_of_one = 0, by_arc = 0;
+    uint64_t d = 19;
+    (void)state;
+    for (int round = 0; round < 4 * COUNT_OF(parts); round++) {
+        dem2d_contact_desc desc = {0}, used;
+        desc.tolerance = round % 2 ? 1e-8 : 0;
+        assert_ok(dem2di_contact_desc_used(NULL, &desc, &used));
+        crowd_draw(&c, 7 * round, &d);
+        for (int k = 0; k < STEPS / 2; k++) {
+            memcpy(before, c.memory, sizeof before);
+            memcpy(after, c.memory, sizeof after);
+            crowd_ask(&c, &desc);
+            assert_ok(dem2d_pairs_contact(NULL, c.bodies, 2 * PAIRS, c.pairs, PAIRS, &desc, after,
+                                          overlaps, NULL));
+            for (int i = 0; i < PAIRS; i++) {
+                const scene *s = &c.scenes[i];
+                const dem2d_contact one = ask_apart(&s->p, &before[i], &used);
+                const dem2d_contact *got = &c.contacts[i];
+                const bool round_pair = s->p.a->kind == CIRCLE && s->p.b->kind == CIRCLE;
+                check_short(s, &one, &c.overlaps[i]);
+                check_short(s, got, &overlaps[i]);
+                EXPECT(round_pair || same_vecs(after[i].normal, c.memory[i].normal), s, got);
+                EXPECT(round_pair || memcmp(after[i].feature, c.memory[i].feature,
+                                            sizeof after[i].feature) == 0,
+                       s, got);
+                EXPECT(one.proof == got->proof && one.support_calls == got->support_calls &&
+                           one.iterations == got->iterations && one.count == got->count,
+                       s, got);
+                EXPECT(same_vecs(one.point_a, got->point_a) && same_vecs(one.point_b, got->point_b),
+                       s, got);
+                EXPECT(memcmp(one.points, got->points, sizeof one.points) == 0, s, got);
+                all_pairs++, calls_of_one += k > 0 && got->support_calls == 1;
+                by_arc += k > 0 && got->support_calls == 1 && got->proof == DEM2D_BY_ARC;
+            }
+            crowd_move(&c, parts[round % COUNT_OF(parts)], &d);
+        }
+    }
+    print_message("%d of %d after one evaluation, %d by arcs\n", calls_of_one, all_pairs, by_arc);
+    assert_true(calls_of_one > all_pairs / 4 && by_arc > 100);
+}
+
+/* Runs of circles of all lengths, some with centres that are in one point or nearly so. */
+static void test_circles(void **state) {
+    enum { MOST = 11 };
+    static const double apart[] = {1, 0, 1e-150, 1e-100, 0.5};
+    static dem2d_body bodies[MOST + 1];
+    static dem2d_body_pair pairs[MOST];
+    static dem2d_overlap overlaps[MOST];
+    dem2d_shape *circle[2], *square;
+    const dem2d_vec corners[4] = {{-1, -1}, {1, -1}, {1, 1}, {-1, 1}};
+    uint64_t d = 20;
+    (void)state;
+    assert_ok(dem2d_shape_create_circle(NULL, 1, &circle[0]));
+    assert_ok(dem2d_shape_create_circle(NULL, 0.3, &circle[1]));
+    assert_ok(dem2d_shape_create_polygon(NULL, corners, 4, 0, &square));
+    for (int k = 0; k < 4000; k++) {
+        const int count = 1 + random_below(&d, MOST), other = random_below(&d, 3 * count);
+        double x = 0;
+        for (int i = 0; i <= count; i++) {
+            bodies[i].shape = circle[random_below(&d, 2)];
+            bodies[i].pose =
+                dem2d_pose_make(x, x * random_between(&d, -1, 1), i, random_between(&d, 0.5, 2));
+            x += apart[random_below(&d, COUNT_OF(apart))] * random_between(&d, 0.5, 3);
+        }
+        if (other <= count) bodies[other].shape = square;
+        for (int i = 0; i < count; i++) pairs[i] = (dem2d_body_pair){i + 1, i};
+        assert_ok(
+            dem2d_pairs_contact(NULL, bodies, count + 1, pairs, count, NULL, NULL, overlaps, NULL));
+        for (int i = 0; i < count; i++) {
+            const dem2d_body *a = &bodies[i + 1], *b = &bodies[i];
+            const dem2d_overlap *o = &overlaps[i];
+            dem2d_contact c;
+            assert_ok(dem2d_pair_contact(a->shape, a->pose, b->shape, b->pose, NULL, &c));
+            assert_true(same_vecs(o->normal, c.normal) && same_vecs(o->point, c.point));
+            assert_true(same_bits(o->depth, c.depth) && same_bits(o->error, c.error));
+            assert_int_equal(o->state, c.state);
+        }
+    }
+    dem2d_shape_destroy(circle[0]);
+    dem2d_shape_destroy(circle[1]);
+    dem2d_shape_destroy(square);
+}
+
 /* Smooth shapes that rest by their radius: the whole search from the same start. */
 static void test_smooth_path(void **state) {
     static const double parts[] = {1e-9, 1e-7, 1e-6, 1e-5, 1e-4};
@@ -436,6 +539,7 @@ int main(void) {
         cmocka_unit_test(test_bodies),       cmocka_unit_test(test_refused),
         cmocka_unit_test(test_extremes),     cmocka_unit_test(test_smooth_path),
         cmocka_unit_test(test_corner_alone), cmocka_unit_test(test_corner_alone_often),
+        cmocka_unit_test(test_tiles),        cmocka_unit_test(test_circles),
     };
     return cmocka_run_group_tests(tests, create_pool, destroy_pool);
 }
