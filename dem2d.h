@@ -9810,33 +9810,35 @@ typedef struct dem2di_corners {
 
 /* Puts corner `corner` of a shape, and what is beside it, at place k. */
 static DEM2DI_INLINE void dem2di_corners_put(const dem2d_shape *shape, int corner, int k,
-                                             dem2di_corners *e) {
+                                             bool second, dem2di_corners *e) {
     const dem2d_vec *corners = dem2di_core_corners(shape);
     e->corner_x[k] = corners[corner].x;
     e->corner_y[k] = corners[corner].y;
-    e->before_x[k] = e->before_y[k] = e->after_x[k] = e->after_y[k] = 0;
+    if (second) e->before_x[k] = e->before_y[k] = e->after_x[k] = e->after_y[k] = 0;
     e->leading_x[k] = e->leading_y[k] = e->leaving_x[k] = e->leaving_y[k] = 0;
     if (shape->type != DEM2D_POLYGON) return;
     const int before = dem2di_before(shape->count, corner);
     const int after = dem2di_after(shape->count, corner);
-    e->before_x[k] = corners[before].x;
-    e->before_y[k] = corners[before].y;
-    e->after_x[k] = corners[after].x;
-    e->after_y[k] = corners[after].y;
     e->leading_x[k] = shape->tangents[before].x;
     e->leading_y[k] = shape->tangents[before].y;
     e->leaving_x[k] = shape->tangents[corner].x;
     e->leaving_y[k] = shape->tangents[corner].y;
+    if (!second) return;
+    e->before_x[k] = corners[before].x;
+    e->before_y[k] = corners[before].y;
+    e->after_x[k] = corners[after].x;
+    e->after_y[k] = corners[after].y;
 }
 
-/* Puts the feature of a pair at place k. What is where the pair is, is not asked. */
+/* Puts the feature of a pair at place k. What is where the pair is, is not asked. `second`: with
+   what only dem2di_corner_alone needs. */
 static DEM2DI_INLINE void dem2di_corners_set(const dem2di_pair *pair, const dem2di_feature *feature,
-                                             int k, dem2di_corners *e) {
+                                             int k, bool second, dem2di_corners *e) {
     const bool of_a = feature->own == 0;
     const dem2d_shape *own = of_a ? pair->a : pair->b, *other = of_a ? pair->b : pair->a;
     const dem2d_rot q = of_a ? pair->ra : pair->rb, turn = of_a ? pair->rb : pair->ra;
     const int edge = of_a ? feature->corner[0] : feature->corner[1];
-    const int next = dem2di_after(own->count, edge), last = dem2di_before(own->count, edge);
+    const int next = dem2di_after(own->count, edge);
     e->own_c[k] = q.c;
     e->own_s[k] = q.s;
     e->other_c[k] = turn.c;
@@ -9850,9 +9852,12 @@ static DEM2DI_INLINE void dem2di_corners_set(const dem2di_pair *pair, const dem2
     e->from_y[k] = own->corners[edge].y;
     e->to_x[k] = own->corners[next].x;
     e->to_y[k] = own->corners[next].y;
-    e->earlier_x[k] = own->tangents[last].x;
-    e->earlier_y[k] = own->tangents[last].y;
-    dem2di_corners_put(other, of_a ? feature->corner[1] : feature->corner[0], k, e);
+    if (second) {
+        const int last = dem2di_before(own->count, edge);
+        e->earlier_x[k] = own->tangents[last].x;
+        e->earlier_y[k] = own->tangents[last].y;
+    }
+    dem2di_corners_put(other, of_a ? feature->corner[1] : feature->corner[0], k, second, e);
     e->radius_a[k] = dem2di_core_radius(pair->a, pair->scale_a);
     e->radius_b[k] = dem2di_core_radius(pair->b, pair->scale_b);
     e->inner[k] = pair->a->inscribed * pair->scale_a + pair->b->inscribed * pair->scale_b;
@@ -9912,11 +9917,11 @@ static DEM2DI_INLINE bool dem2di_corner_alone(const dem2di_corners *e, int k,
    answer if the origin's foot is on the edge and if the cores are separated, or the ends of the
    edge exclude all other directions within a right angle to each side of d (see
    dem2di_corners_exclude). In coordinates along n and the tangent t only the other core's corner
-   has to be rotated. With `check` the corner is checked, and whether there is no second contact
-   point. d, distance and size are those of the pair. All numbers one by one, and no short circuits:
+   has to be rotated. With `check` the corner is checked, with `second` whether there is no second
+   contact point. d, distance and size are those of the pair. All numbers one by one, and no short circuits:
    loops over many pairs turn this into vector instructions. */
 static DEM2DI_INLINE bool dem2di_corner_rests(const dem2di_corners *e, int k, double dx, double dy,
-                                              double distance, double size, bool check,
+                                              double distance, double size, bool check, bool second,
                                               dem2di_search *search) {
     const double sign = e->sign[k];
     const double tx = (e->own_c[k] * e->along_x[k] - e->own_s[k] * e->along_y[k]) * sign;
@@ -9950,7 +9955,7 @@ static DEM2DI_INLINE bool dem2di_corner_rests(const dem2di_corners *e, int k, do
     search->a.y = ay + e->radius_a[k] * ny;
     search->b.x = -(bx + e->radius_b[k] * nx);
     search->b.y = -(by + e->radius_b[k] * ny);
-    search->alone = check & dem2di_corner_alone(e, k, &at, size);
+    search->alone = second && dem2di_corner_alone(e, k, &at, size);
     bool farthest = (!check) | ((at.sine_after >= 0) & (at.sine_before >= 0));
     bool ends = (dn > 0) & (dn * at.high - turned >= least) & (turned - dn * at.low >= least);
     return farthest & (at.low <= 0) & (at.high >= 0) &
@@ -9962,8 +9967,8 @@ static bool dem2di_feature_holds(const dem2di_pair *pair, const dem2di_feature *
                                  dem2di_search *search) {
     dem2di_corners e; /* one of them */
     dem2di_search found;
-    dem2di_corners_set(pair, feature, 0, &e);
-    if (!dem2di_corner_rests(&e, 0, pair->d.x, pair->d.y, pair->distance, pair->size, check,
+    dem2di_corners_set(pair, feature, 0, true, &e);
+    if (!dem2di_corner_rests(&e, 0, pair->d.x, pair->d.y, pair->distance, pair->size, check, check,
                              &found))
         return false;
     search->feature = *feature;
@@ -11281,7 +11286,17 @@ static void dem2di_gjk_epa(dem2di_pair *pair, dem2d_vec start, double tolerance,
     dem2di_polytope polytope;
     dem2di_polytope_start(pair, search, &polytope);
     dem2di_epa(pair, &polytope, absolute, cap, search);
-    search->lower = dem2di_max(search->lower, dem2di_min(0, search->upper)); /* by GJK */
+    const double least = dem2di_min(0, search->upper); /* by GJK */
+    if (search->lower >= least) return;
+    search->lower = least;
+    if (search->state == DEM2D_UNRESOLVED) return;
+    /* The witness points are on an edge of the polytope, which is farther inside than the bound is
+       now: move them a depth apart. */
+    const dem2d_vec n = search->normal;
+    const dem2d_vec w = dem2di_sub(dem2di_sub(search->a, search->b), pair->d);
+    const double shift = (search->upper - dem2di_dot(w, n)) / 2;
+    search->a = dem2di_along(search->a, shift, n);
+    search->b = dem2di_along(search->b, -shift, n);
 }
 
 /* Depth of overlapping shapes, else separation (with `detect`) or distance. The feature of the last
@@ -11836,6 +11851,7 @@ static void dem2di_pairs_query(const dem2di_array_query *query, int i, const dem
    dem2di_smooth_last and dem2di_edge_last, with the same bits. Others are for the search. */
 typedef struct dem2di_array_tile {
     dem2di_corners *corners; /* NULL for pairs without edges */
+    bool second;             /* it is asked whether there may be a second contact point */
     int count;
     int pair[DEM2DI_BATCH];
     double found[DEM2DI_BATCH]; /* 1: goes on, 0: does not */
@@ -11892,7 +11908,7 @@ static DEM2DI_INLINE void dem2di_array_add_corner(const dem2d_body *a, const dem
     pair.rb = b->pose.rotation;
     pair.scale_a = a->pose.scale;
     pair.scale_b = b->pose.scale;
-    dem2di_corners_set(&pair, feature, t->count, t->corners);
+    dem2di_corners_set(&pair, feature, t->count, t->second, t->corners);
 }
 
 /* Fetch a pair into its tile, which is returned; NULL if it is for the search. */
@@ -11947,14 +11963,16 @@ static DEM2DI_INLINE void dem2di_array_found(dem2di_array_tile *t, int k,
                                      : (double)DEM2D_TOUCHING;
 }
 
+/* `second`: whether there may be a second point goes to h. */
 static DEM2DI_INLINE void dem2di_array_corners(dem2di_array_tile *DEM2DI_APART t,
-                                               const dem2di_corners *DEM2DI_APART corners) {
+                                               const dem2di_corners *DEM2DI_APART corners,
+                                               bool second) {
     DEM2DI_INDEPENDENT
     for (int k = 0; k < t->count; k++) {
         const double dx = t->bx[k] - t->ax[k], dy = t->by[k] - t->ay[k];
         const double distance = sqrt(dx * dx + dy * dy), size = t->reach[k] + distance;
         dem2di_search search;
-        bool rests = dem2di_corner_rests(corners, k, dx, dy, distance, size, true, &search);
+        bool rests = dem2di_corner_rests(corners, k, dx, dy, distance, size, true, second, &search);
         t->found[k] = rests ? 1 : 0;
         t->still[k] = 0;
         t->h[k] = search.alone ? 1 : 0;
@@ -12000,8 +12018,10 @@ static DEM2DI_INLINE void dem2di_array_smooth(dem2di_array_tile *t, double toler
 }
 
 static DEM2DI_INLINE void dem2di_array_solve(dem2di_array_tile *t, double tolerance) {
-    if (t->corners != NULL)
-        dem2di_array_corners(t, t->corners);
+    if (t->corners != NULL && t->second)
+        dem2di_array_corners(t, t->corners, true);
+    else if (t->corners != NULL)
+        dem2di_array_corners(t, t->corners, false);
     else
         dem2di_array_smooth(t, tolerance);
 }
@@ -12038,17 +12058,26 @@ static void dem2di_array_search(const dem2di_array_tile *t, int k,
     search->alone = t->h[k] > 0;
 }
 
-/* Is the end of a search, of pair k of a tile, the answer, as dem2di_certified decides? */
-static bool dem2di_array_certify(const dem2di_array_tile *t, int k, const dem2di_pair *pair,
-                                 double tolerance, dem2di_search *search) {
+/* Pair k of a tile, which is without edges and does not go on: the end of the search, if that is
+   proved, or the search from the evaluation that there is. */
+static void dem2di_array_certify(const dem2di_array_query *query, const dem2di_array_tile *t, int k,
+                                 dem2di_pair *pair, dem2di_search *search) {
+    const dem2d_contact_desc *used = &query->used;
+    const dem2di_demand demand = dem2di_demand_of(pair, used->tolerance, false);
     const double roundoff = DEM2DI_ROUNDOFF * pair->size;
     dem2di_eval eval;
     eval.u = dem2di_vec(t->ux[k], t->uy[k]);
-    eval.edge = false;
+    eval.edge = eval.no_step = false;
     eval.h = t->h[k];
     eval.slope[0] = eval.slope[1] = t->slope[k];
-    return dem2di_certify(pair, &eval, tolerance * pair->size, search) &&
-           !(eval.h >= -roundoff && search->lower < -roundoff);
+    if (t->still[k] > 0 && dem2di_certify(pair, &eval, demand.tolerance, search) &&
+        !(eval.h >= -roundoff && search->lower < -roundoff))
+        return;
+    eval.rho[0] = t->rho_a[k];
+    eval.rho[1] = t->rho_b[k];
+    dem2di_vertex_set(pair, dem2di_vec(t->sx_a[k], t->sy_a[k]), dem2di_vec(t->sx_b[k], t->sy_b[k]),
+                      &eval.v[0]);
+    dem2di_certified(pair, eval.u, &demand, used->max_iterations, &eval, search);
 }
 
 /* The answer to pair k of a tile. */
@@ -12075,8 +12104,8 @@ static void dem2di_array_put(const dem2di_array_query *query, const dem2di_array
     dem2di_pair_set(a->shape, &a->pose, b->shape, &b->pose, &pair);
     dem2di_array_search(t, k, memory, &search);
     pair.calls = 1;
-    if (t->found[k] > 0 ||
-        (t->still[k] > 0 && dem2di_array_certify(t, k, &pair, query->used.tolerance, &search)))
+    if (!(t->found[k] > 0) && t->corners == NULL) dem2di_array_certify(query, t, k, &pair, &search);
+    if (t->found[k] > 0 || t->corners == NULL)
         dem2di_pairs_report(query, i, &pair, &search, &a->pose, &b->pose);
     else
         dem2di_pairs_query(query, i, a, b);
@@ -12097,6 +12126,7 @@ static void dem2di_array_tiles(const dem2di_array_query *query, int begin, int e
     dem2di_array_tile smooth, corners;
     smooth.corners = NULL;
     corners.corners = &features;
+    smooth.second = corners.second = query->contacts != NULL && !query->used.skip_points;
     smooth.count = corners.count = 0;
     for (int i = begin; i < end; i++) {
         dem2di_array_tile *t = dem2di_array_add(query, i, &smooth, &corners);
@@ -21979,7 +22009,7 @@ static DEM2DI_INLINE bool dem2di_tile_add_corner(const dem2d_world *world, int i
     pair.rb = world->now[key->b].q;
     pair.scale_a = world->bodies[key->a].scale;
     pair.scale_b = world->bodies[key->b].scale;
-    dem2di_corners_set(&pair, feature, tile->count, tile->corners);
+    dem2di_corners_set(&pair, feature, tile->count, true, tile->corners);
     dem2di_tile_fetch(world, i, tile);
     return true;
 }
@@ -22026,7 +22056,7 @@ static DEM2DI_INLINE void dem2di_tile_corners(dem2di_tile *DEM2DI_APART t,
         const double dx = t->dx[k], dy = t->dy[k];
         const double distance = sqrt(dx * dx + dy * dy), size = t->reach[k] + distance;
         dem2di_search search;
-        bool rests = dem2di_corner_rests(corners, k, dx, dy, distance, size, true, &search);
+        bool rests = dem2di_corner_rests(corners, k, dx, dy, distance, size, true, true, &search);
         t->alone[k] = search.alone ? 1 : 0;
         dem2di_tile_found(t, k, &search, rests & (distance < t->reach[k]));
     }
