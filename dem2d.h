@@ -9918,8 +9918,8 @@ static DEM2DI_INLINE bool dem2di_corner_alone(const dem2di_corners *e, int k,
    edge exclude all other directions within a right angle to each side of d (see
    dem2di_corners_exclude). In coordinates along n and the tangent t only the other core's corner
    has to be rotated. With `check` the corner is checked, with `second` whether there is no second
-   contact point. d, distance and size are those of the pair. All numbers one by one, and no short circuits:
-   loops over many pairs turn this into vector instructions. */
+   contact point. d, distance and size are those of the pair. All numbers one by one, and no short
+   circuits: loops over many pairs turn this into vector instructions. */
 static DEM2DI_INLINE bool dem2di_corner_rests(const dem2di_corners *e, int k, double dx, double dy,
                                               double distance, double size, bool check, bool second,
                                               dem2di_search *search) {
@@ -11274,7 +11274,7 @@ static int dem2di_wall_points(const dem2d_shape *shape, dem2d_rot q, double scal
 
 /* ============================================================================================
    >>contact  Contact of two shapes, of a shape and a wall
-   uses: config, math, memory, fields, shapes, gjk, epa, edges, minimum, faces
+   uses: config, math, memory, fields, support, shapes, gjk, epa, edges, minimum, faces
    ============================================================================================ */
 
 /* [P] sec. 3: GJK, then EPA when the shapes overlap. */
