@@ -26315,25 +26315,30 @@ static void dem2di_region_set(dem2di_question *question, int slot) {
     question->box = dem2di_bounding_box(&world->now[slot]);
 }
 
-/* Does a particle overlap the wall that asks? */
-static bool dem2di_wall_has(const dem2di_question *question, int slot) {
-    const dem2d_world *world = question->world;
-    const dem2di_wall *wall = &world->walls[question->wall];
-    dem2di_question particle = *question;
-    dem2di_region_set(&particle, slot);
-    for (int k = wall->first; k < wall->first + wall->count; k++)
-        if (dem2di_part_distance(world, k, world->now[slot].x) <= world->now[slot].radius &&
-            dem2di_region_has_part(&particle, k))
-            return true;
-    return false;
-}
-
 /* The shift of an image by its number. */
 static void dem2di_image_shift(const dem2di_question *question, int image, int shift[2]) {
     shift[0] = shift[1] = 0;
     if (image < 0) return;
     shift[0] = question->first[0] + image % question->columns;
     shift[1] = question->first[1] + image / question->columns;
+}
+
+/* Does a particle, or the image of it that the question is about, overlap the wall that asks? */
+static bool dem2di_wall_has(const dem2di_question *question, int slot) {
+    const dem2d_world *world = question->world;
+    const dem2di_wall *wall = &world->walls[question->wall];
+    const double radius = world->now[slot].radius;
+    dem2di_question particle = *question;
+    int shift[2];
+    dem2di_region_set(&particle, slot);
+    dem2di_image_shift(question, question->image, shift);
+    particle.pose.position = dem2di_add(particle.pose.position,
+                                        dem2di_cell_shift(&world->cell, shift[0], shift[1]));
+    for (int k = wall->first; k < wall->first + wall->count; k++)
+        if (dem2di_part_distance(world, k, particle.pose.position) <= radius &&
+            dem2di_region_has_part(&particle, k))
+            return true;
+    return false;
 }
 
 /* Is the question about images with a shift? */

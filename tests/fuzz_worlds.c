@@ -15,10 +15,10 @@ static int64_t met[WITH_COUNT][WITH_COUNT];
 /* Two that can't be used together. */
 static bool exclusive(int a, int b) {
     static const int never[][2] = {{WITH_LAW, WITH_TWO_POINTS}, {WITH_TWO_POINTS, WITH_ONE_POINT}};
-    static const int no_cell[] = {WITH_SEGMENT, WITH_CHAIN, WITH_POINTS, WITH_ONE_SIDED,
-                                  WITH_TURNING};
-    static const int no_flow[] = {WITH_SERVO, WITH_MOVING, WITH_TURNED,
-                                  WITH_WALLS, WITH_BELT,   WITH_REFUSED};
+    static const int no_cell[] = {WITH_SEGMENT, WITH_CHAIN}; /* all of them are chains there */
+    static const int no_flow[] = {WITH_SERVO, WITH_TURNED, WITH_REFUSED};
+    static const int not_held[] = {WITH_MOVING, WITH_WALLS,     WITH_BELT,
+                                   WITH_POINTS, WITH_ONE_SIDED, WITH_TURNING};
     for (size_t k = 0; k < sizeof never / sizeof *never; k++)
         if (never[k][0] == a && never[k][1] == b) return true;
     if (b < WITH_CELL || b > WITH_HELD) return false;
@@ -26,6 +26,8 @@ static bool exclusive(int a, int b) {
         if (no_cell[k] == a) return true;
     for (size_t k = 0; k < sizeof no_flow / sizeof *no_flow; k++)
         if (no_flow[k] == a) return b != WITH_CELL;
+    for (size_t k = 0; k < sizeof not_held / sizeof *not_held; k++)
+        if (not_held[k] == a) return b == WITH_HELD;
     return false;
 }
 

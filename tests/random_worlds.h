@@ -262,6 +262,7 @@ static dem2d_pair_desc world_make_pair(uint64_t *r) {
 static dem2d_material_desc world_make_material(uint64_t *r) {
     const dem2d_pair_desc pair = world_make_pair(r);
     dem2d_material_desc m;
+    memset(&m, 0, sizeof m);
     m.density = random_between(r, 0.8, 1.2);
     m.normal_stiffness = pair.normal_stiffness;
     m.tangential_stiffness = pair.tangential_stiffness;
@@ -528,8 +529,46 @@ static dem2d_deformation_desc world_make_flow(uint64_t *r) {
     return flow;
 }
 
-/* Walls that a cell periodic along x can have: a floor and a lid. */
-static void world_make_cell_walls(uint64_t *r, world_script *s, double height) {
+/* A floor that goes round the cell, in place of a half-plane: a chain whose end is its start one
+   period further. */
+static void world_make_round(uint64_t *r, world_script *s, int k, double period) {
+    dem2d_wall_desc *w = &s->walls[k];
+    const double start = random_between(r, -3, 3), flat = random_below(r, 2);
+    w->mode = world_once_in(r, 3) ? DEM2D_WALL_MOVING : DEM2D_WALL_STILL;
+    w->velocity = vec(0, 0);
+    if (w->mode == DEM2D_WALL_MOVING)
+        w->velocity = vec(random_between(r, -1, 1), random_between(r, -0.2, 0.2));
+    w->count = 2 + random_below(r, 3), w->one_sided = world_once_in(r, 3);
+    for (int i = 0; i < w->count; i++) {
+        s->turns[k][i].x = start + i * period / (w->count - 1);
+        s->turns[k][i].y = flat * random_between(r, -0.15, 0.15);
+    }
+    s->turns[k][w->count - 1].y = s->turns[k][0].y;
+}
+
+/* A triangle or a segment among the grains of a cell, that stands still, moves or turns. */
+static void world_make_obstacle(uint64_t *r, world_script *s, double size) {
+    const int k = s->wall_count++;
+    const dem2d_vec at = vec(random_between(r, 3, 6), random_between(r, 0.4, 4));
+    dem2d_wall_desc *w = &s->walls[k];
+    *w = world_make_wall(r, s, at.x, at.y, 0, 0);
+    if (w->mode == DEM2D_WALL_SERVO) w->mode = DEM2D_WALL_MOVING;
+    w->pivot = vec(at.x + random_between(r, -1, 1), at.y);
+    if (w->mode == DEM2D_WALL_MOVING) w->angular_velocity = random_between(r, -2, 2);
+    const double turn = random_between(r, 0, 6);
+    w->count = 2 + random_below(r, 2), w->closed = w->count == 3;
+    w->one_sided = world_once_in(r, 4);
+    if (w->mode == DEM2D_WALL_STILL && world_once_in(r, 3))
+        w->surface_speed = random_between(r, -1, 1);
+    for (int i = 0; i < w->count; i++) {
+        s->turns[k][i].x = at.x + size * cos(turn + 2 * i);
+        s->turns[k][i].y = at.y + size * sin(turn + 2 * i);
+    }
+    s->walls_at_first = s->wall_count;
+}
+
+/* Walls that a cell can have: along x a floor and a lid, and an obstacle. */
+static void world_make_cell_walls(uint64_t *r, world_script *s, double height, double period) {
     s->wall_count = s->walls_at_first = height > 0 ? 2 : 0;
     for (int k = 0; k < s->wall_count; k++) {
         const double up = k == 0 ? 1 : -1;
@@ -537,15 +576,20 @@ static void world_make_cell_walls(uint64_t *r, world_script *s, double height) {
         if (s->walls[k].mode == DEM2D_WALL_STILL && world_once_in(r, 3))
             s->walls[k].surface_speed = random_between(r, -1, 1);
     }
+    if (height > 0 && world_once_in(r, 2)) world_make_round(r, s, 0, period);
+    if (world_once_in(r, 2)) world_make_obstacle(r, s, period > 3 ? 0.5 : 0.2);
     for (int i = 0; i < s->event_count; i++) {
         world_event *e = &s->events[i];
         const bool wall = (e->kind >= EVENT_ADD_WALL && e->kind <= EVENT_REMOVE_WALL) ||
                           e->kind == EVENT_DRIVE_WALL;
         if (wall && s->wall_count == 0) e->kind = EVENT_GRAVITY;
         if (!wall || s->wall_count == 0) continue;
+        const double up = random_between(r, -0.05, 0.05);
         e->which %= s->wall_count;
         e->wall = s->walls[e->which];
-        e->wall.point.y += random_between(r, -0.05, 0.05);
+        e->wall.point.y += up;
+        memcpy(e->turns, s->turns[e->which], sizeof e->turns);
+        for (int k = 0; k < e->wall.count; k++) e->turns[k].y += up;
     }
 }
 
@@ -567,7 +611,7 @@ static void world_make_cell(world_script *s) {
         for (int i = 0; i < s->event_count; i++)
             if (s->events[i].which >= s->grain_count) s->events[i].which = 0;
     }
-    world_make_cell_walls(r, s, kind == 1 ? height : 0);
+    world_make_cell_walls(r, s, kind == 1 ? height : 0, cell->a.x);
     if (kind == 1) return;
     cell->b.y = kind == 2 ? random_between(r, 1.5, 2.5) : height;
     cell->b.x = world_once_in(r, 2) ? 0 : random_between(r, -0.5, 0.5) * cell->a.x;
@@ -578,6 +622,10 @@ static void world_make_cell(world_script *s) {
         e.kind = EVENT_DEFORM;
         if (i > 0) e.step = random_below(r, s->steps);
         e.flow = world_make_flow(r);
+        if (s->wall_count > 0) { /* no stress is held with walls */
+            e.flow.hold_xx = e.flow.hold_yx = e.flow.hold_yy = false;
+            e.flow.stress_xx = e.flow.stress_yx = e.flow.stress_yy = 0;
+        }
         if (!world_once_in(r, 3)) world_add_event(s, &e);
     }
 }
@@ -1751,7 +1799,8 @@ static void world_ask_wall(world_run *run, int wall, int grain) {
     for (int k = 0; k < found; k++)
         touches |= at[k].wall.generation != 0 && at[k].wall.index == run->walls[wall].index;
     touches = touches && world_groups_meet(own.groups, its.groups);
-    if (touches != world_has(over, overlaps, run->grains[grain]))
+    const int images = world_has(over, overlaps, run->grains[grain]);
+    if (touches != (images > 0) || (images > 1 && !world_in_cell(run->script)))
         world_fault(run, "wall_overlaps: wall %d, grain %d", wall, grain);
 }
 

@@ -470,6 +470,9 @@ static void test_seen(void **state) {
     const dem2d_box box = {{0, 2.9}, {8, 3.1}};
     assert_ok(dem2d_world_query_box(s.world, &box, &walls, found, 8, &count));
     assert_int_equal(count, 2);
+    assert_ok(dem2d_world_wall_overlaps(s.world, wall, NULL, found, 8, &count));
+    assert_int_equal(count, 1);
+    assert_int_equal(found[0].shift[0], 2), assert_int_equal(found[0].shift[1], 0);
     dem2d_particle_desc here = grain;
     double overlap;
     here.position = vec(-0.75, -0.6); /* on the copy at -2 a - b */
