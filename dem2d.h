@@ -26332,8 +26332,8 @@ static bool dem2di_wall_has(const dem2di_question *question, int slot) {
     int shift[2];
     dem2di_region_set(&particle, slot);
     dem2di_image_shift(question, question->image, shift);
-    particle.pose.position = dem2di_add(particle.pose.position,
-                                        dem2di_cell_shift(&world->cell, shift[0], shift[1]));
+    particle.pose.position =
+        dem2di_add(particle.pose.position, dem2di_cell_shift(&world->cell, shift[0], shift[1]));
     for (int k = wall->first; k < wall->first + wall->count; k++)
         if (dem2di_part_distance(world, k, particle.pose.position) <= radius &&
             dem2di_region_has_part(&particle, k))
