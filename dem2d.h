@@ -15174,8 +15174,8 @@ DEM2D_API dem2d_result dem2d_world_create(const dem2d_world_desc *desc, dem2d_wo
     return DEM2D_OK;
 }
 
-/* An edit may change the features in use, bounds of the motion, or dampers: see dem2di_plan_make for
-   why the features are found anew in two steps. */
+/* An edit may change the features in use, bounds of the motion, or dampers: see dem2di_plan_make
+   for why the features are found anew in two steps. */
 static void dem2di_edited(dem2d_world *world) {
     world->plan_due = 2;
     world->dampers_due = true;
@@ -20019,7 +20019,7 @@ typedef struct dem2di_batch {
     double wa[DEM2DI_BATCH], wb[DEM2DI_BATCH];
     double kn[DEM2DI_BATCH], kt[DEM2DI_BATCH], mu[DEM2DI_BATCH];
     double mu_r[DEM2DI_BATCH], zeta_t[DEM2DI_BATCH];
-    /* in the columns: the last contacts, then the next; dampers; not of terms that are not in use */
+    /* in the columns: the last contacts, then the next; dampers; none of terms not in use */
     double *normal_x, *normal_y, *depth, *force, *shear, *moment, *viscous_shear, *viscous_moment;
     dem2di_dampers dampers;
     dem2di_action *actions;

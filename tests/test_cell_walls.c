@@ -352,8 +352,8 @@ static void test_memory(void **state) {
 
 /* --- closed forms ----------------------------------------------------------------------------- */
 
-/* A grain that slides without friction along a joined floor, over joints and the border: there is no
-   bump. The floor is a chain that goes round, one segment that does, and a chain along b + 2 a. */
+/* A grain that slides without friction along a joined floor, over joints and the border: there is
+   no bump. The floor is a chain that goes round, one segment that does, a chain along b + 2 a. */
 static void test_slide(void **state) {
     (void)state;
     static const dem2d_vec box[4] = {{-0.5, -0.4}, {0.5, -0.4}, {0.5, 0.4}, {-0.5, 0.4}};
