@@ -481,6 +481,51 @@ static void test_seen(void **state) {
     close_scene(&s);
 }
 
+static int count_of(const char *text, const char *word) {
+    int count = 0;
+    for (; (text = strstr(text, word)) != NULL; text++) count++;
+    return count;
+}
+
+/* Files have the copies that reach into the cell; a wall far away is seen where its copies are. */
+static void test_written(void **state) {
+    (void)state;
+    for (int k = 0; k < 2; k++) {
+        const dem2d_material_desc soft = soft_desc(false);
+        const double far = k * 4 * 5;
+        dem2d_world_desc desc = {0};
+        desc.time_step = DT, desc.cell.a = vec(4, 0);
+        const scene s = open_scene(&desc, &soft);
+        (void)add_segment(&s, vec(3.5 + far, 0.25), vec(4.5 + far, 0.25));
+        (void)add_floor(&s);
+        const dem2d_particle_desc grain =
+            grain_desc(&s, give_shape(&s, make_disc(0.5)), 1, vec(2, 1));
+        (void)add_grain(&s, &grain);
+        step(&s, 1);
+        scene_bytes bytes = {0};
+        dem2d_vtp_desc vtp = {0};
+        vtp.write = scene_write, vtp.user = &bytes, vtp.part = DEM2D_VTP_WALLS;
+        assert_ok(dem2d_world_write_vtp(s.world, &vtp, NULL));
+        assert_true(scene_write(&bytes, "", 1));
+        assert_non_null(strstr(bytes.bytes, "NumberOfLines=\"3\""));
+        assert_non_null(strstr(bytes.bytes, "\n-0.5 0.25 0\n0.5 0.25 0\n"));
+        assert_non_null(strstr(bytes.bytes, "\n3.5 0.25 0\n4.5 0.25 0\n"));
+        assert_non_null(strstr(bytes.bytes, k == 0 ? "format=\"ascii\">\n-1\n0\n0\n</DataArray>"
+                                                   : "format=\"ascii\">\n-6\n-5\n0\n</DataArray>"));
+        bytes.size = 0;
+        dem2d_svg_desc svg = {0};
+        svg.write = scene_write, svg.user = &bytes;
+        assert_ok(dem2d_world_write_svg(s.world, &svg, NULL));
+        assert_true(scene_write(&bytes, "", 1));
+        char *walls = strstr(bytes.bytes, "<g stroke=\"#444\">");
+        assert_non_null(walls);
+        *strstr(walls, "</g>") = 0;
+        assert_int_equal(count_of(walls, "<line"), 3);
+        free(bytes.bytes);
+        close_scene(&s);
+    }
+}
+
 /* --- a cell that deforms ---------------------------------------------------------------------- */
 
 /* A box in simple shear, without friction, from a state in which the cell has sheared for a while:
@@ -666,6 +711,7 @@ int main(void) {
         cmocka_unit_test(test_slide),     cmocka_unit_test(test_momentum),
         cmocka_unit_test(test_seen),      cmocka_unit_test(test_sheared),
         cmocka_unit_test(test_ledger),    cmocka_unit_test(test_refused),
+        cmocka_unit_test(test_written),
     };
     return cmocka_run_group_tests_name("walls in a periodic cell", tests, NULL, NULL);
 }
