@@ -2886,11 +2886,13 @@ DEM2D_API dem2d_result dem2d_world_write_csv(const dem2d_world *world, const dem
 #define DEM2DI_INLINE inline
 #endif
 
-/* Around loops that are to use vector instructions: gcc 12 does not vectorise them at -O2. */
+/* Around loops that are to use vector instructions: gcc 12 does not vectorise them at -O2, and with
+   trapping math does not compute what a choice may leave out. Values are the same without. */
 #if defined(__GNUC__) && !defined(__clang__)
-#define DEM2DI_VECTORS_BEGIN    \
-    _Pragma("GCC push_options") \
-        _Pragma("GCC optimize(\"tree-loop-vectorize\", \"vect-cost-model=dynamic\")")
+#define DEM2DI_VECTORS_BEGIN                                                          \
+    _Pragma("GCC push_options")                                                       \
+        _Pragma("GCC optimize(\"tree-loop-vectorize\", \"vect-cost-model=dynamic\")") \
+            _Pragma("GCC optimize(\"no-trapping-math\")")
 #define DEM2DI_VECTORS_END _Pragma("GCC pop_options")
 #else
 #define DEM2DI_VECTORS_BEGIN
@@ -2962,44 +2964,44 @@ extern "C" {
    uses: config
    ============================================================================================ */
 
-static dem2d_vec dem2di_vec(double x, double y) {
+static DEM2DI_INLINE dem2d_vec dem2di_vec(double x, double y) {
     dem2d_vec v;
     v.x = x;
     v.y = y;
     return v;
 }
 
-static dem2d_vec dem2di_add(dem2d_vec a, dem2d_vec b) {
+static DEM2DI_INLINE dem2d_vec dem2di_add(dem2d_vec a, dem2d_vec b) {
     return dem2di_vec(a.x + b.x, a.y + b.y);
 }
 
-static dem2d_vec dem2di_sub(dem2d_vec a, dem2d_vec b) {
+static DEM2DI_INLINE dem2d_vec dem2di_sub(dem2d_vec a, dem2d_vec b) {
     return dem2di_vec(a.x - b.x, a.y - b.y);
 }
 
-static dem2d_vec dem2di_scale(dem2d_vec a, double f) {
+static DEM2DI_INLINE dem2d_vec dem2di_scale(dem2d_vec a, double f) {
     return dem2di_vec(a.x * f, a.y * f);
 }
 
-static dem2d_vec dem2di_negate(dem2d_vec a) {
+static DEM2DI_INLINE dem2d_vec dem2di_negate(dem2d_vec a) {
     return dem2di_vec(-a.x, -a.y);
 }
 
 /* a + f b */
-static dem2d_vec dem2di_along(dem2d_vec a, double f, dem2d_vec b) {
+static DEM2DI_INLINE dem2d_vec dem2di_along(dem2d_vec a, double f, dem2d_vec b) {
     return dem2di_vec(a.x + f * b.x, a.y + f * b.y);
 }
 
-static double dem2di_dot(dem2d_vec a, dem2d_vec b) {
+static DEM2DI_INLINE double dem2di_dot(dem2d_vec a, dem2d_vec b) {
     return a.x * b.x + a.y * b.y;
 }
 
-static double dem2di_cross(dem2d_vec a, dem2d_vec b) {
+static DEM2DI_INLINE double dem2di_cross(dem2d_vec a, dem2d_vec b) {
     return a.x * b.y - a.y * b.x;
 }
 
 /* A quarter turn counter-clockwise. */
-static dem2d_vec dem2di_perp(dem2d_vec a) {
+static DEM2DI_INLINE dem2d_vec dem2di_perp(dem2d_vec a) {
     return dem2di_vec(-a.y, a.x);
 }
 
@@ -3008,16 +3010,16 @@ static dem2d_vec dem2di_right(dem2d_vec a) {
     return dem2di_vec(a.y, -a.x);
 }
 
-static double dem2di_length(dem2d_vec a) {
+static DEM2DI_INLINE double dem2di_length(dem2d_vec a) {
     return sqrt(dem2di_dot(a, a));
 }
 
 /* If a is NaN the result is b; if b is NaN it is NaN. */
-static double dem2di_max(double a, double b) {
+static DEM2DI_INLINE double dem2di_max(double a, double b) {
     return a > b ? a : b;
 }
 
-static double dem2di_min(double a, double b) {
+static DEM2DI_INLINE double dem2di_min(double a, double b) {
     return a < b ? a : b;
 }
 
@@ -10932,9 +10934,9 @@ typedef struct dem2di_face {
     double height, rise; /* of its line: height at x = 0, slope */
     double square;       /* of its length */
     double rounding;
-    int corner0, corner1; /* at its ends, as in dem2d_contact_point */
-    bool endless;         /* a half-plane, which has no ends */
-    bool segment;         /* of a wall */
+    double corner0, corner1; /* at its ends: numbers as in dem2d_contact_point */
+    bool endless;            /* a half-plane, which has no ends */
+    bool segment;            /* of a wall */
 } dem2di_face;
 
 /* Greatest angle (sine) between a straight arc and a contact, if the arc is to be its face: a tenth
@@ -10981,27 +10983,55 @@ static inline int dem2di_face_find(const dem2d_shape *shape, dem2d_vec v, int co
                                side);
 }
 
+/* The face `yes`, or else `no`: its numbers. */
+static DEM2DI_INLINE void dem2di_face_choose(bool which, const dem2di_face *yes,
+                                             const dem2di_face *no, dem2di_face *face) {
+    face->x0 = which ? yes->x0 : no->x0;
+    face->x1 = which ? yes->x1 : no->x1;
+    face->near = which ? yes->near : no->near;
+    face->top = which ? yes->top : no->top;
+    face->height = which ? yes->height : no->height;
+    face->rise = which ? yes->rise : no->rise;
+    face->square = which ? yes->square : no->square;
+    face->rounding = which ? yes->rounding : no->rounding;
+    face->corner0 = which ? yes->corner0 : no->corner0;
+    face->corner1 = which ? yes->corner1 : no->corner1;
+}
+
+/* Height and place of the shape at its support point. */
+static DEM2DI_INLINE void dem2di_face_top(dem2d_vec v, dem2d_vec support, double rounding,
+                                          double scale, dem2di_face *face) {
+    face->near = dem2di_cross(v, support) * scale;
+    face->top = (dem2di_dot(v, support) + rounding) * scale;
+}
+
+/* The face of a polygon with a scale on the edge between two corners, relative to its centre, for a
+   contact along v, all in coordinates of the shape; but for what is no number. */
+static DEM2DI_INLINE void dem2di_face_of_edge(dem2d_vec v, dem2d_vec from, dem2d_vec to,
+                                              double rounding, double scale, dem2di_face *face) {
+    const dem2d_vec along = dem2di_sub(to, from);
+    const double x0 = dem2di_cross(v, from), width = dem2di_cross(v, along);
+    const double climb = dem2di_dot(v, along);
+    dem2di_face_top(v, dem2di_along(from, climb > 0 ? 1 : 0, along), rounding, scale, face);
+    face->rise = climb / width;
+    face->x0 = x0 * scale;
+    face->x1 = (x0 + width) * scale;
+    face->height = (dem2di_dot(v, from) - face->rise * x0) * scale;
+    face->square = dem2di_dot(along, along) * (scale * scale);
+    face->rounding = rounding * scale;
+}
+
 /* The face on edge `found` of a shape with a scale, relative to its centre. */
 static void dem2di_face_set(const dem2d_shape *shape, double scale, dem2d_vec v, int found,
                             dem2di_face *face) {
-    dem2d_vec from = dem2di_edge_end(shape, found, false);
-    dem2d_vec along = dem2di_sub(dem2di_edge_end(shape, found, true), from), support;
-    if (shape->type == DEM2D_POLYGON)
-        support = dem2di_along(from, dem2di_dot(v, along) > 0, along);
-    else
-        support = dem2di_arc_support(&shape->arcs[dem2di_sector_find(shape, v)], v, NULL);
-    double x0 = dem2di_cross(v, from), width = dem2di_cross(v, along);
-    face->rise = dem2di_dot(v, along) / width;
-    face->x0 = x0 * scale;
-    face->x1 = (x0 + width) * scale;
-    face->near = dem2di_cross(v, support) * scale;
-    face->top = (dem2di_dot(v, support) + shape->rounding) * scale;
-    face->height = (dem2di_dot(v, from) - face->rise * x0) * scale;
-    face->square = dem2di_dot(along, along) * (scale * scale);
-    face->rounding = shape->rounding * scale;
+    const bool polygon = shape->type == DEM2D_POLYGON;
+    dem2di_face_of_edge(v, dem2di_edge_end(shape, found, false),
+                        dem2di_edge_end(shape, found, true), shape->rounding, scale, face);
+    if (!polygon)
+        dem2di_face_top(v, dem2di_arc_support(&shape->arcs[dem2di_sector_find(shape, v)], v, NULL),
+                        shape->rounding, scale, face);
     face->endless = false;
-    face->segment =
-        shape->type == DEM2D_POLYGON && shape->count == 2; /* no other polygon has two */
+    face->segment = polygon && shape->count == 2; /* no other polygon has two */
     /* a corner between two faces has the number of the face before it */
     face->corner0 = 2 * dem2di_edge_beside(shape, dem2di_edge_part(shape, found, -1), -1);
     face->corner1 = 2 * found;
@@ -11009,18 +11039,18 @@ static void dem2di_face_set(const dem2d_shape *shape, double scale, dem2d_vec v,
 }
 
 /* Transform B's face towards -u to heights along u relative to A's centre. */
-static void dem2di_face_turn(dem2d_vec d, dem2d_vec u, dem2di_face *face) {
+static DEM2DI_INLINE void dem2di_face_turn(dem2d_vec d, dem2d_vec u, dem2di_face *face) {
     double place = dem2di_cross(u, d), left = place - face->x1;
     face->height = dem2di_dot(u, d) - (face->height + face->rise * place);
     face->x1 = place - face->x0;
     face->x0 = left;
     face->near = place - face->near;
-    int corner = face->corner0;
+    double corner = face->corner0;
     face->corner0 = face->corner1 + 1;
     face->corner1 = corner + 1;
 }
 
-static double dem2di_face_height(const dem2di_face *face, double x) {
+static DEM2DI_INLINE double dem2di_face_height(const dem2di_face *face, double x) {
     return face->height + face->rise * x;
 }
 
@@ -11028,11 +11058,11 @@ static double dem2di_face_height(const dem2di_face *face, double x) {
    one shape is at a right angle to the face of the other, the base. The deeper end is the first
    point. */
 typedef struct dem2di_second_point {
-    int side;                  /* 1: after the deeper end, -1: before it */
-    int base;                  /* whose face the base is: 0 for A, 1 for B */
-    int corner, corner_deep;   /* at the second point and at the deeper end */
-    double x_deep, level;      /* deeper end: x, and height of the middle between both surfaces */
-    double x, core;            /* corner of the second point, without rounding radius: x, height */
+    double side;                /* 1: after the deeper end, -1: before it */
+    double base;                /* whose face the base is: -1 for A, 1 for B */
+    double corner, corner_deep; /* at the second point and at the deeper end */
+    double x_deep, level;       /* deeper end: x, and height of the middle between both surfaces */
+    double x, core;             /* corner of the second point, without rounding radius: x, height */
     double place, y;           /* second point: x, and height of the middle between both surfaces */
     double rise;               /* slope of the base */
     double slope;              /* length of the base for each unit of x */
@@ -11043,47 +11073,72 @@ typedef struct dem2di_second_point {
 } dem2di_second_point;
 
 /* The deeper end: where the second of both faces begins, or the first one ends. */
-static void dem2di_second_deep(const dem2di_face *a, const dem2di_face *b, int side,
-                               dem2di_second_point *end) {
-    double xa = side > 0 ? dem2di_min(a->x0, a->near) : dem2di_max(a->x1, a->near);
-    double xb = side > 0 ? dem2di_min(b->x0, b->near) : dem2di_max(b->x1, b->near);
-    bool of_a = b->endless || side * (xa - xb) >= 0;
-    const dem2di_face *face = of_a ? a : b;
+static DEM2DI_INLINE void dem2di_second_deep(const dem2di_face *a, const dem2di_face *b, int side,
+                                             dem2di_second_point *end) {
+    const double xa = side > 0 ? dem2di_min(a->x0, a->near) : dem2di_max(a->x1, a->near);
+    const double xb = side > 0 ? dem2di_min(b->x0, b->near) : dem2di_max(b->x1, b->near);
+    const double corner_a = side > 0 ? a->corner0 : a->corner1;
+    const double corner_b = side > 0 ? b->corner0 : b->corner1;
+    const bool of_a = b->endless | (side * (xa - xb) >= 0);
     end->x_deep = of_a ? xa : xb;
-    end->corner_deep = side > 0 ? face->corner0 : face->corner1;
+    end->corner_deep = of_a ? corner_a : corner_b;
 }
 
 /* The second point on a side of two faces in contact with a depth; false if they do not overlap
    there: they are tilted by more than 45 degrees, or the other way. The base changes from one face
    to the other where both corners are on the bisector of the two normals: both overlaps are then
-   equal. */
-static bool dem2di_second_place(const dem2di_face *a, const dem2di_face *b, double depth,
-                                double size, int side, dem2di_second_point *end) {
-    double tilt = side * (b->rise - a->rise);
-    if (tilt > 1) return false;
-    double xa = side > 0 ? a->x1 : a->x0, xb = side > 0 ? b->x1 : b->x0;
-    double from = side > 0 ? dem2di_max(a->x0, b->x0) : dem2di_min(a->x1, b->x1);
-    double apart = dem2di_face_height(b, xb) - dem2di_face_height(a, xa);
-    end->base = b->endless || side * ((xb - xa) + apart * (a->rise + b->rise) / 2) > 0;
-    end->x = end->base ? xa : xb;
-    double length = side * (end->x - from);
-    if (!(length > 0) || -tilt * length > DEM2DI_ROUNDOFF * size) return false;
-    end->rise = end->base ? b->rise : a->rise;
-    double on_a = dem2di_face_height(a, end->x), gap = dem2di_face_height(b, end->x) - on_a;
-    double radii = a->rounding + b->rounding, square = 1 + end->rise * end->rise;
-    if (gap >= 0 && gap * gap >= radii * radii * square) return false;
+   equal. No short circuits: loops over many contacts turn this into vector instructions. */
+static DEM2DI_INLINE bool dem2di_second_place(const dem2di_face *a, const dem2di_face *b,
+                                              double depth, double size, int side,
+                                              dem2di_second_point *end) {
+    const double tilt = side * (b->rise - a->rise);
+    const double xa = side > 0 ? a->x1 : a->x0, xb = side > 0 ? b->x1 : b->x0;
+    const double corner_a = side > 0 ? a->corner1 : a->corner0;
+    const double corner_b = side > 0 ? b->corner1 : b->corner0;
+    const double from = side > 0 ? dem2di_max(a->x0, b->x0) : dem2di_min(a->x1, b->x1);
+    const double apart = dem2di_face_height(b, xb) - dem2di_face_height(a, xa);
+    const bool base = b->endless | (side * ((xb - xa) + apart * (a->rise + b->rise) / 2) > 0);
+    const double x = base ? xa : xb, rise = base ? b->rise : a->rise, length = side * (x - from);
+    const double on_a = dem2di_face_height(a, x), gap = dem2di_face_height(b, x) - on_a;
+    const double radii = a->rounding + b->rounding, square = 1 + rise * rise;
+    const double slope = sqrt(square), core = base ? on_a : on_a + gap;
+    const double lean = side * (base ? -gap : gap) * rise;
     end->side = side;
-    end->corner = side > 0 ? (end->base ? a : b)->corner1 : (end->base ? a : b)->corner0;
-    end->slope = sqrt(square);
-    end->depth = dem2di_min(depth, radii - gap / end->slope);
-    end->core = end->base ? on_a : on_a + gap;
+    end->base = base ? 1 : -1;
+    end->x = x;
+    end->rise = rise;
+    end->corner = base ? corner_a : corner_b;
+    end->slope = slope;
+    end->depth = dem2di_min(depth, radii - gap / slope);
+    end->core = core;
     end->y = on_a + a->rounding + (gap - radii) / 2;
-    end->place = end->x - (end->y - end->core) * end->rise;
+    end->place = x - (end->y - core) * rise;
     dem2di_second_deep(a, b, side, end);
     end->level = a->top - depth / 2;
-    double lean = side * (end->base ? -gap : gap) * end->rise;
-    end->width = length * end->slope + lean / end->slope;
-    return end->depth > 0 && end->width > 0;
+    end->width = length * slope + lean / slope;
+    const bool apart_there = (gap >= 0) & (gap * gap >= radii * radii * square);
+    return !(tilt > 1) & (length > 0) & !(-tilt * length > DEM2DI_ROUNDOFF * size) & !apart_there &
+           (end->depth > 0) & (end->width > 0);
+}
+
+/* The second point `yes`, or else `no`, as dem2di_second_place has left them. */
+static DEM2DI_INLINE void dem2di_second_choose(bool which, const dem2di_second_point *yes,
+                                               const dem2di_second_point *no,
+                                               dem2di_second_point *end) {
+    end->side = which ? yes->side : no->side;
+    end->base = which ? yes->base : no->base;
+    end->x = which ? yes->x : no->x;
+    end->rise = which ? yes->rise : no->rise;
+    end->corner = which ? yes->corner : no->corner;
+    end->corner_deep = which ? yes->corner_deep : no->corner_deep;
+    end->x_deep = which ? yes->x_deep : no->x_deep;
+    end->level = which ? yes->level : no->level;
+    end->core = which ? yes->core : no->core;
+    end->place = which ? yes->place : no->place;
+    end->y = which ? yes->y : no->y;
+    end->slope = which ? yes->slope : no->slope;
+    end->depth = which ? yes->depth : no->depth;
+    end->width = which ? yes->width : no->width;
 }
 
 /* A smooth step from 0 to 1 for x in [0, 1]: value and slope. */
@@ -11114,13 +11169,19 @@ static double dem2di_share_left(double length, double depth, double *slope) {
     return share;
 }
 
+/* Has the second point its full weight, 1? */
+static DEM2DI_INLINE bool dem2di_second_full(double square, double width, double depth) {
+    const double part = DEM2DI_FULL_WIDTH;
+    return (width * width >= part * part * square) & (256 * depth * depth <= square);
+}
+
 /* Weight of the second point, 1 where two faces meet, 0 where two corners meet, and its derivatives
    by width and depth (1/m). */
 static double dem2di_second_share(double square, double width, double depth, double *by_width,
                                   double *by_depth) {
-    *by_width = *by_depth = 0;
     const double part = DEM2DI_FULL_WIDTH;
-    if (width * width >= part * part * square && 256 * depth * depth <= square) return 1;
+    *by_width = *by_depth = 0;
+    if (dem2di_second_full(square, width, depth)) return 1;
     double length = sqrt(square), left = dem2di_share_left(length, depth, by_depth), slope;
     if (width >= part * length) return left;
     double there = dem2di_ramp(width / (part * length), &slope);
@@ -11136,12 +11197,10 @@ static double dem2di_second_share(double square, double width, double depth, dou
    faces tilt to either side. For smaller c that is impossible without attraction at one of the
    points. At a segment the depth is taken from the width: where they are equal the end of the
    segment is as near to the next face of a sharp corner, and the contact goes over to this. */
-static void dem2di_second_forces(double square, double depth, bool segment,
-                                 dem2di_second_point *end) {
-    double by_width, by_depth, s = end->depth, mean = (depth + s) / 2;
-    double width = segment ? dem2di_max(0, end->width - depth) : end->width;
-    double share = dem2di_second_share(square, width, mean, &by_width, &by_depth);
-    double more = dem2di_max(0, 2 * share - 1), ratio = (s / depth) * (s / depth);
+static DEM2DI_INLINE void dem2di_second_shared(double share, double by_width, double by_depth,
+                                               double depth, bool segment,
+                                               dem2di_second_point *end) {
+    double s = end->depth, more = dem2di_max(0, 2 * share - 1), ratio = (s / depth) * (s / depth);
     double a = more * more, b = 4 * share * (1 - share) / 3;
     double by_share = s * s * (2 * more + 2 * (1 - 2 * share) / 3 * ratio);
     double by_mean = by_share * by_depth / 2;
@@ -11150,7 +11209,16 @@ static void dem2di_second_forces(double square, double depth, bool segment,
     if (segment) end->deep = dem2di_max(0, end->deep - by_share * by_width);
     end->press = dem2di_max(0, s * (a + 2 * b * ratio) + by_mean);
     /* the width decreases if the corner moves along the base towards the deeper end */
-    end->slide = by_share * by_width * end->side * (end->base ? 1 : -1);
+    end->slide = by_share * by_width * end->side * end->base;
+}
+
+/* The same with the weight of the second point by the shorter face. */
+static void dem2di_second_forces(double square, double depth, bool segment,
+                                 dem2di_second_point *end) {
+    double by_width, by_depth, mean = (depth + end->depth) / 2;
+    double width = segment ? dem2di_max(0, end->width - depth) : end->width;
+    double share = dem2di_second_share(square, width, mean, &by_width, &by_depth);
+    dem2di_second_shared(share, by_width, by_depth, depth, segment, end);
 }
 
 /* No second point: zero energy, zero force. */
@@ -11170,32 +11238,41 @@ static void dem2di_second_try(const dem2di_face *a, const dem2di_face *b, double
     if (end.energy > best->energy) *best = end;
 }
 
-/* The two points of a contact along u, from its second point. */
-static void dem2di_two_points(const dem2di_second_point *end, double depth, dem2d_vec u,
-                              dem2d_contact_point points[2]) {
-    dem2d_vec across = dem2di_perp(u), force; /* on B, along perp(u) and u */
-    force.x = (end->slide - end->press * end->rise) / end->slope;
-    force.y = (end->press + end->slide * end->rise) / end->slope;
-    double size = dem2di_length(force), up = end->y - end->core;
+/* The two points of a contact along u, from its second point, in the order along perp(u). Is the
+   deeper end the second of them? */
+static DEM2DI_INLINE bool dem2di_two_points(const dem2di_second_point *end, double depth,
+                                            dem2d_vec u, dem2d_contact_point points[2]) {
+    const dem2d_vec across = dem2di_perp(u);
+    const double x = (end->slide - end->press * end->rise) / end->slope; /* of the force on B */
+    const double y = (end->press + end->slide * end->rise) / end->slope;
+    const double size = sqrt(x * x + y * y), up = end->y - end->core;
     /* the force along the base acts at the corner: its moment moves the point of the deeper end */
-    double place = end->x_deep;
-    if (end->deep > 0) place += up * end->slope * end->slide / end->deep;
-    dem2d_contact_point *one = &points[place > end->place];
-    dem2d_contact_point *other = &points[!(place > end->place)];
-    one->position = dem2di_along(dem2di_scale(u, end->level), place, across);
-    one->normal = u;
-    one->depth = depth;
-    one->weight = end->deep / depth;
-    one->energy = depth * depth / 2;
-    one->corner = end->corner_deep;
-    other->position = dem2di_along(dem2di_scale(u, end->y), end->place, across);
-    other->normal = u;
-    if (size > 0)
-        other->normal = dem2di_along(dem2di_scale(u, force.y / size), force.x / size, across);
-    other->depth = end->depth;
-    other->weight = size / end->depth;
-    other->energy = end->energy;
-    other->corner = end->corner;
+    const double moved = end->x_deep + up * end->slope * end->slide / end->deep;
+    const double place = end->deep > 0 ? moved : end->x_deep;
+    const bool swap = place > end->place;
+    const dem2d_vec deep = dem2di_along(dem2di_scale(u, end->level), place, across);
+    const dem2d_vec other = dem2di_along(dem2di_scale(u, end->y), end->place, across);
+    const dem2d_vec turned = dem2di_along(dem2di_scale(u, y / size), x / size, across);
+    const double normal_x = size > 0 ? turned.x : u.x, normal_y = size > 0 ? turned.y : u.y;
+    const double weight_deep = end->deep / depth, weight = size / end->depth;
+    const double energy_deep = depth * depth / 2;
+    points[0].position.x = swap ? other.x : deep.x;
+    points[0].position.y = swap ? other.y : deep.y;
+    points[0].normal.x = swap ? normal_x : u.x;
+    points[0].normal.y = swap ? normal_y : u.y;
+    points[0].depth = swap ? end->depth : depth;
+    points[0].weight = swap ? weight : weight_deep;
+    points[0].energy = swap ? end->energy : energy_deep;
+    points[0].corner = (int)(swap ? end->corner : end->corner_deep);
+    points[1].position.x = swap ? deep.x : other.x;
+    points[1].position.y = swap ? deep.y : other.y;
+    points[1].normal.x = swap ? u.x : normal_x;
+    points[1].normal.y = swap ? u.y : normal_y;
+    points[1].depth = swap ? depth : end->depth;
+    points[1].weight = swap ? weight_deep : weight;
+    points[1].energy = swap ? energy_deep : end->energy;
+    points[1].corner = (int)(swap ? end->corner_deep : end->corner);
+    return swap;
 }
 
 /* The point of a contact with one point. */
@@ -11237,7 +11314,7 @@ static int dem2di_pair_points(const dem2di_pair *pair, const dem2di_search *sear
         dem2di_second_point second = dem2di_second_none();
         dem2di_pair_second(pair, search, &second);
         if (second.energy > 0) {
-            dem2di_two_points(&second, search->upper, u, points);
+            (void)dem2di_two_points(&second, search->upper, u, points);
             return 2;
         }
     }
@@ -11263,7 +11340,7 @@ static int dem2di_wall_points(const dem2d_shape *shape, dem2d_rot q, double scal
         dem2di_second_try(&face, &wall, depth, size, side, &second);
     }
     if (second.energy > 0) {
-        dem2di_two_points(&second, depth, u, points);
+        (void)dem2di_two_points(&second, depth, u, points);
         for (int i = 0; i < 2; i++)
             points[i].position = dem2di_along(points[i].position, -points[i].depth / 2, u);
         return 2;
@@ -12692,34 +12769,47 @@ static void dem2di_point_pair_carry(const dem2di_contact *last, const dem2di_poi
     shear[1] = last_pair->shear[crossed ? 0 : 1];
 }
 
-/* Normal, point (from A's centre) and depths of a contact of two points into the contact: those of
-   the normal springs' resultant, whose moment is theirs. The normals are nearly parallel: as
-   springs along the resultant both keep their parts of it. */
-static dem2d_vec dem2di_point_pair_set(const dem2d_contact_point points[2], dem2di_point_pair *pair,
-                                       dem2di_contact *contact) {
-    dem2d_vec force[2], sum, u;
-    double part[2], moment = 0;
-    for (int i = 0; i < 2; i++) {
-        part[i] = points[i].weight * points[i].depth;
-        force[i] = dem2di_scale(points[i].normal, part[i]);
-    }
-    sum = dem2di_add(force[0], force[1]);
-    if (dem2di_unit(sum, &u)) contact->normal = u;
-    double total = dem2di_dot(sum, contact->normal), both = part[0] + part[1];
-    dem2d_vec point = dem2di_along(points[0].position, part[1] / both,
-                                   dem2di_sub(points[1].position, points[0].position));
-    for (int i = 0; i < 2; i++)
-        moment += dem2di_cross(dem2di_sub(points[i].position, point), force[i]);
-    dem2d_vec t = dem2di_perp(contact->normal);
+/* The part of the normal springs' resultant that a point has. */
+static DEM2DI_INLINE dem2d_vec dem2di_point_push(const dem2d_contact_point *point) {
+    const double part = point->weight * point->depth;
+    return dem2di_vec(point->normal.x * part, point->normal.y * part);
+}
+
+/* The point (from A's centre) of a contact of two points, and these, with its normal: those of the
+   normal springs' resultant, whose moment is theirs. The normals are nearly parallel: as springs
+   along the resultant both keep their parts of it. */
+static DEM2DI_INLINE dem2d_vec dem2di_point_pair_about(const dem2d_contact_point points[2],
+                                                       dem2d_vec normal, dem2di_point_pair *pair) {
+    const dem2d_vec first = points[0].position, second = points[1].position;
+    const dem2d_vec push0 = dem2di_point_push(&points[0]), push1 = dem2di_point_push(&points[1]);
+    const double part0 = points[0].weight * points[0].depth;
+    const double part1 = points[1].weight * points[1].depth, both = part0 + part1;
+    const double total = dem2di_dot(dem2di_add(push0, push1), normal), share = total / both;
+    const dem2d_vec t = dem2di_perp(normal);
+    dem2d_vec point = dem2di_along(first, part1 / both, dem2di_sub(second, first));
+    double moment = 0;
+    moment += dem2di_cross(dem2di_sub(first, point), push0);
+    moment += dem2di_cross(dem2di_sub(second, point), push1);
     point = dem2di_along(point, -moment / total, t);
-    for (int i = 0; i < 2; i++) {
-        pair->weight[i] = points[i].weight * (total / both);
-        pair->depth[i] = points[i].depth;
-        pair->corner[i] = points[i].corner;
-        pair->offset[i] = dem2di_dot(dem2di_sub(points[i].position, point), t);
-    }
+    pair->weight[0] = points[0].weight * share;
+    pair->weight[1] = points[1].weight * share;
+    pair->depth[0] = points[0].depth;
+    pair->depth[1] = points[1].depth;
+    pair->corner[0] = points[0].corner;
+    pair->corner[1] = points[1].corner;
+    pair->offset[0] = dem2di_dot(dem2di_sub(first, point), t);
+    pair->offset[1] = dem2di_dot(dem2di_sub(second, point), t);
     pair->energy = points[0].energy + points[1].energy;
     return point;
+}
+
+/* The same, and the normal into the contact. */
+static dem2d_vec dem2di_point_pair_set(const dem2d_contact_point points[2], dem2di_point_pair *pair,
+                                       dem2di_contact *contact) {
+    dem2d_vec u;
+    if (dem2di_unit(dem2di_add(dem2di_point_push(&points[0]), dem2di_point_push(&points[1])), &u))
+        contact->normal = u;
+    return dem2di_point_pair_about(points, contact->normal, pair);
 }
 
 /* The contact point is moved along the tangent. */
@@ -21904,14 +21994,32 @@ static inline void dem2di_collide(dem2d_world *world, int i, dem2di_law_rows *ro
    dem2di_edge_last. They are taken in tiles: fetched with their support points along the last
    normal, or with corner and edge; computed by loops that compilers turn into vector instructions;
    and put into the columns. They get the same bits as from dem2di_update_pair, which takes those
-   that do not go on, and polygons with two points. */
+   that do not go on. Polygons that had two points are in a tile of their own: they go on if they
+   have two again, the second one with its full weight. */
+
+/* What contacts of two points have beside the rest. Numbers of corners as in dem2d_contact_point;
+   they are doubles as all that is in the loops. */
+typedef struct dem2di_tile_pairs {
+    double rounding_own[DEM2DI_BATCH], rounding_other[DEM2DI_BATCH]; /* of shapes without scale */
+    /* the edges before the edge, its own, and those around the other shape's corner: half the
+       numbers of the corners that they begin with */
+    double own0[DEM2DI_BATCH], own1[DEM2DI_BATCH];
+    double before[DEM2DI_BATCH], middle[DEM2DI_BATCH], after[DEM2DI_BATCH];
+    double last_corner0[DEM2DI_BATCH], last_corner1[DEM2DI_BATCH];
+    double last_shear0[DEM2DI_BATCH], last_shear1[DEM2DI_BATCH];
+    double weight0[DEM2DI_BATCH], weight1[DEM2DI_BATCH]; /* what follows: see dem2di_point_pair */
+    double depth0[DEM2DI_BATCH], depth1[DEM2DI_BATCH];
+    double offset0[DEM2DI_BATCH], offset1[DEM2DI_BATCH];
+    double shear0[DEM2DI_BATCH], shear1[DEM2DI_BATCH];
+    double energy[DEM2DI_BATCH], corner0[DEM2DI_BATCH], corner1[DEM2DI_BATCH];
+} dem2di_tile_pairs;
+
 typedef struct dem2di_tile {
-    dem2di_corners *corners; /* of polygons; NULL for smooth contacts */
+    dem2di_corners *corners;  /* of polygons; NULL for smooth contacts */
+    dem2di_tile_pairs *pairs; /* of contacts of two points, else NULL */
     int count;
     bool round; /* some contact is of a circle */
     int contact[DEM2DI_BATCH];
-    double held[DEM2DI_BATCH];  /* 1: goes on, 0: does not */
-    double alone[DEM2DI_BATCH]; /* of polygons, 1: there is no second point, 0: there may be */
     double dx[DEM2DI_BATCH], dy[DEM2DI_BATCH], reach[DEM2DI_BATCH];
     double ax[DEM2DI_BATCH], ay[DEM2DI_BATCH]; /* support point of A along the last normal, */
     double bx[DEM2DI_BATCH], by[DEM2DI_BATCH]; /* of B against it; each from its centre */
@@ -21922,12 +22030,38 @@ typedef struct dem2di_tile {
     double last_x[DEM2DI_BATCH], last_y[DEM2DI_BATCH], last_shear[DEM2DI_BATCH];
     double last_a_n[DEM2DI_BATCH], last_a_t[DEM2DI_BATCH];
     double last_b_n[DEM2DI_BATCH], last_b_t[DEM2DI_BATCH];
-    double x[DEM2DI_BATCH], y[DEM2DI_BATCH], depth[DEM2DI_BATCH]; /* normal, and what follows */
+    /* what follows: */
+    double held[DEM2DI_BATCH];  /* 1: goes on, 0: does not */
+    double alone[DEM2DI_BATCH]; /* of polygons, 1: there is no second point, 0: there may be */
+    double x[DEM2DI_BATCH], y[DEM2DI_BATCH], depth[DEM2DI_BATCH]; /* normal */
     double a_n[DEM2DI_BATCH], a_t[DEM2DI_BATCH], b_n[DEM2DI_BATCH], b_t[DEM2DI_BATCH];
     double force[DEM2DI_BATCH], shear[DEM2DI_BATCH];
     double load_x[DEM2DI_BATCH], load_y[DEM2DI_BATCH], load_a[DEM2DI_BATCH], load_b[DEM2DI_BATCH];
     double sum[DEM2DI_BATCH]; /* of the loads, without signs */
 } dem2di_tile;
+
+/* How many contacts the loops take: whole vectors of four, so that they have no rest. */
+static DEM2DI_INLINE int dem2di_tile_lanes(const dem2di_tile *tile) {
+    return (tile->count + 3) & ~3;
+}
+
+/* Puts copies of the last contact behind it, up to the end of its vector. */
+static void dem2di_columns_fill(void *columns, size_t bytes, int count) {
+    double *column = (double *)columns;
+    for (size_t at = 0; at < bytes; at += DEM2DI_BATCH * sizeof *column, column += DEM2DI_BATCH)
+        for (int k = count; k % 4 != 0; k++) column[k] = column[count - 1];
+}
+
+/* The same in all that the loops read. */
+static void dem2di_tile_fill(dem2di_tile *tile) {
+    const size_t first = offsetof(dem2di_tile, dx), end = offsetof(dem2di_tile, held);
+    if (tile->count % 4 == 0) return;
+    dem2di_columns_fill(tile->dx, end - first, tile->count);
+    if (tile->corners != NULL)
+        dem2di_columns_fill(tile->corners, sizeof *tile->corners, tile->count);
+    if (tile->pairs != NULL)
+        dem2di_columns_fill(tile->pairs, offsetof(dem2di_tile_pairs, weight0), tile->count);
+}
 
 /* Fetch what all tiles need of a contact: the two, its law and its last step. */
 static DEM2DI_INLINE void dem2di_tile_fetch(const dem2d_world *world, int i, dem2di_tile *tile) {
@@ -21991,17 +22125,42 @@ static DEM2DI_INLINE void dem2di_tile_add_smooth(const dem2d_world *world, int i
     tile->most[k] = shape_a->rho_max * scale_a + shape_b->rho_max * scale_b;
 }
 
-/* Fetch a contact of two polygons that had one point; false if it had two, or its feature is not
-   known. */
-static DEM2DI_INLINE bool dem2di_tile_add_corner(const dem2d_world *world, int i,
-                                                 const dem2d_shape *a, const dem2d_shape *b,
-                                                 dem2di_tile *tile) {
+/* Fetch the last two points of a contact, and the numbers of what may be corners of the next. */
+static DEM2DI_INLINE void dem2di_tile_add_two(const dem2di_point_pair *last,
+                                              const dem2di_feature *feature, const dem2d_shape *a,
+                                              const dem2d_shape *b, int k, dem2di_tile_pairs *p) {
+    const bool of_a = feature->own == 0;
+    const dem2d_shape *own = of_a ? a : b, *other = of_a ? b : a;
+    const int edge = of_a ? feature->corner[0] : feature->corner[1];
+    const int corner = of_a ? feature->corner[1] : feature->corner[0];
+    const int before = dem2di_before(other->count, corner);
+    p->rounding_own[k] = own->rounding;
+    p->rounding_other[k] = other->rounding;
+    p->own0[k] = dem2di_before(own->count, edge);
+    p->own1[k] = edge;
+    p->before[k] = dem2di_before(other->count, before);
+    p->middle[k] = before;
+    p->after[k] = corner;
+    p->last_corner0[k] = last->corner[0];
+    p->last_corner1[k] = last->corner[1];
+    p->last_shear0[k] = last->shear[0];
+    p->last_shear1[k] = last->shear[1];
+}
+
+/* Fetch a contact of two polygons into the tile for those that had one point or two; NULL if its
+   feature is not known. */
+static DEM2DI_INLINE dem2di_tile *dem2di_tile_add_corner(const dem2d_world *world, int i,
+                                                         const dem2d_shape *a, const dem2d_shape *b,
+                                                         dem2di_tile *one_point,
+                                                         dem2di_tile *two_points) {
     const dem2di_contacts *from = &world->list.contacts;
     const int at = i - world->list.discs;
     const dem2di_key *key = &world->list.keys[i];
     const dem2di_feature *feature = &from->history[at].feature;
-    if (world->plan.faces && dem2di_has_two_points(&from->point_pairs[at])) return false;
-    if (!dem2di_is_feature(a, b, feature)) return false;
+    const bool two = world->plan.faces && dem2di_has_two_points(&from->point_pairs[at]);
+    dem2di_tile *tile = two ? two_points : one_point;
+    if (!dem2di_is_feature(a, b, feature)) return NULL;
+    if (two) dem2di_tile_add_two(&from->point_pairs[at], feature, a, b, tile->count, tile->pairs);
     dem2di_pair pair; /* without places */
     pair.a = a;
     pair.b = b;
@@ -22011,48 +22170,56 @@ static DEM2DI_INLINE bool dem2di_tile_add_corner(const dem2d_world *world, int i
     pair.scale_b = world->bodies[key->b].scale;
     dem2di_corners_set(&pair, feature, tile->count, true, tile->corners);
     dem2di_tile_fetch(world, i, tile);
-    return true;
+    return tile;
 }
 
 /* Fetch contact i into its tile, if it may go on; else NULL. */
 static DEM2DI_INLINE dem2di_tile *dem2di_tile_add(const dem2d_world *world, int i,
-                                                  dem2di_tile *smooth, dem2di_tile *corners) {
+                                                  dem2di_tile *smooth, dem2di_tile *corners,
+                                                  dem2di_tile *pairs) {
     const dem2di_key *key = &world->list.keys[i];
     if (!(world->list.contacts.depth[i] > 0)) return NULL;
     const dem2d_shape *a = dem2di_shape_of(world, &world->bodies[key->a]);
     const dem2d_shape *b = dem2di_shape_of(world, &world->bodies[key->b]);
     if (a->type == DEM2D_POLYGON && b->type == DEM2D_POLYGON)
-        return dem2di_tile_add_corner(world, i, a, b, corners) ? corners : NULL;
+        return dem2di_tile_add_corner(world, i, a, b, corners, pairs);
     if (a->flat || b->flat || dem2di_edges_unknown(a) || dem2di_edges_unknown(b)) return NULL;
     dem2di_tile_add_smooth(world, i, a, b, smooth);
     return smooth;
 }
 
 DEM2DI_VECTORS_BEGIN
-/* What a search has found, and the arms, as dem2di_contact_place. */
-static DEM2DI_INLINE void dem2di_tile_found(dem2di_tile *t, int k, const dem2di_search *search,
-                                            bool held) {
-    const double dx = t->dx[k], dy = t->dy[k], nx = search->normal.x, ny = search->normal.y;
-    const double px = (search->a.x + (search->b.x + dx)) * 0.5;
-    const double py = (search->a.y + (search->b.y + dy)) * 0.5;
+/* The normal and the arms of a contact with its point from A's centre, as dem2di_contact_place. */
+static DEM2DI_INLINE void dem2di_tile_arms(dem2di_tile *t, int k, double nx, double ny, double px,
+                                           double py) {
+    const double dx = t->dx[k], dy = t->dy[k];
     const double along = nx * dx + ny * dy, across = nx * dy - ny * dx;
     const double a_n = nx * px + ny * py, a_t = nx * py - ny * px;
-    t->held[k] = (held & (search->upper > 0)) ? 1 : 0;
     t->x[k] = nx;
     t->y[k] = ny;
-    t->depth[k] = search->upper;
     t->a_n[k] = a_n;
     t->a_t[k] = a_t;
     t->b_n[k] = a_n - along;
     t->b_t[k] = a_t - across;
 }
 
+/* What a search has found. */
+static DEM2DI_INLINE void dem2di_tile_found(dem2di_tile *t, int k, const dem2di_search *search,
+                                            bool held) {
+    const double px = (search->a.x + (search->b.x + t->dx[k])) * 0.5;
+    const double py = (search->a.y + (search->b.y + t->dy[k])) * 0.5;
+    t->held[k] = (held & (search->upper > 0)) ? 1 : 0;
+    t->depth[k] = search->upper;
+    dem2di_tile_arms(t, k, search->normal.x, search->normal.y, px, py);
+}
+
 /* Geometry of polygons, as dem2di_edge_last. With `faces` none may have a second point. */
 static DEM2DI_INLINE void dem2di_tile_corners(dem2di_tile *DEM2DI_APART t,
                                               const dem2di_corners *DEM2DI_APART corners,
                                               bool faces) {
+    const int lanes = dem2di_tile_lanes(t);
     DEM2DI_INDEPENDENT
-    for (int k = 0; k < t->count; k++) {
+    for (int k = 0; k < lanes; k++) {
         const double dx = t->dx[k], dy = t->dy[k];
         const double distance = sqrt(dx * dx + dy * dy), size = t->reach[k] + distance;
         dem2di_search search;
@@ -22060,16 +22227,137 @@ static DEM2DI_INLINE void dem2di_tile_corners(dem2di_tile *DEM2DI_APART t,
         t->alone[k] = search.alone ? 1 : 0;
         dem2di_tile_found(t, k, &search, rests & (distance < t->reach[k]));
     }
-    for (int k = 0; k < t->count && faces; k++) t->held[k] *= t->alone[k];
+    for (int k = 0; k < lanes && faces; k++) t->held[k] *= t->alone[k];
+}
+
+/* The three edges of a contact of two polygons as faces: the edge, and those beside the corner. The
+   edge is the face of its shape on both sides, if its neighbour is not parallel to it within
+   rounding errors. */
+typedef struct dem2di_tile_faces {
+    dem2di_face own, before, after;
+    double sine_before, sine_after; /* see dem2di_polygon_face */
+    bool near_before, near_after;   /* less than 45 degrees off the contact */
+    bool distinct;
+} dem2di_tile_faces;
+
+static DEM2DI_INLINE void dem2di_tile_faces_set(const dem2di_tile *t, const dem2di_corners *e,
+                                                const dem2di_tile_pairs *p, int k,
+                                                dem2di_tile_faces *f) {
+    const double ux = t->x[k] * e->sign[k], uy = t->y[k] * e->sign[k];
+    const double vx = e->own_c[k] * ux + e->own_s[k] * uy;
+    const double vy = e->own_c[k] * uy - e->own_s[k] * ux;
+    const double wx = e->other_c[k] * -ux + e->other_s[k] * -uy;
+    const double wy = e->other_c[k] * -uy - e->other_s[k] * -ux;
+    const dem2d_vec v = dem2di_vec(vx, vy), w = dem2di_vec(wx, wy);
+    const dem2d_vec corner = dem2di_vec(e->corner_x[k], e->corner_y[k]);
+    const double turn = e->earlier_x[k] * e->along_y[k] - e->earlier_y[k] * e->along_x[k];
+    dem2di_face_of_edge(v, dem2di_vec(e->from_x[k], e->from_y[k]),
+                        dem2di_vec(e->to_x[k], e->to_y[k]), p->rounding_own[k], e->scale[k],
+                        &f->own);
+    dem2di_face_of_edge(w, dem2di_vec(e->before_x[k], e->before_y[k]), corner, p->rounding_other[k],
+                        e->other_scale[k], &f->before);
+    dem2di_face_of_edge(w, corner, dem2di_vec(e->after_x[k], e->after_y[k]), p->rounding_other[k],
+                        e->other_scale[k], &f->after);
+    f->own.corner0 = 2 * p->own0[k];
+    f->own.corner1 = 2 * p->own1[k];
+    f->before.corner0 = 2 * p->before[k];
+    f->before.corner1 = f->after.corner0 = 2 * p->middle[k];
+    f->after.corner1 = 2 * p->after[k];
+    f->sine_after = fabs(wx * e->leaving_x[k] + wy * e->leaving_y[k]);
+    f->sine_before = fabs(wx * e->leading_x[k] + wy * e->leading_y[k]);
+    f->near_after = wx * e->leaving_y[k] - wy * e->leaving_x[k] > DEM2DI_FACE_COSINE;
+    f->near_before = wx * e->leading_y[k] - wy * e->leading_x[k] > DEM2DI_FACE_COSINE;
+    f->distinct = fabs(turn) > 4 * DEM2DI_ROUNDOFF;
+}
+
+/* The second point of contact k on a side, as in dem2di_pair_second: false if there is none, or if
+   it has not its full weight. */
+static DEM2DI_INLINE bool dem2di_tile_side(const dem2di_tile *t, const dem2di_tile_faces *f,
+                                           double sign, int k, double size, int side,
+                                           dem2di_second_point *end, bool *full) {
+    const bool along_after = f->near_after & (f->sine_after < DEM2DI_ALONG);
+    const bool along_before = f->near_before & (f->sine_before < DEM2DI_ALONG);
+    const bool along = along_after | along_before;
+    const bool is_nearer = f->near_before & (!f->near_after | (f->sine_before < f->sine_after));
+    const bool is_before = (along & is_nearer) | (!along & (side * sign > 0));
+    const bool found = (is_before & f->near_before & (f->sine_before < 1)) |
+                       (!is_before & f->near_after & (f->sine_after < 1));
+    dem2di_face other, a, b;
+    dem2di_face_choose(is_before, &f->before, &f->after, &other);
+    dem2di_face_choose(sign > 0, &f->own, &other, &a);
+    dem2di_face_choose(sign > 0, &other, &f->own, &b);
+    dem2di_face_turn(dem2di_vec(t->dx[k], t->dy[k]), dem2di_vec(t->x[k], t->y[k]), &b);
+    a.endless = b.endless = false;
+    const double square = a.square < b.square ? a.square : b.square, depth = t->depth[k];
+    const bool meet = dem2di_second_place(&a, &b, depth, size, side, end);
+    *full = dem2di_second_full(square, end->width, (depth + end->depth) / 2);
+    return found & f->distinct & meet;
+}
+
+/* The second point of contact k, if it is on one side alone and has its full weight. */
+static DEM2DI_INLINE bool dem2di_tile_second(const dem2di_tile *t, const dem2di_corners *e,
+                                             const dem2di_tile_pairs *p, int k,
+                                             dem2di_second_point *end) {
+    const double dx = t->dx[k], dy = t->dy[k], size = t->reach[k] + sqrt(dx * dx + dy * dy);
+    dem2di_tile_faces f;
+    dem2di_second_point earlier, later;
+    bool full_before, full_after;
+    dem2di_tile_faces_set(t, e, p, k, &f);
+    const bool before = dem2di_tile_side(t, &f, e->sign[k], k, size, -1, &earlier, &full_before);
+    const bool after = dem2di_tile_side(t, &f, e->sign[k], k, size, 1, &later, &full_after);
+    dem2di_second_choose(after, &later, &earlier, end);
+    dem2di_second_shared(1, 0, 0, t->depth[k], false, end);
+    return ((before & full_before & !after) | (after & full_after & !before)) & (end->energy > 0);
+}
+
+/* Both points of contacts that have two, as dem2di_pair_points and dem2di_contact_place, and the
+   springs as dem2di_point_pair_carry. */
+static DEM2DI_INLINE void dem2di_tile_points(dem2di_tile *DEM2DI_APART t,
+                                             const dem2di_corners *DEM2DI_APART e,
+                                             dem2di_tile_pairs *DEM2DI_APART p) {
+    const int lanes = dem2di_tile_lanes(t);
+    DEM2DI_INDEPENDENT
+    for (int k = 0; k < lanes; k++) {
+        dem2di_second_point end;
+        dem2d_contact_point points[2];
+        dem2di_point_pair pair;
+        const double last_shear0 = p->last_shear0[k], last_shear1 = p->last_shear1[k];
+        const bool two = dem2di_tile_second(t, e, p, k, &end);
+        const bool swap =
+            dem2di_two_points(&end, t->depth[k], dem2di_vec(t->x[k], t->y[k]), points);
+        const double corner0 = swap ? end.corner : end.corner_deep;
+        const double corner1 = swap ? end.corner_deep : end.corner;
+        const bool crossed = (corner0 == p->last_corner1[k]) | (corner1 == p->last_corner0[k]);
+        const dem2d_vec push0 = dem2di_point_push(&points[0]);
+        const dem2d_vec push1 = dem2di_point_push(&points[1]);
+        const double px = push0.x + push1.x, py = push0.y + push1.y, square = px * px + py * py;
+        const bool measured = (square > DEM2DI_LEAST_SQUARE) & (square < 1 / DEM2DI_LEAST_SQUARE);
+        const double length = sqrt(square), nx = px / length, ny = py / length;
+        const dem2d_vec point = dem2di_point_pair_about(points, dem2di_vec(nx, ny), &pair);
+        t->held[k] *= (two & measured) ? 1 : 0;
+        dem2di_tile_arms(t, k, nx, ny, point.x, point.y);
+        p->weight0[k] = pair.weight[0];
+        p->weight1[k] = pair.weight[1];
+        p->depth0[k] = pair.depth[0];
+        p->depth1[k] = pair.depth[1];
+        p->offset0[k] = pair.offset[0];
+        p->offset1[k] = pair.offset[1];
+        p->energy[k] = pair.energy;
+        p->corner0[k] = corner0;
+        p->corner1[k] = corner1;
+        p->shear0[k] = crossed ? last_shear1 : last_shear0;
+        p->shear1[k] = crossed ? last_shear0 : last_shear1;
+    }
 }
 
 /* Geometry of smooth contacts, as dem2di_smooth_last. */
 static DEM2DI_INLINE void dem2di_tile_place(dem2di_tile *t, double tolerance) {
     dem2di_demand demand;
+    const int lanes = dem2di_tile_lanes(t);
     demand.detect = true;
     demand.tolerance = 0;
     demand.angle = dem2di_rest_angle(tolerance, true);
-    for (int k = 0; k < t->count; k++) {
+    for (int k = 0; k < lanes; k++) {
         const double dx = t->dx[k], dy = t->dy[k], ux = t->last_x[k], uy = t->last_y[k];
         const double distance = sqrt(dx * dx + dy * dy), size = t->reach[k] + distance;
         const double wx = (t->ax[k] - t->bx[k]) - dx, wy = (t->ay[k] - t->by[k]) - dy;
@@ -22093,18 +22381,41 @@ static DEM2DI_INLINE void dem2di_tile_place(dem2di_tile *t, double tolerance) {
     }
 }
 
-/* Springs and friction of all, as dem2di_contact_load. */
-static DEM2DI_INLINE void dem2di_tile_springs(dem2di_tile *t, double time_step) {
-    for (int k = 0; k < t->count; k++) {
+/* Force and shear of one of two points, into `shear`, which has been that of the last step. */
+static DEM2DI_INLINE double dem2di_tile_spring(const dem2di_tile *t, int k, double weight,
+                                               double depth, double slip, double time_step,
+                                               double *shear) {
+    const double force = t->kn[k] * weight * depth, kt = t->kt[k] * weight;
+    *shear = dem2di_held(t->mu[k] * force, *shear - kt * slip * time_step);
+    return force;
+}
+
+/* Springs and friction of all, as dem2di_contact_load; with `p` those of two points, as
+   dem2di_law_add_two and dem2di_law_put_two. */
+static DEM2DI_INLINE void dem2di_tile_springs(dem2di_tile *DEM2DI_APART t,
+                                              dem2di_tile_pairs *DEM2DI_APART p, double time_step) {
+    const int lanes = dem2di_tile_lanes(t);
+    DEM2DI_INDEPENDENT
+    for (int k = 0; k < lanes; k++) {
         const double x = t->x[k], y = t->y[k], vx = t->vx[k], vy = t->vy[k];
         const double wa = t->wa[k], wb = t->wb[k], a_n = t->a_n[k], b_n = t->b_n[k], none = 0;
         const double now = x * vy - y * vx - (a_n * wa - b_n * wb) + none;
         const double before = t->last_x[k] * vy - t->last_y[k] * vx -
                               (t->last_a_n[k] * wa - t->last_b_n[k] * wb) + none;
         const double slip = now + (before - now) / 2;
-        const double force = t->kn[k] * t->depth[k];
-        const double shear =
-            dem2di_held(t->mu[k] * force, t->last_shear[k] - t->kt[k] * slip * time_step);
+        double force, shear;
+        if (p != NULL) {
+            double shear0 = p->shear0[k], shear1 = p->shear1[k];
+            force = dem2di_tile_spring(t, k, p->weight0[k], p->depth0[k], slip, time_step, &shear0);
+            force +=
+                dem2di_tile_spring(t, k, p->weight1[k], p->depth1[k], slip, time_step, &shear1);
+            p->shear0[k] = shear0;
+            p->shear1[k] = shear1;
+            shear = shear0 + shear1;
+        } else {
+            force = t->kn[k] * t->depth[k];
+            shear = dem2di_held(t->mu[k] * force, t->last_shear[k] - t->kt[k] * slip * time_step);
+        }
         t->force[k] = force;
         t->shear[k] = shear;
         const double load_x = x * force + shear * -y, load_y = y * force + shear * x;
@@ -22121,17 +22432,26 @@ static DEM2DI_INLINE void dem2di_tile_springs(dem2di_tile *t, double time_step) 
 /* Geometry of a tile, whichever. */
 static DEM2DI_INLINE void dem2di_tile_solve(dem2di_tile *t, double tolerance, bool faces) {
     if (t->corners != NULL)
-        dem2di_tile_corners(t, t->corners, faces);
+        dem2di_tile_corners(t, t->corners, faces && t->pairs == NULL);
     else
         dem2di_tile_place(t, tolerance);
+    if (t->pairs != NULL) dem2di_tile_points(t, t->corners, t->pairs);
+}
+
+/* Springs and friction of a tile. */
+static DEM2DI_INLINE void dem2di_tile_load(dem2di_tile *t, double time_step) {
+    if (t->pairs != NULL)
+        dem2di_tile_springs(t, t->pairs, time_step);
+    else
+        dem2di_tile_springs(t, NULL, time_step);
 }
 
 static void dem2di_tile_solve_plain(dem2di_tile *t, double tolerance, bool faces) {
     dem2di_tile_solve(t, tolerance, faces);
 }
 
-static void dem2di_tile_springs_plain(dem2di_tile *t, double time_step) {
-    dem2di_tile_springs(t, time_step);
+static void dem2di_tile_load_plain(dem2di_tile *t, double time_step) {
+    dem2di_tile_load(t, time_step);
 }
 
 #if DEM2DI_FOURS
@@ -22139,12 +22459,12 @@ static DEM2DI_AVX2 void dem2di_tile_solve_fours(dem2di_tile *t, double tolerance
     dem2di_tile_solve(t, tolerance, faces);
 }
 
-static DEM2DI_AVX2 void dem2di_tile_springs_fours(dem2di_tile *t, double time_step) {
-    dem2di_tile_springs(t, time_step);
+static DEM2DI_AVX2 void dem2di_tile_load_fours(dem2di_tile *t, double time_step) {
+    dem2di_tile_load(t, time_step);
 }
 #else
 #define dem2di_tile_solve_fours dem2di_tile_solve_plain
-#define dem2di_tile_springs_fours dem2di_tile_springs_plain
+#define dem2di_tile_load_fours dem2di_tile_load_plain
 #endif
 DEM2DI_VECTORS_END
 
@@ -22178,6 +22498,29 @@ static void dem2di_tile_round(dem2d_world *world, dem2di_tile *tile) {
     }
 }
 
+/* The points of contact k: none, or two. Their shear forces are those of the springs. */
+static DEM2DI_INLINE void dem2di_tile_put_points(dem2d_world *world, const dem2di_tile *tile,
+                                                 int k) {
+    const dem2di_tile_pairs *from = tile->pairs;
+    const int i = tile->contact[k];
+    if (from == NULL) {
+        dem2di_points_clear(world, i);
+        return;
+    }
+    dem2di_point_pair *pair = &world->list.contacts.point_pairs[i - world->list.discs];
+    pair->weight[0] = from->weight0[k];
+    pair->weight[1] = from->weight1[k];
+    pair->depth[0] = from->depth0[k];
+    pair->depth[1] = from->depth1[k];
+    pair->offset[0] = from->offset0[k];
+    pair->offset[1] = from->offset1[k];
+    pair->shear[0] = from->shear0[k];
+    pair->shear[1] = from->shear1[k];
+    pair->energy = from->energy[k];
+    pair->corner[0] = (int)from->corner0[k];
+    pair->corner[1] = (int)from->corner1[k];
+}
+
 /* Forces and loads of contact k, without terms beside springs and friction. */
 static DEM2DI_INLINE void dem2di_tile_put(dem2d_world *world, const dem2di_tile *tile, int k,
                                           dem2di_count *count) {
@@ -22206,12 +22549,12 @@ static void dem2di_tile_apply(dem2d_world *world, dem2di_tile *tile, dem2di_law_
     dem2di_contact contact;
     dem2di_last last;
     if (tile->count == 0) return;
+    dem2di_tile_fill(tile);
     (world->fours ? dem2di_tile_solve_fours : dem2di_tile_solve_plain)(tile, world->tolerance,
                                                                        world->plan.faces);
     if (tile->round) dem2di_tile_round(world, tile);
     if (!terms)
-        (world->fours ? dem2di_tile_springs_fours : dem2di_tile_springs_plain)(tile,
-                                                                               world->made_step);
+        (world->fours ? dem2di_tile_load_fours : dem2di_tile_load_plain)(tile, world->made_step);
     for (int k = 0; k < tile->count; k++) {
         const int i = tile->contact[k];
         dem2di_history *history = &world->list.contacts.history[i - discs];
@@ -22227,13 +22570,12 @@ static void dem2di_tile_apply(dem2d_world *world, dem2di_tile *tile, dem2di_law_
         if (tile->corners == NULL)
             history->feature.own = history->feature.corner[0] = history->feature.corner[1] = -1;
         dem2di_tile_get(tile, k, &contact);
-        if (terms) {
-            dem2di_last_get(world, &world->list.contacts, i, &last);
-            dem2di_law_add(world, i, &last, false, &contact, rows);
-        } else {
+        if (terms) dem2di_last_get(world, &world->list.contacts, i, &last);
+        dem2di_tile_put_points(world, tile, k);
+        if (terms)
+            dem2di_law_add(world, i, &last, tile->pairs != NULL, &contact, rows);
+        else
             dem2di_tile_put(world, tile, k, count);
-        }
-        dem2di_points_clear(world, i);
         dem2di_geometry_put(&world->list, i, &contact);
     }
     tile->count = 0;
@@ -22245,15 +22587,20 @@ static void dem2di_tile_apply(dem2d_world *world, dem2di_tile *tile, dem2di_law_
 static void dem2di_others_range(dem2d_world *world, int begin, int end, dem2di_count *count) {
     const bool tiled = world->solver == DEM2D_CERTIFIED && world->plan.turns && !world->immovable;
     dem2di_law_rows rows;
-    dem2di_corners features;
-    dem2di_tile smooth, corners;
-    rows.count = smooth.count = corners.count = 0;
-    smooth.round = corners.round = false;
+    dem2di_corners features[2];
+    dem2di_tile_pairs points;
+    dem2di_tile smooth, corners, pairs;
+    rows.count = smooth.count = corners.count = pairs.count = 0;
+    smooth.round = corners.round = pairs.round = false;
     smooth.corners = NULL;
-    corners.corners = &features;
+    smooth.pairs = corners.pairs = NULL;
+    corners.corners = &features[0];
+    pairs.corners = &features[1];
+    pairs.pairs = &points;
     for (int i = begin; i < end; i++) {
         dem2di_tile *tile = NULL;
-        if (tiled && i < world->list.pairs) tile = dem2di_tile_add(world, i, &smooth, &corners);
+        if (tiled && i < world->list.pairs)
+            tile = dem2di_tile_add(world, i, &smooth, &corners, &pairs);
         if (tile == NULL) {
             dem2di_law_room(world, &rows, count);
             dem2di_collide(world, i, &rows, count);
@@ -22263,6 +22610,7 @@ static void dem2di_others_range(dem2d_world *world, int begin, int end, dem2di_c
     }
     dem2di_tile_apply(world, &smooth, &rows, count);
     dem2di_tile_apply(world, &corners, &rows, count);
+    dem2di_tile_apply(world, &pairs, &rows, count);
     dem2di_law_apply(world, &rows, count);
 }
 
