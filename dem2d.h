@@ -22934,7 +22934,8 @@ static void dem2di_discs_by_rows(dem2d_world *world, int begin, int end, dem2di_
     }
 }
 
-/* Blocks of the three kinds of contacts, one kind after the other. */
+/* Blocks of the three kinds of contacts, one kind after the other. All blocks that are not of
+   circles go as one, so that their tiles are full. */
 static void dem2di_force_task(void *context, int begin, int end) {
     dem2d_world *world = (dem2d_world *)context;
     const dem2di_list *list = &world->list;
@@ -22943,13 +22944,15 @@ static void dem2di_force_task(void *context, int begin, int end) {
     const int kept_from = world->keeps_last ? 0 : list->pairs;
     dem2di_kept kept[DEM2DI_COLUMNS];
     const int columns = keeps ? dem2di_kept_find(world, kept) : 0;
-    for (int block = begin; block < end; block++) {
+    for (int block = begin, next; block < end; block = next) {
         dem2di_count *count = &world->block_results[block].count;
-        bool round = block < discs;
-        int size = round ? DEM2DI_BLOCK : DEM2DI_BLOCK_OTHERS;
-        int first = round ? block * size : list->discs + (block - discs) * size;
-        int last = dem2di_block_end(first, size, round ? list->discs : list->count);
-        memset(count, 0, sizeof *count);
+        const bool round = block < discs;
+        next = round ? block + 1 : end;
+        const int size = round ? DEM2DI_BLOCK : DEM2DI_BLOCK_OTHERS;
+        const int first = round ? block * size : list->discs + (block - discs) * size;
+        const int last =
+            dem2di_block_end(first, (next - block) * size, round ? list->discs : list->count);
+        for (int k = block; k < next; k++) memset(&world->block_results[k].count, 0, sizeof *count);
         if (keeps)
             dem2di_contacts_keep(kept, columns, first > kept_from ? first : kept_from, last, false);
         if (round && world->law != NULL)
