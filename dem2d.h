@@ -1508,9 +1508,9 @@ typedef struct dem2d_world_desc {
     bool ledger;               ///< keep the ledger of energies, see dem2d_world_ledger
     /// Replaces springs, dashpots and friction. NULL for the built-in law.
     dem2d_law_fn *law;
-    void *law_user;                  ///< passed to law
-    int law_tag;                     ///< identifies law in snapshots
-    int law_omits; ///< sum of DEM2D_LAW_IDS ...: what law does without; 0: nothing
+    void *law_user; ///< passed to law
+    int law_tag;    ///< identifies law in snapshots
+    int law_omits;  ///< sum of DEM2D_LAW_IDS ...: what law does without; 0: nothing
     dem2d_parallel_fn *parallel_for; ///< distributes the work of a step; NULL: the calling thread
     void *parallel_user;             ///< passed to parallel_for
     const dem2d_env *env;            ///< memory and log, copied; NULL for malloc, free, silence
@@ -12345,6 +12345,7 @@ typedef struct dem2di_grid {
     int *place; /* by slot: the head of the disc's cell; after the sort its index in sorted */
     int *heads; /* cells + 1: where each cell begins in sorted */
     int count, cells, table;       /* discs; heads of all cells, of the hash table */
+    bool circles;                  /* all discs are of circles */
     int dense;                     /* levels that are not in the hash table: */
     int first[DEM2DI_LEVELS];      /* head of their first cell, */
     int width[DEM2DI_LEVELS];      /* and cells in a row */
@@ -12477,6 +12478,7 @@ static inline bool dem2di_meet(const dem2di_groups *a, const dem2di_groups *b) {
 typedef struct dem2di_finds {
     dem2di_key *to; /* room + 1: the last is written over */
     int room, count;
+    int walls;                   /* so many of them are with parts of walls */
     const dem2di_groups *groups; /* of the slots; NULL: all meet */
 } dem2di_finds;
 
@@ -12485,6 +12487,7 @@ static inline void dem2di_find(dem2di_finds *finds, int a, int b) {
     to->a = a;
     to->b = b;
     finds->count++;
+    finds->walls += a < 0;
 }
 
 /* Do two discs overlap? */
@@ -12496,9 +12499,9 @@ static inline bool dem2di_discs_meet(const dem2di_disc *a, const dem2di_disc *b)
 
 /* Find partners among the sorted discs from begin to end: without branches, as a third of these
    discs are partners. Plain: there is room for all of them, they are all of the level, and no two
-   are kept apart by groups or because both are fixed. */
+   are kept apart by groups or because both are fixed. Circles: as in the grid. */
 static DEM2DI_INLINE void dem2di_grid_loop(const dem2di_grid *grid, const dem2di_disc *own,
-                                           int begin, int end, int level, bool plain,
+                                           int begin, int end, int level, bool plain, bool circles,
                                            dem2di_finds *finds) {
     const int slot = own->slot, own_other = own->other;
     int count = finds->count;
@@ -12510,7 +12513,8 @@ static DEM2DI_INLINE void dem2di_grid_loop(const dem2di_grid *grid, const dem2di
             near = dem2di_meet(&finds->groups[slot], &finds->groups[other->slot]);
         dem2di_key *to = &finds->to[plain || count < finds->room ? count : finds->room];
         to->a = slot;
-        to->b = other->slot ^ (own_other | other->other); /* ~ it where one is no circle */
+        to->b = circles ? other->slot
+                        : other->slot ^ (own_other | other->other); /* ~ it: one is no circle */
         count += near;
     }
     finds->count = count;
@@ -12518,11 +12522,14 @@ static DEM2DI_INLINE void dem2di_grid_loop(const dem2di_grid *grid, const dem2di
 
 static DEM2DI_INLINE void dem2di_grid_range(const dem2di_grid *grid, const dem2di_disc *own,
                                             int begin, int end, int level, dem2di_finds *finds) {
-    if (level < grid->dense && finds->groups == NULL && !own->fixed &&
-        end - begin <= finds->room - finds->count)
-        dem2di_grid_loop(grid, own, begin, end, level, true, finds);
+    const bool plain = level < grid->dense && finds->groups == NULL && !own->fixed &&
+                       end - begin <= finds->room - finds->count;
+    if (plain && grid->circles)
+        dem2di_grid_loop(grid, own, begin, end, level, true, true, finds);
+    else if (plain)
+        dem2di_grid_loop(grid, own, begin, end, level, true, false, finds);
     else
-        dem2di_grid_loop(grid, own, begin, end, level, false, finds);
+        dem2di_grid_loop(grid, own, begin, end, level, false, false, finds);
 }
 
 /* Cells of a row from x to `last`, as many as have their discs together: from begin to end in
@@ -13695,7 +13702,7 @@ struct dem2d_world {
     double softness; /* of the list: times the stiffness of a contact it bounds all eigenvalues; 0
                         until a check of the time step asks for it. HUGE_VAL: it tells nothing */
     double limit_softness; /* the same for those of the limit: also beside dashpots and rolling */
-    double spread;   /* mean distance in memory of two partners when last sorted */
+    double spread;         /* mean distance in memory of two partners when last sorted */
     int64_t steps, rebuilds, slow_time_step, fast_motion, listed_at;
     int64_t timed_at; /* steps when the time step was last changed */
     double timed;     /* s, the time then: one product adds the rest, with one rounding */
@@ -18169,22 +18176,64 @@ static inline int dem2di_entry_contact(uint64_t entry) {
     return (int)(entry & 0x7FFFFFFFu);
 }
 
-/* Up to so many contacts of a particle are sorted by counting: most have a handful. */
+/* Most particles have a handful of contacts: up to so many are sorted by a network, which has no
+   branches. */
 #define DEM2DI_FEW_CONTACTS 8
 
-/* The few contacts of a particle in order: the place of each is how many entries are lower, or the
-   same and come before. No branch depends on the ranks. */
-static void dem2di_entries_sort_few(const uint64_t *entries, int count, int *run) {
-    int place[DEM2DI_FEW_CONTACTS];
-    for (int i = 0; i < count; i++) {
-        place[i] = i;
-        for (int k = 0; k < i; k++) {
-            const int follows = entries[k] > entries[i];
-            place[k] += follows;
-            place[i] -= follows;
-        }
-    }
-    for (int i = 0; i < count; i++) run[place[i]] = dem2di_entry_contact(entries[i]);
+static inline void dem2di_entries_swap(uint64_t *one, uint64_t *other) {
+    const uint64_t low = *one < *other ? *one : *other, high = *one < *other ? *other : *one;
+    *one = low;
+    *other = high;
+}
+
+/* Twelve exchanges sort six entries, and 19 sort eight, which is the least in both cases (Knuth, The
+   Art of Computer Programming 3, 5.3.4). Places that are not used have an entry behind all others. */
+static inline void dem2di_entries_sort_six(uint64_t e[6]) {
+    dem2di_entries_swap(&e[0], &e[5]), dem2di_entries_swap(&e[1], &e[3]);
+    dem2di_entries_swap(&e[2], &e[4]), dem2di_entries_swap(&e[1], &e[2]);
+    dem2di_entries_swap(&e[3], &e[4]), dem2di_entries_swap(&e[0], &e[3]);
+    dem2di_entries_swap(&e[2], &e[5]), dem2di_entries_swap(&e[0], &e[1]);
+    dem2di_entries_swap(&e[2], &e[3]), dem2di_entries_swap(&e[4], &e[5]);
+    dem2di_entries_swap(&e[1], &e[2]), dem2di_entries_swap(&e[3], &e[4]);
+}
+
+static inline void dem2di_entries_sort_eight(uint64_t e[8]) {
+    dem2di_entries_swap(&e[0], &e[2]), dem2di_entries_swap(&e[1], &e[3]);
+    dem2di_entries_swap(&e[4], &e[6]), dem2di_entries_swap(&e[5], &e[7]);
+    dem2di_entries_swap(&e[0], &e[4]), dem2di_entries_swap(&e[1], &e[5]);
+    dem2di_entries_swap(&e[2], &e[6]), dem2di_entries_swap(&e[3], &e[7]);
+    dem2di_entries_swap(&e[0], &e[1]), dem2di_entries_swap(&e[2], &e[3]);
+    dem2di_entries_swap(&e[4], &e[5]), dem2di_entries_swap(&e[6], &e[7]);
+    dem2di_entries_swap(&e[2], &e[4]), dem2di_entries_swap(&e[3], &e[5]);
+    dem2di_entries_swap(&e[1], &e[4]), dem2di_entries_swap(&e[3], &e[6]);
+    dem2di_entries_swap(&e[1], &e[2]), dem2di_entries_swap(&e[3], &e[4]);
+    dem2di_entries_swap(&e[5], &e[6]);
+}
+
+static inline uint64_t dem2di_entry_at(const uint64_t *entries, int count, int i) {
+    return i < count ? entries[i] : UINT64_MAX;
+}
+
+static inline void dem2di_entry_put(int *run, int count, int i, uint64_t entry) {
+    if (i < count) run[i] = dem2di_entry_contact(entry);
+}
+
+/* The few contacts of a particle in order. Without loops compilers keep the entries in registers. */
+static DEM2DI_INLINE void dem2di_entries_sort_few(const uint64_t *entries, int n, bool six,
+                                                  int *run) {
+    uint64_t e[DEM2DI_FEW_CONTACTS];
+    e[0] = dem2di_entry_at(entries, n, 0), e[1] = dem2di_entry_at(entries, n, 1);
+    e[2] = dem2di_entry_at(entries, n, 2), e[3] = dem2di_entry_at(entries, n, 3);
+    e[4] = dem2di_entry_at(entries, n, 4), e[5] = dem2di_entry_at(entries, n, 5);
+    if (!six) e[6] = dem2di_entry_at(entries, n, 6), e[7] = dem2di_entry_at(entries, n, 7);
+    if (six)
+        dem2di_entries_sort_six(e);
+    else
+        dem2di_entries_sort_eight(e);
+    dem2di_entry_put(run, n, 0, e[0]), dem2di_entry_put(run, n, 1, e[1]);
+    dem2di_entry_put(run, n, 2, e[2]), dem2di_entry_put(run, n, 3, e[3]);
+    dem2di_entry_put(run, n, 4, e[4]), dem2di_entry_put(run, n, 5, e[5]);
+    if (!six) dem2di_entry_put(run, n, 6, e[6]), dem2di_entry_put(run, n, 7, e[7]);
 }
 
 /* The same for many by Shell's sort (Ciura's gaps): a particle that is a hundred times larger than
@@ -18258,8 +18307,10 @@ static void dem2di_adjacency_sort_task(void *context, int begin, int end) {
             const uint64_t own = dem2di_entry_make(world->bodies[slot].rank, 0);
             uint64_t bits = 0;
             for (int i = 0; i < count; i++) as_b += entries[i] < own, bits |= entries[i];
-            if (count <= DEM2DI_FEW_CONTACTS)
-                dem2di_entries_sort_few(entries, count, run);
+            if (count <= 6)
+                dem2di_entries_sort_few(entries, count, true, run);
+            else if (count <= DEM2DI_FEW_CONTACTS)
+                dem2di_entries_sort_few(entries, count, false, run);
             else
                 dem2di_entries_sort_many(entries, count, run);
             if (bits & DEM2DI_ENTRY_IMAGE)
@@ -18271,33 +18322,48 @@ static void dem2di_adjacency_sort_task(void *context, int begin, int end) {
     }
 }
 
+/* How many contacts each particle has, into last; those that were forgotten do not count. */
+static void dem2di_adjacency_count(const dem2d_world *world, int *last) {
+    const dem2di_key *keys = world->list.keys;
+    const int pairs = world->list.pairs, count = world->list.count;
+    const int images = world->image_count > 0 ? world->image_first : INT_MAX;
+    for (int i = 0; i < pairs; i++) {
+        const int a = keys[i].a, b = keys[i].b;
+        if (a < 0) continue;
+        last[a]++;
+        last[b < images ? b : dem2di_owner(world, b)]++;
+    }
+    for (int i = pairs; i < count; i++)
+        if (keys[i].a >= 0) last[dem2di_owner(world, keys[i].a)]++;
+}
+
+/* Entries of all contacts, each particle's from its first on. */
 static void dem2di_adjacency_fill_task(void *context, int begin, int end) {
     dem2d_world *world = (dem2d_world *)context;
-    dem2di_list *list = &world->list;
+    const dem2di_key *keys = world->list.keys;
+    const dem2di_body *bodies = world->bodies;
+    const int pairs = world->list.pairs, count = world->list.count;
+    const int images = world->image_count > 0 ? world->image_first : INT_MAX;
     uint64_t *entries = (uint64_t *)(void *)world->scratch;
-    int *first = list->first, *last = first + 1, slots = world->body_count;
+    int *first = world->list.first, *last = first + 1;
     (void)begin;
     (void)end;
-    memset(first, 0, ((size_t)slots + 1) * sizeof *first);
-    for (int i = 0; i < list->count; i++) {
-        if (list->keys[i].a < 0) continue;
-        last[dem2di_owner(world, list->keys[i].a)]++;
-        if (i < list->pairs) last[dem2di_owner(world, list->keys[i].b)]++;
-    }
-    (void)dem2di_starts(last, slots);
-    for (int i = 0; i < list->count; i++) {
-        const int a = list->keys[i].a, b = list->keys[i].b;
+    memset(first, 0, ((size_t)world->body_count + 1) * sizeof *first);
+    dem2di_adjacency_count(world, last);
+    (void)dem2di_starts(last, world->body_count);
+    for (int i = 0; i < pairs; i++) {
+        const int a = keys[i].a, b = keys[i].b;
         if (a < 0) continue;
-        const int slot = dem2di_owner(world, a);
-        if (i >= list->pairs) {
-            const uint64_t image = a == slot ? 0 : DEM2DI_ENTRY_IMAGE;
-            entries[last[slot]++] = dem2di_entry_make((1 << 30) + b, i) | image;
-            continue;
-        }
-        const int owner = dem2di_owner(world, b);
-        const uint64_t image = b == owner ? 0 : DEM2DI_ENTRY_IMAGE;
-        entries[last[slot]++] = dem2di_entry_make(world->bodies[b].rank, i) | image;
-        entries[last[owner]++] = dem2di_entry_make(world->bodies[a].rank, i) | image;
+        const int owner = b < images ? b : dem2di_owner(world, b);
+        const uint64_t image = b < images ? 0 : DEM2DI_ENTRY_IMAGE;
+        entries[last[a]++] = dem2di_entry_make(bodies[owner].rank, i) | image;
+        entries[last[owner]++] = dem2di_entry_make(bodies[a].rank, i) | image;
+    }
+    for (int i = pairs; i < count; i++) {
+        if (keys[i].a < 0) continue;
+        const uint64_t image = keys[i].a < images ? 0 : DEM2DI_ENTRY_IMAGE;
+        entries[last[dem2di_owner(world, keys[i].a)]++] =
+            dem2di_entry_make((1 << 30) + keys[i].b, i) | image;
     }
 }
 
@@ -18472,15 +18538,15 @@ typedef struct dem2di_build {
     int *old;                            /* of the new list: its contact in the old one, or -1 */
     dem2di_order *wall_contacts, *spare; /* part, rank of particle; slot */
     char *column;                        /* room for a column of contacts, where the search was */
-    bool bounded, back;      /* as in the world; whether the next step may look back on contacts */
+    bool bounded, back; /* as in the world; whether the next step may look back on contacts */
     double softness, limit_softness; /* as in the world */
-    int image_base;          /* an image that was found has this plus its number for a slot, */
-    int images;              /* so many are in world->images_next: those near other particles, */
-    int wall_images;         /* those near segments alone, */
-    int lost_images;         /* those of contacts that are out of reach */
-    int *image_of;           /* where there are segments, of each particle: as world->images_of, but
+    int image_base;  /* an image that was found has this plus its number for a slot, */
+    int images;      /* so many are in world->images_next: those near other particles, */
+    int wall_images; /* those near segments alone, */
+    int lost_images; /* those of contacts that are out of reach */
+    int *image_of;   /* where there are segments, of each particle: as world->images_of, but
                                 without the last ones */
-    bool failed;             /* there was no memory for an image */
+    bool failed;     /* there was no memory for an image */
 } dem2di_build;
 
 /* The particle that a slot in the keys of the next list shows. */
@@ -18662,6 +18728,7 @@ static void dem2di_discs_survey(dem2di_build *build) {
         all->strayed |= result->strayed;
     }
     grid->box = all->box;
+    grid->circles = dem2di_has_discs(world) && !all->extremes.others;
     if (grid->count > 0) dem2di_grid_plan(grid, all->least, all->most);
     for (int j = 0; j < world->wall_count; j++)
         world->walls[j].skin =
@@ -19162,17 +19229,16 @@ static void dem2di_find_lost(const dem2di_build *build, dem2di_finds *finds) {
     }
 }
 
-/* How many contacts of each kind were found. */
-static void dem2di_kinds_count(const dem2di_finds *finds, int numbers[DEM2DI_KINDS]) {
+/* How many contacts of each kind were found. Those without room do not matter: there will be
+   another pass. */
+static void dem2di_kinds_count(const dem2di_finds *finds, bool circles, int numbers[DEM2DI_KINDS]) {
     const int count = finds->count < finds->room ? finds->count : finds->room;
-    int walls = 0, others = 0;
-    for (int k = 0; k < count; k++) {
-        walls += finds->to[k].a < 0;
+    int others = 0;
+    for (int k = 0; k < count && !circles; k++)
         others += finds->to[k].b < 0; /* of a wall it is a part, and from 0 */
-    }
-    numbers[DEM2DI_DISCS] = count - walls - others;
+    numbers[DEM2DI_DISCS] = count - finds->walls - others;
     numbers[DEM2DI_OTHERS] = others;
-    numbers[DEM2DI_WALL_CONTACTS] = walls;
+    numbers[DEM2DI_WALL_CONTACTS] = finds->walls;
 }
 
 static void dem2di_search_task(void *context, int begin, int end) {
@@ -19183,7 +19249,7 @@ static void dem2di_search_task(void *context, int begin, int end) {
     for (int block = begin; block < end; block++) {
         dem2di_block_result *result = &world->block_results[block];
         int first = (block - bodies) * DEM2DI_BLOCK_OTHERS;
-        dem2di_finds finds = {build->finds + result->finds, result->room, 0,
+        dem2di_finds finds = {build->finds + result->finds, result->room, 0, 0,
                               dem2di_groups_used(world)};
         if (block < bodies)
             dem2di_search_particles(build, block, &finds);
@@ -19196,7 +19262,7 @@ static void dem2di_search_task(void *context, int begin, int end) {
                  j++)
                 if (world->parts[j].extent > 0) dem2di_search_part(build, j, &finds);
         result->found = finds.count;
-        dem2di_kinds_count(&finds, result->starts);
+        dem2di_kinds_count(&finds, build->grid.circles, result->starts);
     }
 }
 
@@ -19227,32 +19293,32 @@ static int dem2di_listed_image(const dem2di_build *build, const dem2di_key *key,
     return -1;
 }
 
-/* The contact that two partners had in the old list, or -1. First the one that follows the last one
-   found is tried: most of a list comes in the order of the old one. */
-static int dem2di_listed(const dem2d_world *world, const dem2di_key *key, bool wall, int *last) {
-    const dem2di_list *list = &world->list;
+/* The contact that two particles, or a particle and a part of a wall, had in the old list; or -1. */
+static int dem2di_listed(const dem2di_list *list, const dem2di_key *key, bool wall) {
     const int begin = wall ? list->pairs : 0, end = wall ? list->count : list->pairs;
-    const int next = *last + 1;
-    if (next >= begin && next < end && list->keys[next].a == key->a && list->keys[next].b == key->b)
-        return *last = next;
     for (int k = list->own[key->a]; k < list->first[key->a + 1]; k++) {
         int contact = list->adjacent[k];
         const dem2di_key *old = &list->keys[contact]; /* a < 0 if it was forgotten */
         if (old->a == key->a && old->b == key->b && contact >= begin && contact < end)
-            return *last = contact;
+            return contact;
     }
     return -1;
 }
 
+/* Is this contact of the old list, if it is one of a pair, that of two partners? Most of a list comes
+   in the order of the old one: the contact that follows the last one found is tried first. */
+static inline bool dem2di_is_listed(const dem2di_list *list, int contact, const dem2di_key *key) {
+    return contact < list->pairs && list->keys[contact].a == key->a &&
+           list->keys[contact].b == key->b;
+}
+
 /* The contact of a key of the next list in the old one, or -1. In a cell one of the two may have
    been an image, or is one now. */
-static int dem2di_listed_before(const dem2di_build *build, const dem2di_key *key, bool wall,
-                                int *last) {
+static int dem2di_listed_before(const dem2di_build *build, const dem2di_key *key, bool wall) {
     int listed = -1;
     if ((wall ? key->a : key->b) < build->image_base)
-        listed = dem2di_listed(build->world, key, wall, last);
-    if (listed < 0 && build->world->image_count > 0)
-        listed = dem2di_listed_image(build, key, wall);
+        listed = dem2di_listed(&build->world->list, key, wall);
+    if (listed < 0 && build->world->image_count > 0) listed = dem2di_listed_image(build, key, wall);
     return listed;
 }
 
@@ -19267,12 +19333,13 @@ typedef struct dem2di_carry {
 
 static DEM2DI_INLINE void dem2di_carry_range(const dem2di_carry *carry, int begin, int end,
                                              size_t size) {
-    const int *old = carry->old + carry->begin;
-    for (int i = begin; i < end; i++) {
-        const int from = old[i] - carry->old_begin;
-        char *to = carry->spare + (size_t)i * size;
+    const dem2di_carry c = *carry; /* not to be read again after each store */
+    const int *old = c.old + c.begin;
+    char *to = c.spare + (size_t)begin * size;
+    for (int i = begin; i < end; i++, to += size) {
+        const int from = old[i] - c.old_begin;
         if (from >= 0)
-            memcpy(to, carry->column + (size_t)from * size, size);
+            memcpy(to, c.column + (size_t)from * size, size);
         else
             memset(to, 0, size);
     }
@@ -19332,38 +19399,49 @@ static void dem2di_carry_others(const dem2di_build *build, int discs, int pairs)
     }
 }
 
-/* What the search found, the one of lower rank first, and their contacts in the old list, by
-   kinds. */
+/* What a block of the search found, the one of lower rank first, and their contacts in the old list,
+   by kinds. */
+static void dem2di_fill_block(const dem2di_build *build, dem2di_block_result *result) {
+    const dem2d_world *world = build->world;
+    const dem2di_list list = world->list;
+    const dem2di_body *bodies = world->bodies;
+    const int base = build->image_base, found = result->found;
+    dem2di_key *finds = build->finds + result->finds;
+    dem2di_order *wall_contacts = build->wall_contacts + result->starts[DEM2DI_WALL_CONTACTS];
+    int *old[2], next[2] = {0, 0};
+    int64_t spread = 0;
+    old[DEM2DI_DISCS] = build->old + result->starts[DEM2DI_DISCS];
+    old[DEM2DI_OTHERS] = build->old + result->starts[DEM2DI_OTHERS];
+    for (int k = 0; k < found; k++) {
+        const int a = finds[k].a, kind = finds[k].b < 0 ? DEM2DI_OTHERS : DEM2DI_DISCS;
+        const int b = kind == DEM2DI_OTHERS ? ~finds[k].b : finds[k].b;
+        if (a < 0) {
+            wall_contacts->key =
+                (uint64_t)b << 32 | (uint64_t)bodies[dem2di_build_owner(build, ~a)].rank;
+            wall_contacts++->value = ~a;
+            continue;
+        }
+        const int owner = b < base ? b : dem2di_build_owner(build, b);
+        const int turned = bodies[a].rank > bodies[owner].rank;
+        const int swap = (a ^ b) & -turned; /* without a branch: half of them are */
+        const dem2di_key key = {a ^ swap, b ^ swap};
+        const bool follows = b < base && dem2di_is_listed(&list, next[kind], &key);
+        const int contact = follows ? next[kind] : dem2di_listed_before(build, &key, false);
+        if (contact >= 0) next[kind] = contact + 1;
+        *old[kind]++ = contact;
+        finds[k].a = key.a;
+        finds[k].b = kind == DEM2DI_OTHERS ? ~key.b : key.b;
+        spread += abs(a - owner);
+    }
+    for (int kind = 0; kind < 2; kind++) result->starts[kind] = (int)(old[kind] - build->old);
+    result->starts[DEM2DI_WALL_CONTACTS] = (int)(wall_contacts - build->wall_contacts);
+    result->spread = spread;
+}
+
 static void dem2di_fill_task(void *context, int begin, int end) {
     const dem2di_build *build = (const dem2di_build *)context;
-    const dem2d_world *world = build->world;
-    const dem2di_body *bodies = world->bodies;
-    for (int block = begin; block < end; block++) {
-        dem2di_block_result *result = &world->block_results[block];
-        dem2di_key *finds = build->finds + result->finds;
-        int64_t spread = 0;
-        int last[2] = {-1, -1};
-        for (int k = 0; k < result->found; k++) {
-            int a = finds[k].a, b = finds[k].b, kind = b < 0 ? DEM2DI_OTHERS : DEM2DI_DISCS;
-            if (a < 0) {
-                dem2di_order *item = &build->wall_contacts[result->starts[DEM2DI_WALL_CONTACTS]++];
-                item->key =
-                    (uint64_t)b << 32 | (uint64_t)bodies[dem2di_build_owner(build, ~a)].rank;
-                item->value = ~a;
-                continue;
-            }
-            if (b < 0) b = ~b;
-            const int owner = dem2di_build_owner(build, b);
-            const bool turned = bodies[a].rank > bodies[owner].rank;
-            const dem2di_key key = {turned ? b : a, turned ? a : b};
-            build->old[result->starts[kind]++] =
-                dem2di_listed_before(build, &key, false, &last[kind]);
-            finds[k].a = key.a;
-            finds[k].b = kind == DEM2DI_OTHERS ? ~key.b : key.b;
-            spread += a < owner ? owner - a : a - owner;
-        }
-        result->spread = spread;
-    }
+    for (int block = begin; block < end; block++)
+        dem2di_fill_block(build, &build->world->block_results[block]);
 }
 
 /* Images of one particle at one part of a wall in the order of their shifts. */
@@ -19385,7 +19463,7 @@ static void dem2di_wall_images_sort(const dem2di_build *build, dem2di_order *ite
 static void dem2di_wall_contacts_task(void *context, int begin, int end) {
     dem2di_build *build = (dem2di_build *)context;
     int count = build->total[DEM2DI_WALL_CONTACTS];
-    int pairs = build->total[DEM2DI_DISCS] + build->total[DEM2DI_OTHERS], last = -1;
+    int pairs = build->total[DEM2DI_DISCS] + build->total[DEM2DI_OTHERS];
     (void)begin;
     (void)end;
     dem2di_sort(build->wall_contacts, build->spare, count);
@@ -19393,7 +19471,7 @@ static void dem2di_wall_contacts_task(void *context, int begin, int end) {
     for (int i = 0; i < count; i++) {
         const dem2di_order *item = &build->wall_contacts[i];
         const dem2di_key key = {item->value, (int)(item->key >> 32)};
-        build->old[pairs + i] = dem2di_listed_before(build, &key, true, &last);
+        build->old[pairs + i] = dem2di_listed_before(build, &key, true);
     }
 }
 

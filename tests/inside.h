@@ -136,8 +136,7 @@ int inside_count_missed(const dem2d_world *world) {
             if (inside_depth(world, a, b) <= 1e-7 * size) continue;
             dem2di_key key = {b, a};
             if (world->bodies[a].index < world->bodies[b].index) key.a = a, key.b = b;
-            int last = -1;
-            const int listed = dem2di_listed(world, &key, false, &last);
+            const int listed = dem2di_listed(&world->list, &key, false);
             missed += listed < 0 || (!dem2di_immovable(world, listed) &&
                                      !(world->list.contacts.depth[listed] > 0));
         }
