@@ -21453,8 +21453,8 @@ typedef struct dem2di_wall_face {
 } dem2di_wall_face;
 
 /* The face of the copy of a part that is as many cell vectors from the part. */
-static dem2di_wall_face dem2di_face_at(const dem2d_world *world, int part, int along_a,
-                                       int along_b) {
+static DEM2DI_INLINE dem2di_wall_face dem2di_face_at(const dem2d_world *world, int part,
+                                                     int along_a, int along_b) {
     const dem2di_wall_joint *joint = &world->joints[part];
     dem2di_wall_face face;
     face.first = world->parts[part].extent > 0 ? joint->first : -1;
@@ -21465,7 +21465,7 @@ static dem2di_wall_face dem2di_face_at(const dem2d_world *world, int part, int a
 
 /* The face that a contact with a part is with: the particle is in the cell, an image of it meets
    the part, so that itself meets the copy as far on the other side. */
-static dem2di_wall_face dem2di_face_of(const dem2d_world *world, int contact) {
+static DEM2DI_INLINE dem2di_wall_face dem2di_face_of(const dem2d_world *world, int contact) {
     const dem2di_key *key = &world->list.keys[contact];
     int shift[2];
     dem2di_shift_of(world, key->a, shift);
@@ -21473,8 +21473,8 @@ static dem2di_wall_face dem2di_face_of(const dem2d_world *world, int contact) {
 }
 
 /* Are two faces one? All copies are of a face that goes round that are whole rounds apart. */
-static bool dem2di_same_face(const dem2d_world *world, const dem2di_wall_face *one,
-                             const dem2di_wall_face *other) {
+static inline bool dem2di_same_face(const dem2d_world *world, const dem2di_wall_face *one,
+                                    const dem2di_wall_face *other) {
     if (one->first != other->first || one->first < 0) return false;
     const int64_t a = (int64_t)one->at[0] - other->at[0], b = (int64_t)one->at[1] - other->at[1];
     const int *round = world->joints[one->first].round;
