@@ -23956,8 +23956,14 @@ static inline void dem2di_response_closed(const dem2di_cell_aim *aim, int i,
     dem2di_cell_sum(response->next, dem2di_from_frame(contact->normal, force, shear), d);
 }
 
-/* A particle, and the contacts with those of a higher rank; what walls press is no part of the
-   stress of a cell, as dem2d_world_stress has it. */
+/* A contact with a wall, taken to press as it does now. */
+static void dem2di_response_wall(const dem2di_contact *contact, dem2di_cell_response *response) {
+    const dem2d_vec force = dem2di_contact_force(contact), d = dem2di_branch_of(contact, true);
+    dem2di_cell_sum(response->stress, force, d);
+    dem2di_cell_sum(response->next, force, d);
+}
+
+/* A particle, its contacts with those of a higher rank and with walls. */
 static void dem2di_response_particle(const dem2di_cell_aim *aim, int slot,
                                      dem2di_cell_response *response) {
     const dem2d_world *world = aim->world;
@@ -23966,8 +23972,10 @@ static void dem2di_response_particle(const dem2di_cell_aim *aim, int slot,
     for (int k = list->own[slot]; k < list->first[slot + 1]; k++) {
         const int i = list->adjacent[k];
         dem2di_contact contact;
-        if (i >= list->pairs || list->keys[i].a < 0) continue;
+        if (list->keys[i].a < 0) continue;
         const bool closed = dem2di_contact_get(world, &list->contacts, i, &contact);
+        if (closed && i >= list->pairs) dem2di_response_wall(&contact, response);
+        if (i >= list->pairs) continue;
         if (!closed && (i >= list->discs || world->law != NULL)) continue;
         const dem2di_state *other = &world->before[dem2di_owner(world, list->keys[i].b)];
         const dem2d_vec v = dem2di_sub(other->v, next->v);
