@@ -1,5 +1,6 @@
 /* bench_cost settle SCENE SEED FILE              settles a scene and saves it
-   bench_cost go-on FILE STEPS                    takes steps of a saved scene in `measured`
+   bench_cost go-on FILE STEPS [RENEWAL]          takes steps of a saved scene in `measured`; the
+   neighbour list is made anew every RENEWAL steps, if that is given
    bench_cost feature FILE FEATURE STATE STEPS    the discs of a saved scene with a feature,
    likewise
 
@@ -555,15 +556,16 @@ int main(int count, char **arguments) {
         b = open_scene(s, strtoull(arguments[3], NULL, 10));
         settle(&b, s);
         save_scene(&b, arguments[4]);
-    } else if (count == 4 && strcmp(task, "go-on") == 0) {
+    } else if ((count == 4 || count == 5) && strcmp(task, "go-on") == 0) {
         b = load_scene(arguments[2]);
+        if (count == 5) b.kept.renewal = atoi(arguments[4]);
         measure(&b, atoi(arguments[3]));
     } else if (count == 6 && strcmp(task, "feature") == 0) {
         b = open_feature(arguments[2], arguments[3], atoi(arguments[4]));
         measure(&b, atoi(arguments[5]));
     } else {
-        fprintf(stderr, "usage: bench_cost settle SCENE SEED FILE | go-on FILE STEPS | feature "
-                        "FILE FEATURE STATE STEPS\n");
+        fprintf(stderr, "usage: bench_cost settle SCENE SEED FILE | go-on FILE STEPS [RENEWAL] | "
+                        "feature FILE FEATURE STATE STEPS\n");
         return 2;
     }
     close_bench(&b);
