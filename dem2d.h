@@ -1510,7 +1510,7 @@ typedef struct dem2d_world_desc {
     dem2d_law_fn *law;
     void *law_user; ///< passed to law
     int law_tag;    ///< identifies law in snapshots
-    int law_omits;  ///< sum of DEM2D_LAW_IDS ...: what law does without; 0: nothing
+    int law_omits;  ///< sum of DEM2D_LAW_IDS ..., 0 to 15: what law does without; 0: nothing
     dem2d_parallel_fn *parallel_for; ///< distributes the work of a step; NULL: the calling thread
     void *parallel_user;             ///< passed to parallel_for
     const dem2d_env *env;            ///< memory and log, copied; NULL for malloc, free, silence
@@ -13636,6 +13636,7 @@ typedef enum dem2di_group {
     DEM2DI_PARTS,
     DEM2DI_KEYS,
     DEM2DI_DASHPOTS,             /* of all contacts, where plan.terms has anything, */
+    DEM2DI_RADII,                /* DEM2DI_ROLLING or DEM2DI_CALLERS_LAW, */
     DEM2DI_MOMENTS,              /* DEM2DI_ROLLING, */
     DEM2DI_VISCOUS_SHEARS,       /* DEM2DI_TANGENTIAL_DASHPOT, */
     DEM2DI_VISCOUS_MOMENTS,      /* DEM2DI_ROLLING_DASHPOT, */
@@ -14302,7 +14303,7 @@ static const dem2di_column dem2di_columns[] = {
     DEM2DI_CONTACT_COLUMN("shear_force", KEYS, shear, finite_field),
     DEM2DI_UNSAVED(DASHPOTS, list.dampers.normal, 0),
     DEM2DI_CONTACT_COLUMN("moment", MOMENTS, moment, finite_field),
-    DEM2DI_UNSAVED(MOMENTS, list.dampers.radius, 0),
+    DEM2DI_UNSAVED(RADII, list.dampers.radius, 0),
     DEM2DI_CONTACT_COLUMN("viscous_shear", VISCOUS_SHEARS, viscous_shear, finite_field),
     DEM2DI_UNSAVED(VISCOUS_SHEARS, list.dampers.inverse, 0),
     DEM2DI_UNSAVED(VISCOUS_SHEARS, list.dampers.inverse_a, 0),
@@ -14472,6 +14473,7 @@ static bool dem2di_plan_needs(const dem2di_plan *plan, dem2di_group group) {
     if (group == DEM2DI_DASHPOTS && (terms & DEM2DI_CALLERS_LAW))
         return (terms & DEM2DI_DASHPOT) != 0;
     if (group == DEM2DI_DASHPOTS) return terms != 0;
+    if (group == DEM2DI_RADII) return (terms & (DEM2DI_ROLLING | DEM2DI_CALLERS_LAW)) != 0;
     if (group == DEM2DI_MOMENTS) return (terms & DEM2DI_ROLLING) != 0;
     if (group == DEM2DI_VISCOUS_SHEARS) return (terms & DEM2DI_TANGENTIAL_DASHPOT) != 0;
     if (group == DEM2DI_VISCOUS_MOMENTS) return (terms & DEM2DI_ROLLING_DASHPOT) != 0;
@@ -19959,7 +19961,8 @@ static void dem2di_dampers_task(void *context, int begin, int end) {
             to->inverse_a[i] = world->inverse[key->a].inertia;
             to->inverse_b[i] = i < list->pairs ? world->inverse[key->b].inertia : 0;
         }
-        if (terms & DEM2DI_ROLLING) to->radius[i] = dem2di_reduced_radius(world, i);
+        if (terms & (DEM2DI_ROLLING | DEM2DI_CALLERS_LAW))
+            to->radius[i] = dem2di_reduced_radius(world, i);
         if (terms & DEM2DI_ROLLING_DASHPOT) to->rolling[i] = dem2di_rolling_dashpot(world, i);
     }
 }
@@ -20793,14 +20796,16 @@ static DEM2DI_INLINE void dem2di_law_row_callers(const dem2d_world *world, int i
                                                  const dem2di_contact *contact, double radius,
                                                  const dem2di_two *state, int k,
                                                  dem2di_law_rows *rows) {
-    const double inverse = dem2di_reduced_inverse(world, i);
     if (!(world->law_omits & DEM2D_LAW_IDS)) dem2di_law_row_name(world, i, k, rows);
+    if (!(world->law_omits & DEM2D_LAW_DASHPOTS)) {
+        const double inverse = world->list.dampers.inverse[i];
+        rows->mass[k] = inverse > 0 ? 1 / inverse : 0;
+    }
     rows->pair[k] = law;
     rows->point[k] = 0;
     rows->normal_x[k] = contact->normal.x;
     rows->normal_y[k] = contact->normal.y;
     rows->sign[k] = dem2di_sign_of(world, i);
-    rows->mass[k] = inverse > 0 ? 1 / inverse : 0;
     rows->radius[k] = radius;
     rows->compression[k] = contact->depth * contact->depth / 2;
     if (state != NULL) memcpy(rows->state[k], state->at, sizeof rows->state[k]);
@@ -20838,11 +20843,10 @@ static void dem2di_law_row_second(const dem2d_world *world, int i, const dem2di_
 }
 
 /* Terms of the law beside springs and friction, of the rows from `first` on. */
-static void dem2di_law_add_terms(const dem2d_world *world, int i, const dem2di_last *last,
-                                 const dem2di_contact *contact,
+static void dem2di_law_add_terms(const dem2d_world *world, int i, const dem2d_pair_desc *law,
+                                 const dem2di_last *last, const dem2di_contact *contact,
                                  const dem2di_relative_motion *motion, int first,
                                  dem2di_law_rows *rows) {
-    const dem2d_pair_desc *law = dem2di_law_of(world, i);
     const double spin = motion->wb - motion->wa, approach = -dem2di_velocity_n(contact, motion);
     const dem2di_dampers *dampers = &world->list.dampers;
     const int terms = world->plan.terms;
@@ -20850,7 +20854,9 @@ static void dem2di_law_add_terms(const dem2d_world *world, int i, const dem2di_l
     rows->approach[first] = approach;
     rows->dashpot[first] = dashpot;
     rows->tangential_dashpot[first] =
-        terms & DEM2DI_ALL_DASHPOTS ? dem2di_tangential_dashpot(world, i, &contact->arms) : 0;
+        law->tangential_damping_ratio > 0 && (terms & DEM2DI_ALL_DASHPOTS)
+            ? dem2di_tangential_dashpot(world, i, &contact->arms)
+            : 0;
     if (rows->count - first == 2) {
         const dem2di_point_pair *pair = &world->list.contacts.point_pairs[i - world->list.discs];
         double sliding = rows->tangential_dashpot[first];
@@ -20862,9 +20868,7 @@ static void dem2di_law_add_terms(const dem2d_world *world, int i, const dem2di_l
     }
     if (!(terms & (DEM2DI_ROLLING | DEM2DI_CALLERS_LAW))) return;
     bool rolls = law->rolling_friction > 0 || world->law != NULL;
-    double radius = 0;
-    if (rolls)
-        radius = terms & DEM2DI_ROLLING ? dampers->radius[i] : dem2di_reduced_radius(world, i);
+    double radius = rolls ? dampers->radius[i] : 0;
     rows->spin[first] = spin;
     rows->rolling_stiffness[first] = dem2di_rolling_stiffness(law, radius);
     rows->rolling_friction[first] = law->rolling_friction * radius;
@@ -20922,7 +20926,7 @@ static DEM2DI_INLINE void dem2di_law_add(const dem2d_world *world, int i, const 
         dem2di_law_add_two(world, i, last, slip, rows);
     else
         dem2di_law_add_row(law, i, 1, contact->depth, slip, last->contact.shear, rows);
-    if (terms) dem2di_law_add_terms(world, i, last, contact, &motion, first, rows);
+    if (terms) dem2di_law_add_terms(world, i, law, last, contact, &motion, first, rows);
 }
 
 /* Are the normal forces of two points those of their springs alone? */
@@ -24224,19 +24228,24 @@ static void dem2di_observe_motion(dem2d_world *world, const dem2di_ledger *last)
 /* Is the next state of each particle finite if no load exceeds the greatest of this pass? */
 static bool dem2di_surely_finite(const dem2d_world *world, const dem2di_count *count) {
     const double dt = world->time_step, pushed = count->load * (world->list.count + 1.0);
-    double far = 0, speed = 0, spin = 0;
+    double x = 0, y = 0, vx = 0, vy = 0, w = 0, light = 0, slender = 0, load = 0;
     if (count->unsound > world->count.unsound) return false;
     for (int i = 0; i < world->body_count; i++) {
         const dem2di_state *now = &world->now[i];
-        const dem2di_inverse *inverse = &world->inverse[i];
-        const dem2di_load external = dem2di_external(world, i);
-        const double load = pushed + dem2di_load_size(&external);
-        far = dem2di_max(far, fabs(now->x.x) + fabs(now->x.y));
-        speed = dem2di_max(speed, fabs(now->v.x) + fabs(now->v.y) + dt * (load * inverse->mass));
-        spin = dem2di_max(spin, fabs(now->w) + dt * (load * inverse->inertia));
+        x = dem2di_max(x, fabs(now->x.x));
+        y = dem2di_max(y, fabs(now->x.y));
+        vx = dem2di_max(vx, fabs(now->v.x));
+        vy = dem2di_max(vy, fabs(now->v.y));
+        w = dem2di_max(w, fabs(now->w));
+        light = dem2di_max(light, world->inverse[i].mass);
+        slender = dem2di_max(slender, world->inverse[i].inertia);
     }
-    speed += dt * (fabs(world->gravity.x) + fabs(world->gravity.y)); /* damping doubles at most */
-    return far + 4 * dt * speed < 1e300 && 4 * dt * spin < 1e50;
+    for (int i = 0; i < world->body_count && world->loaded; i++)
+        load = dem2di_max(load, dem2di_load_size(&world->loads[i]));
+    load += pushed;
+    const double gravity = fabs(world->gravity.x) + fabs(world->gravity.y);
+    const double speed = vx + vy + dt * (load * light + gravity); /* damping doubles at most */
+    return x + y + 4 * dt * speed < 1e300 && 4 * dt * (w + dt * (load * slender)) < 1e50;
 }
 
 /* A particle that the step would give a state that is not finite, or -1. */
