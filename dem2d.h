@@ -13192,7 +13192,7 @@ static inline dem2d_rot dem2di_rotate(dem2d_rot q, double angle) {
 /* An angle turned further, about once around at most. */
 static inline double dem2di_turned(double angle, double by) {
     angle += by;
-    return fabs(angle) > DEM2DI_PI ? fmod(angle, 2 * DEM2DI_PI) : angle;
+    return fabs(angle) >= 2 * DEM2DI_PI ? fmod(angle, 2 * DEM2DI_PI) : angle;
 }
 
 /* Bound of how far a point of the support moves with a particle in a step: its path, by the
@@ -21378,6 +21378,74 @@ static void dem2di_contact_idle(dem2d_world *world, int i) {
         dem2di_contact_apart(world, i, dem2di_vec(0, 0));
 }
 
+/* The built-in law of one contact of one point, with terms beside springs and friction: what
+   dem2di_law_solve makes of its row. Returns the moment. */
+static DEM2DI_INLINE double dem2di_law_one_terms(const dem2d_world *world, int i,
+                                                 const dem2d_pair_desc *law, double slip,
+                                                 const dem2di_relative_motion *motion,
+                                                 double last_shear, dem2di_contact *contact) {
+    const dem2di_contacts *to = &world->list.contacts;
+    const dem2di_dampers *dampers = &world->list.dampers;
+    const int terms = world->plan.terms;
+    const double dt = world->made_step, kt = law->tangential_stiffness;
+    double viscous, dashpot = 0;
+    contact->force = law->normal_stiffness * contact->depth;
+    if (terms & (DEM2DI_DASHPOT | DEM2DI_TANGENTIAL_DASHPOT))
+        contact->force =
+            dem2di_damped(contact->force, dampers->normal[i], -dem2di_velocity_n(contact, motion));
+    const double limit = law->friction * contact->force;
+    if (terms & DEM2DI_TANGENTIAL_DASHPOT)
+        contact->shear =
+            dem2di_slider(kt, dem2di_tangential_dashpot(world, i, &contact->arms), slip, dt, limit,
+                          last_shear - to->viscous_shear[i], &to->viscous_shear[i]);
+    else
+        contact->shear = dem2di_held(limit, last_shear - kt * slip * dt);
+    if (!(terms & DEM2DI_ROLLING)) return 0;
+    const double radius = law->rolling_friction > 0 ? dampers->radius[i] : 0;
+    const double last = to->moment[i] - dem2di_viscous_moment_of(world, to, i);
+    if ((terms & DEM2DI_ROLLING_DASHPOT) && radius > 0) dashpot = dampers->rolling[i];
+    to->moment[i] =
+        dem2di_slider(dem2di_rolling_stiffness(law, radius), dashpot, motion->wb - motion->wa, dt,
+                      law->rolling_friction * radius * contact->force, last, &viscous);
+    if (terms & DEM2DI_ROLLING_DASHPOT) to->viscous_moment[i] = viscous;
+    return to->moment[i];
+}
+
+/* dem2di_update_wall_contact for a half-plane without a pivot, in a world of circles with the
+   built-in law: the same numbers, without those that are 0. Returns whether the contact is one of
+   these. */
+static DEM2DI_INLINE bool dem2di_update_plane_contact(dem2d_world *world, int i,
+                                                      dem2di_count *count) {
+    const dem2di_key *key = &world->list.keys[i];
+    if (key->b >= DEM2DI_VERTEX || world->parts[key->b].extent > 0 || dem2di_has_pivot(world, i))
+        return false;
+    const dem2di_surface *surface = &world->surfaces[key->b];
+    const dem2di_state *state = &world->now[key->a];
+    const dem2d_pair_desc *law = dem2di_law_with(world, i, true);
+    const dem2di_relative_motion motion = dem2di_motion_with(world, i, true);
+    dem2di_contact last, contact;
+    contact.normal = dem2di_negate(dem2di_surface_normal(surface));
+    contact.depth =
+        state->radius - dem2di_dot(dem2di_sub(surface->point, state->x), contact.normal);
+    if (!(contact.depth > 0)) {
+        dem2di_contact_apart(world, i, contact.normal);
+        return true;
+    }
+    (void)dem2di_contact_get(world, &world->list.contacts, i, &last);
+    contact.arms.a_n = state->radius - contact.depth;
+    contact.arms.a_t = contact.arms.b_n = contact.arms.b_t = 0;
+    dem2di_wall_deepen(world, i, &contact);
+    const double slip = law->friction > 0 ? dem2di_slip(&last, &contact, &motion) : 0;
+    double moment = 0;
+    if (world->plan.terms == 0)
+        dem2di_law_one(law, slip, last.shear, world->made_step, &contact);
+    else
+        moment = dem2di_law_one_terms(world, i, law, slip, &motion, last.shear, &contact);
+    dem2di_force_put(world, i, &contact, moment, count);
+    dem2di_geometry_put(&world->list, i, &contact);
+    return true;
+}
+
 /* The same as for a pair, for a particle and a wall. Where segments are joined, the law comes after
    all of the geometry, and vertices are searched where both of their faces overlap. */
 static void dem2di_update_wall_contact(dem2d_world *world, int i, dem2di_law_rows *rows,
@@ -22686,7 +22754,9 @@ static void dem2di_tile_apply(dem2d_world *world, dem2di_tile *tile, dem2di_law_
 /* The contacts of a block that are not of two circles: first their geometry, then the law, whenever
    the rows are full. */
 static void dem2di_others_range(dem2d_world *world, int begin, int end, dem2di_count *count) {
-    const bool tiled = world->solver == DEM2D_CERTIFIED && world->plan.turns && !world->immovable;
+    const dem2di_plan *plan = &world->plan;
+    const bool tiled = world->solver == DEM2D_CERTIFIED && plan->turns && !world->immovable;
+    const bool planes = !plan->turns && !plan->joints && !world->immovable && world->law == NULL;
     dem2di_law_rows rows;
     dem2di_corners features[2];
     dem2di_tile_pairs points;
@@ -22700,6 +22770,8 @@ static void dem2di_others_range(dem2d_world *world, int begin, int end, dem2di_c
     pairs.pairs = &points;
     for (int i = begin; i < end; i++) {
         dem2di_tile *tile = NULL;
+        if (planes && i >= world->list.pairs && dem2di_update_plane_contact(world, i, count))
+            continue;
         if (tiled && i < world->list.pairs)
             tile = dem2di_tile_add(world, i, &smooth, &corners, &pairs);
         if (tile == NULL) {
@@ -23584,7 +23656,7 @@ DEM2DI_AVX2_INLINE double dem2di_fours_integrate(const dem2d_world *world, int b
         x = spin ? DEM2DI_SHUFFLE(moved, x, 0, 1, 2, 7) : DEM2DI_SHUFFLE(moved, x, 0, 1, 6, 7);
         dem2di_four_put(next, x);
         dem2di_four_put(next + 4, v);
-        if (spin && fabs(x[2]) > DEM2DI_PI) next[2] = fmod(x[2], 2 * DEM2DI_PI);
+        if (spin && fabs(x[2]) >= 2 * DEM2DI_PI) next[2] = fmod(x[2], 2 * DEM2DI_PI);
         dem2di_four square = v * v;
         most = dem2di_max(most, (square[0] + square[1]) * world->inverse_skin_squared[i]);
     }
