@@ -16609,10 +16609,11 @@ static int dem2di_parts_described(const dem2d_wall_desc *desc) {
     return desc->closed ? desc->count : desc->count - 1;
 }
 
-/* The ends of segment k of a chain. */
-static void dem2di_chain_ends(const dem2d_wall_desc *desc, int k, dem2d_vec ends[2]) {
-    ends[0] = desc->points[k];
-    ends[1] = desc->points[k + 1 < desc->count ? k + 1 : 0];
+/* The ends of segment k of a segment or chain. */
+static void dem2di_segment_ends(const dem2d_wall_desc *desc, int k, dem2d_vec ends[2]) {
+    const bool chain = desc->points != NULL;
+    ends[0] = chain ? desc->points[k] : desc->point;
+    ends[1] = chain ? desc->points[k + 1 < desc->count ? k + 1 : 0] : desc->end;
 }
 
 /* Is a segment of a chain without length, or does it turn straight back, by an angle that no grain
@@ -16620,7 +16621,7 @@ static void dem2di_chain_ends(const dem2d_wall_desc *desc, int k, dem2d_vec ends
 static dem2d_result dem2di_check_chain_segment(const dem2d_env *env, const dem2d_wall_desc *desc,
                                                int k) {
     dem2d_vec ends[2], along, next;
-    dem2di_chain_ends(desc, k, ends);
+    dem2di_segment_ends(desc, k, ends);
     double length = dem2di_length(dem2di_sub(ends[1], ends[0]));
     if (length == 0 && k + 1 == desc->count)
         return dem2di_fail(env, DEM2D_OUT_OF_RANGE, k,
@@ -16631,66 +16632,11 @@ static dem2d_result dem2di_check_chain_segment(const dem2d_env *env, const dem2d
     (void)dem2di_unit(dem2di_sub(ends[1], ends[0]), &along);
     int parts = dem2di_parts_described(desc), after = (k + 1) % parts;
     if (k + 1 == parts && !desc->closed) return DEM2D_OK;
-    dem2di_chain_ends(desc, after, ends);
+    dem2di_segment_ends(desc, after, ends);
     if (!dem2di_unit(dem2di_sub(ends[1], ends[0]), &next)) return DEM2D_OK; /* told by itself */
     if (dem2di_dot(along, next) > 0 || fabs(dem2di_cross(along, next)) > 1e-8) return DEM2D_OK;
     return dem2di_fail(env, DEM2D_OUT_OF_RANGE, (k + 1) % desc->count,
                        "points[%d]: the chain turns straight back", (k + 1) % desc->count);
-}
-
-/* What a segment of a chain covers in x. */
-typedef struct dem2di_extent_x {
-    double low, high;
-    int segment;
-} dem2di_extent_x;
-
-static int dem2di_extent_x_order(const void *a, const void *b) {
-    const dem2di_extent_x *one = (const dem2di_extent_x *)a, *other = (const dem2di_extent_x *)b;
-    if (one->low != other->low) return one->low < other->low ? -1 : 1;
-    return one->segment - other->segment;
-}
-
-/* Have two segments a point in common, to rounding? */
-static bool dem2di_segments_cross(const dem2d_vec a[2], const dem2d_vec b[2]) {
-    dem2d_vec u = dem2di_sub(a[1], a[0]), v = dem2di_sub(b[1], b[0]);
-    double side[4];
-    if (dem2di_max(a[0].y, a[1].y) < dem2di_min(b[0].y, b[1].y) ||
-        dem2di_max(b[0].y, b[1].y) < dem2di_min(a[0].y, a[1].y))
-        return false;
-    side[0] = dem2di_cross(u, dem2di_sub(b[0], a[0]));
-    side[1] = dem2di_cross(u, dem2di_sub(b[1], a[0]));
-    side[2] = dem2di_cross(v, dem2di_sub(a[0], b[0]));
-    side[3] = dem2di_cross(v, dem2di_sub(a[1], b[0]));
-    return !((side[0] > 0 && side[1] > 0) || (side[0] < 0 && side[1] < 0) ||
-             (side[2] > 0 && side[3] > 0) || (side[2] < 0 && side[3] < 0));
-}
-
-/* Segments in the order of their least x against those that begin before they end. */
-static dem2d_result dem2di_check_crossings(const dem2d_env *env, const dem2d_wall_desc *desc,
-                                           dem2di_extent_x *extents) {
-    int parts = dem2di_parts_described(desc);
-    for (int k = 0; k < parts; k++) {
-        dem2d_vec ends[2];
-        dem2di_chain_ends(desc, k, ends);
-        extents[k].low = dem2di_min(ends[0].x, ends[1].x);
-        extents[k].high = dem2di_max(ends[0].x, ends[1].x);
-        extents[k].segment = k;
-    }
-    qsort(extents, (size_t)parts, sizeof *extents, dem2di_extent_x_order);
-    for (int i = 0; i < parts; i++)
-        for (int j = i + 1; j < parts && extents[j].low <= extents[i].high; j++) {
-            int a = extents[i].segment, b = extents[j].segment, low = a < b ? a : b;
-            int apart = a < b ? b - a : a - b;
-            dem2d_vec one[2], other[2];
-            if (apart == 1 || (desc->closed && apart == parts - 1)) continue;
-            dem2di_chain_ends(desc, a, one);
-            dem2di_chain_ends(desc, b, other);
-            if (dem2di_segments_cross(one, other))
-                return dem2di_fail(env, DEM2D_OUT_OF_RANGE, low,
-                                   "points: the segments from points[%d] and points[%d] cross", low,
-                                   low + apart);
-        }
-    return DEM2D_OK;
 }
 
 static dem2d_result dem2di_check_chain(const dem2d_world *world, const dem2d_wall_desc *desc) {
@@ -16708,12 +16654,7 @@ static dem2d_result dem2di_check_chain(const dem2d_world *world, const dem2d_wal
         dem2d_result result = dem2di_check_chain_segment(env, desc, k);
         if (result != DEM2D_OK) return result;
     }
-    dem2di_extent_x *extents =
-        (dem2di_extent_x *)dem2di_allocate(&world->user_env, (size_t)parts, sizeof *extents);
-    if (extents == NULL) return dem2di_out_of_memory(world, "the check of a chain");
-    dem2d_result result = dem2di_check_crossings(env, desc, extents);
-    dem2di_release(&world->user_env, extents, (size_t)parts, sizeof *extents);
-    return result;
+    return DEM2D_OK;
 }
 
 static dem2d_result dem2di_check_segment(const dem2d_world *world, const dem2d_wall_desc *desc) {
@@ -16777,74 +16718,6 @@ static dem2d_result dem2di_check_wall_in_cell(const dem2d_world *world,
                                       dem2di_control_make(&world->control).holds);
 }
 
-/* Have a segment and a copy of one more than an end in common? */
-static bool dem2di_copies_cross(const dem2d_vec a[2], const dem2d_vec b[2]) {
-    const dem2d_vec u = dem2di_sub(a[1], a[0]), v = dem2di_sub(b[1], b[0]);
-    const double one = dem2di_length(u), other = dem2di_length(v);
-    const double near = DEM2DI_JOINT * dem2di_min(one, other);
-    for (int k = 0; k < 4; k++) {
-        const int p = k & 1, q = k >> 1;
-        if (dem2di_length(dem2di_sub(a[p], b[q])) > near) continue;
-        const double turn = p == q ? dem2di_dot(u, v) : -dem2di_dot(u, v); /* both from there */
-        return turn > 0 && fabs(dem2di_cross(u, v)) <= 1e-8 * one * other;
-    }
-    return dem2di_min(a[0].x, a[1].x) <= dem2di_max(b[0].x, b[1].x) &&
-           dem2di_min(b[0].x, b[1].x) <= dem2di_max(a[0].x, a[1].x) && dem2di_segments_cross(a, b);
-}
-
-/* The ends of segment k of a segment or chain. */
-static void dem2di_segment_ends(const dem2d_wall_desc *desc, int k, dem2d_vec ends[2]) {
-    ends[0] = desc->point;
-    ends[1] = desc->end;
-    if (desc->points != NULL) dem2di_chain_ends(desc, k, ends);
-}
-
-/* Does a wall cross its copy that is moved by a vector? */
-static dem2d_result dem2di_check_copy(const dem2d_env *env, const dem2d_wall_desc *desc,
-                                      dem2d_vec way) {
-    const int parts = dem2di_parts_described(desc);
-    for (int i = 0; i < parts; i++)
-        for (int j = 0; j < parts; j++) {
-            dem2d_vec one[2], other[2];
-            dem2di_segment_ends(desc, i, one);
-            dem2di_segment_ends(desc, j, other);
-            for (int k = 0; k < 2; k++) other[k] = dem2di_add(other[k], way);
-            if (!dem2di_copies_cross(one, other)) continue;
-            if (desc->points == NULL)
-                return dem2di_fail(env, DEM2D_OUT_OF_RANGE, -1,
-                                   "end: the segment meets its copy across the border of the cell");
-            return dem2di_fail(env, DEM2D_OUT_OF_RANGE, i,
-                               "points: the segment from points[%d] meets the copy of that from "
-                               "points[%d] across the border of the cell",
-                               i, j);
-        }
-    return DEM2D_OK;
-}
-
-/* A segment or chain that is given must not cross its copies; they may be joined at ends. Of two
-   copies on opposite sides one is enough. */
-static dem2d_result dem2di_check_copies(const dem2d_world *world, const dem2d_wall_desc *desc) {
-    dem2d_result result = DEM2D_OK;
-    if (!world->periodic || (desc->points == NULL && !desc->segment)) return DEM2D_OK;
-    dem2d_box box = {{HUGE_VAL, HUGE_VAL}, {-HUGE_VAL, -HUGE_VAL}};
-    for (int k = 0; k < dem2di_parts_described(desc); k++) {
-        dem2d_vec ends[2];
-        dem2di_segment_ends(desc, k, ends);
-        for (int end = 0; end < 2; end++) dem2di_box_add(&box, ends[end]);
-    }
-    const dem2d_vec from = box.lower, size = dem2di_sub(box.upper, box.lower);
-    const dem2d_vec margin =
-        dem2di_scale(dem2di_vec(size.x + size.y, size.x + size.y), DEM2DI_JOINT);
-    box.lower = dem2di_sub(dem2di_sub(from, size), margin);
-    box.upper = dem2di_add(box.upper, margin);
-    dem2di_shifts at = dem2di_shifts_start(&world->cell, from, &box);
-    while (result == DEM2D_OK && dem2di_shifts_next(&at))
-        if (at.along_b > 0 || (at.along_b == 0 && at.along_a > 0))
-            result = dem2di_check_copy(&world->env, desc,
-                                       dem2di_cell_shift(&world->cell, at.along_a, at.along_b));
-    return result;
-}
-
 static dem2d_result dem2di_check_wall(const dem2d_world *world, const dem2d_wall_desc *desc) {
     const dem2d_env *env = &world->env;
     dem2d_vec unit;
@@ -16872,6 +16745,146 @@ static dem2d_result dem2di_check_wall(const dem2d_world *world, const dem2d_wall
     if (!desc->segment && !dem2di_unit(desc->normal, &unit))
         return dem2di_fail(env, DEM2D_OUT_OF_RANGE, -1, "normal is 0");
     return dem2di_check_spans(world, desc);
+}
+
+/* --- crossings of segments, and of their copies in a cell --------------------------------------
+ */
+
+/* What a segment of a wall covers in x. */
+typedef struct dem2di_extent_x {
+    double low, high;
+    int segment;
+} dem2di_extent_x;
+
+static int dem2di_extent_x_order(const void *a, const void *b) {
+    const dem2di_extent_x *one = (const dem2di_extent_x *)a, *other = (const dem2di_extent_x *)b;
+    if (one->low != other->low) return one->low < other->low ? -1 : 1;
+    return one->segment - other->segment;
+}
+
+/* The segments of a wall in the order of their least x. */
+typedef struct dem2di_extents {
+    const dem2d_wall_desc *desc;
+    dem2di_extent_x *at;
+    int count;
+    double longest; /* length of a segment */
+    dem2d_box box;
+} dem2di_extents;
+
+static void dem2di_extents_set(dem2di_extents *extents) {
+    for (int k = 0; k < extents->count; k++) {
+        dem2d_vec ends[2];
+        dem2di_segment_ends(extents->desc, k, ends);
+        extents->at[k].low = dem2di_min(ends[0].x, ends[1].x);
+        extents->at[k].high = dem2di_max(ends[0].x, ends[1].x);
+        extents->at[k].segment = k;
+        double length = dem2di_length(dem2di_sub(ends[1], ends[0]));
+        extents->longest = dem2di_max(extents->longest, length);
+        for (int end = 0; end < 2; end++) dem2di_box_add(&extents->box, ends[end]);
+    }
+    qsort(extents->at, (size_t)extents->count, sizeof *extents->at, dem2di_extent_x_order);
+}
+
+/* Have two segments a point in common, to rounding? */
+static bool dem2di_segments_cross(const dem2d_vec a[2], const dem2d_vec b[2]) {
+    dem2d_vec u = dem2di_sub(a[1], a[0]), v = dem2di_sub(b[1], b[0]);
+    double side[4];
+    if (dem2di_max(a[0].x, a[1].x) < dem2di_min(b[0].x, b[1].x) ||
+        dem2di_max(b[0].x, b[1].x) < dem2di_min(a[0].x, a[1].x) ||
+        dem2di_max(a[0].y, a[1].y) < dem2di_min(b[0].y, b[1].y) ||
+        dem2di_max(b[0].y, b[1].y) < dem2di_min(a[0].y, a[1].y))
+        return false;
+    side[0] = dem2di_cross(u, dem2di_sub(b[0], a[0]));
+    side[1] = dem2di_cross(u, dem2di_sub(b[1], a[0]));
+    side[2] = dem2di_cross(v, dem2di_sub(a[0], b[0]));
+    side[3] = dem2di_cross(v, dem2di_sub(a[1], b[0]));
+    return !((side[0] > 0 && side[1] > 0) || (side[0] < 0 && side[1] < 0) ||
+             (side[2] > 0 && side[3] > 0) || (side[2] < 0 && side[3] < 0));
+}
+
+/* Have a segment and a copy of one more than an end in common? */
+static bool dem2di_copies_cross(const dem2d_vec a[2], const dem2d_vec b[2]) {
+    const dem2d_vec u = dem2di_sub(a[1], a[0]), v = dem2di_sub(b[1], b[0]);
+    const double one = dem2di_length(u), other = dem2di_length(v);
+    const double near = DEM2DI_JOINT * dem2di_min(one, other);
+    for (int k = 0; k < 4; k++) {
+        const int p = k & 1, q = k >> 1;
+        if (dem2di_length(dem2di_sub(a[p], b[q])) > near) continue;
+        const double turn = p == q ? dem2di_dot(u, v) : -dem2di_dot(u, v); /* both from there */
+        return turn > 0 && fabs(dem2di_cross(u, v)) <= 1e-8 * one * other;
+    }
+    return dem2di_segments_cross(a, b);
+}
+
+/* Does segment a of a wall cross its segment b, or the copy of b that is moved by a vector? */
+static bool dem2di_wall_crosses(const dem2d_wall_desc *desc, int a, int b, const dem2d_vec *way) {
+    const int apart = abs(b - a);
+    dem2d_vec one[2], other[2];
+    if (way == NULL && (apart == 1 || (desc->closed && apart == desc->count - 1))) return false;
+    dem2di_segment_ends(desc, a, one);
+    dem2di_segment_ends(desc, b, other);
+    for (int k = 0; k < 2 && way != NULL; k++) other[k] = dem2di_add(other[k], *way);
+    return way == NULL ? dem2di_segments_cross(one, other) : dem2di_copies_cross(one, other);
+}
+
+/* Segments in the order of their least x against those that begin before they end: of the wall, or
+   of its copy that is moved by a vector. */
+static dem2d_result dem2di_check_crossings(const dem2d_env *env, const dem2di_extents *extents,
+                                           const dem2d_vec *way) {
+    const dem2d_wall_desc *desc = extents->desc;
+    const double x = way != NULL ? way->x : 0, near = DEM2DI_JOINT * extents->longest;
+    for (int i = 0, from = 0; i < extents->count; i++) {
+        const double low = extents->at[i].low - x - extents->longest - near;
+        while (from < extents->count && extents->at[from].low < low) from++;
+        int j = way != NULL ? from : i + 1;
+        for (; j < extents->count && extents->at[j].low + x <= extents->at[i].high + near; j++) {
+            const int a = extents->at[i].segment, b = extents->at[j].segment;
+            const int first = way == NULL && b < a ? b : a;
+            if (!dem2di_wall_crosses(desc, a, b, way)) continue;
+            if (desc->points == NULL)
+                return dem2di_fail(env, DEM2D_OUT_OF_RANGE, -1,
+                                   "end: the segment meets its copy across the border of the cell");
+            return dem2di_fail(env, DEM2D_OUT_OF_RANGE, first,
+                               "points: the segments from points[%d] and points[%d] cross%s", first,
+                               a + b - first,
+                               way == NULL ? "" : ": the second is a copy, across the border");
+        }
+    }
+    return DEM2D_OK;
+}
+
+/* A wall must not cross its copies; they may be joined at ends. Of two copies on opposite sides one
+   is enough. */
+static dem2d_result dem2di_check_copies(const dem2d_world *world, const dem2di_extents *extents) {
+    dem2d_box box = extents->box;
+    const dem2d_vec from = box.lower, size = dem2di_sub(box.upper, box.lower);
+    const double margin = DEM2DI_JOINT * (size.x + size.y);
+    dem2d_result result = dem2di_check_cells(&world->env, "wall", &world->cell, &box);
+    box.lower = dem2di_sub(dem2di_sub(from, size), dem2di_vec(margin, margin));
+    box.upper = dem2di_add(box.upper, dem2di_vec(margin, margin));
+    dem2di_shifts at = dem2di_shifts_start(&world->cell, from, &box);
+    while (result == DEM2D_OK && dem2di_shifts_next(&at)) {
+        const dem2d_vec way = dem2di_cell_shift(&world->cell, at.along_a, at.along_b);
+        if (at.along_b > 0 || (at.along_b == 0 && at.along_a > 0))
+            result = dem2di_check_crossings(&world->env, extents, &way);
+    }
+    return result;
+}
+
+/* The segments of a wall that is given cross neither each other nor their copies. */
+static dem2d_result dem2di_check_given(const dem2d_world *world, const dem2d_wall_desc *desc) {
+    const size_t count = (size_t)dem2di_parts_described(desc);
+    const dem2d_box none = {{HUGE_VAL, HUGE_VAL}, {-HUGE_VAL, -HUGE_VAL}};
+    dem2di_extents extents = {desc, NULL, (int)count, 0, none};
+    if (desc->points == NULL && !(desc->segment && world->periodic)) return DEM2D_OK;
+    extents.at = (dem2di_extent_x *)dem2di_allocate(&world->user_env, count, sizeof *extents.at);
+    if (extents.at == NULL) return dem2di_out_of_memory(world, "the check of a wall");
+    dem2di_extents_set(&extents);
+    dem2d_result result = DEM2D_OK;
+    if (desc->points != NULL) result = dem2di_check_crossings(&world->env, &extents, NULL);
+    if (result == DEM2D_OK && world->periodic) result = dem2di_check_copies(world, &extents);
+    dem2di_release(&world->user_env, extents.at, count, sizeof *extents.at);
+    return result;
 }
 
 /* Does wall a come before b in the order of names, then of indices? */
@@ -16983,7 +16996,7 @@ static dem2d_wall_desc dem2di_wall_settled(const dem2d_wall_desc *desc, dem2d_ve
     dem2d_wall_desc settled = *desc;
     dem2d_vec ends[2], along;
     if (desc->points != NULL) {
-        dem2di_chain_ends(desc, 0, ends);
+        dem2di_segment_ends(desc, 0, ends);
         settled.segment = true;
         settled.point = ends[0];
         settled.end = ends[1];
@@ -17004,13 +17017,9 @@ static dem2di_part dem2di_part_described(const dem2d_wall_desc *desc, int slot, 
     part.start = dem2di_vec(0, 0);
     part.extent = 0;
     part.wall = slot;
-    ends[0] = desc->point;
-    ends[1] = desc->end;
-    if (desc->points != NULL) {
-        dem2di_chain_ends(desc, k, ends);
-        part.start = dem2di_sub(ends[0], desc->point);
-    }
     if (desc->segment) {
+        dem2di_segment_ends(desc, k, ends);
+        part.start = dem2di_sub(ends[0], desc->point);
         (void)dem2di_unit(dem2di_sub(ends[1], ends[0]), &along);
         part.extent = dem2di_length(dem2di_sub(ends[1], ends[0]));
     }
@@ -17203,7 +17212,7 @@ DEM2D_API dem2d_result dem2d_world_add_wall(dem2d_world *world, const dem2d_wall
                                             dem2d_wall_id *id) {
     if (world == NULL || desc == NULL || id == NULL) return DEM2D_NULL_ARGUMENT;
     dem2d_result result = dem2di_check_wall(world, desc);
-    if (result == DEM2D_OK) result = dem2di_check_copies(world, desc);
+    if (result == DEM2D_OK) result = dem2di_check_given(world, desc);
     if (result != DEM2D_OK) return result;
     int slot = 0;
     while (slot < world->wall_count && world->walls[slot].alive) slot++;
@@ -17284,7 +17293,7 @@ DEM2D_API dem2d_result dem2d_world_set_wall(dem2d_world *world, dem2d_wall_id id
     if (world == NULL || desc == NULL) return DEM2D_NULL_ARGUMENT;
     if (!dem2di_wall_lives(world, id)) return dem2di_stale(world, "wall", id.index);
     dem2d_result result = dem2di_check_wall(world, desc);
-    if (result == DEM2D_OK) result = dem2di_check_copies(world, desc);
+    if (result == DEM2D_OK) result = dem2di_check_given(world, desc);
     if (result != DEM2D_OK) return result;
     if (!dem2di_line_make(world, desc)) return DEM2D_OUT_OF_MEMORY;
     int slot = (int)id.index, parts = dem2di_parts_described(desc);

@@ -647,8 +647,11 @@ static void test_refused(void **state) {
     static const struct {
         dem2d_vec end;
         const char *word;
-    } segments[] = {
-        {{4.7, 0.5}, "copy"}, {{-4, 0.5}, "copy"}, {{8.6, 8.6}, "copy"}, {{1e10, 0}, "2^26"}};
+    } segments[] = {{{4.7, 0.5}, "copy"},
+                    {{-4, 0.5}, "copy"},
+                    {{8.6, 8.6}, "copy"},
+                    {{1e10, 0}, "2^26"},
+                    {{1e5, 3e4}, "1024 cells"}};
     wall.segment = true;
     for (int k = 0; k < COUNT_OF(segments); k++) {
         wall.end = segments[k].end;
@@ -704,14 +707,71 @@ static void test_refused(void **state) {
     assert_clean(&env);
 }
 
+/* Twice the area of the triangle from p by a and b. */
+static double side_of(dem2d_vec p, dem2d_vec a, dem2d_vec b) {
+    return (a.x - p.x) * (b.y - p.y) - (a.y - p.y) * (b.x - p.x);
+}
+
+/* Does a star cross its copy that is moved by a vector? Each side against each, in doubles: points
+   are random, none is on a side. */
+static bool copy_crosses(const dem2d_vec *points, int count, dem2d_vec way) {
+    for (int i = 0; i < count; i++)
+        for (int j = 0; j < count; j++) {
+            const dem2d_vec a = points[i], b = points[(i + 1) % count];
+            dem2d_vec p = points[j], q = points[(j + 1) % count];
+            p.x += way.x, p.y += way.y, q.x += way.x, q.y += way.y;
+            if ((side_of(a, b, p) > 0) != (side_of(a, b, q) > 0) &&
+                (side_of(p, q, a) > 0) != (side_of(p, q, b) > 0))
+                return true;
+        }
+    return false;
+}
+
+/* Chains that reach beyond the cell are refused if, and only if, they cross a copy: stars of random
+   radii in cells that lean. */
+static void test_chains_and_copies(void **state) {
+    (void)state;
+    const dem2d_material_desc soft = soft_desc(false);
+    uint64_t seed = 11;
+    int refused = 0;
+    for (int n = 0; n < 400; n++) {
+        dem2d_vec points[40];
+        const int count = 3 + n % 38;
+        const dem2d_vec centre = vec(random_between(&seed, -3, 3), random_between(&seed, -3, 3));
+        for (int k = 0; k < count; k++) {
+            const double angle = 2 * TEST_PI * k / count, r = random_between(&seed, 0.3, 0.9);
+            points[k] = vec(centre.x + r * cos(angle), centre.y + r * sin(angle));
+        }
+        dem2d_world_desc desc = {0};
+        desc.time_step = DT;
+        if (n % 3 != 1) desc.cell.a = vec(random_between(&seed, 0.8, 1.7), 0);
+        if (n % 3 != 2) desc.cell.b = vec(n % 3 == 0 ? random_between(&seed, -0.4, 0.4) : 0, 1.2);
+        const scene s = open_scene(&desc, &soft);
+        dem2d_wall_desc chain = plane_desc(&s, vec(0, 0), vec(0, 0));
+        dem2d_wall_id id;
+        chain.points = points, chain.count = count, chain.closed = true;
+        bool crosses = false;
+        for (int i = -3; i <= 3; i++)
+            for (int j = -3; j <= 3; j++) {
+                const dem2d_vec way = vec(i * desc.cell.a.x + j * desc.cell.b.x, j * desc.cell.b.y);
+                if (way.x != 0 || way.y != 0) crosses = crosses || copy_crosses(points, count, way);
+            }
+        assert_result(dem2d_world_add_wall(s.world, &chain, &id),
+                      crosses ? DEM2D_OUT_OF_RANGE : DEM2D_OK);
+        refused += crosses;
+        close_scene(&s);
+    }
+    assert_in_range(refused, 50, 350); /* both happen */
+}
+
 int main(void) {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(test_copies),    cmocka_unit_test(test_independent),
-        cmocka_unit_test(test_snapshots), cmocka_unit_test(test_memory),
-        cmocka_unit_test(test_slide),     cmocka_unit_test(test_momentum),
-        cmocka_unit_test(test_seen),      cmocka_unit_test(test_sheared),
-        cmocka_unit_test(test_ledger),    cmocka_unit_test(test_refused),
-        cmocka_unit_test(test_written),
+        cmocka_unit_test(test_copies),      cmocka_unit_test(test_chains_and_copies),
+        cmocka_unit_test(test_independent), cmocka_unit_test(test_snapshots),
+        cmocka_unit_test(test_memory),      cmocka_unit_test(test_slide),
+        cmocka_unit_test(test_momentum),    cmocka_unit_test(test_seen),
+        cmocka_unit_test(test_sheared),     cmocka_unit_test(test_ledger),
+        cmocka_unit_test(test_refused),     cmocka_unit_test(test_written),
     };
     return cmocka_run_group_tests_name("walls in a periodic cell", tests, NULL, NULL);
 }
