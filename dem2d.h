@@ -12911,7 +12911,8 @@ static DEM2DI_INLINE double dem2di_damped(double spring, double dashpot, double 
 
 /* Spring and dashpot side by side, and in series with both a slider that yields at the limit of
    their sum: the whole slides at a rate, spring and dashpot at that of which the slider has no
-   part. So what the dashpot and the slider take is never below 0. */
+   part. So what the dashpot and the slider take is never below 0. A law that has neither, after one
+   that had both, holds what is left of them to its limit. */
 typedef struct dem2di_slid {
     double sum, held; /* force of both without a limit, and within it */
     double own, all;  /* of the dashpot, without sign: while the slider yields, and while not */
@@ -12923,7 +12924,8 @@ static DEM2DI_INLINE dem2di_slid dem2di_slider_sum(double stiffness, double dash
     slid.all = dashpot * rate;
     slid.sum = last - stiffness * rate * time_step - slid.all;
     slid.held = dem2di_held(limit, slid.sum);
-    slid.own = dashpot * ((last - slid.held) / (stiffness * time_step + dashpot));
+    const double both = stiffness * time_step + dashpot;
+    slid.own = dashpot * ((last - slid.held) / (both > 0 ? both : 1));
     return slid;
 }
 

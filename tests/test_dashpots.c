@@ -479,13 +479,72 @@ static void test_edited(void **state) {
     }
 }
 
+/* --- a law that loses its springs ---------------------------------------------------------------
+ */
+
+/* A grain that slides and rolls on a floor, and one on it that goes the other way. One of another
+   material is far away: its dashpots are those of the world. */
+static scene rubbed_grains(bool round) {
+    dem2d_world_desc desc = {0};
+    dem2d_material_desc stone = stone_desc(8e6, 0.5);
+    dem2d_material_id other;
+    dem2d_vec corners[12];
+    stone.damping_ratio = stone.tangential_damping_ratio = stone.rolling_damping_ratio = 0.1;
+    stone.rolling_friction = 0.1;
+    desc.time_step = 1e-5;
+    const scene s = open_scene(&desc, &stone);
+    assert_ok(dem2d_world_add_material(s.world, &stone, &other));
+    (void)add_floor(&s);
+    for (int k = 0; k < 12; k++) {
+        const double angle = (double)TEST_PI / 6 * (k - 2.5); /* one edge is below */
+        corners[k] = vec(RADIUS * cos(angle), RADIUS * sin(angle));
+    }
+    for (int i = 0; i < 2; i++) {
+        dem2d_shape *shape = round ? make_disc(RADIUS) : make_polygon(corners, 12, 0);
+        const double height = round ? RADIUS : RADIUS * cos((double)TEST_PI / 12);
+        (void)add_shape(&s, shape, DEM2D_FREE, vec(0, (2 * i + 1) * (height - 1e-4)), 0,
+                        vec(1 - 2 * i, 0), 5 - 15 * i);
+    }
+    const dem2d_particle_id far =
+        add_shape(&s, make_disc(RADIUS), DEM2D_FREE, vec(1, 1), 0, vec(0, 0), 0);
+    assert_ok(dem2d_world_set_material(s.world, far, other));
+    step(&s, 3);
+    return s;
+}
+
+/* What is left of the forces is held to limits of 0 in the next step. */
+static void test_springs_end(void **state) {
+    (void)state;
+    for (int round = 0; round < 2; round++)
+        for (int which = 0; which < 2; which++) {
+            const scene s = rubbed_grains(round);
+            dem2d_pair_desc pair;
+            dem2d_contact_info list[2];
+            assert_int_equal(contacts_of(&s, list, 2), 2);
+            for (int k = 0; k < 2; k++)
+                assert_true(list[k].tangential_force != 0 && list[k].moment != 0);
+            assert_ok(dem2d_world_get_pair(s.world, s.material, s.material, &pair));
+            if (which == 0) pair.rolling_friction = pair.rolling_damping_ratio = 0;
+            if (which == 1) pair.tangential_stiffness = 0;
+            assert_ok(dem2d_world_set_pair(s.world, s.material, s.material, &pair));
+            step(&s, 1);
+            assert_int_equal(contacts_of(&s, list, 2), 2);
+            for (int k = 0; k < 2; k++) {
+                assert_true(list[k].moment == 0);
+                assert_true((list[k].tangential_force == 0) == (which == 1));
+            }
+            step(&s, 10);
+            close_scene(&s);
+        }
+}
+
 int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(test_impacts),   cmocka_unit_test(test_energies),
         cmocka_unit_test(test_bounds),    cmocka_unit_test(test_bounds_at_once),
         cmocka_unit_test(test_safe_step), cmocka_unit_test(test_nothing_to_damp),
         cmocka_unit_test(test_snapshots), cmocka_unit_test(test_refused),
-        cmocka_unit_test(test_edited),
+        cmocka_unit_test(test_edited),    cmocka_unit_test(test_springs_end),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }
