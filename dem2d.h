@@ -18218,8 +18218,9 @@ static inline void dem2di_entries_swap(uint64_t *one, uint64_t *other) {
     *other = high;
 }
 
-/* Twelve exchanges sort six entries, and 19 sort eight, which is the least in both cases (Knuth, The
-   Art of Computer Programming 3, 5.3.4). Places that are not used have an entry behind all others. */
+/* Twelve exchanges sort six entries, and 19 sort eight, which is the least in both cases (Knuth,
+   The Art of Computer Programming 3, 5.3.4). Places that are not used have an entry behind all
+   others. */
 static inline void dem2di_entries_sort_six(uint64_t e[6]) {
     dem2di_entries_swap(&e[0], &e[5]), dem2di_entries_swap(&e[1], &e[3]);
     dem2di_entries_swap(&e[2], &e[4]), dem2di_entries_swap(&e[1], &e[2]);
@@ -18250,7 +18251,7 @@ static inline void dem2di_entry_put(int *run, int count, int i, uint64_t entry) 
     if (i < count) run[i] = dem2di_entry_contact(entry);
 }
 
-/* The few contacts of a particle in order. Without loops compilers keep the entries in registers. */
+/* The few contacts of a particle in order. Without loops the entries stay in registers. */
 static DEM2DI_INLINE void dem2di_entries_sort_few(const uint64_t *entries, int n, bool six,
                                                   int *run) {
     uint64_t e[DEM2DI_FEW_CONTACTS];
@@ -19325,7 +19326,7 @@ static int dem2di_listed_image(const dem2di_build *build, const dem2di_key *key,
     return -1;
 }
 
-/* The contact that two particles, or a particle and a part of a wall, had in the old list; or -1. */
+/* The contact of two particles, or of a particle and a part of a wall, in the old list; or -1. */
 static int dem2di_listed(const dem2di_list *list, const dem2di_key *key, bool wall) {
     const int begin = wall ? list->pairs : 0, end = wall ? list->count : list->pairs;
     for (int k = list->own[key->a]; k < list->first[key->a + 1]; k++) {
@@ -19337,8 +19338,8 @@ static int dem2di_listed(const dem2di_list *list, const dem2di_key *key, bool wa
     return -1;
 }
 
-/* Is this contact of the old list, if it is one of a pair, that of two partners? Most of a list comes
-   in the order of the old one: the contact that follows the last one found is tried first. */
+/* Is this contact of the old list, if it is one of a pair, that of two partners? Most of a list
+   comes in the order of the old one: the contact that follows the last one found is tried first. */
 static inline bool dem2di_is_listed(const dem2di_list *list, int contact, const dem2di_key *key) {
     return contact < list->pairs && list->keys[contact].a == key->a &&
            list->keys[contact].b == key->b;
@@ -19431,8 +19432,8 @@ static void dem2di_carry_others(const dem2di_build *build, int discs, int pairs)
     }
 }
 
-/* What a block of the search found, the one of lower rank first, and their contacts in the old list,
-   by kinds. */
+/* What a block of the search found, the one of lower rank first, and their contacts in the old
+   list, by kinds. */
 static void dem2di_fill_block(const dem2di_build *build, dem2di_block_result *result) {
     const dem2d_world *world = build->world;
     const dem2di_list list = world->list;
