@@ -27266,8 +27266,9 @@ static dem2d_box dem2di_question_reach(const dem2di_question *question) {
 }
 
 /* Numbers along a of the images of the tree's box within reach in row `along_b`: of a ray those
-   where it crosses the row, up to its limit. last below first: none. */
-static void dem2di_images_row(const dem2di_question *question, const dem2d_box *reach, int along_b,
+   where it crosses the row, up to its limit. last below first: none. False if a ray does not cross
+   the row; if it has crossed one before, it crosses none behind this one either. */
+static bool dem2di_images_row(const dem2di_question *question, const dem2d_box *reach, int along_b,
                               int *first, int *last) {
     const dem2d_cell *cell = &question->world->cell;
     const dem2d_box *tree = &question->world->tree.boxes[0];
@@ -27283,7 +27284,7 @@ static void dem2di_images_row(const dem2di_question *question, const dem2d_box *
         in[1] = dem2di_min(in[1], question->limit);
         *first = 0;
         *last = -1;
-        if (in[0] > in[1]) return;
+        if (in[0] > in[1]) return false;
         low = start.x + dem2di_min(in[0] * question->direction.x, in[1] * question->direction.x);
         high = start.x + dem2di_max(in[0] * question->direction.x, in[1] * question->direction.x);
     }
@@ -27292,6 +27293,7 @@ static void dem2di_images_row(const dem2di_question *question, const dem2d_box *
     const int begin = question->first[0], end = begin + question->columns - 1;
     *first = *first > begin ? *first : begin; /* both ends are rounded */
     *last = *last < end ? *last : end;
+    return true;
 }
 
 /* The rectangle of shifts within reach: rows from first[1] to `last`. */
@@ -27335,9 +27337,10 @@ static dem2d_result dem2di_images_ask(dem2di_question *question) {
         const int row = south ? rows - k : k;
         for (int n = 0;; n++) {
             int first, last;
-            dem2di_images_row(question, &reach, question->first[1] + row, &first, &last);
+            const bool crossed =
+                dem2di_images_row(question, &reach, question->first[1] + row, &first, &last);
             const int along_a = west ? last - n : first + n;
-            if (n == 0 && first > last && ordered && question->count > 0) return DEM2D_OK;
+            if (n == 0 && !crossed && ordered && question->count > 0) return DEM2D_OK;
             if (along_a < first || along_a > last) break;
             const int column = along_a - question->first[0];
             dem2di_question_to(question, row * question->columns + column);

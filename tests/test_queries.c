@@ -1039,6 +1039,32 @@ static void test_cells(void **state) {
     }
 }
 
+/* A wall that is higher than three rows of a cell that leans: a ray crosses rows together, and finds
+   nothing in one between others. The first hit is the nearest of all. */
+static void test_rows(void **state) {
+    (void)state;
+    dem2d_world_desc desc = {0};
+    uint64_t random = 3;
+    desc.time_step = 1e-4, desc.cell.a = vec(4, 0), desc.cell.b = vec(1.5, 1);
+    const dem2d_material_desc stone = stone_desc(1e7, 0.5);
+    const scene s = open_scene(&desc, &stone);
+    (void)add_segment(&s, vec(0, -1.6), vec(0.01, 1.6));
+    for (int k = 0; k < 2000; k++) {
+        const double angle = random_between(&random, -4, 4);
+        const double x = random_between(&random, -3, 3), y = random_between(&random, -2, 2);
+        dem2d_hit first, all[64];
+        int count;
+        assert_ok(
+            dem2d_world_cast_ray(s.world, vec(x, y), vec(cos(angle), sin(angle)), 9, NULL, &first));
+        assert_ok(dem2d_world_cast_ray_all(s.world, vec(x, y), vec(cos(angle), sin(angle)), 9, NULL,
+                                           all, COUNT_OF(all), &count));
+        assert_true(count <= COUNT_OF(all));
+        assert_int_equal(count > 0, first.found.wall.generation > 0);
+        assert_true(count == 0 || first.distance == all[0].distance);
+    }
+    close_scene(&s);
+}
+
 /* Large regions, long rays, distant places; half-planes; what can't be asked. */
 static void test_cell_contract(void **state) {
     (void)state;
@@ -1092,11 +1118,11 @@ static void test_cell_contract(void **state) {
 
 int main(void) {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(test_random),        cmocka_unit_test(test_rays),
-        cmocka_unit_test(test_custom_rays),   cmocka_unit_test(test_contract),
-        cmocka_unit_test(test_extremes),      cmocka_unit_test(test_pile),
-        cmocka_unit_test(test_work),          cmocka_unit_test(test_cells),
-        cmocka_unit_test(test_cell_contract),
+        cmocka_unit_test(test_random),      cmocka_unit_test(test_rays),
+        cmocka_unit_test(test_custom_rays), cmocka_unit_test(test_contract),
+        cmocka_unit_test(test_extremes),    cmocka_unit_test(test_pile),
+        cmocka_unit_test(test_work),        cmocka_unit_test(test_cells),
+        cmocka_unit_test(test_rows),        cmocka_unit_test(test_cell_contract),
     };
     return cmocka_run_group_tests(tests, oracle_make, NULL);
 }
