@@ -368,7 +368,19 @@ HOW TO
       pushing            dem2d_world_wall_overlaps as often as you want to know; at least twice
                          while a grain passes, if you count grains (examples/counter.c).
     build a hopper       a wall with points: a chain of segments. Or walls with segment: where two
-                         meet, a particle has one contact.
+                         meet, a particle has one contact. Grains go in by dem2d_world_fill or
+                         dem2d_world_feed, the outflow is dem2d_world_flow (examples/hopper.c,
+                         examples/silo.c).
+    run a shear cell     Without walls: dem2d_world_deform of a cell periodic along both vectors, xy
+                         the shear rate, hold_yy and stress_yy the normal stress
+                         (examples/mu_of_i.c). Between walls: a cell periodic along x, a floor and a
+                         servo lid with normals (0, 1) and (0, -1). Of the same surface_speed they
+                         move against each other: it is along the normal turned by -90 degrees.
+    run a biaxial test   dem2d_outline_fit of your outlines, dem2d_world_add_shape, then a packing
+                         (fill a region, pack grains). Side walls hold a stress (SERVO), top and
+                         bottom go together (MOVING): examples/biaxial.c, with your outlines
+                         --grains DIR. Without walls: dem2d_world_deform, hold_xx and yy < 0
+                         (examples/periodic_biaxial.c). Read q and p as under "measure a sample".
     turn a drum          a closed chain, MOVING, with an angular_velocity about its pivot; a mixer's
                          blade likewise. dem2d_world_drive_wall changes it.
     run a belt           a wall with a surface_speed: it stands still, its surface does not.
