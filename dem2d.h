@@ -3195,6 +3195,20 @@ static void dem2di_box_add(dem2d_box *box, dem2d_vec p) {
     box->upper = dem2di_vec(dem2di_max(box->upper.x, p.x), dem2di_max(box->upper.y, p.y));
 }
 
+/* A box that is wider by a distance on all sides. */
+static dem2d_box dem2di_box_widened(const dem2d_box *box, double by) {
+    dem2d_box wide;
+    wide.lower = dem2di_sub(box->lower, dem2di_vec(by, by));
+    wide.upper = dem2di_add(box->upper, dem2di_vec(by, by));
+    return wide;
+}
+
+/* The box of a circle. */
+static dem2d_box dem2di_box_about(dem2d_vec centre, double radius) {
+    const dem2d_box point = {centre, centre};
+    return dem2di_box_widened(&point, radius);
+}
+
 /* The bounding box of points; its upper corner relative to the lower one is *size. */
 static dem2d_box dem2di_box_of(const dem2d_vec *points, int count, dem2d_vec *size) {
     dem2d_box box = {points[0], points[0]};
@@ -14701,11 +14715,24 @@ static bool dem2di_some_out(const dem2di_fractions *f, const dem2di_state *state
 }
 
 /* A position in the cell. */
-static dem2d_vec dem2di_wrapped(const dem2d_world *world, dem2d_vec x) {
-    const dem2di_fractions f = dem2di_fractions_make(&world->cell);
+static dem2d_vec dem2di_wrapped(const dem2d_cell *cell, dem2d_vec x) {
+    const dem2di_fractions f = dem2di_fractions_make(cell);
     int out[2];
-    if (!world->periodic || !dem2di_cells_out(&f, x, out)) return x;
-    return dem2di_sub(x, dem2di_cell_shift(&world->cell, out[0], out[1]));
+    if (!dem2di_cells_out(&f, x, out)) return x;
+    return dem2di_sub(x, dem2di_cell_shift(cell, out[0], out[1]));
+}
+
+/* Extend a box to the border of the cell, in the directions in which it is periodic. */
+static void dem2di_box_cell(const dem2d_cell *cell, dem2d_box *all) {
+    const dem2d_vec o = cell->origin, a = cell->a, b = cell->b;
+    if (a.x > 0) {
+        all->lower.x = dem2di_min(all->lower.x, o.x + dem2di_min(0, b.x));
+        all->upper.x = dem2di_max(all->upper.x, o.x + a.x + dem2di_max(0, b.x));
+    }
+    if (b.y > 0) {
+        all->lower.y = dem2di_min(all->lower.y, o.y);
+        all->upper.y = dem2di_max(all->upper.y, o.y + b.y);
+    }
 }
 
 /* Is one side more than `most` times the other? From DEM2DI_CELLS_MOST on, the longer side is more
@@ -15700,7 +15727,7 @@ DEM2D_API dem2d_result dem2d_world_add_particle(dem2d_world *world, const dem2d_
     world->inverse[slot] = dem2di_inverse_of(world, &body);
     world->templates[desc->shape.index].users++;
     dem2di_state state;
-    state.x = dem2di_wrapped(world, desc->position);
+    state.x = dem2di_wrapped(&world->cell, desc->position);
     state.q = dem2di_orientation(world, desc->angle);
     state.v = desc->velocity;
     state.w = desc->angular_velocity;
@@ -16164,7 +16191,7 @@ static void dem2di_moved(dem2d_world *world, int slot, dem2d_vec way) {
 
 /* To a position and an orientation, as states hold it. */
 static void dem2di_put_at(dem2d_world *world, int slot, dem2d_vec position, dem2d_rot q) {
-    position = dem2di_wrapped(world, position);
+    position = dem2di_wrapped(&world->cell, position);
     dem2d_vec way = dem2di_sub(position, world->now[slot].x);
     world->now[slot].x = position;
     world->now[slot].q = q;
@@ -16698,7 +16725,7 @@ static dem2d_result dem2di_check_plane_in_cell(const dem2d_world *world,
         return dem2di_fail(env, DEM2D_OUT_OF_RANGE, -1,
                            "angular_velocity = %g of a half-plane in a cell",
                            desc->angular_velocity);
-    if (!dem2di_unit(desc->normal, &normal)) return DEM2D_OK; /* an error of all half-planes */
+    (void)dem2di_unit(desc->normal, &normal);
     (void)dem2di_unit(along, &along);
     if (fabs(dem2di_dot(normal, along)) <= 4 * DBL_EPSILON) return DEM2D_OK; /* two roundings */
     return dem2di_fail(env, DEM2D_OUT_OF_RANGE, -1,
@@ -16745,19 +16772,16 @@ static dem2d_result dem2di_check_wall(const dem2d_world *world, const dem2d_wall
         return dem2di_fail(env, DEM2D_OUT_OF_RANGE, -1, "angular_velocity = %g of a servo wall",
                            desc->angular_velocity);
     if (desc->points == NULL && desc->count != 0) return dem2di_fail_null(env, "points");
-    if (desc->points != NULL) {
+    if (desc->points != NULL)
         result = dem2di_check_chain(world, desc);
-        if (result == DEM2D_OK) result = dem2di_check_wall_in_cell(world, desc);
-        return result == DEM2D_OK ? dem2di_check_spans(world, desc) : result;
-    }
-    result = dem2di_check_wall_in_cell(world, desc);
-    if (result != DEM2D_OK) return result;
-    if (desc->segment) result = dem2di_check_segment(world, desc);
-    if (result != DEM2D_OK) return result;
-    if (desc->one_sided && !desc->segment)
+    else if (desc->segment)
+        result = dem2di_check_segment(world, desc);
+    else if (desc->one_sided)
         return dem2di_fail(env, DEM2D_OUT_OF_RANGE, -1, "one_sided: a half-plane has one side");
-    if (!desc->segment && !dem2di_unit(desc->normal, &unit))
+    else if (!dem2di_unit(desc->normal, &unit))
         return dem2di_fail(env, DEM2D_OUT_OF_RANGE, -1, "normal is 0");
+    if (result == DEM2D_OK) result = dem2di_check_wall_in_cell(world, desc);
+    if (result != DEM2D_OK) return result;
     return dem2di_check_spans(world, desc);
 }
 
@@ -17077,6 +17101,15 @@ static inline dem2d_vec dem2di_surface_normal(const dem2di_surface *surface) {
 /* The end of a segment of a length. */
 static dem2d_vec dem2di_surface_end(const dem2di_surface *surface, double extent) {
     return dem2di_along(surface->point, extent, dem2di_vec(surface->along.c, surface->along.s));
+}
+
+/* Shifts of the copies of a segment of a length whose boxes meet a box. */
+static dem2di_shifts dem2di_copies_in(const dem2d_cell *cell, const dem2di_surface *surface,
+                                      double extent, const dem2d_box *box) {
+    const double half = extent / 2;
+    const dem2d_vec far = dem2di_vec(half * fabs(surface->along.c), half * fabs(surface->along.s));
+    const dem2d_box wide = {dem2di_sub(box->lower, far), dem2di_add(box->upper, far)};
+    return dem2di_shifts_start(cell, dem2di_surface_end(surface, half), &wide);
 }
 
 /* Angular velocity of a wall from now on. */
@@ -17747,16 +17780,12 @@ static void dem2di_ends_inside_of(const dem2d_world *world, dem2di_joining *join
 static void dem2di_ends_inside(const dem2d_world *world, dem2di_joining *joining) {
     const dem2d_cell *cell = &world->cell;
     for (int k = 0; k < world->part_count; k++) {
-        const dem2di_surface *surface = &world->surfaces[k];
-        const double half = world->parts[k].extent / 2, far = half * (1 + 2 * DEM2DI_JOINT);
-        if (!(half > 0)) continue;
-        dem2d_box box = {cell->origin, cell->origin}; /* of the cell, where it is periodic */
-        box.lower = dem2di_add(box.lower, dem2di_vec(dem2di_min(0, cell->b.x) - far, -far));
-        box.upper = dem2di_add(
-            box.upper, dem2di_vec(cell->a.x + dem2di_max(0, cell->b.x) + far, cell->b.y + far));
-        dem2d_vec along = dem2di_vec(surface->along.c, surface->along.s);
-        dem2di_shifts at =
-            dem2di_shifts_start(cell, dem2di_along(surface->point, half, along), &box);
+        const double extent = world->parts[k].extent;
+        if (!(extent > 0)) continue;
+        dem2d_box box = {cell->origin, cell->origin};
+        dem2di_box_cell(cell, &box);
+        box = dem2di_box_widened(&box, 2 * DEM2DI_JOINT * extent);
+        dem2di_shifts at = dem2di_copies_in(cell, &world->surfaces[k], extent, &box);
         while (dem2di_shifts_next(&at)) {
             const int shift[2] = {at.along_a, at.along_b};
             dem2di_ends_inside_of(world, joining, k, shift);
@@ -25306,6 +25335,15 @@ DEM2D_API dem2d_result dem2d_world_stress(const dem2d_world *world, double area,
     return DEM2D_OK;
 }
 
+/* Mean of the half steps before and after the last force pass. */
+static dem2di_velocities dem2di_velocities_mean(const dem2d_world *world, int slot) {
+    const dem2di_state *before = &world->before[slot];
+    dem2di_velocities mean = dem2di_velocities_made(world, slot);
+    mean.v = dem2di_scale(dem2di_add(before->v, mean.v), 0.5);
+    mean.w = (before->w + mean.w) / 2;
+    return mean;
+}
+
 DEM2D_API dem2d_result dem2d_world_get_cell(const dem2d_world *world, dem2d_cell_info *info) {
     if (world == NULL || info == NULL) return DEM2D_NULL_ARGUMENT;
     memset(info, 0, sizeof *info);
@@ -25321,8 +25359,7 @@ DEM2D_API dem2d_result dem2d_world_get_cell(const dem2d_world *world, dem2d_cell
     for (int place = 0, i; (i = dem2di_next_particle(world, &place)) >= 0;) {
         if (!(world->inverse[i].mass > 0)) continue;
         const double mass = dem2di_body_mass(world, &world->bodies[i]);
-        const dem2di_velocities made = dem2di_velocities_made(world, i);
-        const dem2d_vec c = dem2di_scale(dem2di_add(world->before[i].v, made.v), 0.5);
+        const dem2d_vec c = dem2di_velocities_mean(world, i).v;
         dem2di_stress_add(&sum, dem2di_scale(c, mass), c);
     }
     info->kinetic = dem2di_stress_over(&sum, info->area);
@@ -25489,11 +25526,9 @@ static double dem2di_area_inside(const dem2d_world *world, int slot, const dem2d
 /* The same of a particle and of all its images in a cell. */
 static double dem2di_images_inside(const dem2d_world *world, int slot, const dem2d_box *region) {
     const dem2di_state *state = &world->before[slot];
-    dem2d_vec reach = dem2di_vec(state->radius, state->radius);
-    dem2d_box box, seen;
+    const dem2d_box box = dem2di_box_widened(region, state->radius);
+    dem2d_box seen;
     double area = 0;
-    box.lower = dem2di_sub(region->lower, reach);
-    box.upper = dem2di_add(region->upper, reach);
     dem2di_shifts at = dem2di_shifts_start(&world->cell_before, state->x, &box);
     while (dem2di_shifts_next(&at)) {
         dem2d_vec way = dem2di_cell_shift(&world->cell_before, at.along_a, at.along_b);
@@ -25722,15 +25757,6 @@ DEM2D_API dem2d_result dem2d_world_histogram(const dem2d_world *world, dem2d_his
 
 /* --- distance from rest -------------------------------------------------------------------------
  */
-
-/* Mean of the half steps before and after the last force pass. */
-static dem2di_velocities dem2di_velocities_mean(const dem2d_world *world, int slot) {
-    const dem2di_state *before = &world->before[slot];
-    dem2di_velocities mean = dem2di_velocities_made(world, slot);
-    mean.v = dem2di_scale(dem2di_add(before->v, mean.v), 0.5);
-    mean.w = (before->w + mean.w) / 2;
-    return mean;
-}
 
 /* Mean force of a contact, walls included; 0 without contacts. */
 static double dem2di_mean_contact_force(const dem2d_world *world) {
@@ -26406,9 +26432,7 @@ DEM2D_API dem2d_result dem2d_world_average_circle(const dem2d_world *world, dem2
     if (result != DEM2D_OK) return result;
     if (!(radius * radius >= DBL_MIN && dem2di_finite(4 * radius * radius)))
         return dem2di_fail(&world->env, DEM2D_OUT_OF_RANGE, -1, "radius = %g: no area", radius);
-    dem2d_box box;
-    box.lower = dem2di_sub(centre, dem2di_vec(radius, radius));
-    box.upper = dem2di_add(centre, dem2di_vec(radius, radius));
+    const dem2d_box box = dem2di_box_about(centre, radius);
     return dem2di_average_one(world, &box, radius, average);
 }
 
@@ -26506,11 +26530,7 @@ static dem2d_box dem2di_box_join(const dem2d_box *a, const dem2d_box *b) {
 /* The bounding circle of a particle in a box, and a margin for rounding errors. */
 static dem2d_box dem2di_bounding_box(const dem2di_state *state) {
     double margin = DEM2DI_ROUNDOFF * (dem2di_size_of(state->x) + state->radius);
-    double reach = state->radius + margin;
-    dem2d_box box;
-    box.lower = dem2di_sub(state->x, dem2di_vec(reach, reach));
-    box.upper = dem2di_add(state->x, dem2di_vec(reach, reach));
-    return box;
+    return dem2di_box_about(state->x, state->radius + margin);
 }
 
 /* The box of an item: of a segment both ends, with such a margin. */
@@ -26519,12 +26539,9 @@ static dem2d_box dem2di_item_box(const dem2d_world *world, int item) {
     const dem2di_surface *surface = &world->surfaces[-1 - item];
     dem2d_vec end = dem2di_surface_end(surface, world->parts[-1 - item].extent);
     double size = dem2di_size_of(surface->point) + dem2di_size_of(end);
-    dem2d_vec margin = dem2di_vec(DEM2DI_ROUNDOFF * size, DEM2DI_ROUNDOFF * size);
-    dem2d_box from = {surface->point, surface->point}, to = {end, end};
-    dem2d_box box = dem2di_box_join(&from, &to);
-    box.lower = dem2di_sub(box.lower, margin);
-    box.upper = dem2di_add(box.upper, margin);
-    return box;
+    dem2d_box box = {surface->point, surface->point};
+    dem2di_box_add(&box, end);
+    return dem2di_box_widened(&box, DEM2DI_ROUNDOFF * size);
 }
 
 static dem2d_vec dem2di_box_centre(const dem2d_box *box) {
@@ -26987,6 +27004,15 @@ static bool dem2di_ray_part(const dem2di_question *question, int part, dem2d_hit
 /* --- the nearest -------------------------------------------------------------------------------
  */
 
+/* Depth and normal of two shapes; false: of sizes that numbers have no squares of. */
+static bool dem2di_depth_of(const dem2d_shape *a, dem2d_pose a_pose, const dem2d_shape *b,
+                            dem2d_pose b_pose, dem2d_contact *contact) {
+    dem2d_contact_desc desc;
+    memset(&desc, 0, sizeof desc);
+    desc.skip_points = true;
+    return dem2d_pair_contact(a, a_pose, b, b_pose, &desc, contact) == DEM2D_OK;
+}
+
 /* A surface that has its nearest point at a distance from the point, against the normal. */
 static void dem2di_nearest_set(const dem2di_question *question, double distance, dem2d_vec normal,
                                dem2d_hit *hit) {
@@ -27007,16 +27033,12 @@ static bool dem2di_nearest_particle(const dem2di_question *question, int slot, d
         return hit->distance <= question->limit;
     }
     dem2d_shape dot; /* a circle of radius 0 */
-    dem2d_contact_desc desc;
     dem2d_contact contact;
     memset((void *)&dot, 0, sizeof dot);
-    memset(&desc, 0, sizeof desc);
-    desc.skip_points = true;
     dem2d_pose pose = dem2di_pose_of(world, world->now, slot), there = pose;
     there.position = question->origin;
-    if (dem2d_pair_contact(dem2di_shape_of(world, &world->bodies[slot]), pose, &dot, there, &desc,
-                           &contact) != DEM2D_OK)
-        return false; /* farther than numbers have squares */
+    if (!dem2di_depth_of(dem2di_shape_of(world, &world->bodies[slot]), pose, &dot, there, &contact))
+        return false;
     dem2di_nearest_set(question, -contact.depth, contact.normal, hit);
     return hit->distance <= question->limit;
 }
@@ -27265,16 +27287,13 @@ static void dem2di_tree_ask(dem2di_question *question) {
 
 /* What a question in a cell can reach. */
 static dem2d_box dem2di_question_reach(const dem2di_question *question) {
-    const dem2d_vec start = question->asked.origin,
-                    reach = dem2di_vec(question->limit, question->limit);
-    dem2d_box box = question->asked.box, far;
-    if (question->ask == DEM2DI_ASK_REGION || question->ask == DEM2DI_ASK_WALL) return box;
-    box.lower = dem2di_sub(start, reach);
-    box.upper = dem2di_add(start, reach);
-    if (question->ask == DEM2DI_ASK_NEAREST) return box;
-    box.lower = box.upper = start;
-    far.lower = far.upper = dem2di_along(start, question->limit, question->direction);
-    return dem2di_box_join(&box, &far);
+    const dem2d_vec start = question->asked.origin;
+    if (question->ask == DEM2DI_ASK_REGION || question->ask == DEM2DI_ASK_WALL)
+        return question->asked.box;
+    if (question->ask == DEM2DI_ASK_NEAREST) return dem2di_box_about(start, question->limit);
+    dem2d_box box = {start, start};
+    dem2di_box_add(&box, dem2di_along(start, question->limit, question->direction));
+    return box;
 }
 
 /* Numbers along a of the images of the tree's box within reach in row `along_b`: of a ray those
@@ -27512,8 +27531,7 @@ DEM2D_API dem2d_result dem2d_world_query_shape(dem2d_world *world, const dem2d_s
         return dem2di_fail(&world->env, DEM2D_OUT_OF_RANGE, -1, "pose: scale = %g", pose.scale);
     question.shape = shape;
     question.pose = pose;
-    question.box.lower = dem2di_sub(pose.position, dem2di_vec(radius, radius));
-    question.box.upper = dem2di_add(pose.position, dem2di_vec(radius, radius));
+    question.box = dem2di_box_about(pose.position, radius);
     return dem2di_region_ask(&question, found, capacity, count);
 }
 
@@ -27651,16 +27669,12 @@ static double dem2di_overlap_with(dem2di_question *question, const dem2di_order 
     const dem2d_world *world = question->world;
     const int item = found->value;
     dem2di_question_to(question, found->image);
-    dem2d_contact_desc desc;
     dem2d_contact contact;
-    dem2d_result result;
-    memset(&desc, 0, sizeof desc);
-    desc.skip_points = true;
+    bool known;
     if (item >= 0) {
-        dem2d_pose there = dem2di_pose_of(world, world->now, item);
-        result = dem2d_pair_contact(question->shape, question->pose,
-                                    dem2di_shape_of(world, &world->bodies[item]), there, &desc,
-                                    &contact);
+        known = dem2di_depth_of(question->shape, question->pose,
+                                dem2di_shape_of(world, &world->bodies[item]),
+                                dem2di_pose_of(world, world->now, item), &contact);
     } else {
         const dem2di_surface *surface = &world->surfaces[-1 - item];
         double extent = world->parts[-1 - item].extent;
@@ -27669,12 +27683,12 @@ static double dem2di_overlap_with(dem2di_question *question, const dem2di_order 
         there.position = dem2di_along(surface->point, extent / 2, along);
         there.rotation = surface->along;
         there.scale = extent;
-        result = extent > 0 ? dem2d_pair_contact(question->shape, question->pose, world->line,
-                                                 there, &desc, &contact)
-                            : dem2d_wall_contact(question->shape, question->pose, surface->point,
-                                                 dem2di_surface_normal(surface), &contact);
+        known = extent > 0
+                    ? dem2di_depth_of(question->shape, question->pose, world->line, there, &contact)
+                    : dem2d_wall_contact(question->shape, question->pose, surface->point,
+                                         dem2di_surface_normal(surface), &contact) == DEM2D_OK;
     }
-    if (result != DEM2D_OK) return 0; /* of sizes that numbers have no squares of */
+    if (!known) return 0;
     *normal = contact.normal;
     return item < 0 && dem2di_is_behind(world, -1 - item, contact.normal) ? 0 : contact.depth;
 }
@@ -27684,20 +27698,14 @@ static double dem2di_overlap_with_images(const dem2d_world *world, const dem2d_s
                                          dem2d_pose pose) {
     const double width = 2 * shape->circumscribed * pose.scale;
     double greatest = 0;
-    dem2d_contact_desc desc;
     dem2d_contact contact;
-    dem2d_box box;
-    memset(&desc, 0, sizeof desc);
-    desc.skip_points = true;
-    box.lower = dem2di_sub(pose.position, dem2di_vec(width, width));
-    box.upper = dem2di_add(pose.position, dem2di_vec(width, width));
+    const dem2d_box box = dem2di_box_about(pose.position, width);
     dem2di_shifts at = dem2di_shifts_start(&world->cell, pose.position, &box);
     while (dem2di_shifts_next(&at)) {
         dem2d_pose there = pose;
-        there.position =
-            dem2di_add(pose.position, dem2di_cell_shift(&world->cell, at.along_a, at.along_b));
+        there.position = dem2di_shifts_point(&at);
         if ((at.along_a != 0 || at.along_b != 0) &&
-            dem2d_pair_contact(shape, pose, shape, there, &desc, &contact) == DEM2D_OK)
+            dem2di_depth_of(shape, pose, shape, there, &contact))
             greatest = dem2di_max(greatest, contact.depth);
     }
     return greatest;
@@ -27715,9 +27723,8 @@ DEM2D_API dem2d_result dem2d_world_overlap_at(dem2d_world *world, const dem2d_pa
     question.pose.rotation = dem2d_rot_make(desc->angle);
     question.pose.scale = desc->scale;
     double radius = question.shape->circumscribed * desc->scale, greatest = 0;
-    dem2d_vec reach = dem2di_vec(radius, radius), normal;
-    question.box.lower = dem2di_sub(desc->position, reach);
-    question.box.upper = dem2di_add(desc->position, reach);
+    dem2d_vec normal;
+    question.box = dem2di_box_about(desc->position, radius);
     question.desc.skip_sensors = question.all = true;
     if (!question.groups.sensor) result = dem2di_question_ask(&question);
     if (result != DEM2D_OK) return result;
@@ -28790,13 +28797,10 @@ static bool dem2di_filler_near(const dem2di_filler *filler, int i, const dem2d_p
     const dem2d_shape *a = dem2di_filler_shape(filler, i), *b = dem2di_filler_shape(filler, k);
     dem2d_vec d = dem2di_sub(pose->position, filler->poses[k].position);
     double reach = dem2di_filler_radius(filler, i) + dem2di_filler_radius(filler, k) + filler->gap;
-    dem2d_contact_desc desc;
     dem2d_contact contact;
     if (!(dem2di_dot(d, d) < reach * reach)) return false;
     if (a->type == DEM2D_CIRCLE && b->type == DEM2D_CIRCLE) return true;
-    memset(&desc, 0, sizeof desc);
-    desc.skip_points = true;
-    return dem2d_pair_contact(a, *pose, b, filler->poses[k], &desc, &contact) != DEM2D_OK ||
+    return !dem2di_depth_of(a, *pose, b, filler->poses[k], &contact) ||
            contact.depth > -filler->gap;
 }
 
@@ -28819,9 +28823,7 @@ static bool dem2di_filler_hits(const dem2di_filler *filler, int i, const dem2d_p
 /* Shifts that put the centre of grain i into a box, or nearer to it than `reach`. */
 static dem2di_shifts dem2di_filler_images(const dem2di_filler *filler, int i, const dem2d_box *box,
                                           double reach) {
-    dem2d_box wide;
-    wide.lower = dem2di_sub(box->lower, dem2di_vec(reach, reach));
-    wide.upper = dem2di_add(box->upper, dem2di_vec(reach, reach));
+    const dem2d_box wide = dem2di_box_widened(box, reach);
     return dem2di_shifts_start(&filler->world->cell, filler->poses[i].position, &wide);
 }
 
@@ -28867,13 +28869,10 @@ static bool dem2di_filler_inside(const dem2di_filler *filler, int i) {
     double radius = dem2di_filler_radius(filler, i);
     dem2d_vec corners[2], tangents[2];
     dem2d_shape line;
-    dem2d_contact_desc desc;
     dem2d_contact contact;
     if (area->points == NULL) return true;
     if (!dem2di_area_has(area, pose->position)) return false;
     memset((void *)&line, 0, sizeof line);
-    memset(&desc, 0, sizeof desc);
-    desc.skip_points = true;
     line.type = DEM2D_POLYGON;
     line.count = line.parts = 2;
     line.corners = corners;
@@ -28890,8 +28889,7 @@ static bool dem2di_filler_inside(const dem2di_filler *filler, int i) {
         double reach = radius + filler->gap + side.scale / 2;
         if (!(dem2di_dot(d, d) < reach * reach) || !dem2di_unit(e, &u)) continue;
         side.rotation = dem2di_rot(u);
-        if (dem2d_pair_contact(dem2di_filler_shape(filler, i), *pose, &line, side, &desc,
-                               &contact) != DEM2D_OK ||
+        if (!dem2di_depth_of(dem2di_filler_shape(filler, i), *pose, &line, side, &contact) ||
             contact.depth > -filler->gap)
             return false;
     }
@@ -28903,13 +28901,12 @@ static dem2d_result dem2di_filler_meets(const dem2di_filler *filler, int i, bool
     const dem2d_particle_desc *grain = &filler->grains[i];
     dem2di_question question = dem2di_question_make(filler->world, DEM2DI_ASK_REGION, NULL);
     double reach = dem2di_filler_radius(filler, i) + filler->gap;
-    dem2d_vec normal, wide = dem2di_vec(reach, reach);
+    dem2d_vec normal;
     *meets = false;
     if (grain->groups.sensor) return DEM2D_OK;
     question.pose = filler->poses[i];
     question.groups = dem2di_groups_of(&grain->groups, grain->user_data);
-    question.box.lower = dem2di_sub(question.pose.position, wide);
-    question.box.upper = dem2di_add(question.pose.position, wide);
+    question.box = dem2di_box_about(question.pose.position, reach);
     question.desc.skip_sensors = question.all = true;
     dem2d_result result = dem2di_question_ask(&question);
     if (result != DEM2D_OK) return result;
@@ -29299,9 +29296,7 @@ static int dem2di_images_crossing(const dem2d_world *world, int slot, dem2d_vec 
                         dem2di_size_of(dem2di_sub(line->upper, old->origin));
     const double flow = dem2di_flow_size(&world->flow_made) * world->time_step;
     const double reach = 1.5 * (flow * size + dem2di_size_of(d));
-    dem2d_box box;
-    box.lower = dem2di_sub(line->lower, dem2di_vec(reach, reach));
-    box.upper = dem2di_add(line->upper, dem2di_vec(reach, reach));
+    const dem2d_box box = dem2di_box_widened(line, reach);
     dem2di_shifts at = dem2di_shifts_start(old, before, &box);
     int sum = 0;
     while (dem2di_shifts_next(&at)) {
@@ -31107,19 +31102,6 @@ static dem2d_box dem2di_particle_box(const dem2d_world *world) {
     return all;
 }
 
-/* Extend the box to the border of the cell, in the directions in which it is periodic. */
-static void dem2di_box_cell(const dem2d_cell *cell, dem2d_box *all) {
-    const dem2d_vec o = cell->origin, a = cell->a, b = cell->b;
-    if (a.x > 0) {
-        all->lower.x = dem2di_min(all->lower.x, o.x + dem2di_min(0, b.x));
-        all->upper.x = dem2di_max(all->upper.x, o.x + a.x + dem2di_max(0, b.x));
-    }
-    if (b.y > 0) {
-        all->lower.y = dem2di_min(all->lower.y, o.y);
-        all->upper.y = dem2di_max(all->upper.y, o.y + b.y);
-    }
-}
-
 /* Where the box is empty along x or y: from 0 to 1, or to the length of a cell with one period. */
 static void dem2di_box_fill(const dem2d_cell *cell, dem2d_box *all) {
     const double period = cell->a.x + cell->b.y, side = period > 0 ? period : 1;
@@ -31136,15 +31118,9 @@ static void dem2di_box_fill(const dem2d_cell *cell, dem2d_box *all) {
 /* Extend the box to a segment: in a cell to the copies of its ends that are there. */
 static void dem2di_box_segment(const dem2d_world *world, int part, dem2d_box *all) {
     const dem2di_surface surface = dem2di_surface_of(world, world->wall_before, part);
-    const dem2di_fractions f = dem2di_fractions_make(&world->cell_before);
-    for (int k = 0; k < 2; k++) {
-        dem2d_vec end = surface.point;
-        int out[2];
-        if (k == 1) end = dem2di_surface_end(&surface, world->parts[part].extent);
-        if (world->periodic && dem2di_cells_out(&f, end, out))
-            end = dem2di_sub(end, dem2di_cell_shift(&world->cell_before, out[0], out[1]));
-        dem2di_box_add(all, end);
-    }
+    const dem2d_vec end = dem2di_surface_end(&surface, world->parts[part].extent);
+    dem2di_box_add(all, dem2di_wrapped(&world->cell_before, surface.point));
+    dem2di_box_add(all, dem2di_wrapped(&world->cell_before, end));
 }
 
 /* The bounding box of particles, segments and the cell's border and, if `beside`, of half-planes
@@ -31213,9 +31189,7 @@ static dem2di_border dem2di_border_make(const dem2d_world *world, const dem2d_bo
 /* Shifts that put the centre of a particle into the box, or nearer to it than a length. */
 static dem2di_shifts dem2di_seen_start(const dem2d_world *world, const dem2d_box *seen, int slot,
                                        double near) {
-    dem2d_box box = *seen;
-    box.lower = dem2di_sub(box.lower, dem2di_vec(near, near));
-    box.upper = dem2di_add(box.upper, dem2di_vec(near, near));
+    const dem2d_box box = dem2di_box_widened(seen, near);
     return dem2di_shifts_start(&world->cell_before, world->before[slot].x, &box);
 }
 
@@ -31317,19 +31291,13 @@ static dem2di_copies dem2di_copies_start(const dem2d_box *box) {
 static bool dem2di_copies_next(const dem2d_world *world, dem2di_copies *copies) {
     while (copies->whole || !dem2di_shifts_next(&copies->at)) {
         if (++copies->part >= world->part_count) return false;
-        const double half = world->parts[copies->part].extent / 2;
-        copies->whole = !world->periodic || !(half > 0);
+        const double extent = world->parts[copies->part].extent;
+        copies->whole = !world->periodic || !(extent > 0);
         copies->at.along_a = copies->at.along_b = 0;
         copies->way = dem2di_vec(0, 0);
         if (copies->whole) return true;
         const dem2di_surface surface = dem2di_surface_of(world, world->wall_before, copies->part);
-        const dem2d_vec far =
-            dem2di_vec(half * fabs(surface.along.c), half * fabs(surface.along.s));
-        dem2d_box box = copies->box;
-        box.lower = dem2di_sub(box.lower, far);
-        box.upper = dem2di_add(box.upper, far);
-        copies->at =
-            dem2di_shifts_start(&world->cell_before, dem2di_surface_end(&surface, half), &box);
+        copies->at = dem2di_copies_in(&world->cell_before, &surface, extent, &copies->box);
     }
     copies->way = dem2di_cell_shift(copies->at.cell, copies->at.along_a, copies->at.along_b);
     return true;
