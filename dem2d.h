@@ -11890,7 +11890,7 @@ DEM2DI_AVX2_INLINE bool dem2di_overlap_fours(const dem2d_body *bodies, const dem
     const dem2di_four error = DEM2DI_ROUNDOFF * (reach + distance);
     const dem2di_four_bits deep = (dem2di_four_bits)(depth > error);
     const dem2di_four_bits apart = (dem2di_four_bits)(depth < -error);
-    const dem2di_four_bits state = apart - deep + DEM2D_TOUCHING;
+    const dem2di_four_bits state = apart - deep + (int64_t)DEM2D_TOUCHING;
     dem2di_four rows[4] = {nx, ny, ((a.x + nx * a.r) + (b.x - nx * b.r)) * 0.5,
                            ((a.y + ny * a.r) + (b.y - ny * b.r)) * 0.5};
     dem2di_four_turn(rows);
