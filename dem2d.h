@@ -28201,7 +28201,7 @@ DEM2D_API dem2d_result dem2d_world_read_contacts(const dem2d_world *world,
 
 /* ============================================================================================
    >>generators  Gradings, filling, growth, inlets and outlets
-   uses: config, math, memory, fields, shapes, outlines, contact, broad, world, cell, objects,
+   uses: config, math, memory, fields, shapes, outlines, broad, world, cell, objects,
          walls, step, measures, queries
    ============================================================================================ */
 
