@@ -13380,6 +13380,11 @@ static inline int dem2di_part_of(int number) {
     return number & (DEM2DI_VERTEX - 1);
 }
 
+/* The start (0) or end (1) whose vertex a number is of; -1: that of the part. */
+static inline int dem2di_vertex_of(int number) {
+    return number / DEM2DI_VERTEX - 1;
+}
+
 /* Depths of contacts with one-sided walls that are apart because the particle passes from the
    right, or because the contact with another face pushes it back. Others that are apart have -1. */
 #define DEM2DI_PASSING (-2)
@@ -13400,6 +13405,11 @@ typedef struct dem2di_wall_joint {
     int beyond[2][2]; /* where the partners are */
     int round[2];     /* a face that goes round meets itself after so many; 0: it has ends */
 } dem2di_wall_joint;
+
+/* The partner at an end; of a part that is new, or no segment, none. */
+static inline int dem2di_partner_of(const dem2di_wall_joint *joint, int end) {
+    return joint->face.extent > 0 ? joint->partner[end] : -1;
+}
 
 /* What a servo wall pushes against: sums over its closed contacts. */
 typedef struct dem2di_backing {
@@ -15746,6 +15756,18 @@ DEM2D_API dem2d_result dem2d_world_add_particle(dem2d_world *world, const dem2d_
     return DEM2D_OK;
 }
 
+/* What terms of the law keep of the two points of contact i, which may have two: nothing. */
+static void dem2di_point_terms_clear(const dem2d_world *world, int i) {
+    const dem2di_contacts *contacts = &world->list.contacts;
+    const int terms = world->plan.terms, at = i - world->list.discs;
+    if (terms & DEM2DI_DASHPOT)
+        memset(&contacts->point_viscous[at], 0, sizeof *contacts->point_viscous);
+    if (dem2di_has_state(terms))
+        memset(&contacts->point_state[at], 0, sizeof *contacts->point_state);
+    if (terms & DEM2DI_TANGENTIAL_DASHPOT)
+        memset(&contacts->point_viscous_shear[at], 0, sizeof *contacts->point_viscous_shear);
+}
+
 /* What terms of the law and two points keep of contact i: nothing. */
 static void dem2di_terms_clear(dem2d_world *world, int i) {
     const dem2di_contacts *contacts = &world->list.contacts;
@@ -15760,12 +15782,7 @@ static void dem2di_terms_clear(dem2d_world *world, int i) {
     if (dem2di_has_state(terms)) memset(&contacts->state[i], 0, sizeof *contacts->state);
     if (!world->plan.faces || at < 0) return;
     memset(&contacts->point_pairs[at], 0, sizeof *contacts->point_pairs);
-    if (terms & DEM2DI_DASHPOT)
-        memset(&contacts->point_viscous[at], 0, sizeof *contacts->point_viscous);
-    if (dem2di_has_state(terms))
-        memset(&contacts->point_state[at], 0, sizeof *contacts->point_state);
-    if (terms & DEM2DI_TANGENTIAL_DASHPOT)
-        memset(&contacts->point_viscous_shear[at], 0, sizeof *contacts->point_viscous_shear);
+    dem2di_point_terms_clear(world, i);
 }
 
 /* Contact i has no force and no history: the two are apart. */
@@ -16956,6 +16973,26 @@ static dem2d_result dem2di_parts_reserve(dem2d_world *world, int parts) {
     return dem2di_out_of_memory(world, "parts of a wall");
 }
 
+/* Parts from `end` on are about to move by so many places, over those before them if this is below
+   0: joints meet them at their new places, and vertices with parts that end are forgotten. */
+static void dem2di_partners_move(dem2d_world *world, int end, int more) {
+    const dem2di_list *list = &world->list;
+    const int gone = more < 0 ? end + more : end;
+    for (int i = list->pairs; i < list->count; i++) {
+        const int at = dem2di_vertex_of(list->keys[i].b), part = dem2di_part_of(list->keys[i].b);
+        if (list->keys[i].a < 0 || at < 0) continue;
+        const int partner = dem2di_partner_of(&world->joints[part], at);
+        if (partner >= gone && partner < end) dem2di_contact_forget(world, i);
+    }
+    for (int k = 0; k < 2 * world->part_count; k++) {
+        int *partner = &world->joints[k / 2].partner[k % 2];
+        if (*partner >= end)
+            *partner += more;
+        else if (*partner >= gone)
+            *partner = -1;
+    }
+}
+
 /* A wall gets so many parts, for which there is room: those of the walls after it move, and with
    them the keys of their contacts. */
 static void dem2di_parts_resize(dem2d_world *world, int slot, int count) {
@@ -16963,6 +17000,7 @@ static void dem2di_parts_resize(dem2d_world *world, int slot, int count) {
     int end = wall->first + wall->count, more = count - wall->count;
     const dem2di_list *list = &world->list;
     if (more == 0) return;
+    dem2di_partners_move(world, end, more);
     size_t moved = (size_t)(world->part_count - end);
     memmove(world->parts + end + more, world->parts + end, moved * sizeof *world->parts);
     memmove(world->surfaces + end + more, world->surfaces + end, moved * sizeof *world->surfaces);
@@ -16996,10 +17034,19 @@ static dem2di_surface dem2di_surface_of(const dem2d_world *world, const dem2di_w
     return dem2di_surface_at(&states[own->wall], own);
 }
 
-/* The parts of a wall whose name is new to their places in the order of ranks, one by one; keys go
-   with them. */
+/* The place of a part when `count` parts from `old` on move by so many places, and those between
+   move over theirs. */
+static inline int dem2di_part_ranked(int part, int old, int count, int by) {
+    const int low = by < 0 ? old + by : old, high = low + count + abs(by);
+    if (part < low || part >= high) return part;
+    return part + (part >= old && part < old + count ? by : by < 0 ? count : -count);
+}
+
+/* The parts of a wall whose name is new to their places in the order of ranks, one by one; joints
+   and keys go with them. */
 static void dem2di_parts_rank(dem2d_world *world, int slot) {
     dem2di_part *parts = world->parts;
+    dem2di_wall_joint *joints = world->joints;
     const dem2di_list *list = &world->list;
     dem2di_wall *wall = &world->walls[slot];
     int old = wall->first, first = 0;
@@ -17013,15 +17060,22 @@ static void dem2di_parts_rank(dem2d_world *world, int slot) {
     int high = low + count + abs(by);
     for (int i = list->pairs; i < list->count && by != 0; i++) {
         int *number = &list->keys[i].b, part = dem2di_part_of(*number);
-        if (part < low || part >= high) continue;
-        *number += part >= old && part < old + count ? by : by < 0 ? count : -count;
+        *number += dem2di_part_ranked(part, old, count, by) - part;
+    }
+    for (int k = 0; k < 2 * world->part_count && by != 0; k++) {
+        int *partner = &world->joints[k / 2].partner[k % 2];
+        *partner = dem2di_part_ranked(*partner, old, count, by);
     }
     for (int k = 0; k < count && by != 0; k++) { /* the last first, or the first last */
         int from = by > 0 ? old : old + count - 1, to = by > 0 ? high - 1 : low;
+        const int over[2] = {by > 0 ? from : to + 1, by > 0 ? from + 1 : to};
+        const size_t between = (size_t)abs(to - from);
         const dem2di_part part = parts[from];
-        memmove(parts + (by > 0 ? from : to + 1), parts + (by > 0 ? from + 1 : to),
-                (size_t)abs(to - from) * sizeof *parts);
+        const dem2di_wall_joint joint = joints[from];
+        memmove(parts + over[0], parts + over[1], between * sizeof *parts);
+        memmove(joints + over[0], joints + over[1], between * sizeof *joints);
         parts[to] = part;
+        joints[to] = joint;
     }
     for (int k = low; k < high && by != 0; k++)
         world->surfaces[k] = dem2di_surface_of(world, world->wall_now, k);
@@ -17595,11 +17649,6 @@ DEM2D_API dem2d_result dem2d_world_get_wall(const dem2d_world *world, dem2d_wall
    of a wall that turns are not at rest relative to each other; a step is refused where the flow of
    the cell would part a joint. */
 
-/* The start (0) or end (1) whose vertex a number is of; -1: that of the part. */
-static inline int dem2di_vertex_of(int number) {
-    return number / DEM2DI_VERTEX - 1;
-}
-
 /* An end of a segment, and what becomes of it. */
 typedef struct dem2di_segment_end {
     dem2d_vec at, home; /* where it is; the same in the cell */
@@ -18041,11 +18090,6 @@ static inline bool dem2di_goes_round(const dem2di_wall_joint *joint) {
     return joint->round[0] != 0 || joint->round[1] != 0;
 }
 
-/* The partner at an end; of a part that is new, or no segment, none. */
-static int dem2di_partner_of(const dem2di_wall_joint *joint, int end) {
-    return joint->face.extent > 0 ? joint->partner[end] : -1;
-}
-
 /* Faces and vertices of all walls. Returns whether some are joined or have one side. */
 static bool dem2di_joints_find(dem2d_world *world, dem2di_joining *joining) {
     bool joined = false;
@@ -18075,18 +18119,23 @@ static bool dem2di_joints_find(dem2d_world *world, dem2di_joining *joining) {
     return joined;
 }
 
-/* Contacts with vertices are forgotten: others have their numbers. */
-static void dem2di_forget_vertices(dem2d_world *world) {
+/* Contacts with vertices that are not those of before, but have their numbers, are forgotten. Others
+   stay: what they had in the last force pass must outlast a step that is refused. */
+static void dem2di_forget_vertices(dem2d_world *world, const dem2di_wall_joint *before) {
     const dem2di_list *list = &world->list;
-    for (int i = list->pairs; i < list->count; i++)
-        if (list->keys[i].a >= 0 && dem2di_vertex_of(list->keys[i].b) >= 0)
+    for (int i = list->pairs; i < list->count; i++) {
+        const int end = dem2di_vertex_of(list->keys[i].b), part = dem2di_part_of(list->keys[i].b);
+        if (list->keys[i].a < 0 || end < 0) continue;
+        if (dem2di_partner_of(&before[part], end) != dem2di_partner_of(&world->joints[part], end))
             dem2di_contact_forget(world, i);
+    }
     world->list_stale = true;
 }
 
 /* The joints that were found are those of the next step; the vertices may be the same. */
-static void dem2di_joints_set(dem2d_world *world, bool joined, bool same) {
-    if (!same) dem2di_forget_vertices(world);
+static void dem2di_joints_set(dem2d_world *world, const dem2di_wall_joint *before, bool joined,
+                              bool same) {
+    if (!same) dem2di_forget_vertices(world, before);
     for (int k = 0; k < world->part_count; k++) dem2di_face_place(world, k);
     if (joined != world->plan.joints) dem2di_edited(world);
     world->joined = joined;
@@ -18112,7 +18161,7 @@ static dem2d_result dem2di_join(dem2d_world *world) {
         for (int k = 0; k < 2 * parts && joining.parted < 0; k++)
             same = same && dem2di_partner_of(&before[k / 2], k % 2) ==
                                dem2di_partner_of(&world->joints[k / 2], k % 2);
-        if (joining.parted < 0) dem2di_joints_set(world, joined, same);
+        if (joining.parted < 0) dem2di_joints_set(world, before, joined, same);
     }
     dem2di_release(&world->env, before, (size_t)parts + 1, old);
     dem2di_release(&world->env, joining.ends, ends + 1, size);
@@ -18644,9 +18693,19 @@ static int dem2di_terms_of(const dem2d_pair_desc *law) {
                                                                         : 0);
 }
 
+/* Had vertices a part of some contact's normal force in the last force pass? Only an edit is a
+   reason to ask. */
+static bool dem2di_some_relief(const dem2d_world *world) {
+    const dem2di_list *list = &world->list;
+    if (!world->plan.joints || world->plan_due == 0) return false;
+    for (int i = list->pairs; i < list->count; i++)
+        if (list->contacts.depth[i] > 0 && list->contacts.relief[i - list->discs] != 0) return true;
+    return false;
+}
+
 /* The features in use. A term of the law that is no longer needed is still there in the first step
    after an edit: what contacts had of it in the last force pass must outlast a step that is
-   refused. */
+   refused. So is the relief of contacts when no segments are joined any more. */
 static dem2di_plan dem2di_plan_make(const dem2d_world *world) {
     dem2di_plan plan;
     memset(&plan, 0, sizeof plan);
@@ -18677,7 +18736,7 @@ static dem2di_plan dem2di_plan_make(const dem2d_world *world) {
             plan.terms_now |= dem2di_terms_of(law);
         }
     if (world->law != NULL) plan.terms_now = dem2di_callers_terms(world->law_omits);
-    plan.joints = world->joined;
+    plan.joints = world->joined || dem2di_some_relief(world);
     plan.terms_made = world->plan.terms_made;
     plan.terms = plan.terms_now | plan.terms_made;
     plan.turns = plan.turns || !dem2di_has_discs(world);
@@ -21064,7 +21123,10 @@ static DEM2DI_INLINE int dem2di_law_put(dem2d_world *world, const dem2di_law_row
     (void)dem2di_contact_get(world, contacts, i, &contact);
     contact.force = rows->force[k];
     contact.shear = rows->shear[k];
-    if (two) dem2di_law_put_two(world, i, rows, k, &contact);
+    if (two)
+        dem2di_law_put_two(world, i, rows, k, &contact);
+    else if (world->plan.faces && i >= world->list.discs)
+        dem2di_point_terms_clear(world, i);
     if (world->plan.terms & DEM2DI_ROLLING) contacts->moment[i] = moment = rows->moment[k];
     if (world->plan.terms & DEM2DI_TANGENTIAL_DASHPOT)
         contacts->viscous_shear[i] =

@@ -366,6 +366,42 @@ static void test_refused(void **state) {
     close_scene(&s);
 }
 
+/* The same after one of two points has gone, and then the dashpots: nothing is left of what they had
+   of both. A box on its face turns about a corner, on a floor or on another box. */
+static void test_refused_with_one_point(void **state) {
+    (void)state;
+    const impact c = {"", 0.1, 0.2, 0, 0.5, 0, 0, 0};
+    for (int pair = 0; pair < 2; pair++) {
+        dem2d_world_desc desc = {0};
+        const dem2d_material_desc material = material_of(&c);
+        dem2d_contact_info contact;
+        int last = 0, turned = 0;
+        desc.time_step = contact_time() / 100;
+        scene s = open_scene(&desc, &material);
+        add_plane(&s, 0, pair ? -0.3 : 0, 0, 1);
+        if (pair) add_shape(&s, make_box(0.4, 0.1), DEM2D_FIXED, vec(0, -0.05), 0, vec(0, 0), 0);
+        add_shape(&s, make_box(0.1, 0.06), DEM2D_FREE, vec(0, 0.03 - 2e-4), 0, vec(0, -0.05), 5);
+        for (int i = 0; i < 1000 && turned == 0; i++) {
+            step(&s, 1);
+            if (contacts_of(&s, &contact, 1) == 0) contact.points = 0;
+            turned = last == 2 && contact.points == 1;
+            last = contact.points;
+        }
+        assert_true(turned);
+        dem2d_pair_desc law;
+        assert_ok(dem2d_world_get_pair(s.world, s.material, s.material, &law));
+        law.damping_ratio = law.tangential_damping_ratio = 0;
+        assert_ok(dem2d_world_set_pair(s.world, s.material, s.material, &law));
+        step(&s, 1);
+        assert_int_equal(contacts_of(&s, &contact, 1), 1);
+        assert_ok(dem2d_world_set_time_step(s.world, 1));
+        const uint64_t hash = dem2d_world_hash(s.world);
+        assert_int_not_equal(dem2d_world_step(s.world, 1, NULL), DEM2D_OK);
+        assert_true(dem2d_world_hash(s.world) == hash);
+        close_scene(&s);
+    }
+}
+
 /* --- what follows from laws, masses and radii, after they have changed ------------------------- */
 
 /* Two discs, and a disc and a wall, near each other: a list is made, something is edited, and then
@@ -545,6 +581,7 @@ int main(void) {
         cmocka_unit_test(test_safe_step), cmocka_unit_test(test_nothing_to_damp),
         cmocka_unit_test(test_snapshots), cmocka_unit_test(test_refused),
         cmocka_unit_test(test_edited),    cmocka_unit_test(test_springs_end),
+        cmocka_unit_test(test_refused_with_one_point),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

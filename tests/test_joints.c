@@ -679,6 +679,55 @@ static void test_springs(void **state) {
     }
 }
 
+/* A step that is refused after an edit leaves the state as the edit left it: a disc in a valley of
+   two segments, whose vertex takes a part of both forces. Joints come or go elsewhere, one of the
+   two is named anew and gets another place among the walls, or goes; or both go, while a third
+   contact remains. */
+enum { JOINTS_COME, JOINTS_GO, VALLEY_NAMED, VALLEY_ENDS, ONE_FACE, VALLEY_EDITS };
+
+static void test_refused_after_edits(void **state) {
+    (void)state;
+    for (int edit = 0; edit < VALLEY_EDITS; edit++) {
+        dem2d_contact_info list[8];
+        scene s = free_scene(0.5, 0, false);
+        const dem2d_wall_id far = add_segment(&s, vec(5, 0), vec(6, 0));
+        const dem2d_wall_id next = add_segment(&s, vec(6, 0), vec(7, 0.1));
+        add_segment(&s, vec(-1, 0.2), vec(0, 0));
+        const dem2d_wall_id right = add_segment(&s, vec(0, 0), vec(1, 0.2));
+        if (edit == ONE_FACE) assert_ok(dem2d_world_remove_wall(s.world, next));
+        add_shape(&s, make_disc(0.05), DEM2D_FREE, vec(0, 0.0495), 0, vec(0, 0), 0);
+        add_shape(&s, make_disc(0.05), DEM2D_FREE, vec(5.5, 0.0499), 0, vec(0, 0), 0);
+        step(&s, 2);
+        assert_int_equal(contacts_of(&s, list, 8), 4);
+        assert_true(list[0].sign + list[1].sign + list[2].sign + list[3].sign == 2);
+        if (edit == JOINTS_COME) add_segment(&s, vec(7, 0.1), vec(8, 0));
+        if (edit == JOINTS_GO) assert_ok(dem2d_world_remove_wall(s.world, far));
+        if (edit == VALLEY_NAMED) {
+            dem2d_wall_desc desc;
+            assert_ok(dem2d_world_get_wall_desc(s.world, right, &desc));
+            desc.name = 7;
+            assert_ok(dem2d_world_set_wall(s.world, right, &desc));
+        }
+        if (edit == VALLEY_ENDS || edit == ONE_FACE)
+            assert_ok(dem2d_world_remove_wall(s.world, right));
+        const int left = contacts_of(&s, list, 8);
+        const int expected[VALLEY_EDITS] = {4, 3, 4, 2, 2};
+        assert_int_equal(left, expected[edit]);
+        assert_ok(dem2d_world_set_time_step(s.world, 1));
+        const uint64_t hash = dem2d_world_hash(s.world);
+        const dem2d_energy energy = energy_of(&s);
+        for (int k = 0; k < 2; k++) {
+            assert_int_not_equal(dem2d_world_step(s.world, 1, NULL), DEM2D_OK);
+            assert_true(dem2d_world_hash(s.world) == hash);
+            assert_true(energy_of(&s).normal == energy.normal);
+        }
+        assert_ok(dem2d_world_set_time_step(s.world, 1e-5));
+        step(&s, 3);
+        assert_int_equal(contacts_of(&s, list, 8), expected[edit]);
+        close_scene(&s);
+    }
+}
+
 /* A grain that slides over joints of a floor stays in one contact, as events tell: it closes once.
    At a reflex vertex it closes with the second face, and the contact of sign -1 is told by none. */
 static void test_events(void **state) {
@@ -719,6 +768,7 @@ int main(void) {
         cmocka_unit_test(test_corner),
         cmocka_unit_test(test_moving),
         cmocka_unit_test(test_edits_of_joints),
+        cmocka_unit_test(test_refused_after_edits),
         cmocka_unit_test(test_strange_chains),
         cmocka_unit_test(test_runs),
         cmocka_unit_test(test_springs),
