@@ -1437,7 +1437,8 @@ typedef dem2d_result dem2d_commit_fn(void *user, dem2d_result result);
 /// Sets external loads: called at the start of each step that is tried, by the thread that called
 /// the step. It may call queries and dem2d_world_set_load of this world: positions are those of the
 /// force pass that follows, velocities those of half a step before. When a step fails, it is called
-/// again in the next try; the loads stay as it has set them.
+/// again in the next try; the loads stay as it has set them. Other functions that change this world
+/// are refused during a step (IN_USE).
 ///
 /// A load that depends on the velocity is of first order in the time step: F = -c v has the factor
 /// 1 - c dt/m on v in each step, so that c dt/m must be below 1 (from 2 on it is unstable); for a
@@ -15394,9 +15395,16 @@ static dem2d_result dem2di_stale(const dem2d_world *w, const char *kind, uint32_
     return dem2di_fail(&w->env, DEM2D_STALE_ID, (int)(index & INT_MAX), "no such %s", kind);
 }
 
+/* What functions that change the world return while a step is on its way, whose passes rely on what
+   was there before. */
+static dem2d_result dem2di_in_step(const dem2d_world *world) {
+    return dem2di_fail(&world->env, DEM2D_IN_USE, -1, "called by a callback of a step");
+}
+
 DEM2D_API dem2d_result dem2d_world_add_shape(dem2d_world *world, const dem2d_shape *shape,
                                              dem2d_shape_id *id) {
     if (world == NULL || shape == NULL || id == NULL) return DEM2D_NULL_ARGUMENT;
+    if (world->stepping) return dem2di_in_step(world);
     int slot = 0;
     while (slot < world->template_count && world->templates[slot].shape != NULL) slot++;
     if (!dem2di_group_reserve(world, DEM2DI_TEMPLATES, slot + 1))
@@ -15415,6 +15423,7 @@ DEM2D_API dem2d_result dem2d_world_add_shape(dem2d_world *world, const dem2d_sha
 
 DEM2D_API dem2d_result dem2d_world_remove_shape(dem2d_world *world, dem2d_shape_id id) {
     if (world == NULL) return DEM2D_NULL_ARGUMENT;
+    if (world->stepping) return dem2di_in_step(world);
     if (!dem2di_shape_lives(world, id)) return dem2di_stale(world, "shape", id.index);
     dem2di_template *place = &world->templates[id.index];
     if (place->users > 0)
@@ -15503,6 +15512,7 @@ static bool dem2di_widen_laws(dem2d_world *world) {
 DEM2D_API dem2d_result dem2d_world_add_material(dem2d_world *world, const dem2d_material_desc *desc,
                                                 dem2d_material_id *id) {
     if (world == NULL || desc == NULL || id == NULL) return DEM2D_NULL_ARGUMENT;
+    if (world->stepping) return dem2di_in_step(world);
     dem2d_result result =
         dem2di_check_fields(&world->env, DEM2DI_ALL(dem2di_material_fields), desc);
     if (result != DEM2D_OK) return result;
@@ -15525,6 +15535,7 @@ DEM2D_API dem2d_result dem2d_world_add_material(dem2d_world *world, const dem2d_
 DEM2D_API dem2d_result dem2d_world_set_pair(dem2d_world *world, dem2d_material_id a,
                                             dem2d_material_id b, const dem2d_pair_desc *desc) {
     if (world == NULL || desc == NULL) return DEM2D_NULL_ARGUMENT;
+    if (world->stepping) return dem2di_in_step(world);
     if (!dem2di_material_lives(world, a)) return dem2di_stale(world, "material", a.index);
     if (!dem2di_material_lives(world, b)) return dem2di_stale(world, "material", b.index);
     dem2d_result result = dem2di_check_fields(&world->env, DEM2DI_ALL(dem2di_pair_fields), desc);
@@ -15707,6 +15718,7 @@ static bool dem2di_groups_begin(dem2d_world *world, const dem2di_groups *groups)
 DEM2D_API dem2d_result dem2d_world_add_particle(dem2d_world *world, const dem2d_particle_desc *desc,
                                                 dem2d_particle_id *id) {
     if (world == NULL || desc == NULL || id == NULL) return DEM2D_NULL_ARGUMENT;
+    if (world->stepping) return dem2di_in_step(world);
     dem2d_result result = dem2di_check_particle(world, desc);
     if (result != DEM2D_OK) return result;
     dem2di_body body;
@@ -15850,6 +15862,7 @@ static void dem2di_forget(dem2d_world *world, int slot) {
 
 DEM2D_API dem2d_result dem2d_world_remove_particle(dem2d_world *world, dem2d_particle_id id) {
     if (world == NULL) return DEM2D_NULL_ARGUMENT;
+    if (world->stepping) return dem2di_in_step(world);
     int slot = dem2di_slot(world, id);
     if (slot < 0) return dem2di_stale(world, "particle", id.index);
     dem2di_body *body = &world->bodies[slot];
@@ -16220,6 +16233,7 @@ static void dem2di_put_at(dem2d_world *world, int slot, dem2d_vec position, dem2
 DEM2D_API dem2d_result dem2d_world_move_particle(dem2d_world *world, dem2d_particle_id id,
                                                  dem2d_vec position, double angle) {
     if (world == NULL) return DEM2D_NULL_ARGUMENT;
+    if (world->stepping) return dem2di_in_step(world);
     int slot = dem2di_slot(world, id);
     if (slot < 0) return dem2di_stale(world, "particle", id.index);
     dem2d_particle_desc moved = dem2di_particle_plain();
@@ -16263,6 +16277,7 @@ static void dem2di_contact_regroup(dem2d_world *world, int i) {
 DEM2D_API dem2d_result dem2d_world_set_groups(dem2d_world *world, dem2d_particle_id id,
                                               dem2d_groups groups) {
     if (world == NULL) return DEM2D_NULL_ARGUMENT;
+    if (world->stepping) return dem2di_in_step(world);
     int slot = dem2di_slot(world, id);
     if (slot < 0) return dem2di_stale(world, "particle", id.index);
     const dem2di_list *list = &world->list;
@@ -16283,6 +16298,7 @@ DEM2D_API dem2d_result dem2d_world_set_groups(dem2d_world *world, dem2d_particle
 DEM2D_API dem2d_result dem2d_world_set_user_data(dem2d_world *world, dem2d_particle_id id,
                                                  uint64_t user_data) {
     if (world == NULL) return DEM2D_NULL_ARGUMENT;
+    if (world->stepping) return dem2di_in_step(world);
     int slot = dem2di_slot(world, id);
     if (slot < 0) return dem2di_stale(world, "particle", id.index);
     dem2di_groups now = dem2di_groups_at(world, slot);
@@ -16353,6 +16369,7 @@ DEM2D_API dem2d_result dem2d_world_drive_particle(dem2d_world *world, dem2d_part
                                                   dem2d_motion motion, dem2d_vec velocity,
                                                   double angular_velocity) {
     if (world == NULL) return DEM2D_NULL_ARGUMENT;
+    if (world->stepping) return dem2di_in_step(world);
     int slot = dem2di_slot(world, id);
     if (slot < 0) return dem2di_stale(world, "particle", id.index);
     dem2d_particle_desc driven = dem2di_particle_plain();
@@ -16406,6 +16423,7 @@ DEM2D_API dem2d_result dem2d_world_set_load(dem2d_world *world, dem2d_particle_i
 
 DEM2D_API dem2d_result dem2d_world_set_gravity(dem2d_world *world, dem2d_vec gravity) {
     if (world == NULL) return DEM2D_NULL_ARGUMENT;
+    if (world->stepping) return dem2di_in_step(world);
     dem2d_result result = dem2di_check_one(&world->env, dem2di_world_fields,
                                            offsetof(dem2d_world_desc, gravity), &gravity);
     if (result != DEM2D_OK) return result;
@@ -16416,6 +16434,7 @@ DEM2D_API dem2d_result dem2d_world_set_gravity(dem2d_world *world, dem2d_vec gra
 
 DEM2D_API dem2d_result dem2d_world_set_damping(dem2d_world *world, double local, double global) {
     if (world == NULL) return DEM2D_NULL_ARGUMENT;
+    if (world->stepping) return dem2di_in_step(world);
     dem2d_result result = dem2di_check_one(&world->env, dem2di_world_fields,
                                            offsetof(dem2d_world_desc, local_damping), &local);
     if (result == DEM2D_OK)
@@ -16434,6 +16453,7 @@ static double dem2di_time(const dem2d_world *world) {
 
 DEM2D_API dem2d_result dem2d_world_set_time_step(dem2d_world *world, double time_step) {
     if (world == NULL) return DEM2D_NULL_ARGUMENT;
+    if (world->stepping) return dem2di_in_step(world);
     dem2d_result result = dem2di_check_one(&world->env, dem2di_world_fields,
                                            offsetof(dem2d_world_desc, time_step), &time_step);
     if (result != DEM2D_OK) return result;
@@ -16470,6 +16490,7 @@ static void dem2di_momentum_clear(dem2d_world *world) {
 
 DEM2D_API dem2d_result dem2d_world_deform(dem2d_world *world, const dem2d_deformation_desc *desc) {
     if (world == NULL || desc == NULL) return DEM2D_NULL_ARGUMENT;
+    if (world->stepping) return dem2di_in_step(world);
     dem2d_result result = dem2di_check_deformation(&world->env, desc, world->time_step);
     if (result != DEM2D_OK) return result;
     const dem2di_control control = dem2di_control_make(desc);
@@ -16502,6 +16523,7 @@ DEM2D_API dem2d_result dem2d_world_deform(dem2d_world *world, const dem2d_deform
 DEM2D_API dem2d_result dem2d_world_set_material(dem2d_world *world, dem2d_particle_id id,
                                                 dem2d_material_id material) {
     if (world == NULL) return DEM2D_NULL_ARGUMENT;
+    if (world->stepping) return dem2di_in_step(world);
     int slot = dem2di_slot(world, id);
     if (slot < 0) return dem2di_stale(world, "particle", id.index);
     if (!dem2di_material_lives(world, material))
@@ -16543,6 +16565,7 @@ static void dem2di_resized(dem2d_world *world, int slot) {
 DEM2D_API dem2d_result dem2d_world_set_shape(dem2d_world *world, dem2d_particle_id id,
                                              dem2d_shape_id shape, double scale) {
     if (world == NULL) return DEM2D_NULL_ARGUMENT;
+    if (world->stepping) return dem2di_in_step(world);
     int slot = dem2di_slot(world, id);
     if (slot < 0) return dem2di_stale(world, "particle", id.index);
     if (!dem2di_shape_lives(world, shape)) return dem2di_stale(world, "shape", shape.index);
@@ -17312,6 +17335,7 @@ static double dem2di_wall_change(const dem2d_world *world, const dem2di_wall_sta
 DEM2D_API dem2d_result dem2d_world_add_wall(dem2d_world *world, const dem2d_wall_desc *desc,
                                             dem2d_wall_id *id) {
     if (world == NULL || desc == NULL || id == NULL) return DEM2D_NULL_ARGUMENT;
+    if (world->stepping) return dem2di_in_step(world);
     dem2d_result result = dem2di_check_wall(world, desc);
     if (result == DEM2D_OK) result = dem2di_check_given(world, desc);
     if (result != DEM2D_OK) return result;
@@ -17392,6 +17416,7 @@ static void dem2di_forget_turned(dem2d_world *world, int slot, const dem2d_wall_
 DEM2D_API dem2d_result dem2d_world_set_wall(dem2d_world *world, dem2d_wall_id id,
                                             const dem2d_wall_desc *desc) {
     if (world == NULL || desc == NULL) return DEM2D_NULL_ARGUMENT;
+    if (world->stepping) return dem2di_in_step(world);
     if (!dem2di_wall_lives(world, id)) return dem2di_stale(world, "wall", id.index);
     dem2d_result result = dem2di_check_wall(world, desc);
     if (result == DEM2D_OK) result = dem2di_check_given(world, desc);
@@ -17435,6 +17460,7 @@ DEM2D_API dem2d_result dem2d_world_set_wall(dem2d_world *world, dem2d_wall_id id
 DEM2D_API dem2d_result dem2d_world_drive_wall(dem2d_world *world, dem2d_wall_id id,
                                               dem2d_vec velocity, double angular_velocity) {
     if (world == NULL) return DEM2D_NULL_ARGUMENT;
+    if (world->stepping) return dem2di_in_step(world);
     if (!dem2di_wall_lives(world, id)) return dem2di_stale(world, "wall", id.index);
     const dem2d_env *env = &world->env;
     int slot = (int)id.index;
@@ -17467,6 +17493,7 @@ DEM2D_API dem2d_result dem2d_world_drive_wall(dem2d_world *world, dem2d_wall_id 
 
 DEM2D_API dem2d_result dem2d_world_remove_wall(dem2d_world *world, dem2d_wall_id id) {
     if (world == NULL) return DEM2D_NULL_ARGUMENT;
+    if (world->stepping) return dem2di_in_step(world);
     if (!dem2di_wall_lives(world, id)) return dem2di_stale(world, "wall", id.index);
     dem2di_wall *wall = &world->walls[id.index];
     int self = (wall->span[0] == (int)id.index) + (wall->span[1] == (int)id.index);
@@ -25066,9 +25093,8 @@ static dem2d_result dem2di_step(dem2d_world *world) {
 DEM2D_API dem2d_result dem2d_world_step(dem2d_world *world, int count, int *done) {
     if (done != NULL) *done = 0;
     if (world == NULL) return DEM2D_NULL_ARGUMENT;
+    if (world->stepping) return dem2di_in_step(world);
     dem2d_result result = dem2di_check_number(&world->env, "count", count, DEM2DI_COUNT);
-    if (world->stepping)
-        result = dem2di_fail(&world->env, DEM2D_IN_USE, -1, "step called by a callback of a step");
     if (result != DEM2D_OK) return result;
     world->stepping = true;
     for (int i = 0; i < count && result == DEM2D_OK; i++) {
@@ -27866,6 +27892,7 @@ DEM2D_API dem2d_result dem2d_world_relax(dem2d_world *world, double tolerance, i
                                          dem2d_relaxation *relaxation) {
     dem2d_relaxation done;
     if (world == NULL || relaxation == NULL) return DEM2D_NULL_ARGUMENT;
+    if (world->stepping) return dem2di_in_step(world);
     const dem2d_env *env = &world->env;
     dem2d_result result = dem2di_check_number(env, "tolerance", tolerance, 0, 1,
                                               DEM2DI_ABOVE | DEM2DI_BELOW, DEM2DI_DOUBLE);
@@ -28197,6 +28224,7 @@ static dem2d_result dem2di_check_rows(const dem2d_world *world, const dem2d_part
 DEM2D_API dem2d_result dem2d_world_write_particles(dem2d_world *world,
                                                    const dem2d_particle_arrays *arrays, int count) {
     if (world == NULL || arrays == NULL) return DEM2D_NULL_ARGUMENT;
+    if (world->stepping) return dem2di_in_step(world);
     dem2d_result result = dem2di_check_rows(world, arrays, count);
     if (result != DEM2D_OK || count == 0) return result;
     bool moves = arrays->positions != NULL || arrays->angles != NULL;
@@ -29261,6 +29289,7 @@ DEM2D_API dem2d_result dem2d_world_fill(dem2d_world *world, const dem2d_fill_des
                                         dem2d_filling *filling) {
     dem2di_filler filler;
     if (world == NULL || desc == NULL || filling == NULL) return DEM2D_NULL_ARGUMENT;
+    if (world->stepping) return dem2di_in_step(world);
     const dem2d_env *env = &world->env;
     memset((void *)&filler, 0, sizeof filler);
     dem2d_result result = dem2di_check_fields(env, DEM2DI_ALL(dem2di_fill_fields), desc);
@@ -29310,6 +29339,7 @@ DEM2D_API dem2d_result dem2d_world_remove_in(dem2d_world *world, const dem2d_reg
                                              dem2d_flow *flow) {
     dem2di_area area;
     if (world == NULL) return DEM2D_NULL_ARGUMENT;
+    if (world->stepping) return dem2di_in_step(world);
     if (region == NULL) return dem2di_fail_null(&world->env, "region");
     dem2d_result result = dem2di_area_make(world, region, &area);
     for (int place = 0, slot;
@@ -29556,6 +29586,7 @@ DEM2D_API dem2d_result dem2d_world_feed(dem2d_world *world, const dem2d_inlet_de
     dem2di_feed feed;
     dem2di_filler filler;
     if (world == NULL || desc == NULL || inlet == NULL) return DEM2D_NULL_ARGUMENT;
+    if (world->stepping) return dem2di_in_step(world);
     const dem2d_env *env = &world->env;
     memset((void *)&filler, 0, sizeof filler);
     dem2d_result result = dem2di_feed_check(env, desc, seconds, inlet);
@@ -29806,9 +29837,10 @@ DEM2D_API dem2d_result dem2d_world_grow(dem2d_world *world, const dem2d_growth_d
                                         int steps, dem2d_growth *growth) {
     dem2d_growth done;
     if (world == NULL || desc == NULL || growth == NULL) return DEM2D_NULL_ARGUMENT;
+    if (world->stepping) return dem2di_in_step(world);
     dem2d_growth_desc own = *desc;
-    dem2d_result result = dem2d_world_step(world, 0, NULL); /* not by a callback of a step */
-    if (result == DEM2D_OK && own.area == 0) result = dem2di_growth_area(world, &own.area);
+    dem2d_result result = DEM2D_OK;
+    if (own.area == 0) result = dem2di_growth_area(world, &own.area);
     if (result == DEM2D_OK) result = dem2di_growth_check(world, &own, steps);
     if (result != DEM2D_OK) return result;
     int laws = world->material_count * world->material_count;

@@ -112,7 +112,14 @@ typedef struct fixture {
     dem2d_wall_id free_wall, stale_walls[STALE];
     store snapshot;           /* of another world */
     dem2d_custom_desc custom; /* room for what is found by a tag */
+    void (*within)(struct fixture *f); /* called at the start of each step, or NULL */
 } fixture;
+
+static void fixture_loads(void *user, dem2d_world *world) {
+    fixture *f = user;
+    (void)world;
+    if (f->within != NULL) f->within(f);
+}
 
 static const uint8_t pixels[8 * 8] = {/* one grain of 4 x 5 */
                                       255, 255, 255, 255, 255, 255, 255, 255, 255, 255, 9,
@@ -272,6 +279,7 @@ static void fixture_make(fixture *f, int steps) {
     dem2d_world_desc d = good_world(&f->env.env);
     const dem2d_image_desc image = good_image();
     d.ledger = true;
+    d.loads = fixture_loads, d.loads_user = f;
     assert_ok(dem2d_shape_create_ellipse(&f->env.env, 1.2, 0.8, &f->ellipse));
     assert_ok(dem2d_shape_create_polygon(&f->env.env, five_corners, 5, 0, &f->polygon));
     assert_ok(dem2d_image_outlines(&f->env.env, &image, &f->set));

@@ -794,13 +794,80 @@ static void test_limits(void **state) {
     fixture_end(&twin);
 }
 
+/* --- calls within a step ----------------------------------------------------------------------
+   Every function of a world is called by the callback that sets loads, with good arguments. Those
+   that change the world are refused; the step and all that follow are as if none had been called. */
+
+static const char *const refused_within[] = {
+    "world_add_shape",     "world_remove_shape",    "world_add_material",
+    "world_set_pair",      "world_add_particle",    "world_remove_particle",
+    "world_move_particle", "world_drive_particle",  "world_set_groups",
+    "world_set_user_data", "world_add_wall",        "world_set_wall",
+    "world_drive_wall",    "world_remove_wall",     "world_set_gravity",
+    "world_set_damping",   "world_deform",          "world_set_time_step",
+    "world_set_material",  "world_set_shape",       "world_relax",
+    "world_step",          "world_write_particles", "world_fill",
+    "world_remove_in",     "world_feed",            "world_grow"};
+static int refusals;
+
+static bool is_refused_within(const function *of) {
+    for (int k = 0; k < COUNT_OF(refused_within); k++)
+        if (strcmp(refused_within[k], of->name) == 0) return true;
+    return false;
+}
+
+static bool is_of_world(const function *of) {
+    for (int i = 0; i < of->count; i++)
+        if (of->rows[i].offset == offsetof(args, world) && of->rows[i].kind == POINTER) return true;
+    return false;
+}
+
+static void call_within(fixture *f) {
+    static args v;
+    for (int i = 0; i < COUNT_OF(functions); i++) {
+        const function *of = &functions[i];
+        const bool refused = is_refused_within(of);
+        if (!is_of_world(of) || strcmp(of->name, "world_set_load") == 0) continue;
+        args_make(&v, f);
+        of->prepare(&v, f);
+        const args before = v;
+        const uint64_t hash = dem2d_world_hash(f->world);
+        f->env.log.count = 0;
+        const dem2d_result result = of->call(&v);
+        if (dem2d_world_hash(f->world) != hash) fail_msg("dem2d_%s changes the hash", of->name);
+        if (!refused) continue;
+        const bool steps = strcmp(of->name, "world_step") == 0; /* none was done */
+        if (result != DEM2D_IN_USE || (!steps && memcmp(&before, &v, sizeof v) != 0))
+            fail_msg("dem2d_%s in a step: %s", of->name, dem2d_result_text(result));
+        assert_logged(&f->env, DEM2D_IN_USE, -1, "callback of a step");
+        refusals++;
+    }
+}
+
+static void test_within_a_step(void **state) {
+    fixture f, twin;
+    (void)state;
+    fixture_make(&f, 30);
+    fixture_make(&twin, 30);
+    refusals = 0;
+    f.within = call_within;
+    assert_ok(dem2d_world_step(f.world, 1, NULL));
+    f.within = NULL;
+    assert_int_equal(refusals, COUNT_OF(refused_within));
+    assert_ok(dem2d_world_step(twin.world, 1, NULL));
+    check_goes_on(&f, &twin);
+    fixture_end(&f);
+    fixture_end(&twin);
+}
+
 int main(void) {
-    static struct CMUnitTest tests[COUNT_OF(functions) + 8];
+    static struct CMUnitTest tests[COUNT_OF(functions) + 9];
     const struct CMUnitTest others[] = {
         cmocka_unit_test(test_all_functions), cmocka_unit_test(test_all_descs),
         cmocka_unit_test(test_others),        cmocka_unit_test(test_unfinished_worlds),
         cmocka_unit_test(test_in_use),        cmocka_unit_test(test_emptied),
         cmocka_unit_test(test_limits),        cmocka_unit_test(test_extremes),
+        cmocka_unit_test(test_within_a_step),
     };
     size_t count = 0;
     for (int i = 0; i < COUNT_OF(functions); i++) {
