@@ -798,16 +798,33 @@ static void test_limits(void **state) {
    Every function of a world is called by the callback that sets loads, with good arguments. Those
    that change the world are refused; the step and all that follow are as if none had been called. */
 
-static const char *const refused_within[] = {
-    "world_add_shape",     "world_remove_shape",    "world_add_material",
-    "world_set_pair",      "world_add_particle",    "world_remove_particle",
-    "world_move_particle", "world_drive_particle",  "world_set_groups",
-    "world_set_user_data", "world_add_wall",        "world_set_wall",
-    "world_drive_wall",    "world_remove_wall",     "world_set_gravity",
-    "world_set_damping",   "world_deform",          "world_set_time_step",
-    "world_set_material",  "world_set_shape",       "world_relax",
-    "world_step",          "world_write_particles", "world_fill",
-    "world_remove_in",     "world_feed",            "world_grow"};
+static const char *const refused_within[] = {"world_add_shape",
+                                             "world_remove_shape",
+                                             "world_add_material",
+                                             "world_set_pair",
+                                             "world_add_particle",
+                                             "world_remove_particle",
+                                             "world_move_particle",
+                                             "world_drive_particle",
+                                             "world_set_groups",
+                                             "world_set_user_data",
+                                             "world_add_wall",
+                                             "world_set_wall",
+                                             "world_drive_wall",
+                                             "world_remove_wall",
+                                             "world_set_gravity",
+                                             "world_set_damping",
+                                             "world_deform",
+                                             "world_set_time_step",
+                                             "world_set_material",
+                                             "world_set_shape",
+                                             "world_relax",
+                                             "world_step",
+                                             "world_write_particles",
+                                             "world_fill",
+                                             "world_remove_in",
+                                             "world_feed",
+                                             "world_grow"};
 static int refusals;
 
 static bool is_refused_within(const function *of) {
