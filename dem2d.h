@@ -1624,8 +1624,9 @@ typedef enum dem2d_wall_mode {
 /// moved into the cell; it may be up to 2^26 cells away (else OUT_OF_RANGE, or STATE when it moves
 /// there). Segments are joined to copies as to others: a chain whose end is its start one cell
 /// vector further is a floor that goes round, without a step at the border. A wall that crosses a
-/// copy of itself as it is set is refused (OUT_OF_RANGE); copies that meet as the wall turns, or as
-/// the cell gets smaller, do not notice each other. The copies of a one-sided wall count as one
+/// copy of itself as it is set, or reaches over more than 1024 cells along x or y, is refused
+/// (OUT_OF_RANGE); copies that meet as the wall turns, or as the cell gets smaller, do not notice
+/// each other. The copies of a one-sided wall count as one
 /// wall for grains that pass. While the cell deforms, the wall has its own velocity in the plane,
 /// also 0, and its copies have that of the flow between their places and its own beside it; servo
 /// walls are refused then, and stresses are not held in a cell with walls.
@@ -17376,15 +17377,20 @@ static dem2d_vec dem2di_wall_velocity(const dem2d_world *world, int wall) {
     return desc->mode == DEM2D_WALL_MOVING ? desc->velocity : dem2di_vec(0, 0);
 }
 
+/* To a point from the nearest point of a segment. */
+static dem2d_vec dem2di_from_segment(const dem2d_world *world, int part, dem2d_vec x) {
+    const dem2di_surface *surface = &world->surfaces[part];
+    dem2d_vec from = dem2di_sub(x, surface->point);
+    dem2d_vec along = dem2di_vec(surface->along.c, surface->along.s);
+    double place = dem2di_min(world->parts[part].extent, dem2di_dot(from, along));
+    return dem2di_along(from, -dem2di_max(0, place), along);
+}
+
 /* Distance of a point from a part; behind a half-plane negative. */
 static double dem2di_part_distance(const dem2d_world *world, int part, dem2d_vec x) {
     const dem2di_surface *surface = &world->surfaces[part];
-    double extent = world->parts[part].extent;
-    dem2d_vec from = dem2di_sub(x, surface->point);
-    if (!(extent > 0)) return dem2di_dot(from, dem2di_surface_normal(surface));
-    dem2d_vec along = dem2di_vec(surface->along.c, surface->along.s);
-    double place = dem2di_max(0, dem2di_min(extent, dem2di_dot(from, along)));
-    return dem2di_length(dem2di_along(from, -place, along));
+    if (world->parts[part].extent > 0) return dem2di_length(dem2di_from_segment(world, part, x));
+    return dem2di_dot(dem2di_sub(x, surface->point), dem2di_surface_normal(surface));
 }
 
 /* May a wall that was set again change the features in use, or the bounds of the motion? */
@@ -17718,12 +17724,6 @@ static bool dem2di_rest_together(const dem2d_world *world, int a, int b, const i
            (one->velocity.x == other->velocity.x && one->velocity.y == other->velocity.y);
 }
 
-/* An end moved by cell vectors. */
-static dem2d_vec dem2di_end_moved(const dem2d_world *world, const dem2di_segment_end *end,
-                                  int along_a, int along_b) {
-    return dem2di_add(end->at, dem2di_cell_shift(&world->cell, along_a, along_b));
-}
-
 /* Away from an end along its segment, a unit vector. */
 static dem2d_vec dem2di_end_away(const dem2d_world *world, const dem2di_segment_end *end) {
     dem2d_rot along = world->surfaces[end->part].along;
@@ -17743,7 +17743,8 @@ static void dem2di_ends_list(const dem2d_world *world, dem2di_joining *joining) 
             end->home = end->at;
             end->out[0] = end->out[1] = 0;
             if (dem2di_cells_out(&f, end->at, end->out))
-                end->home = dem2di_end_moved(world, end, -end->out[0], -end->out[1]);
+                end->home =
+                    dem2di_sub(end->at, dem2di_cell_shift(&world->cell, end->out[0], end->out[1]));
             end->cells[0] = -end->out[0];
             end->cells[1] = -end->out[1];
             end->near = DEM2DI_JOINT * extent;
@@ -17955,9 +17956,10 @@ static dem2di_row_end dem2di_row_on(const dem2di_joining *joining, const dem2di_
     return next;
 }
 
+/* An end moved by cell vectors. */
 static dem2d_vec dem2di_row_place(const dem2d_world *world, const dem2di_joining *joining, int end,
                                   const int at[2]) {
-    return dem2di_end_moved(world, &joining->ends[end], at[0], at[1]);
+    return dem2di_add(joining->ends[end].at, dem2di_cell_shift(&world->cell, at[0], at[1]));
 }
 
 /* Where the face ends that begins at an end: as long as its vertices are on a line, or where it
@@ -27132,16 +27134,11 @@ static bool dem2di_nearest_particle(const dem2di_question *question, int slot, d
 }
 
 static bool dem2di_nearest_part(const dem2di_question *question, int part, dem2d_hit *hit) {
-    const dem2di_surface *surface = &question->world->surfaces[part];
-    double distance = dem2di_part_distance(question->world, part, question->origin);
-    double extent = question->world->parts[part].extent;
-    dem2d_vec normal = dem2di_surface_normal(surface);
-    if (extent > 0) {
-        dem2d_vec along = dem2di_vec(surface->along.c, surface->along.s);
-        dem2d_vec from = dem2di_sub(question->origin, surface->point);
-        double place = dem2di_max(0, dem2di_min(extent, dem2di_dot(from, along)));
-        (void)dem2di_unit(dem2di_along(from, -place, along), &normal);
-    }
+    const dem2d_world *world = question->world;
+    double distance = dem2di_part_distance(world, part, question->origin);
+    dem2d_vec normal = dem2di_surface_normal(&world->surfaces[part]);
+    if (world->parts[part].extent > 0)
+        (void)dem2di_unit(dem2di_from_segment(world, part, question->origin), &normal);
     dem2di_nearest_set(question, distance, normal, hit);
     return hit->distance <= question->limit;
 }
