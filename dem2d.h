@@ -18148,8 +18148,8 @@ static bool dem2di_joints_find(dem2d_world *world, dem2di_joining *joining) {
     return joined;
 }
 
-/* Contacts with vertices that are not those of before, but have their numbers, are forgotten. Others
-   stay: what they had in the last force pass must outlast a step that is refused. */
+/* Contacts with vertices that are not those of before, but have their numbers, are forgotten. The
+   others stay: what they had in the last force pass must outlast a step that is refused. */
 static void dem2di_forget_vertices(dem2d_world *world, const dem2di_wall_joint *before) {
     const dem2di_list *list = &world->list;
     for (int i = list->pairs; i < list->count; i++) {
@@ -29917,7 +29917,7 @@ static dem2d_result dem2di_writer_close(const dem2d_env *env, const char *path,
 /* ============================================================================================
    >>snapshot  State hash, snapshots: both follow the tables of columns and fields
    uses: config, math, memory, fields, support, shapes, broad, law, motion, world, cell, objects,
-         walls, joints, list, measures, output
+         walls, list, measures, output
    ============================================================================================ */
 
 /* To save, load, check and hash another number, add a row to the table of fields of its struct; for
