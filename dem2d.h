@@ -23514,7 +23514,7 @@ typedef struct dem2di_pressing {
 } dem2di_pressing;
 
 static DEM2DI_INLINE dem2di_pressing dem2di_pressing_of(const dem2d_world *world, int i,
-                                          const dem2di_contact *contact) {
+                                                        const dem2di_contact *contact) {
     const dem2di_contacts *contacts = &world->list.contacts;
     const dem2di_point_pair *pair = dem2di_point_pair_of(world, contacts, i);
     dem2di_pressing pressing;
@@ -24005,6 +24005,32 @@ static void dem2di_flow_begin_task(void *context, int begin, int end) {
     }
 }
 
+/* The same where the integrate pass came first, without a flow: it keeps this part of a velocity.
+   The greatest square of speed over skin is found again. */
+static void dem2di_flow_late_task(void *context, int begin, int end) {
+    dem2d_world *world = (dem2d_world *)context;
+    const dem2di_flow flow = dem2di_flow_mean(&world->flow_made, &world->flow);
+    const double dt = world->time_step;
+    const double half = dem2di_damping_make(0, world->global_damping, dt).keep * dt / 2;
+    for (int block = begin; block < end; block++) {
+        const int last = dem2di_block_end(block * DEM2DI_BLOCK, DEM2DI_BLOCK, world->body_count);
+        double most = 0;
+        for (int i = block * DEM2DI_BLOCK; i < last; i++) {
+            const dem2d_vec c = world->now[i].v, way = dem2di_flow_at(&flow, c);
+            dem2d_vec *next = &world->before[i].v;
+            world->fluctuations[i].v = c;
+            if (world->inverse[i].mass > 0) {
+                *next = dem2di_along(*next, -half, way);
+                if (world->plan.turns)
+                    world->next_displacement[i] +=
+                        dem2di_length(way) * fabs(half) * dt * (1 + 4 * DBL_EPSILON);
+            }
+            most = dem2di_max(most, dem2di_dot(*next, *next) * world->inverse_skin_squared[i]);
+        }
+        world->block_results[block].most = most;
+    }
+}
+
 /* The second half: what integrate has made of them, and the positions that follow. The displacement
    grows by what integrate has not counted: see dem2di_displaced. The two of a listed pair are apart
    by R + 2 s of both at most, while the list lasts. As s is at most (skin + 1/4) R, this is below
@@ -24039,7 +24065,8 @@ static double dem2di_flow_pass(dem2d_world *world) {
     const int blocks = dem2di_blocks(world->body_count, DEM2DI_BLOCK);
     const double used = world->list_displacement;
     const double strain = dem2di_flow_size(&world->flow) * world->time_step;
-    dem2di_run(world, DEM2D_PHASE_MOTION, blocks, dem2di_flow_begin_task, world);
+    dem2di_run(world, DEM2D_PHASE_MOTION, blocks,
+               world->foreseen ? dem2di_flow_late_task : dem2di_flow_begin_task, world);
     double path = dem2di_integrate_pass(world) - used;
     dem2di_run(world, DEM2D_PHASE_MOTION, blocks, dem2di_flow_end_task, world);
     return used + 1.25 * (1 + strain) * path + dem2di_max(10, 1.06 / world->skin) * strain;
@@ -24049,12 +24076,12 @@ static double dem2di_flow_pass(dem2d_world *world) {
    The rates L of a cell move its contacts to where the next force pass finds them, as the speed of
    a servo wall does. The forces of this pass alone decide the velocities c+ of the particles, but
    for terms of second order, so that they are known: an integrate pass without a flow has left them
-   in world->before. A contact with the line d from A to B, the normal n and the tangent t, the
+   in world->before. The flow pass goes on from there (dem2di_flow_late_task). A contact with the line d from A to B, the normal n and the tangent t, the
    stiffnesses kn, kt and the dashpots gn, gt, whose springs press with N and shear with S now, will
    press and shear with
        N+ = max(0, N - (kn dt + gn) n (C + L d)),   S+ = S - (kt dt + gt) t (C + L d), at most mu N+
-   where C is the velocity of B against A at the contact without a flow. Two discs that are apart
-   press where C + L d brings them together. So the stress of the next pass is known as a function
+   where C is the velocity of B against A at the contact without a flow. Of two discs N is kn times
+   their overlap, below 0 while they are apart: they press where C + L d brings them together. So the stress of the next pass is known as a function
    of L; its slope is found at the last L. The rates L that are taken solve
        stress+(L) = target + R (L - D),   R = 0.05 slope + 3 s dt
    with the greatest target s. R limits what a step makes up for, and takes energy out of
@@ -24088,7 +24115,9 @@ static double dem2di_flow_pass(dem2d_world *world) {
 /* What holds for all contacts in a control of the cell. */
 typedef struct dem2di_cell_aim {
     dem2d_world *world;
-    double rate[3]; /* xx, xy, yy: the stress of the next pass is found at these */
+    double rate[3];             /* xx, xy, yy: the stress of the next pass is found at these */
+    const dem2d_pair_desc *law; /* of all circles; NULL where they have several */
+    bool only_yy;               /* no other component is held */
 } dem2di_cell_aim;
 
 /* The parts in xx, yx, yy of a force along a direction at the end of a line d; also those of the
@@ -24109,45 +24138,70 @@ static inline double dem2di_cell_leaves(const dem2di_cell_parts *parts, const do
     return parts->xx * rate[0] + parts->xy * rate[1] + parts->yy * rate[2];
 }
 
-static inline void dem2di_cell_sum(double sum[3], dem2d_vec force, dem2d_vec d) {
-    sum[0] += force.x * d.x;
-    sum[1] += force.x * d.y;
+/* Sums are made where `all` components may be held; else of yy alone. */
+static DEM2DI_INLINE void dem2di_cell_sum(double sum[3], bool all, dem2d_vec force, dem2d_vec d) {
+    if (all) {
+        sum[0] += force.x * d.x;
+        sum[1] += force.x * d.y;
+    }
     sum[2] += force.y * d.y;
 }
 
-static inline void dem2di_cell_slope(double slope[6], const dem2di_cell_parts *parts,
-                                     double impedance) {
-    const double xx = impedance * parts->xx, xy = impedance * parts->xy;
-    slope[0] += xx * parts->xx;
-    slope[1] += xx * parts->xy;
-    slope[2] += xx * parts->yy;
-    slope[3] += xy * parts->xy;
-    slope[4] += xy * parts->yy;
+static DEM2DI_INLINE void dem2di_cell_slope(double slope[6], bool all,
+                                            const dem2di_cell_parts *parts, double impedance) {
+    if (all) {
+        const double xx = impedance * parts->xx, xy = impedance * parts->xy;
+        slope[0] += xx * parts->xx;
+        slope[1] += xx * parts->xy;
+        slope[2] += xx * parts->yy;
+        slope[3] += xy * parts->xy;
+        slope[4] += xy * parts->yy;
+    }
     slope[5] += impedance * parts->yy * parts->yy;
 }
 
-/* Two discs that are apart now: what they do if they meet in the next force pass. */
-static inline void dem2di_response_gap(const dem2di_cell_aim *aim, int i, dem2d_vec v,
-                                       dem2di_cell_response *response) {
+/* Two circles by a law of the world's own, closed or not: the columns hold normal and depth of both
+   kinds, and no forces of those that are apart. */
+static DEM2DI_INLINE void dem2di_response_circles(const dem2di_cell_aim *aim, bool all, int i,
+                                                  const dem2di_state *a, const dem2di_state *b,
+                                                  dem2di_cell_response *response) {
     const dem2d_world *world = aim->world;
-    const dem2di_key *key = &world->list.keys[i];
-    const dem2di_state *a = &world->now[key->a], *b = &world->now[key->b];
-    const dem2d_vec d = dem2di_sub(b->x, a->x);
-    const double dt = world->time_step, reach = a->radius + b->radius;
-    v.x += aim->rate[0] * d.x + aim->rate[1] * d.y;
-    v.y += aim->rate[2] * d.y;
-    const dem2d_vec to = dem2di_along(d, dt, v);
-    if (dem2di_dot(to, to) >= reach * reach) return;
-    const dem2d_pair_desc *law = dem2di_law_of(world, i);
-    const double distance = dem2di_length(d), gap = distance - reach;
-    const dem2d_vec n = dem2di_scale(d, 1 / distance);
+    const dem2di_contacts *contacts = &world->list.contacts;
+    const dem2d_vec n = dem2di_vec(contacts->normal_x[i], contacts->normal_y[i]);
+    const double dt = world->time_step, depth = contacts->depth[i];
+    const double arm_a = a->radius - depth / 2, arm_b = b->radius - depth / 2;
+    const dem2d_vec d = dem2di_scale(n, arm_a + arm_b);
+    dem2d_vec c = dem2di_sub(b->v, a->v);
+    c.x += aim->rate[0] * d.x + aim->rate[1] * d.y;
+    c.y += aim->rate[2] * d.y;
+    double shear = contacts->shear[i];
+    if (depth > 0)
+        dem2di_cell_sum(response->stress, all, dem2di_from_frame(n, contacts->force[i], shear), d);
+    const double leaves = dem2di_dot(n, c);
+    if (!(depth - dt * leaves > 0)) return;
+    const dem2d_pair_desc *law = aim->law != NULL ? aim->law : dem2di_law_with(world, i, false);
     double impedance = law->normal_stiffness * dt;
-    if (world->plan.terms & DEM2DI_DASHPOT) impedance += dem2di_normal_dashpot(world, i);
-    const double force = -law->normal_stiffness * gap - impedance * dem2di_dot(n, v);
+    if (world->plan.terms & DEM2DI_DASHPOT) impedance += world->list.dampers.normal[i];
+    const double force = law->normal_stiffness * depth - impedance * leaves;
     if (!(force > 0)) return;
-    const dem2di_cell_parts parts = dem2di_cell_parts_of(n, d);
-    dem2di_cell_sum(response->next, dem2di_scale(n, force), d);
-    dem2di_cell_slope(response->slope, &parts, impedance);
+    const dem2di_cell_parts normal = dem2di_cell_parts_of(n, d);
+    dem2di_cell_slope(response->slope, all, &normal, impedance);
+    if (law->tangential_stiffness > 0) {
+        impedance = law->tangential_stiffness * dt;
+        if (world->plan.terms & DEM2DI_TANGENTIAL_DASHPOT) {
+            const dem2di_arms arms = {arm_a, 0, -arm_b, 0};
+            impedance += dem2di_tangential_dashpot(world, i, &arms);
+            shear -= contacts->viscous_shear[i];
+        }
+        shear -= impedance * (dem2di_cross(n, c) - (arm_a * a->w + arm_b * b->w));
+        const double most = law->friction * force;
+        if (fabs(shear) < most) {
+            const dem2di_cell_parts tangent = dem2di_cell_parts_of(dem2di_perp(n), d);
+            dem2di_cell_slope(response->slope, all, &tangent, impedance);
+        }
+        shear = dem2di_held(most, shear);
+    }
+    dem2di_cell_sum(response->next, all, dem2di_from_frame(n, force, shear), d);
 }
 
 /* A closed contact. A caller's law may pull, and says nothing of the tangential force. */
@@ -24165,13 +24219,12 @@ static inline void dem2di_response_closed(const dem2di_cell_aim *aim, int i,
     memset(&motion, 0, sizeof motion);
     motion.v = v, motion.wa = wa, motion.wb = wb;
     at.arms = pressing.arms;
-    dem2di_cell_sum(response->stress, dem2di_contact_force(contact), d);
-    const double leaves =
-        dem2di_velocity_n(&at, &motion) + dem2di_cell_leaves(&normal, aim->rate);
+    dem2di_cell_sum(response->stress, true, dem2di_contact_force(contact), d);
+    const double leaves = dem2di_velocity_n(&at, &motion) + dem2di_cell_leaves(&normal, aim->rate);
     const double force = pressing.spring - pressing.impedance * leaves;
     if (!(force > 0) && world->law == NULL) return;
     double shear = contact->shear;
-    dem2di_cell_slope(response->slope, &normal, pressing.impedance);
+    dem2di_cell_slope(response->slope, true, &normal, pressing.impedance);
     if (law->tangential_stiffness > 0 && world->law == NULL) {
         double impedance = pressing.weight * law->tangential_stiffness * world->time_step;
         if (world->plan.terms & DEM2DI_TANGENTIAL_DASHPOT)
@@ -24180,45 +24233,48 @@ static inline void dem2di_response_closed(const dem2di_cell_aim *aim, int i,
             dem2di_velocity_t(contact, &motion) + dem2di_cell_leaves(&tangent, aim->rate);
         const double most = law->friction * force;
         shear -= dem2di_viscous_shear_of(world, &world->list.contacts, i) + impedance * slides;
-        if (fabs(shear) < most) dem2di_cell_slope(response->slope, &tangent, impedance);
+        if (fabs(shear) < most) dem2di_cell_slope(response->slope, true, &tangent, impedance);
         shear = dem2di_held(most, shear);
     }
-    dem2di_cell_sum(response->next, dem2di_from_frame(contact->normal, force, shear), d);
+    dem2di_cell_sum(response->next, true, dem2di_from_frame(contact->normal, force, shear), d);
 }
 
 /* A contact with a wall, taken to press as it does now. */
 static void dem2di_response_wall(const dem2di_contact *contact, dem2di_cell_response *response) {
     const dem2d_vec force = dem2di_contact_force(contact), d = dem2di_branch_of(contact, true);
-    dem2di_cell_sum(response->stress, force, d);
-    dem2di_cell_sum(response->next, force, d);
+    dem2di_cell_sum(response->stress, true, force, d);
+    dem2di_cell_sum(response->next, true, force, d);
 }
 
 /* A particle, its contacts with those of a higher rank and with walls. */
-static void dem2di_response_particle(const dem2di_cell_aim *aim, int slot,
-                                     dem2di_cell_response *response) {
+static DEM2DI_INLINE void dem2di_response_particle(const dem2di_cell_aim *aim, bool all, int slot,
+                                                   dem2di_cell_response *response) {
     const dem2d_world *world = aim->world;
     const dem2di_list *list = &world->list;
     const dem2di_state *next = &world->before[slot];
+    const double inverse = world->inverse[slot].mass;
+    const int circles = world->law == NULL ? list->discs : 0;
     for (int k = list->own[slot]; k < list->first[slot + 1]; k++) {
         const int i = list->adjacent[k];
         dem2di_contact contact;
         if (list->keys[i].a < 0) continue;
-        const bool closed = dem2di_contact_get(world, &list->contacts, i, &contact);
-        if (closed && i >= list->pairs) dem2di_response_wall(&contact, response);
-        if (i >= list->pairs) continue;
-        if (!closed && (i >= list->discs || world->law != NULL)) continue;
+        if (i >= list->pairs) {
+            if (dem2di_contact_get(world, &list->contacts, i, &contact))
+                dem2di_response_wall(&contact, response);
+            continue;
+        }
         const dem2di_state *other = &world->before[dem2di_owner(world, list->keys[i].b)];
-        const dem2d_vec v = dem2di_sub(other->v, next->v);
-        if (closed)
-            dem2di_response_closed(aim, i, &contact, v, next->w, other->w, response);
-        else
-            dem2di_response_gap(aim, i, v, response);
+        if (i < circles)
+            dem2di_response_circles(aim, all, i, next, other, response);
+        else if (dem2di_contact_get(world, &list->contacts, i, &contact))
+            dem2di_response_closed(aim, i, &contact, dem2di_sub(other->v, next->v), next->w,
+                                   other->w, response);
     }
-    if (!(world->inverse[slot].mass > 0)) return;
-    const double mass = dem2di_body_mass(world, &world->bodies[slot]);
+    if (!(inverse > 0)) return;
+    const double mass = 1 / inverse;
     const dem2d_vec c = dem2di_scale(dem2di_add(world->now[slot].v, next->v), 0.5);
-    dem2di_cell_sum(response->stress, dem2di_scale(c, mass), c);
-    dem2di_cell_sum(response->next, dem2di_scale(c, mass), c);
+    dem2di_cell_sum(response->stress, all, dem2di_scale(c, mass), c);
+    dem2di_cell_sum(response->next, all, dem2di_scale(c, mass), c);
     response->mass += mass;
     response->count++;
 }
@@ -24234,7 +24290,11 @@ static void dem2di_response_task(void *context, int begin, int end) {
         memset(&sums, 0, sizeof sums);
         for (; place < last; place++) {
             const int slot = dem2di_slot_at(world, place);
-            if (slot >= 0) dem2di_response_particle(aim, slot, &sums);
+            if (slot < 0) continue;
+            if (aim->only_yy)
+                dem2di_response_particle(aim, false, slot, &sums);
+            else
+                dem2di_response_particle(aim, true, slot, &sums);
         }
         world->block_results[block].response = sums;
     }
@@ -24293,6 +24353,9 @@ static void dem2di_cell_control(dem2d_world *world) {
     rates[0] = &world->flow.xx, rates[1] = &world->flow.xy, rates[2] = &world->flow.yy;
     drifts[0] = &world->drift.xx, drifts[1] = &world->drift.xy, drifts[2] = &world->drift.yy;
     aim.world = world;
+    aim.law =
+        world->plan.one_law ? dem2di_law(world, world->plan.material, world->plan.material) : NULL;
+    aim.only_yy = !control.hold[0] && !control.hold[1];
     for (int c = 0; c < 3; c++) aim.rate[c] = *rates[c];
     const dem2di_cell_response response = dem2di_response_make(&aim);
     const double most = dem2di_cell_most(world, control.scale, response.mass);
@@ -25073,6 +25136,7 @@ static dem2d_result dem2di_step(dem2d_world *world) {
     const bool flows = dem2di_cell_flows(world);
     if (flows && dem2di_control_make(&world->control).holds) {
         (void)dem2di_integrate_pass(world);
+        world->foreseen = true;
         dem2di_cell_control(world);
     }
     double path = flows ? dem2di_flow_pass(world) : dem2di_integrate_pass(world);
