@@ -24076,13 +24076,14 @@ static double dem2di_flow_pass(dem2d_world *world) {
    The rates L of a cell move its contacts to where the next force pass finds them, as the speed of
    a servo wall does. The forces of this pass alone decide the velocities c+ of the particles, but
    for terms of second order, so that they are known: an integrate pass without a flow has left them
-   in world->before. The flow pass goes on from there (dem2di_flow_late_task). A contact with the line d from A to B, the normal n and the tangent t, the
-   stiffnesses kn, kt and the dashpots gn, gt, whose springs press with N and shear with S now, will
-   press and shear with
+   in world->before. The flow pass goes on from there (dem2di_flow_late_task). A contact with the
+   line d from A to B, the normal n and the tangent t, the stiffnesses kn, kt and the dashpots gn,
+   gt, whose springs press with N and shear with S now, will press and shear with
        N+ = max(0, N - (kn dt + gn) n (C + L d)),   S+ = S - (kt dt + gt) t (C + L d), at most mu N+
    where C is the velocity of B against A at the contact without a flow. Of two discs N is kn times
-   their overlap, below 0 while they are apart: they press where C + L d brings them together. So the stress of the next pass is known as a function
-   of L; its slope is found at the last L. The rates L that are taken solve
+   their overlap, below 0 while they are apart: they press where C + L d brings them together. So
+   the stress of the next pass is known as a function of L; its slope is found at the last L. The
+   rates L that are taken solve
        stress+(L) = target + R (L - D),   R = 0.05 slope + 3 s dt
    with the greatest target s. R limits what a step makes up for, and takes energy out of
    vibrations. Of other shapes it is not known which contacts will close, so that the stress comes
