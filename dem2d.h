@@ -19279,6 +19279,7 @@ static bool dem2di_build_images(dem2di_build *build) {
     const int slots = world->body_count + build->images + build->wall_images + build->lost_images;
     return !world->periodic ||
            (dem2di_reserve_bodies(world, slots) &&
+            (!dem2di_cell_flows(world) || dem2di_group_reserve(world, DEM2DI_FLOWING, slots)) &&
             (!build->plan.turns || dem2di_group_reserve(world, DEM2DI_DISPLACEMENTS, slots)));
 }
 
@@ -25079,14 +25080,14 @@ static dem2d_result dem2di_step_try(dem2d_world *world, dem2di_trial *trial) {
     if (result != DEM2D_OK) return result;
     if (!dem2di_group_reserve(world, DEM2DI_EVENTS, world->event_capacity))
         return dem2di_out_of_memory(world, "events");
-    result = dem2di_prepare(world, &trial->listed);
-    if (result != DEM2D_OK) return result;
-    world->list_stale = trial->listed; /* if the step fails, the next try builds a list as well */
     if (flows && !dem2di_group_reserve(world, DEM2DI_FLOWING, dem2di_slots(world)))
-        return dem2di_out_of_memory(world, "velocities in the cell");
+        return dem2di_out_of_memory(world, "velocities in the cell"); /* a list may need more */
     if (flows && !dem2di_group_reserve(world, DEM2DI_BLOCK_RESULTS,
                                        dem2di_blocks(world->id_count, DEM2DI_BLOCK)))
         return dem2di_out_of_memory(world, "sums over the cell");
+    result = dem2di_prepare(world, &trial->listed);
+    if (result != DEM2D_OK) return result;
+    world->list_stale = trial->listed; /* if the step fails, the next try builds a list as well */
     bool due = dem2di_check_is_due(world);
     dem2di_softness_set(world);
     bool back = dem2di_looks_back(world, world->bounded, world->limit_softness);

@@ -90,6 +90,7 @@ typedef struct life_desc {
     double skin;
     bool rush;     /* grains begin apart and run together: lists wear out and grow */
     bool segments; /* two that are joined, and one more late */
+    bool cell;     /* periodic, and it shears: walls are a floor that goes round, and segments */
     bool ledger;
     int full;   /* EARLY: dashpots and rolling friction; LATE: from the middle on; BY_CALLER */
     int number; /* of this life */
@@ -126,6 +127,7 @@ static dem2d_result life_create(life *l, int i) {
     d.parallel_for = l->desc->blocks ? backwards : NULL;
     d.ledger = l->desc->ledger, d.law_tag = LAW_TAG;
     if (l->desc->full == BY_CALLER) d.law = soft_law;
+    if (l->desc->cell) d.cell.a = vec(0.8, 0), d.cell.b = vec(0.1, 0.8);
     return dem2d_world_create(&d, &l->world);
 }
 
@@ -143,10 +145,13 @@ static dem2d_result life_wall(life *l, int i) {
     static const double at[WALLS][4] = {
         {0, 0, 0, 1},         {0, 0, 1, 0},         {0.8, 0, -1, 0},     {0, 0.8, 0, -1},
         {0.2, 0.2, 0.4, 0.3}, {0.4, 0.3, 0.6, 0.2}, {0.6, 0.2, 0.7, 0.3}};
+    static const double in_cell[PLANES][4] = {
+        {0, 0, 0.8, 0}, {0, 0.3, 0.1, 0.6}, {0.7, 0.5, 0.9, 0.6}, {0.4, 0.7, 0.5, 0.9}};
+    const double *place = l->desc->cell && i < PLANES ? in_cell[i] : at[i];
     dem2d_wall_desc d = {0};
     if (i >= PLANES && !l->desc->segments) return DEM2D_OK;
-    d.material = l->materials[i], d.point = vec(at[i][0], at[i][1]);
-    d.normal = d.end = vec(at[i][2], at[i][3]), d.segment = i >= PLANES;
+    d.material = l->materials[i], d.point = vec(place[0], place[1]);
+    d.normal = d.end = vec(place[2], place[3]), d.segment = i >= PLANES || l->desc->cell;
     const dem2d_result result = dem2d_world_add_wall(l->world, &d, &l->walls[i]);
     if (result == DEM2D_OK) l->wall_count = i + 1;
     return result;
@@ -224,7 +229,7 @@ static dem2d_result life_relax(life *l, int i) {
     dem2d_hit hit;
     (void)i;
     const dem2d_result result =
-        dem2d_world_cast_ray(l->world, vec(-1, 0.3), vec(1, 0), 0, NULL, &hit);
+        dem2d_world_cast_ray(l->world, vec(-1, 0.3), vec(1, 0), 3, NULL, &hit);
     if (result != DEM2D_OK) return result;
     return dem2d_world_relax(l->world, 0.01, 2, &done);
 }
@@ -237,6 +242,17 @@ static dem2d_result life_chain(life *l, int i) {
     (void)i;
     d.material = l->materials[0], d.points = points, d.count = 3, d.one_sided = true;
     return dem2d_world_add_wall(l->world, &d, &id);
+}
+
+/* A cell shears; a wall in it turns. */
+static dem2d_result life_shear(life *l, int i) {
+    dem2d_deformation_desc flow = {0};
+    (void)i;
+    if (!l->desc->cell) return DEM2D_OK;
+    flow.xy = 1;
+    const dem2d_result result = dem2d_world_deform(l->world, &flow);
+    if (result != DEM2D_OK) return result;
+    return dem2d_world_drive_wall(l->world, l->walls[3], vec(0.1, 0), 1);
 }
 
 static dem2d_result life_rub(life *l, int i) {
@@ -300,6 +316,7 @@ static const life_event events[] = {
     {"change", life_change, 24, 24},
     {"ray and relax", life_relax, 0, 0},
     {"add chain", life_chain, 0, 0},
+    {"shear", life_shear, 0, 0},
     {"step", life_step, 0, 30},
     {"save and load", life_reload, 0, 0},
     {"add wall", life_wall, WALLS - 1, WALLS - 1},
@@ -401,6 +418,12 @@ static const life_desc lives[] = {
      .full = LATE},
     {.name = "a caller's law", .only = -1, .segments = true, .ledger = true, .full = BY_CALLER},
     {.name = "running together", .only = -1, .rush = true},
+    {.name = "a cell that shears, with walls",
+     .only = -1,
+     .segments = true,
+     .cell = true,
+     .ledger = true,
+     .full = LATE},
 };
 
 static void test_life(void **state) {
