@@ -309,13 +309,16 @@ HOW TO
                          changes from step to step (drag, magnets, motors, a spring to the mouse) is
                          set by dem2d_world_desc.loads (examples/drag.c, examples/game.c). The work
                          is in the ledger.
-    leave out the walls  dem2d_world_desc.cell makes the world periodic. A rough floor, or bodies in
-                         a stream: chains, which have copies as grains have images. Without walls,
+    leave out the walls  dem2d_world_desc.cell makes the world periodic. Without walls,
                          dem2d_world_stress with the area of the cell is the stress of a sample
-                         without any border.
+                         without any border. A rough floor, or bodies in a stream: segments and
+                         chains, still, moving or turning, which have copies as grains have images.
+                         A chain whose end is its start one cell vector further goes round
+                         (examples/incline.c).
     deform a cell        dem2d_world_deform: shear and compression at given rates, or at stresses
                          that are held, changed at any time; from a gas to a packing: hold xx and
-                         yy. Then dem2d_world_get_cell for the cell, its rates and its stress.
+                         yy. Then dem2d_world_get_cell for the cell, its rates and its stress. In
+                         a cell with walls rates alone; walls have the velocities you give them.
                          dem2d_world_grow packs grains in a cell that keeps its shape.
     share a scene        Each world holds its own grains, and copies (ghosts) of the others' grains
       out to processes   within reach, with the same names. dem2d_world_desc.gather gives each ghost
@@ -2813,8 +2816,8 @@ DEM2D_API dem2d_result dem2d_world_write_svg(const dem2d_world *world, const dem
 /// particles and the cell. An image has the values of its particle. Three more arrays tell them
 /// apart: image (1; 0 for the particle), shift_a and shift_b (the image is at shift_a a + shift_b b
 /// from the particle). To count or sum, take those whose image is 0. Segments of walls have the
-/// same arrays for their copies: those whose boxes meet this box are written. A contact is written
-/// once:
+/// same arrays for their copies: those whose boxes meet this box are written, with the velocity of
+/// the flow between the wall and its copy added to that of the wall. A contact is written once:
 /// from the centre of A to that of the image of B at shift_a a + shift_b b. desc may be NULL: all
 /// zero.
 DEM2D_API dem2d_result dem2d_world_write_vtp(const dem2d_world *world, const dem2d_vtp_desc *desc,
@@ -32055,6 +32058,7 @@ static void dem2di_wall_numbers(const dem2d_world *world, const dem2di_copies *c
         info.stress = own.stress;
     }
     dem2d_vec v = dem2di_add(world->wall_before[j].velocity, world->wall_now[j].velocity);
+    v = dem2di_along(v, 2, dem2di_flow_at(&world->flow_made, copies->way));
     const double all[] = {
         (double)j,    (double)info.mode, v.x / 2, v.y / 2,     0,
         info.force.x, info.force.y,      0,       info.stress, a != 0 || b != 0 ? 1.0 : 0.0,

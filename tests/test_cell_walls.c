@@ -526,6 +526,66 @@ static void test_written(void **state) {
     }
 }
 
+/* While the cell deforms, a copy of a wall has the velocity of the wall and of the flow between. */
+static void test_written_flow(void **state) {
+    (void)state;
+    const dem2d_material_desc soft = soft_desc(false);
+    dem2d_world_desc desc = {0};
+    dem2d_deformation_desc shear = {0};
+    desc.time_step = DT, desc.cell.a = vec(4, 0), desc.cell.b = vec(0.5, 4);
+    const scene s = open_scene(&desc, &soft);
+    dem2d_wall_desc wall = plane_desc(&s, vec(1, 3.5), vec(0, 0));
+    wall.segment = true, wall.end = vec(1, 4.5);
+    wall.mode = DEM2D_WALL_MOVING, wall.velocity = vec(0.25, 0);
+    (void)add_wall(&s, &wall);
+    const dem2d_particle_desc grain = grain_desc(&s, give_shape(&s, make_disc(0.5)), 1, vec(2, 1));
+    (void)add_grain(&s, &grain);
+    shear.xy = 0.5;
+    assert_ok(dem2d_world_deform(s.world, &shear));
+    step(&s, 3);
+    scene_bytes bytes = {0};
+    dem2d_vtp_desc vtp = {0};
+    vtp.write = scene_write, vtp.user = &bytes, vtp.part = DEM2D_VTP_WALLS;
+    assert_ok(dem2d_world_write_vtp(s.world, &vtp, NULL));
+    assert_true(scene_write(&bytes, "", 1));
+    /* two copies below, at -b and a - b, and itself */
+    assert_non_null(strstr(bytes.bytes, ">\n-1.75 0 0\n-1.75 0 0\n0.25 0 0\n<"));
+    free(bytes.bytes);
+    close_scene(&s);
+}
+
+/* A servo segment across the border presses a grain against its copies of a floor: it is carried
+   round, and each step after the first contacts has the force that is asked for. */
+static void test_servo(void **state) {
+    (void)state;
+    const dem2d_material_desc soft = soft_desc(true);
+    dem2d_world_desc desc = {0};
+    desc.time_step = DT, desc.cell.a = vec(4, 0), desc.ledger = true;
+    const scene s = open_scene(&desc, &soft);
+    const dem2d_shape_id disc = give_shape(&s, make_disc(0.5));
+    (void)add_segment(&s, vec(1, 0), vec(5, 0));
+    for (int i = 0; i < 4; i++) {
+        dem2d_particle_desc grain = grain_desc(&s, disc, 1, vec(i, 0.5));
+        grain.velocity = vec(2, 0);
+        (void)add_grain(&s, &grain);
+    }
+    dem2d_wall_desc lid = plane_desc(&s, vec(6.5, 1.2), vec(0, 0)); /* over 2.5 to 6.5: round */
+    lid.segment = true, lid.end = vec(2.5, 1.2), lid.mode = DEM2D_WALL_SERVO;
+    lid.stress = 5, lid.max_speed = 2;
+    const dem2d_wall_id id = add_wall(&s, &lid);
+    step(&s, 3000);
+    for (int i = 0; i < 500; i++) {
+        step(&s, 1);
+        const dem2d_wall_info now = wall_of(&s, id);
+        assert_within(now.force.y, 4 * 5, 1e-3 * 4 * 5);
+        assert_within(now.stress, 5, 1e-3 * 5);
+        assert_near(now.point.y, now.end.y, 1e-12);
+        assert_between(now.point.y, 0.97, 1);
+    }
+    assert_true(inside_holds(s.world));
+    close_scene(&s);
+}
+
 /* --- a cell that deforms ---------------------------------------------------------------------- */
 
 /* A box in simple shear, without friction, from a state in which the cell has sheared for a while:
@@ -766,12 +826,13 @@ static void test_chains_and_copies(void **state) {
 
 int main(void) {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(test_copies),      cmocka_unit_test(test_chains_and_copies),
-        cmocka_unit_test(test_independent), cmocka_unit_test(test_snapshots),
-        cmocka_unit_test(test_memory),      cmocka_unit_test(test_slide),
-        cmocka_unit_test(test_momentum),    cmocka_unit_test(test_seen),
-        cmocka_unit_test(test_sheared),     cmocka_unit_test(test_ledger),
-        cmocka_unit_test(test_refused),     cmocka_unit_test(test_written),
+        cmocka_unit_test(test_copies),       cmocka_unit_test(test_chains_and_copies),
+        cmocka_unit_test(test_independent),  cmocka_unit_test(test_snapshots),
+        cmocka_unit_test(test_memory),       cmocka_unit_test(test_slide),
+        cmocka_unit_test(test_momentum),     cmocka_unit_test(test_seen),
+        cmocka_unit_test(test_sheared),      cmocka_unit_test(test_ledger),
+        cmocka_unit_test(test_refused),      cmocka_unit_test(test_written),
+        cmocka_unit_test(test_written_flow), cmocka_unit_test(test_servo),
     };
     return cmocka_run_group_tests_name("walls in a periodic cell", tests, NULL, NULL);
 }
