@@ -971,6 +971,66 @@ static void test_flow_in_cell(void **state) {
     }
 }
 
+/* In a cell with one period, along x or y: a line along it is crossed by free discs once for each
+   period of its length, a line across it by all that come round, however far they have gone. */
+static void test_flow_one_period(void **state) {
+    enum { DISCS = 30, STEPS = 1500 };
+    (void)state;
+    for (int k = 0; k < 2; k++) {
+        const double period = k == 0 ? 1 : 0.7, high = 0.1, far = 0.37;
+        const dem2d_material_desc stone = material_desc(2700, 1e4, 0, 0);
+        dem2d_world_desc desc = {0};
+        dem2d_particle_id ids[DISCS];
+        dem2d_vec place[DISCS];
+        dem2d_flow over = {0}, three = {0}, round = {0}, none = {0};
+        int64_t overs = 0, rounds = 0, all = 0;
+        uint64_t random = 5;
+        desc.time_step = 1e-3, desc.cell.origin = vec(0.3, -0.2);
+        desc.cell.a.x = k == 0 ? period : 0, desc.cell.b.y = k == 0 ? 0 : period;
+        const scene s = open_scene(&desc, &stone);
+        const dem2d_shape_id disc = give_shape(&s, make_disc(0.004));
+        for (int i = 0; i < DISCS; i++) {
+            dem2d_particle_desc g = grain_desc(&s, disc, 1, vec(0, 0));
+            g.position.x = dem2d_random_uniform(&random);
+            g.position.y = dem2d_random_uniform(&random);
+            g.velocity.x = 1 + 3 * dem2d_random_normal(&random);
+            g.velocity.y = 1 + 3 * dem2d_random_normal(&random);
+            ids[i] = add_grain(&s, &g);
+            place[i] = grain_of(&s, ids[i]).pose.position;
+        }
+        for (int n = 0; n < STEPS; n++) {
+            step(&s, 1);
+            /* from right to left of a line along x is up, along y is to the left */
+            const dem2d_vec from = k == 0 ? vec(-8, high) : vec(high, -8);
+            const dem2d_vec one = k == 0 ? vec(-8 + period, high) : vec(high, -8 + period);
+            const dem2d_vec more = k == 0 ? vec(-8 + 3 * period, high) : vec(high, -8 + 3 * period);
+            const dem2d_vec low = k == 0 ? vec(far, -90) : vec(-90, far);
+            const dem2d_vec top = k == 0 ? vec(far, 90) : vec(90, far);
+            assert_ok(dem2d_world_flow(s.world, from, one, &over));
+            assert_ok(dem2d_world_flow(s.world, from, more, &three));
+            assert_ok(dem2d_world_flow(s.world, low, top, &round));
+            assert_ok(dem2d_world_flow(s.world, top, k == 0 ? vec(far, 99) : vec(99, far), &none));
+            for (int i = 0; i < DISCS; i++) {
+                const dem2d_vec now = grain_of(&s, ids[i]).pose.position, old = place[i];
+                const double across = k == 0 ? now.y : now.x, before = k == 0 ? old.y : old.x;
+                const double t0 = ((k == 0 ? old.x : old.y) - far) / period;
+                double t = ((k == 0 ? now.x : now.y) - far) / period;
+                t -= rint(t - t0);
+                const int sign = k == 0 ? 1 : -1;
+                overs += sign * ((across >= high) - (before >= high));
+                rounds -= sign * passed(t0, t), all += llabs(passed(t0, t));
+                place[i] = now;
+            }
+        }
+        assert_true(all > 100 && overs != 0 && rounds != 0);
+        assert_int_equal(over.count, overs);
+        assert_int_equal(three.count, 3 * overs);
+        assert_int_equal(round.count, rounds);
+        assert_int_equal(none.count, 0);
+        close_scene(&s);
+    }
+}
+
 /* An outlet in a cell sees images: a box across the border, all of the cell along one vector, or
    along both. */
 static void test_outlet_in_cell(void **state) {
@@ -1019,6 +1079,7 @@ int main(void) {
         cmocka_unit_test(test_flow),
         cmocka_unit_test(test_replaced),
         cmocka_unit_test(test_flow_in_cell),
+        cmocka_unit_test(test_flow_one_period),
         cmocka_unit_test(test_outlet_in_cell),
         cmocka_unit_test(test_fill_in_cell),
         cmocka_unit_test(test_fill_refused),
