@@ -62,10 +62,14 @@ static void use(dem2d_world *world) {
     dem2d_energy energy;
     dem2d_packing packing;
     dem2d_particle_desc grain = {.scale = 1};
+    dem2d_wall_desc bar = {.segment = true, .end = {0.03, 0.01}};
     dem2d_wall_id wall = {0, 1};
+    const dem2d_deformation_desc flow = {.xy = 0.5, .yy = -0.1};
+    dem2d_cell_info cell;
     int count = 0;
     (void)dem2d_world_step(world, 2, NULL);
     (void)dem2d_world_energy(world, &energy);
+    promise(dem2d_world_get_cell(world, &cell) == DEM2D_OK);
     (void)dem2d_world_packing(world, &packing);
     promise(dem2d_world_particles(world, ids, 4, &count) == DEM2D_OK);
     for (int i = 0; i < count && i < 4; i++) {
@@ -76,6 +80,9 @@ static void use(dem2d_world *world) {
     }
     (void)dem2d_world_add_particle(world, &grain, &added);
     (void)dem2d_world_remove_wall(world, wall);
+    bar.material = grain.material;
+    (void)dem2d_world_add_wall(world, &bar, &wall);
+    (void)dem2d_world_deform(world, &flow);
     if (count > 0) (void)dem2d_world_remove_particle(world, ids[0]);
     (void)dem2d_world_step(world, 2, NULL);
 }
@@ -125,22 +132,87 @@ typedef struct sample {
     size_t size;
 } sample;
 
-enum { SAMPLES = 2 * SCENE_COUNT };
+enum { IN_BOX, ON_FLOOR, UNDER_SERVO, CELLS, SCENES = SCENE_COUNT + CELLS, SAMPLES = 2 * SCENES };
+
+static const char *const cell_names[CELLS] = {"box", "floor", "servo"};
+
+/* Walls in a cell: a closed chain that turns across the corner, with a fixed bar, while the cell
+   shears; a one-sided floor that goes round under gravity; the same with a servo segment above. */
+static void add_cell_walls(dem2d_world *world, int kind, dem2d_material_id stone) {
+    static const dem2d_vec box[4] = {{-0.02, -0.02}, {0.02, -0.02}, {0.02, 0.02}, {-0.02, 0.02}};
+    static const dem2d_vec ground[3] = {{0.05, 0.01}, {0.12, 0.03}, {0.25, 0.01}};
+    dem2d_wall_desc chain = {.material = stone, .points = box, .count = 4, .closed = true};
+    dem2d_wall_desc bar = {.material = stone, .segment = true};
+    dem2d_wall_id id;
+    chain.mode = DEM2D_WALL_MOVING, chain.angular_velocity = 3;
+    bar.point = (dem2d_vec){0.15, 0.1}, bar.end = (dem2d_vec){0.23, 0.12};
+    if (kind != IN_BOX) {
+        chain.points = ground, chain.count = 3, chain.closed = false, chain.one_sided = true;
+        chain.mode = DEM2D_WALL_STILL, chain.angular_velocity = 0;
+    }
+    if (kind == UNDER_SERVO) {
+        bar.mode = DEM2D_WALL_SERVO, bar.stress = 500, bar.max_speed = 1;
+        bar.point = (dem2d_vec){0.18, 0.15}, bar.end = (dem2d_vec){0.02, 0.15};
+    }
+    scene_check(dem2d_world_add_wall(world, &chain, &id));
+    scene_check(dem2d_world_add_wall(world, &bar, &id));
+}
+
+/* Discs and rounded boxes across the border of such a cell. */
+static dem2d_world *make_cell(int kind) {
+    static const dem2d_vec corners[4] = {{0, 0}, {0.04, 0}, {0.04, 0.03}, {0, 0.03}};
+    const dem2d_material_desc stone = material_desc(2700, 1e6, 1e6, 0.5);
+    const dem2d_deformation_desc shear = {.xy = 2};
+    dem2d_world_desc desc = {.time_step = 1e-4, .ledger = true, .cell = {.a = {0.2, 0}}};
+    dem2d_particle_desc grain = {.scale = 1};
+    dem2d_shape *shapes[2];
+    dem2d_shape_id ids[2];
+    dem2d_world *world;
+    if (kind == IN_BOX) desc.cell.b = (dem2d_vec){0.03, 0.2};
+    if (kind != IN_BOX) desc.gravity.y = -9.81;
+    scene_check(dem2d_world_create(&desc, &world));
+    scene_check(dem2d_world_add_material(world, &stone, &grain.material));
+    scene_check(dem2d_shape_create_circle(NULL, 0.02, &shapes[0]));
+    scene_check(dem2d_shape_create_polygon(NULL, corners, 4, 0.004, &shapes[1]));
+    for (int k = 0; k < 2; k++) {
+        scene_check(dem2d_world_add_shape(world, shapes[k], &ids[k]));
+        dem2d_shape_destroy(shapes[k]);
+    }
+    add_cell_walls(world, kind, grain.material);
+    for (int i = 0; i < (kind == IN_BOX ? 16 : 6); i++) {
+        dem2d_particle_id id;
+        grain.shape = ids[i % 2], grain.angle = i;
+        grain.position = (dem2d_vec){0.05 * (i % 4), 0.06 + 0.05 * (i / 4)};
+        grain.velocity = (dem2d_vec){0.5 - 0.2 * i, -1.5 + 0.3 * (i % 3)};
+        scene_check(dem2d_world_add_particle(world, &grain, &id));
+    }
+    if (kind == IN_BOX) scene_check(dem2d_world_deform(world, &shear));
+    return world;
+}
+
+static dem2d_world *make_world(int scene) {
+    snapshot_scene s;
+    if (scene >= SCENE_COUNT) return make_cell(scene - SCENE_COUNT);
+    const dem2d_world_desc desc = scene_desc(scene);
+    scene_make(&s, scene, 5, &desc);
+    return s.world;
+}
 
 /* Each scene at rest in its list, and with one just removed. */
 static void make_samples(sample samples[SAMPLES]) {
     for (int i = 0; i < SAMPLES; i++) {
-        snapshot_scene s;
-        dem2d_world_desc desc = scene_desc(i / 2);
+        dem2d_world *world = make_world(i / 2);
         dem2d_particle_id id = {1, 1};
-        scene_make(&s, i / 2, 5, &desc);
-        scene_check(dem2d_world_step(s.world, 220, NULL));
-        if (i % 2 == 1) scene_check(dem2d_world_remove_particle(s.world, id));
-        scene_bytes bytes = scene_save(s.world);
+        dem2d_stats stats;
+        scene_check(dem2d_world_step(world, 220, NULL));
+        scene_check(dem2d_world_stats(world, &stats));
+        promise(stats.contacts + stats.wall_contacts > 0 || i < 2 * SCENE_COUNT);
+        if (i % 2 == 1) scene_check(dem2d_world_remove_particle(world, id));
+        scene_bytes bytes = scene_save(world);
         samples[i].bytes = (uint8_t *)bytes.bytes;
         samples[i].size = bytes.size;
         promise(bytes.size <= ROOM);
-        dem2d_world_destroy(s.world);
+        dem2d_world_destroy(world);
     }
 }
 
@@ -198,7 +270,9 @@ static size_t change(uint8_t *bytes, size_t size, const sample *samples, uint64_
 static void write_samples(const sample *samples, const char *folder) {
     for (int i = 0; i < SAMPLES; i++) {
         char path[512];
-        snprintf(path, sizeof path, "%s/%s-%d", folder, scene_names[i / 2], i % 2);
+        const int cell = i / 2 - SCENE_COUNT;
+        snprintf(path, sizeof path, "%s/%s-%d", folder,
+                 cell < 0 ? scene_names[i / 2] : cell_names[cell], i % 2);
         FILE *file = fopen(path, "wb");
         promise(file != NULL &&
                 fwrite(samples[i].bytes, 1, samples[i].size, file) == samples[i].size);
