@@ -10173,7 +10173,7 @@ static dem2di_member dem2di_member_of(const dem2di_pair *pair, int own) {
 }
 
 /* A direction of the pair in the coordinates of a member. */
-static dem2d_vec dem2di_member_direction(const dem2di_member *m, dem2d_vec u) {
+static DEM2DI_INLINE dem2d_vec dem2di_member_direction(const dem2di_member *m, dem2d_vec u) {
     return dem2di_turn_back(m->q, m->own == 0 ? u : dem2di_negate(u));
 }
 
@@ -10182,46 +10182,50 @@ static dem2d_vec dem2di_member_normal(const dem2di_member *m, int edge) {
     return m->own == 0 ? u : dem2di_negate(u);
 }
 
-/* Support points s[] of one member in u: both ends of an edge, or (edge -1) the point of a part. */
-static void dem2di_member_eval(const dem2di_member *m, dem2d_vec u, int part, int edge,
-                               dem2di_eval *eval, dem2d_vec s[2]) {
+/* Support point of a part of a member in u. */
+static DEM2DI_INLINE void dem2di_member_point(const dem2di_member *m, dem2d_vec u, int part,
+                                              dem2di_eval *eval, dem2d_vec *s) {
     const dem2d_shape *shape = m->shape;
+    const dem2d_vec v = dem2di_member_direction(m, u);
     double rho = shape->rounding;
-    dem2d_vec v = dem2di_member_direction(m, u);
-    for (int i = 0; i < 2; i++) {
-        eval->part[m->own][i] = part;
-        if (edge >= 0) {
-            s[i] = dem2di_edge_end(shape, edge, i == 1);
-            eval->part[m->own][i] = dem2di_edge_part(shape, edge, 2 * i - 1);
-        } else if (i == 1) {
-            s[1] = s[0];
-            continue;
-        } else if (shape->type == DEM2D_POLYGON) {
-            s[0] = shape->corners[part];
-        } else if (shape->type == DEM2D_BEZIER) {
-            s[0] = dem2di_arc_support(&shape->arcs[part], v, &rho);
-        } else {
-            s[0] = dem2di_support(shape, v, &rho);
-        }
-        if (shape->type == DEM2D_POLYGON) s[i] = dem2di_along(s[i], rho, v);
-        s[i] = dem2di_scale(dem2di_turn(m->q, s[i]), m->scale);
-    }
+    if (shape->type == DEM2D_POLYGON)
+        *s = dem2di_along(shape->corners[part], rho, v);
+    else if (shape->type == DEM2D_BEZIER)
+        *s = dem2di_arc_support(&shape->arcs[part], v, &rho);
+    else
+        *s = dem2di_support(shape, v, &rho);
+    *s = dem2di_scale(dem2di_turn(m->q, *s), m->scale);
+    eval->part[m->own][0] = eval->part[m->own][1] = part;
     eval->rho[m->own] = rho * m->scale;
 }
 
-/* Evaluation at u, with the edge (-1: none) or the part of each member. */
-static void dem2di_eval_parts(dem2di_pair *pair, const dem2di_member member[2], dem2d_vec u,
-                              const int part[2], const int edge[2], dem2di_eval *eval) {
-    dem2d_vec a[2], b[2];
-    eval->u = u;
-    eval->edge = edge[0] >= 0 || edge[1] >= 0;
-    dem2di_member_eval(&member[0], u, part[0], edge[0], eval, a);
-    dem2di_member_eval(&member[1], u, part[1], edge[1], eval, b);
+/* Both ends of an edge of a member, whose normal is u. */
+static DEM2DI_INLINE void dem2di_member_edge(const dem2di_member *m, dem2d_vec u, int edge,
+                                             dem2di_eval *eval, dem2d_vec s[2]) {
+    const dem2d_shape *shape = m->shape;
+    const dem2d_vec v = dem2di_member_direction(m, u);
     for (int i = 0; i < 2; i++) {
-        if (i == 0 || eval->edge) dem2di_vertex_set(pair, a[i], b[i], &eval->v[i]);
-        eval->slope[i] = dem2di_cross(u, eval->v[eval->edge ? i : 0].w);
+        s[i] = dem2di_edge_end(shape, edge, i == 1);
+        eval->part[m->own][i] = dem2di_edge_part(shape, edge, 2 * i - 1);
+        if (shape->type == DEM2D_POLYGON) s[i] = dem2di_along(s[i], shape->rounding, v);
+        s[i] = dem2di_scale(dem2di_turn(m->q, s[i]), m->scale);
     }
-    eval->h = dem2di_dot(eval->v[0].w, u);
+    eval->rho[m->own] = shape->rounding * m->scale;
+}
+
+/* Evaluation at u, with a part of each member. */
+static DEM2DI_INLINE void dem2di_eval_parts(dem2di_pair *pair, const dem2di_member member[2],
+                                            dem2d_vec u, const int part[2], dem2di_eval *eval) {
+    dem2di_vertex *v = &eval->v[0];
+    dem2d_vec a, b;
+    dem2di_member_point(&member[0], u, part[0], eval, &a);
+    dem2di_member_point(&member[1], u, part[1], eval, &b);
+    dem2di_vertex_set(pair, a, b, v);
+    eval->u.x = u.x;
+    eval->u.y = u.y;
+    eval->edge = false;
+    eval->h = v->w.x * u.x + v->w.y * u.y;
+    eval->slope[0] = eval->slope[1] = u.x * v->w.y - u.y * v->w.x;
     pair->calls++;
 }
 
@@ -10233,10 +10237,11 @@ static inline int dem2di_member_part(const dem2di_member *m, dem2d_vec u) {
 
 /* The edge beside a part whose normal is nearest to u, with a sine below *sine, which gets the sine
    between them; -1 if there is none that faces u. */
-static int dem2di_member_near(const dem2di_member *m, dem2d_vec u, int part, double *sine) {
+static DEM2DI_INLINE int dem2di_member_near(const dem2di_member *m, dem2d_vec u, int part,
+                                            double *sine) {
     int nearest = -1;
     if (!m->shape->flat) return -1;
-    dem2d_vec v = dem2di_member_direction(m, u);
+    const dem2d_vec v = dem2di_member_direction(m, u);
     for (int side = 1; side >= -1; side -= 2) {
         int edge = dem2di_edge_beside(m->shape, part, side);
         dem2d_vec along = m->shape->tangents[edge];
@@ -10254,19 +10259,34 @@ static int dem2di_member_near(const dem2di_member *m, dem2d_vec u, int part, dou
 /* Evaluation at the normal of an edge of one member, with the other's edge if that is parallel. */
 static void dem2di_eval_edge(dem2di_pair *pair, const dem2di_member member[2], int own, int found,
                              dem2di_eval *eval) {
-    int part[2] = {0, 0}, edge[2] = {-1, -1}, other = 1 - own;
+    const dem2di_member *other = &member[1 - own];
+    const dem2d_vec u = dem2di_member_normal(&member[own], found);
     double parallel = DEM2DI_PARALLEL;
-    dem2d_vec u = dem2di_member_normal(&member[own], found);
-    edge[own] = found;
-    part[other] = dem2di_member_part(&member[other], u);
-    edge[other] = dem2di_member_near(&member[other], u, part[other], &parallel);
-    dem2di_eval_parts(pair, member, u, part, edge, eval);
+    dem2d_vec s[2], t[2];
+    dem2di_member_edge(&member[own], u, found, eval, s);
+    const int part = dem2di_member_part(other, u);
+    const int edge = dem2di_member_near(other, u, part, &parallel);
+    if (edge >= 0) {
+        dem2di_member_edge(other, u, edge, eval, t);
+    } else {
+        dem2di_member_point(other, u, part, eval, &t[0]);
+        t[1].x = t[0].x;
+        t[1].y = t[0].y;
+    }
+    for (int i = 0; i < 2; i++) {
+        dem2di_vertex_set(pair, own == 0 ? s[i] : t[i], own == 0 ? t[i] : s[i], &eval->v[i]);
+        eval->slope[i] = dem2di_cross(u, eval->v[i].w);
+    }
+    eval->u.x = u.x;
+    eval->u.y = u.y;
+    eval->edge = true;
+    eval->h = dem2di_dot(eval->v[0].w, u);
+    pair->calls++;
 }
 
 /* The first evaluation: at u, or at the normal of an edge nearby. */
 static void dem2di_eval_first(dem2di_pair *pair, const dem2di_member member[2], dem2d_vec u,
                               dem2di_eval *eval) {
-    static const int none[2] = {-1, -1};
     int part[2], own = -1, found = -1;
     double sine = DEM2DI_SNAP;
     for (int i = 0; i < 2; i++) {
@@ -10277,7 +10297,7 @@ static void dem2di_eval_first(dem2di_pair *pair, const dem2di_member member[2], 
     if (found >= 0)
         dem2di_eval_edge(pair, member, own, found, eval);
     else
-        dem2di_eval_parts(pair, member, u, part, none, eval);
+        dem2di_eval_parts(pair, member, u, part, eval);
 }
 
 /* The last edge of a member between two of its parts, turning to a side; -1 if there is none. */
@@ -10311,14 +10331,13 @@ static int dem2di_edge_passed(const dem2di_member member[2], dem2d_vec u, const 
 /* The next evaluation, towards u: at u, or at the normal of the last edge before it. */
 static void dem2di_eval_towards(dem2di_pair *pair, const dem2di_member member[2], dem2d_vec u,
                                 dem2di_eval *eval) {
-    static const int none[2] = {-1, -1};
     int part[2], own = 0;
     for (int i = 0; i < 2; i++) part[i] = dem2di_member_part(&member[i], u);
     int found = dem2di_edge_passed(member, u, part, eval, &own);
     if (found >= 0)
         dem2di_eval_edge(pair, member, own, found, eval);
     else
-        dem2di_eval_parts(pair, member, u, part, none, eval);
+        dem2di_eval_parts(pair, member, u, part, eval);
 }
 
 /* Reduce an evaluation at an edge to the edge's end on the side of the minimum. */
