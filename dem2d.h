@@ -4173,6 +4173,13 @@ static inline bool dem2di_has_parts(const dem2d_shape *shape) {
     return shape->type == DEM2D_POLYGON || shape->type == DEM2D_BEZIER;
 }
 
+/* The least radius of two shapes if one of them has parts, else no bound. */
+static inline double dem2di_least_part(const dem2d_shape *a, const dem2d_shape *b, double least_a,
+                                       double least_b) {
+    if (!dem2di_has_parts(a) && !dem2di_has_parts(b)) return HUGE_VAL;
+    return least_a < least_b ? least_a : least_b;
+}
+
 /* The part (not an edge) that has the support point; only for shapes with parts. */
 static inline int dem2di_part_find(const dem2d_shape *shape, dem2d_vec u) {
     return shape->type == DEM2D_POLYGON ? dem2di_polygon_corner(shape, u)
@@ -10408,23 +10415,34 @@ static bool dem2di_bracket_next(dem2di_bracket *bracket, bool slow, dem2d_vec *u
 
 /* Does h curve upward, so that Newton's step can find a minimum? Not if the radius is so large that
    its circle is straight within rounding errors over the size of the pair: that is an edge. */
-static bool dem2di_curves_up(const dem2di_pair *pair, double bend) {
-    return bend > 0 && bend * DEM2DI_ROUNDOFF < pair->size;
+static inline bool dem2di_curves_up(double size, double bend) {
+    return bend > 0 && bend * DEM2DI_ROUNDOFF < size;
+}
+
+/* Is Newton's step below `angle`, and does it lower h by less than half the tolerance? */
+static inline bool dem2di_step_small(double size, double angle, double bend, double slope) {
+    return dem2di_curves_up(size, bend) && fabs(slope) <= angle * bend &&
+           slope * slope <= angle * angle * bend * size;
+}
+
+/* So many steps of a descent need no bracket, if they are short. */
+#define DEM2DI_FREE_STEPS 4
+
+static inline bool dem2di_step_free(double bend, double slope, int step) {
+    return fabs(slope) < 0.2 * bend && step < DEM2DI_FREE_STEPS;
 }
 
 /* Is h stationary at the last evaluation? At an edge: if the slope changes sign there. At the
    normal of the bracket's chord: if the chord is an edge within rounding errors. Elsewhere: if
-   Newton's step is below `angle`, and lowers h by less than half the tolerance. */
+   Newton's step is small. */
 static inline bool dem2di_stationary(const dem2di_pair *pair, const dem2di_bracket *bracket,
                                      double angle, dem2di_eval *eval) {
     if (eval->edge) {
         if (eval->slope[0] <= 0 && eval->slope[1] >= 0) return true;
         dem2di_leave_edge(pair, eval->slope[1] < 0, eval);
     }
-    double bend = eval->rho[0] + eval->rho[1] - eval->h, slope = eval->slope[0];
-    if (dem2di_curves_up(pair, bend) && fabs(slope) <= angle * bend &&
-        slope * slope <= angle * angle * bend * pair->size)
-        return true;
+    double bend = eval->rho[0] + eval->rho[1] - eval->h;
+    if (dem2di_step_small(pair->size, angle, bend, eval->slope[0])) return true;
     double roundoff = DEM2DI_ROUNDOFF * pair->size;
     if (!bracket->chord || eval->h - dem2di_dot(bracket->at[0].w, eval->u) > roundoff ||
         eval->h - dem2di_dot(bracket->at[1].w, eval->u) > roundoff)
@@ -10513,9 +10531,8 @@ static inline bool dem2di_step_smooth(const dem2di_pair *pair, double angle, dou
 static inline bool dem2di_descend_next(const dem2di_pair *pair, const dem2di_eval *eval,
                                        double bend, int i, dem2di_bracket *bracket, dem2d_vec *u) {
     double slope = fabs(eval->slope[0]);
-    bool bends = dem2di_curves_up(pair, bend);
-    /* small steps need no bracket, unless there are many */
-    bool near = bends && slope < 0.2 * bend && i < 4;
+    bool bends = dem2di_curves_up(pair->size, bend);
+    bool near = bends && dem2di_step_free(bend, slope, i);
     bool outside = (bracket->known || !near) && !dem2di_bracket_cut(pair, eval, bracket);
     /* where rho has no bound Newton's steps may oscillate: each two have to halve the step */
     double turn = bends ? slope / bend : HUGE_VAL;
@@ -10892,15 +10909,28 @@ static DEM2DI_INLINE bool dem2di_rest_found(double size, double least_a, double 
            !(demand->detect & (h < -roundoff));
 }
 
-/* The same for a pair, whose radii are looked up. */
+/* Does a descent that detects go on from this evaluation by Newton's step, without a bracket? The
+   conditions are those of dem2di_descend. */
+static inline bool dem2di_descent_steps(double size, const dem2di_eval *eval,
+                                        const dem2di_demand *demand, int step, dem2d_vec *to) {
+    const double bend = eval->rho[0] + eval->rho[1] - eval->h, slope = eval->slope[0];
+    if (!(eval->h >= -DEM2DI_ROUNDOFF * size) || !dem2di_curves_up(size, bend) ||
+        !dem2di_step_free(bend, slope, step) ||
+        dem2di_step_small(size, demand->angle, bend, slope))
+        return false;
+    *to = dem2di_newton(eval, bend);
+    return true;
+}
+
+/* The same as dem2di_rest_found for a pair, whose radii are looked up. */
 static DEM2DI_INLINE bool dem2di_rests_by_radius(const dem2di_pair *pair, const dem2di_eval *eval,
                                                  const dem2di_demand *demand,
                                                  dem2di_search *search) {
     const dem2d_shape *a = pair->a, *b = pair->b;
     const double least_a = a->rho_min * pair->scale_a, least_b = b->rho_min * pair->scale_b;
     const double most = a->rho_max * pair->scale_a + b->rho_max * pair->scale_b;
-    return dem2di_rest_found(pair->size, least_a, least_b, dem2di_min(least_a, least_b), most, eval,
-                             demand, search);
+    return dem2di_rest_found(pair->size, least_a, least_b,
+                             dem2di_least_part(a, b, least_a, least_b), most, eval, demand, search);
 }
 
 /* Try the direction of the last step for a pair without edges; false if it is not known to be the
@@ -12013,7 +12043,6 @@ static DEM2DI_INLINE void dem2di_array_add_smooth(const dem2d_body *a, const dem
     const dem2d_vec on_b = dem2di_body_support(b, dem2di_negate(u), &t->rho_b[k]);
     const double least_a = a->shape->rho_min * a->pose.scale;
     const double least_b = b->shape->rho_min * b->pose.scale;
-    const bool parts = dem2di_has_parts(a->shape) || dem2di_has_parts(b->shape);
     t->ux[k] = u.x;
     t->uy[k] = u.y;
     t->sx_a[k] = on_a.x;
@@ -12022,7 +12051,7 @@ static DEM2DI_INLINE void dem2di_array_add_smooth(const dem2d_body *a, const dem
     t->sy_b[k] = on_b.y;
     t->least_a[k] = least_a;
     t->least_b[k] = least_b;
-    t->least_part[k] = parts ? dem2di_min(least_a, least_b) : HUGE_VAL;
+    t->least_part[k] = dem2di_least_part(a->shape, b->shape, least_a, least_b);
     t->most[k] = a->shape->rho_max * a->pose.scale + b->shape->rho_max * b->pose.scale;
 }
 
@@ -22330,7 +22359,9 @@ static inline void dem2di_collide(dem2d_world *world, int i, dem2di_law_rows *ro
    dem2di_edge_last. They are taken in tiles: fetched with their support points along the last
    normal, or with corner and edge; computed by loops that compilers turn into vector instructions;
    and put into the columns. They get the same bits as from dem2di_update_pair, which takes those
-   that do not go on. Polygons that had two points are in a tile of their own: they go on if they
+   that do not go on. Where the normal of a smooth contact turns by more than Newton's last step
+   may, the tile keeps the contact for another pass, with the support points along the normal of a
+   Newton step, see dem2di_tile_step. Polygons that had two points are in a tile of their own: they go on if they
    have two again, the second one with its full weight. */
 
 /* What contacts of two points have beside the rest. Numbers of corners as in dem2d_contact_point;
@@ -22354,13 +22385,16 @@ typedef struct dem2di_tile {
     dem2di_corners *corners;  /* of polygons; NULL for smooth contacts */
     dem2di_tile_pairs *pairs; /* of contacts of two points, else NULL */
     int count;
+    int calls;  /* evaluations of each contact */
     bool round; /* some contact is of a circle */
     int contact[DEM2DI_BATCH];
     double dx[DEM2DI_BATCH], dy[DEM2DI_BATCH], reach[DEM2DI_BATCH];
-    double ax[DEM2DI_BATCH], ay[DEM2DI_BATCH]; /* support point of A along the last normal, */
-    double bx[DEM2DI_BATCH], by[DEM2DI_BATCH]; /* of B against it; each from its centre */
+    double ux[DEM2DI_BATCH], uy[DEM2DI_BATCH]; /* the last normal, or that of a Newton step */
+    double ax[DEM2DI_BATCH], ay[DEM2DI_BATCH]; /* support point of A along it, of B against it; */
+    double bx[DEM2DI_BATCH], by[DEM2DI_BATCH]; /* each from its centre */
     double rho_a[DEM2DI_BATCH], rho_b[DEM2DI_BATCH];
     double least_a[DEM2DI_BATCH], least_b[DEM2DI_BATCH], most[DEM2DI_BATCH]; /* of rho */
+    double least_part[DEM2DI_BATCH]; /* see dem2di_least_part */
     double vx[DEM2DI_BATCH], vy[DEM2DI_BATCH], wa[DEM2DI_BATCH], wb[DEM2DI_BATCH];
     double kn[DEM2DI_BATCH], kt[DEM2DI_BATCH], mu[DEM2DI_BATCH];
     double last_x[DEM2DI_BATCH], last_y[DEM2DI_BATCH], last_shear[DEM2DI_BATCH];
@@ -22434,18 +22468,16 @@ static DEM2DI_INLINE void dem2di_tile_fetch(const dem2d_world *world, int i, dem
     }
 }
 
-/* Fetch a contact of two particles without edges. */
-static DEM2DI_INLINE void dem2di_tile_add_smooth(const dem2d_world *world, int i,
-                                                 const dem2d_shape *shape_a,
-                                                 const dem2d_shape *shape_b, dem2di_tile *tile) {
-    const dem2di_contacts *from = &world->list.contacts;
-    const int slot_a = world->list.keys[i].a, slot_b = world->list.keys[i].b, k = tile->count;
-    const dem2di_state *a = &world->now[slot_a], *b = &world->now[slot_b];
-    const double scale_a = world->bodies[slot_a].scale, scale_b = world->bodies[slot_b].scale;
+/* Evaluate contact k of two particles without edges along u. */
+static DEM2DI_INLINE void dem2di_tile_evaluate(const dem2d_world *world, dem2d_vec u, int k,
+                                               const dem2d_shape *shape_a,
+                                               const dem2d_shape *shape_b, dem2di_tile *tile) {
+    const dem2di_key *key = &world->list.keys[tile->contact[k]];
+    const dem2di_state *a = &world->now[key->a], *b = &world->now[key->b];
+    const double scale_a = world->bodies[key->a].scale, scale_b = world->bodies[key->b].scale;
     double rho;
-    dem2d_vec u = dem2di_vec(from->normal_x[i], from->normal_y[i]);
-    dem2di_tile_fetch(world, i, tile);
-    tile->round |= world->lever[slot_a] == 0 || world->lever[slot_b] == 0;
+    tile->ux[k] = u.x;
+    tile->uy[k] = u.y;
     dem2d_vec s = dem2di_support(shape_a, dem2di_turn_back(a->q, u), &rho);
     s = dem2di_scale(dem2di_turn(a->q, s), scale_a);
     tile->ax[k] = s.x;
@@ -22456,9 +22488,24 @@ static DEM2DI_INLINE void dem2di_tile_add_smooth(const dem2d_world *world, int i
     tile->bx[k] = s.x;
     tile->by[k] = s.y;
     tile->rho_b[k] = rho * scale_b;
-    tile->least_a[k] = shape_a->rho_min * scale_a;
-    tile->least_b[k] = shape_b->rho_min * scale_b;
-    tile->most[k] = shape_a->rho_max * scale_a + shape_b->rho_max * scale_b;
+}
+
+/* Fetch a contact of two particles without edges. */
+static DEM2DI_INLINE void dem2di_tile_add_smooth(const dem2d_world *world, int i,
+                                                 const dem2d_shape *a, const dem2d_shape *b,
+                                                 dem2di_tile *tile) {
+    const dem2di_contacts *from = &world->list.contacts;
+    const dem2di_key *key = &world->list.keys[i];
+    const double scale_a = world->bodies[key->a].scale, scale_b = world->bodies[key->b].scale;
+    const double least_a = a->rho_min * scale_a, least_b = b->rho_min * scale_b;
+    const int k = tile->count;
+    dem2di_tile_fetch(world, i, tile);
+    tile->round |= world->lever[key->a] == 0 || world->lever[key->b] == 0;
+    dem2di_tile_evaluate(world, dem2di_vec(from->normal_x[i], from->normal_y[i]), k, a, b, tile);
+    tile->least_a[k] = least_a;
+    tile->least_b[k] = least_b;
+    tile->least_part[k] = dem2di_least_part(a, b, least_a, least_b);
+    tile->most[k] = a->rho_max * scale_a + b->rho_max * scale_b;
 }
 
 /* Fetch the last two points of a contact, and the numbers of what may be corners of the next. */
@@ -22686,33 +22733,42 @@ static DEM2DI_INLINE void dem2di_tile_points(dem2di_tile *DEM2DI_APART t,
     }
 }
 
-/* Geometry of smooth contacts, as dem2di_smooth_last. */
-static DEM2DI_INLINE void dem2di_tile_place(dem2di_tile *t, double tolerance) {
+/* The evaluation of a smooth contact. */
+static DEM2DI_INLINE void dem2di_tile_eval(const dem2di_tile *t, int k, dem2di_eval *eval) {
+    const double ux = t->ux[k], uy = t->uy[k];
+    const double wx = (t->ax[k] - t->bx[k]) - t->dx[k], wy = (t->ay[k] - t->by[k]) - t->dy[k];
+    eval->u.x = ux;
+    eval->u.y = uy;
+    eval->v[0].a.x = t->ax[k];
+    eval->v[0].a.y = t->ay[k];
+    eval->v[0].b.x = t->bx[k];
+    eval->v[0].b.y = t->by[k];
+    eval->rho[0] = t->rho_a[k];
+    eval->rho[1] = t->rho_b[k];
+    eval->h = wx * ux + wy * uy;
+    eval->slope[0] = ux * wy - uy * wx;
+}
+
+static DEM2DI_INLINE dem2di_demand dem2di_tile_demand(double tolerance) {
     dem2di_demand demand;
-    const int lanes = dem2di_tile_lanes(t);
     demand.detect = true;
     demand.tolerance = 0;
     demand.angle = dem2di_rest_angle(tolerance, true);
+    return demand;
+}
+
+/* Geometry of smooth contacts, as dem2di_smooth_last. */
+static DEM2DI_INLINE void dem2di_tile_place(dem2di_tile *t, double tolerance) {
+    const dem2di_demand demand = dem2di_tile_demand(tolerance);
+    const int lanes = dem2di_tile_lanes(t);
     for (int k = 0; k < lanes; k++) {
-        const double dx = t->dx[k], dy = t->dy[k], ux = t->last_x[k], uy = t->last_y[k];
+        const double dx = t->dx[k], dy = t->dy[k];
         const double distance = sqrt(dx * dx + dy * dy), size = t->reach[k] + distance;
-        const double wx = (t->ax[k] - t->bx[k]) - dx, wy = (t->ay[k] - t->by[k]) - dy;
         dem2di_eval eval;
         dem2di_search search;
-        eval.u.x = ux;
-        eval.u.y = uy;
-        eval.v[0].a.x = t->ax[k];
-        eval.v[0].a.y = t->ay[k];
-        eval.v[0].b.x = t->bx[k];
-        eval.v[0].b.y = t->by[k];
-        eval.rho[0] = t->rho_a[k];
-        eval.rho[1] = t->rho_b[k];
-        eval.h = wx * ux + wy * uy;
-        eval.slope[0] = ux * wy - uy * wx;
-        const double least_a = t->least_a[k], least_b = t->least_b[k];
-        const double least = least_a < least_b ? least_a : least_b;
-        bool rests =
-            dem2di_rest_found(size, least_a, least_b, least, t->most[k], &eval, &demand, &search);
+        dem2di_tile_eval(t, k, &eval);
+        bool rests = dem2di_rest_found(size, t->least_a[k], t->least_b[k], t->least_part[k],
+                                       t->most[k], &eval, &demand, &search);
         dem2di_tile_found(t, k, &search, rests & (distance < t->reach[k]));
     }
 }
@@ -22877,44 +22933,77 @@ static void dem2di_tile_leave(dem2d_world *world, int i, dem2di_law_rows *rows,
     dem2di_update_pair(world, i, rows, count);
 }
 
-/* All contacts of a tile: geometry, and forces or rows. */
-static void dem2di_tile_apply(dem2d_world *world, dem2di_tile *tile, dem2di_law_rows *rows,
-                              dem2di_count *count) {
+/* A contact that goes on: its geometry, and its forces or rows. */
+static DEM2DI_INLINE void dem2di_tile_keep(dem2d_world *world, const dem2di_tile *tile, int k,
+                                           dem2di_law_rows *rows, dem2di_count *count) {
     const bool terms = world->plan.terms != 0;
-    const int discs = world->list.discs;
+    const int i = tile->contact[k];
+    dem2di_history *history = &world->list.contacts.history[i - world->list.discs];
     dem2di_contact contact;
     dem2di_last last;
-    if (tile->count == 0) return;
-    dem2di_tile_fill(tile);
-    (world->fours ? dem2di_tile_solve_fours : dem2di_tile_solve_plain)(tile, world->tolerance,
-                                                                       world->plan.faces);
-    if (tile->round) dem2di_tile_round(world, tile);
-    if (!terms)
-        (world->fours ? dem2di_tile_load_fours : dem2di_tile_load_plain)(tile, world->made_step);
-    for (int k = 0; k < tile->count; k++) {
-        const int i = tile->contact[k];
-        dem2di_history *history = &world->list.contacts.history[i - discs];
-        dem2di_law_room(world, rows, count);
-        if (!(tile->held[k] > 0)) {
-            dem2di_tile_leave(world, i, rows, count);
-            continue;
+    count->collisions++;
+    count->calls += tile->calls;
+    count->proofs[tile->corners != NULL ? DEM2D_BY_FORM : DEM2D_BY_RADIUS]++;
+    history->bound = 0;
+    if (tile->corners == NULL)
+        history->feature.own = history->feature.corner[0] = history->feature.corner[1] = -1;
+    dem2di_tile_get(tile, k, &contact);
+    if (terms) dem2di_last_get(world, &world->list.contacts, i, &last);
+    dem2di_tile_put_points(world, tile, k);
+    if (terms)
+        dem2di_law_add(world, i, &last, tile->pairs != NULL, &contact, rows);
+    else
+        dem2di_tile_put(world, tile, k, count);
+    dem2di_geometry_put(&world->list, i, &contact);
+}
+
+/* Put smooth contact k with an evaluation one Newton step on into place `to`, which is not behind
+   k; false if the search would not take this step. */
+static bool dem2di_tile_step(const dem2d_world *world, dem2di_tile *tile, int k, int to) {
+    const size_t first = offsetof(dem2di_tile, dx), end = offsetof(dem2di_tile, held);
+    const dem2di_demand demand = dem2di_tile_demand(world->tolerance);
+    const int i = tile->contact[k];
+    const dem2di_key *key = &world->list.keys[i];
+    const double dx = tile->dx[k], dy = tile->dy[k], distance = sqrt(dx * dx + dy * dy);
+    dem2di_eval eval;
+    dem2d_vec u;
+    dem2di_tile_eval(tile, k, &eval);
+    if (!(distance < tile->reach[k]) ||
+        !dem2di_descent_steps(tile->reach[k] + distance, &eval, &demand, tile->calls - 1, &u))
+        return false;
+    double *column = tile->dx;
+    for (size_t at = first; at < end; at += sizeof tile->dx, column += DEM2DI_BATCH)
+        column[to] = column[k];
+    tile->contact[to] = i;
+    dem2di_tile_evaluate(world, u, to, dem2di_shape_of(world, &world->bodies[key->a]),
+                         dem2di_shape_of(world, &world->bodies[key->b]), tile);
+    return true;
+}
+
+/* All contacts of a tile: geometry, and forces or rows. Those that Newton's step takes on stay in
+   the tile for another pass. */
+static void dem2di_tile_apply(dem2d_world *world, dem2di_tile *tile, dem2di_law_rows *rows,
+                              dem2di_count *count) {
+    for (tile->calls = 1; tile->count > 0; tile->calls++) {
+        int stay = 0;
+        dem2di_tile_fill(tile);
+        (world->fours ? dem2di_tile_solve_fours : dem2di_tile_solve_plain)(tile, world->tolerance,
+                                                                           world->plan.faces);
+        if (tile->round) dem2di_tile_round(world, tile);
+        if (world->plan.terms == 0)
+            (world->fours ? dem2di_tile_load_fours : dem2di_tile_load_plain)(tile,
+                                                                             world->made_step);
+        for (int k = 0; k < tile->count; k++) {
+            dem2di_law_room(world, rows, count);
+            if (tile->held[k] > 0)
+                dem2di_tile_keep(world, tile, k, rows, count);
+            else if (tile->corners == NULL && dem2di_tile_step(world, tile, k, stay))
+                stay++;
+            else
+                dem2di_tile_leave(world, tile->contact[k], rows, count);
         }
-        count->collisions++;
-        count->calls++;
-        count->proofs[tile->corners != NULL ? DEM2D_BY_FORM : DEM2D_BY_RADIUS]++;
-        history->bound = 0;
-        if (tile->corners == NULL)
-            history->feature.own = history->feature.corner[0] = history->feature.corner[1] = -1;
-        dem2di_tile_get(tile, k, &contact);
-        if (terms) dem2di_last_get(world, &world->list.contacts, i, &last);
-        dem2di_tile_put_points(world, tile, k);
-        if (terms)
-            dem2di_law_add(world, i, &last, tile->pairs != NULL, &contact, rows);
-        else
-            dem2di_tile_put(world, tile, k, count);
-        dem2di_geometry_put(&world->list, i, &contact);
+        tile->count = stay;
     }
-    tile->count = 0;
     tile->round = false;
 }
 
