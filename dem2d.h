@@ -22355,14 +22355,15 @@ static inline void dem2di_collide(dem2d_world *world, int i, dem2di_law_rows *ro
 
 /* --- contacts that go on -------------------------------------------------------------------------
    Most contacts of particles without edges are where they were in the last step, see
-   dem2di_smooth_last, and most of two polygons are of the same corner and edge, see
-   dem2di_edge_last. They are taken in tiles: fetched with their support points along the last
-   normal, or with corner and edge; computed by loops that compilers turn into vector instructions;
-   and put into the columns. They get the same bits as from dem2di_update_pair, which takes those
-   that do not go on. Where the normal of a smooth contact turns by more than Newton's last step
-   may, the tile keeps the contact for another pass, with the support points along the normal of a
-   Newton step, see dem2di_tile_step. Polygons that had two points are in a tile of their own: they go on if they
-   have two again, the second one with its full weight. */
+   dem2di_smooth_last, and most of two polygons, or of a polygon and a circle, are of the same
+   corner and edge, see dem2di_edge_last. They are taken in tiles: fetched with their support
+   points along the last normal, or with corner and edge; computed by loops that compilers turn
+   into vector instructions; and put into the columns. They get the same bits as from
+   dem2di_update_pair, which takes those that do not go on. Where the normal of a smooth contact
+   turns by more than Newton's last step may, the tile keeps the contact for another pass, with the
+   support points along the normal of a Newton step, see dem2di_tile_step. Polygons that had two
+   points are in a tile of their own: they go on if they have two again, the second one with its
+   full weight. */
 
 /* What contacts of two points have beside the rest. Numbers of corners as in dem2d_contact_point;
    they are doubles as all that is in the loops. */
@@ -22530,8 +22531,8 @@ static DEM2DI_INLINE void dem2di_tile_add_two(const dem2di_point_pair *last,
     p->last_shear1[k] = last->shear[1];
 }
 
-/* Fetch a contact of two polygons into the tile for those that had one point or two; NULL if its
-   feature is not known. */
+/* Fetch a contact of two polygons, or of a polygon and a circle, into the tile for those that had
+   one point or two; NULL if its feature is not known. */
 static DEM2DI_INLINE dem2di_tile *dem2di_tile_add_corner(const dem2d_world *world, int i,
                                                          const dem2d_shape *a, const dem2d_shape *b,
                                                          dem2di_tile *one_point,
@@ -22553,6 +22554,7 @@ static DEM2DI_INLINE dem2di_tile *dem2di_tile_add_corner(const dem2d_world *worl
     pair.scale_b = world->bodies[key->b].scale;
     dem2di_corners_set(&pair, feature, tile->count, true, tile->corners);
     dem2di_tile_fetch(world, i, tile);
+    tile->round |= a->type == DEM2D_CIRCLE || b->type == DEM2D_CIRCLE;
     return tile;
 }
 
@@ -22564,7 +22566,7 @@ static DEM2DI_INLINE dem2di_tile *dem2di_tile_add(const dem2d_world *world, int 
     if (!(world->list.contacts.depth[i] > 0)) return NULL;
     const dem2d_shape *a = dem2di_shape_of(world, &world->bodies[key->a]);
     const dem2d_shape *b = dem2di_shape_of(world, &world->bodies[key->b]);
-    if (a->type == DEM2D_POLYGON && b->type == DEM2D_POLYGON)
+    if (dem2di_has_core(a) && dem2di_has_core(b))
         return dem2di_tile_add_corner(world, i, a, b, corners, pairs);
     if (a->flat || b->flat || dem2di_edges_unknown(a) || dem2di_edges_unknown(b)) return NULL;
     dem2di_tile_add_smooth(world, i, a, b, smooth);
@@ -22596,7 +22598,8 @@ static DEM2DI_INLINE void dem2di_tile_found(dem2di_tile *t, int k, const dem2di_
     dem2di_tile_arms(t, k, search->normal.x, search->normal.y, px, py);
 }
 
-/* Geometry of polygons, as dem2di_edge_last. With `faces` none may have a second point. */
+/* Geometry of polygons, as dem2di_edge_last. With `faces` none may have a second point; a circle,
+   which has no edges, has none. */
 static DEM2DI_INLINE void dem2di_tile_corners(dem2di_tile *DEM2DI_APART t,
                                               const dem2di_corners *DEM2DI_APART corners,
                                               bool faces) {
@@ -22871,7 +22874,7 @@ static inline void dem2di_tile_get(const dem2di_tile *tile, int k, dem2di_contac
     contact->arms.b_t = tile->b_t[k];
 }
 
-/* The arms of circles, which dem2di_tile_place does not know. */
+/* The arms of circles, which dem2di_tile_found does not know. */
 static void dem2di_tile_round(dem2d_world *world, dem2di_tile *tile) {
     for (int k = 0; k < tile->count; k++) {
         const int i = tile->contact[k];
