@@ -4177,7 +4177,7 @@ static inline bool dem2di_has_parts(const dem2d_shape *shape) {
 static inline double dem2di_least_part(const dem2d_shape *a, const dem2d_shape *b, double least_a,
                                        double least_b) {
     if (!dem2di_has_parts(a) && !dem2di_has_parts(b)) return HUGE_VAL;
-    return least_a < least_b ? least_a : least_b;
+    return dem2di_min(least_a, least_b);
 }
 
 /* The part (not an edge) that has the support point; only for shapes with parts. */
@@ -10509,20 +10509,28 @@ static bool dem2di_step_known(const dem2di_pair *pair, const dem2di_member membe
     return dem2di_stationary_close(pair, angle, bend, eval);
 }
 
-/* The same for a pair without edges. If the witness points move by s past the end of an arc, they
-   leave the outline by at most s^2/(2 rho): that is allowed below the default tolerance. */
+/* Does Newton's step from an evaluation stay on the same parts of a pair without edges? */
+static inline bool dem2di_step_stays(const dem2di_pair *pair, double bend,
+                                     const dem2di_eval *eval) {
+    const dem2d_vec u = dem2di_newton(eval, bend);
+    bool stays = true;
+    for (int i = 0; i < 2; i++) {
+        const dem2di_member m = dem2di_member_of(pair, i);
+        stays &= dem2di_member_part(&m, u) == dem2di_member_part(&m, eval->u);
+    }
+    return stays;
+}
+
+/* dem2di_step_known for a pair without edges. If the witness points move by s past the end of an
+   arc, they leave the outline by at most s^2/(2 rho): that is allowed below the default
+   tolerance. */
 static inline bool dem2di_step_smooth(const dem2di_pair *pair, double angle, double bend,
                                       dem2di_eval *eval) {
     double r = dem2di_min(pair->a->rho_min * pair->scale_a, pair->b->rho_min * pair->scale_b);
     double slope = eval->slope[0];
     bool rises = dem2di_step_rises(pair, angle, bend, eval);
     if (!rises && slope * slope <= 1e-10 * r * pair->size) return true;
-    dem2d_vec u = dem2di_newton(eval, bend);
-    eval->no_step |= rises;
-    for (int i = 0; i < 2; i++) {
-        dem2di_member m = dem2di_member_of(pair, i);
-        eval->no_step |= dem2di_member_part(&m, u) != dem2di_member_part(&m, eval->u);
-    }
+    eval->no_step |= rises || !dem2di_step_stays(pair, bend, eval);
     return !eval->no_step || dem2di_stationary_close(pair, angle, bend, eval);
 }
 
@@ -10893,17 +10901,19 @@ static DEM2DI_INLINE bool dem2di_descent_ends(double size, double flat, double m
    proof? True only if that would end there with the same bits: with t the tolerance of the search,
    r the least radius, and e, S, b and s of dem2di_descent_ends, its conditions are
      r - h > 0, s^2 <= 2 t (r - h);
-   here r - h <= b and e^2 S <= t, so that s^2 <= e^2 (r - h) S is enough for this and for the
-   first part of `flat`. least_part is the least radius of the shapes with parts, or greater. */
-static DEM2DI_INLINE bool dem2di_rest_found(double size, double least_a, double least_b,
-                                            double least_part, double most, const dem2di_eval *eval,
+   here e^2 S <= 0.09 t, see dem2di_rest_angle, so that s^2 <= 20 e^2 (r - h) S is enough.
+   least is the sum of the least radii, least_part that of the shapes with parts, or greater. */
+static DEM2DI_INLINE bool dem2di_rest_found(double size, double least, double least_part,
+                                            double most, const dem2di_eval *eval,
                                             const dem2di_demand *demand, dem2di_search *search) {
     const double h = eval->h, slope = eval->slope[0], square = slope * slope;
     const double bend = eval->rho[0] + eval->rho[1] - h;
-    const double room = least_a + least_b - h, roundoff = DEM2DI_ROUNDOFF * size;
-    const double by_room = demand->angle * demand->angle * room, by_step = 1e-10 * least_part;
-    const bool still = dem2di_descent_ends(size, by_room < by_step ? by_room : by_step, most, eval,
-                                           demand, search);
+    const double room = least - h, roundoff = DEM2DI_ROUNDOFF * size;
+    const double turn = demand->angle * demand->angle, by_bend = turn * bend;
+    const double by_room = 20 * turn * room, by_step = 1e-10 * least_part;
+    const double flat = by_bend < by_step ? by_bend : by_step;
+    const bool still =
+        dem2di_descent_ends(size, flat < by_room ? flat : by_room, most, eval, demand, search);
     search->lower = search->upper - square / (2 * room);
     return (room > 0) & (room <= bend) & still & !((h >= -roundoff) & (search->lower < -roundoff)) &
            !(demand->detect & (h < -roundoff));
@@ -10915,8 +10925,7 @@ static inline bool dem2di_descent_steps(double size, const dem2di_eval *eval,
                                         const dem2di_demand *demand, int step, dem2d_vec *to) {
     const double bend = eval->rho[0] + eval->rho[1] - eval->h, slope = eval->slope[0];
     if (!(eval->h >= -DEM2DI_ROUNDOFF * size) || !dem2di_curves_up(size, bend) ||
-        !dem2di_step_free(bend, slope, step) ||
-        dem2di_step_small(size, demand->angle, bend, slope))
+        !dem2di_step_free(bend, slope, step) || dem2di_step_small(size, demand->angle, bend, slope))
         return false;
     *to = dem2di_newton(eval, bend);
     return true;
@@ -10929,7 +10938,7 @@ static DEM2DI_INLINE bool dem2di_rests_by_radius(const dem2di_pair *pair, const 
     const dem2d_shape *a = pair->a, *b = pair->b;
     const double least_a = a->rho_min * pair->scale_a, least_b = b->rho_min * pair->scale_b;
     const double most = a->rho_max * pair->scale_a + b->rho_max * pair->scale_b;
-    return dem2di_rest_found(pair->size, least_a, least_b,
+    return dem2di_rest_found(pair->size, least_a + least_b,
                              dem2di_least_part(a, b, least_a, least_b), most, eval, demand, search);
 }
 
@@ -12164,7 +12173,7 @@ static DEM2DI_INLINE void dem2di_array_smooth(dem2di_array_tile *t, double toler
         const double by_step = 1e-10 * t->least_part[k];
         const bool still = dem2di_descent_ends(size, by_bend < by_step ? by_bend : by_step,
                                                t->most[k], &eval, &demand, &search);
-        const bool rests = dem2di_rest_found(size, t->least_a[k], t->least_b[k], t->least_part[k],
+        const bool rests = dem2di_rest_found(size, t->least_a[k] + t->least_b[k], t->least_part[k],
                                              t->most[k], &eval, &demand, &search);
         t->found[k] = rests ? 1 : 0;
         t->still[k] = still ? 1 : 0;
@@ -22386,16 +22395,16 @@ typedef struct dem2di_tile {
     dem2di_corners *corners;  /* of polygons; NULL for smooth contacts */
     dem2di_tile_pairs *pairs; /* of contacts of two points, else NULL */
     int count;
-    int calls;  /* evaluations of each contact */
-    bool round; /* some contact is of a circle */
+    bool round; /* some contact may be of a circle */
     int contact[DEM2DI_BATCH];
+    int steps[DEM2DI_BATCH]; /* Newton steps taken; set in the first of them */
     double dx[DEM2DI_BATCH], dy[DEM2DI_BATCH], reach[DEM2DI_BATCH];
     double ux[DEM2DI_BATCH], uy[DEM2DI_BATCH]; /* the last normal, or that of a Newton step */
     double ax[DEM2DI_BATCH], ay[DEM2DI_BATCH]; /* support point of A along it, of B against it; */
     double bx[DEM2DI_BATCH], by[DEM2DI_BATCH]; /* each from its centre */
     double rho_a[DEM2DI_BATCH], rho_b[DEM2DI_BATCH];
-    double least_a[DEM2DI_BATCH], least_b[DEM2DI_BATCH], most[DEM2DI_BATCH]; /* of rho */
-    double least_part[DEM2DI_BATCH]; /* see dem2di_least_part */
+    double least[DEM2DI_BATCH], most[DEM2DI_BATCH]; /* of the sum of rho */
+    double least_part[DEM2DI_BATCH];                /* see dem2di_rest_found */
     double vx[DEM2DI_BATCH], vy[DEM2DI_BATCH], wa[DEM2DI_BATCH], wb[DEM2DI_BATCH];
     double kn[DEM2DI_BATCH], kt[DEM2DI_BATCH], mu[DEM2DI_BATCH];
     double last_x[DEM2DI_BATCH], last_y[DEM2DI_BATCH], last_shear[DEM2DI_BATCH];
@@ -22469,13 +22478,25 @@ static DEM2DI_INLINE void dem2di_tile_fetch(const dem2d_world *world, int i, dem
     }
 }
 
+/* The two of contact i as a pair, without places. */
+static DEM2DI_INLINE void dem2di_tile_pair(const dem2d_world *world, int i, const dem2d_shape *a,
+                                           const dem2d_shape *b, dem2di_pair *pair) {
+    const dem2di_key *key = &world->list.keys[i];
+    pair->a = a;
+    pair->b = b;
+    pair->ra = world->now[key->a].q;
+    pair->rb = world->now[key->b].q;
+    pair->scale_a = world->bodies[key->a].scale;
+    pair->scale_b = world->bodies[key->b].scale;
+}
+
 /* Evaluate contact k of two particles without edges along u. */
-static DEM2DI_INLINE void dem2di_tile_evaluate(const dem2d_world *world, dem2d_vec u, int k,
+static DEM2DI_INLINE void dem2di_tile_evaluate(const dem2d_world *world, int slot_a, int slot_b,
                                                const dem2d_shape *shape_a,
-                                               const dem2d_shape *shape_b, dem2di_tile *tile) {
-    const dem2di_key *key = &world->list.keys[tile->contact[k]];
-    const dem2di_state *a = &world->now[key->a], *b = &world->now[key->b];
-    const double scale_a = world->bodies[key->a].scale, scale_b = world->bodies[key->b].scale;
+                                               const dem2d_shape *shape_b, dem2d_vec u, int k,
+                                               dem2di_tile *tile) {
+    const dem2di_state *a = &world->now[slot_a], *b = &world->now[slot_b];
+    const double scale_a = world->bodies[slot_a].scale, scale_b = world->bodies[slot_b].scale;
     double rho;
     tile->ux[k] = u.x;
     tile->uy[k] = u.y;
@@ -22493,20 +22514,20 @@ static DEM2DI_INLINE void dem2di_tile_evaluate(const dem2d_world *world, dem2d_v
 
 /* Fetch a contact of two particles without edges. */
 static DEM2DI_INLINE void dem2di_tile_add_smooth(const dem2d_world *world, int i,
-                                                 const dem2d_shape *a, const dem2d_shape *b,
-                                                 dem2di_tile *tile) {
+                                                 const dem2d_shape *shape_a,
+                                                 const dem2d_shape *shape_b, dem2di_tile *tile) {
     const dem2di_contacts *from = &world->list.contacts;
-    const dem2di_key *key = &world->list.keys[i];
-    const double scale_a = world->bodies[key->a].scale, scale_b = world->bodies[key->b].scale;
-    const double least_a = a->rho_min * scale_a, least_b = b->rho_min * scale_b;
-    const int k = tile->count;
+    const int a = world->list.keys[i].a, b = world->list.keys[i].b, k = tile->count;
+    const double scale_a = world->bodies[a].scale, scale_b = world->bodies[b].scale;
+    const dem2d_vec u = dem2di_vec(from->normal_x[i], from->normal_y[i]);
     dem2di_tile_fetch(world, i, tile);
-    tile->round |= world->lever[key->a] == 0 || world->lever[key->b] == 0;
-    dem2di_tile_evaluate(world, dem2di_vec(from->normal_x[i], from->normal_y[i]), k, a, b, tile);
-    tile->least_a[k] = least_a;
-    tile->least_b[k] = least_b;
-    tile->least_part[k] = dem2di_least_part(a, b, least_a, least_b);
-    tile->most[k] = a->rho_max * scale_a + b->rho_max * scale_b;
+    tile->round |= !(world->lever[a] * world->lever[b] > 0);
+    dem2di_tile_evaluate(world, a, b, shape_a, shape_b, u, k, tile);
+    const double least_a = shape_a->rho_min * scale_a, least_b = shape_b->rho_min * scale_b;
+    const bool parts = shape_a->type == DEM2D_BEZIER || shape_b->type == DEM2D_BEZIER;
+    tile->least[k] = least_a + least_b;
+    tile->least_part[k] = !parts ? HUGE_VAL : least_a < least_b ? least_a : least_b;
+    tile->most[k] = shape_a->rho_max * scale_a + shape_b->rho_max * scale_b;
 }
 
 /* Fetch the last two points of a contact, and the numbers of what may be corners of the next. */
@@ -22531,30 +22552,31 @@ static DEM2DI_INLINE void dem2di_tile_add_two(const dem2di_point_pair *last,
     p->last_shear1[k] = last->shear[1];
 }
 
-/* Fetch a contact of two polygons, or of a polygon and a circle, into the tile for those that had
-   one point or two; NULL if its feature is not known. */
+/* Fetch a contact of two shapes with cores into the tile for those that had one point or two; NULL
+   if its feature is not known. */
 static DEM2DI_INLINE dem2di_tile *dem2di_tile_add_corner(const dem2d_world *world, int i,
                                                          const dem2d_shape *a, const dem2d_shape *b,
                                                          dem2di_tile *one_point,
                                                          dem2di_tile *two_points) {
     const dem2di_contacts *from = &world->list.contacts;
     const int at = i - world->list.discs;
-    const dem2di_key *key = &world->list.keys[i];
     const dem2di_feature *feature = &from->history[at].feature;
     const bool two = world->plan.faces && dem2di_has_two_points(&from->point_pairs[at]);
     dem2di_tile *tile = two ? two_points : one_point;
     if (!dem2di_is_feature(a, b, feature)) return NULL;
     if (two) dem2di_tile_add_two(&from->point_pairs[at], feature, a, b, tile->count, tile->pairs);
-    dem2di_pair pair; /* without places */
-    pair.a = a;
-    pair.b = b;
-    pair.ra = world->now[key->a].q;
-    pair.rb = world->now[key->b].q;
-    pair.scale_a = world->bodies[key->a].scale;
-    pair.scale_b = world->bodies[key->b].scale;
+    dem2di_pair pair;
+    dem2di_tile_pair(world, i, a, b, &pair);
     dem2di_corners_set(&pair, feature, tile->count, true, tile->corners);
     dem2di_tile_fetch(world, i, tile);
-    tile->round |= a->type == DEM2D_CIRCLE || b->type == DEM2D_CIRCLE;
+    return tile;
+}
+
+/* The same of a polygon and a circle. A function of its own: that of polygons need not ask. */
+static dem2di_tile *dem2di_tile_add_round(const dem2d_world *world, int i, const dem2d_shape *a,
+                                          const dem2d_shape *b, dem2di_tile *corners) {
+    dem2di_tile *tile = dem2di_tile_add_corner(world, i, a, b, corners, corners);
+    corners->round |= tile != NULL;
     return tile;
 }
 
@@ -22566,9 +22588,13 @@ static DEM2DI_INLINE dem2di_tile *dem2di_tile_add(const dem2d_world *world, int 
     if (!(world->list.contacts.depth[i] > 0)) return NULL;
     const dem2d_shape *a = dem2di_shape_of(world, &world->bodies[key->a]);
     const dem2d_shape *b = dem2di_shape_of(world, &world->bodies[key->b]);
-    if (dem2di_has_core(a) && dem2di_has_core(b))
+    if (a->type == DEM2D_POLYGON && b->type == DEM2D_POLYGON)
         return dem2di_tile_add_corner(world, i, a, b, corners, pairs);
-    if (a->flat || b->flat || dem2di_edges_unknown(a) || dem2di_edges_unknown(b)) return NULL;
+    if (a->flat || b->flat) {
+        const bool cores = dem2di_has_core(a) && dem2di_has_core(b);
+        return cores ? dem2di_tile_add_round(world, i, a, b, corners) : NULL;
+    }
+    if (dem2di_edges_unknown(a) || dem2di_edges_unknown(b)) return NULL;
     dem2di_tile_add_smooth(world, i, a, b, smooth);
     return smooth;
 }
@@ -22770,8 +22796,8 @@ static DEM2DI_INLINE void dem2di_tile_place(dem2di_tile *t, double tolerance) {
         dem2di_eval eval;
         dem2di_search search;
         dem2di_tile_eval(t, k, &eval);
-        bool rests = dem2di_rest_found(size, t->least_a[k], t->least_b[k], t->least_part[k],
-                                       t->most[k], &eval, &demand, &search);
+        bool rests = dem2di_rest_found(size, t->least[k], t->least_part[k], t->most[k], &eval,
+                                       &demand, &search);
         dem2di_tile_found(t, k, &search, rests & (distance < t->reach[k]));
     }
 }
@@ -22930,82 +22956,112 @@ static DEM2DI_INLINE void dem2di_tile_put(dem2d_world *world, const dem2di_tile 
     if (!world->bounded) count->load = dem2di_max(count->load, tile->sum[k]);
 }
 
-/* A contact that does not go on. Not inline: dem2di_others_range has the same for its own. */
-static void dem2di_tile_leave(dem2d_world *world, int i, dem2di_law_rows *rows,
-                              dem2di_count *count) {
-    dem2di_update_pair(world, i, rows, count);
-}
-
-/* A contact that goes on: its geometry, and its forces or rows. */
-static DEM2DI_INLINE void dem2di_tile_keep(dem2d_world *world, const dem2di_tile *tile, int k,
-                                           dem2di_law_rows *rows, dem2di_count *count) {
-    const bool terms = world->plan.terms != 0;
-    const int i = tile->contact[k];
-    dem2di_history *history = &world->list.contacts.history[i - world->list.discs];
-    dem2di_contact contact;
-    dem2di_last last;
-    count->collisions++;
-    count->calls += tile->calls;
-    count->proofs[tile->corners != NULL ? DEM2D_BY_FORM : DEM2D_BY_RADIUS]++;
-    history->bound = 0;
-    if (tile->corners == NULL)
-        history->feature.own = history->feature.corner[0] = history->feature.corner[1] = -1;
-    dem2di_tile_get(tile, k, &contact);
-    if (terms) dem2di_last_get(world, &world->list.contacts, i, &last);
-    dem2di_tile_put_points(world, tile, k);
-    if (terms)
-        dem2di_law_add(world, i, &last, tile->pairs != NULL, &contact, rows);
-    else
-        dem2di_tile_put(world, tile, k, count);
-    dem2di_geometry_put(&world->list, i, &contact);
-}
-
-/* Put smooth contact k with an evaluation one Newton step on into place `to`, which is not behind
-   k; false if the search would not take this step. */
-static bool dem2di_tile_step(const dem2d_world *world, dem2di_tile *tile, int k, int to) {
+/* Put smooth contact k, which did not go on, into place `to`, which is not behind k, for another
+   pass: with an evaluation one Newton step on, or with the same one, if the step would be the last
+   and stays on the same parts. `taken` steps are done. False if the search would do neither. */
+static bool dem2di_tile_step(const dem2d_world *world, dem2di_tile *tile, int k, int taken,
+                             int to) {
     const size_t first = offsetof(dem2di_tile, dx), end = offsetof(dem2di_tile, held);
     const dem2di_demand demand = dem2di_tile_demand(world->tolerance);
-    const int i = tile->contact[k];
-    const dem2di_key *key = &world->list.keys[i];
+    const int i = tile->contact[k], slot_a = world->list.keys[i].a, slot_b = world->list.keys[i].b;
+    const dem2d_shape *a = dem2di_shape_of(world, &world->bodies[slot_a]);
+    const dem2d_shape *b = dem2di_shape_of(world, &world->bodies[slot_b]);
     const double dx = tile->dx[k], dy = tile->dy[k], distance = sqrt(dx * dx + dy * dy);
+    const double size = tile->reach[k] + distance;
     dem2di_eval eval;
+    dem2di_pair pair;
     dem2d_vec u;
     dem2di_tile_eval(tile, k, &eval);
-    if (!(distance < tile->reach[k]) ||
-        !dem2di_descent_steps(tile->reach[k] + distance, &eval, &demand, tile->calls - 1, &u))
+    const double bend = eval.rho[0] + eval.rho[1] - eval.h;
+    const bool last = dem2di_step_small(size, demand.angle, bend, eval.slope[0]);
+    if (last) {
+        if (!(tile->least_part[k] < HUGE_VAL)) return false;
+        dem2di_tile_pair(world, i, a, b, &pair);
+        if (!dem2di_step_stays(&pair, bend, &eval)) return false;
+    } else if (!(distance < tile->reach[k]) ||
+               !dem2di_descent_steps(size, &eval, &demand, taken, &u)) {
         return false;
+    }
     double *column = tile->dx;
     for (size_t at = first; at < end; at += sizeof tile->dx, column += DEM2DI_BATCH)
         column[to] = column[k];
     tile->contact[to] = i;
-    dem2di_tile_evaluate(world, u, to, dem2di_shape_of(world, &world->bodies[key->a]),
-                         dem2di_shape_of(world, &world->bodies[key->b]), tile);
+    tile->steps[to] = taken + !last;
+    if (last)
+        tile->least_part[to] = HUGE_VAL;
+    else
+        dem2di_tile_evaluate(world, slot_a, slot_b, a, b, u, to, tile);
     return true;
 }
 
-/* All contacts of a tile: geometry, and forces or rows. Those that Newton's step takes on stay in
-   the tile for another pass. */
+/* Geometry of a tile, and forces or rows of all that go on. Returns how many do not. */
+static int dem2di_tile_pass(dem2d_world *world, dem2di_tile *tile, dem2di_law_rows *rows,
+                            dem2di_count *count) {
+    const bool terms = world->plan.terms != 0;
+    const int discs = world->list.discs;
+    dem2di_contact contact;
+    dem2di_last last;
+    int left = 0;
+    dem2di_tile_fill(tile);
+    (world->fours ? dem2di_tile_solve_fours : dem2di_tile_solve_plain)(tile, world->tolerance,
+                                                                       world->plan.faces);
+    if (tile->round) dem2di_tile_round(world, tile);
+    if (!terms)
+        (world->fours ? dem2di_tile_load_fours : dem2di_tile_load_plain)(tile, world->made_step);
+    for (int k = 0; k < tile->count; k++) {
+        const int i = tile->contact[k];
+        dem2di_history *history = &world->list.contacts.history[i - discs];
+        if (!(tile->held[k] > 0)) {
+            left++;
+            continue;
+        }
+        dem2di_law_room(world, rows, count);
+        count->collisions++;
+        count->calls++;
+        count->proofs[tile->corners != NULL ? DEM2D_BY_FORM : DEM2D_BY_RADIUS]++;
+        history->bound = 0;
+        if (tile->corners == NULL)
+            history->feature.own = history->feature.corner[0] = history->feature.corner[1] = -1;
+        dem2di_tile_get(tile, k, &contact);
+        if (terms) dem2di_last_get(world, &world->list.contacts, i, &last);
+        dem2di_tile_put_points(world, tile, k);
+        if (terms)
+            dem2di_law_add(world, i, &last, tile->pairs != NULL, &contact, rows);
+        else
+            dem2di_tile_put(world, tile, k, count);
+        dem2di_geometry_put(&world->list, i, &contact);
+    }
+    return left;
+}
+
+/* The contacts of a tile that do not go on: they stay in the tile for another pass, or are
+   collided. */
+static void dem2di_tile_remain(dem2d_world *world, dem2di_tile *tile, bool first,
+                               dem2di_law_rows *rows, dem2di_count *count) {
+    int stay = 0;
+    for (int k = 0; k < tile->count; k++) {
+        const int taken = first ? 0 : tile->steps[k];
+        if (tile->held[k] > 0) {
+            count->calls += taken;
+        } else if (tile->corners == NULL && dem2di_tile_step(world, tile, k, taken, stay)) {
+            stay++;
+        } else {
+            dem2di_law_room(world, rows, count);
+            dem2di_update_pair(world, tile->contact[k], rows, count);
+        }
+    }
+    tile->count = stay;
+}
+
+/* All contacts of a tile. */
 static void dem2di_tile_apply(dem2d_world *world, dem2di_tile *tile, dem2di_law_rows *rows,
                               dem2di_count *count) {
-    for (tile->calls = 1; tile->count > 0; tile->calls++) {
-        int stay = 0;
-        dem2di_tile_fill(tile);
-        (world->fours ? dem2di_tile_solve_fours : dem2di_tile_solve_plain)(tile, world->tolerance,
-                                                                           world->plan.faces);
-        if (tile->round) dem2di_tile_round(world, tile);
-        if (world->plan.terms == 0)
-            (world->fours ? dem2di_tile_load_fours : dem2di_tile_load_plain)(tile,
-                                                                             world->made_step);
-        for (int k = 0; k < tile->count; k++) {
-            dem2di_law_room(world, rows, count);
-            if (tile->held[k] > 0)
-                dem2di_tile_keep(world, tile, k, rows, count);
-            else if (tile->corners == NULL && dem2di_tile_step(world, tile, k, stay))
-                stay++;
-            else
-                dem2di_tile_leave(world, tile->contact[k], rows, count);
-        }
-        tile->count = stay;
+    bool first = true;
+    while (tile->count > 0) {
+        const int left = dem2di_tile_pass(world, tile, rows, count);
+        if (first && left == 0) tile->count = 0;
+        if (tile->count > 0) dem2di_tile_remain(world, tile, first, rows, count);
+        first = false;
     }
     tile->round = false;
 }
