@@ -22572,9 +22572,13 @@ static DEM2DI_INLINE dem2di_tile *dem2di_tile_add_corner(const dem2d_world *worl
     return tile;
 }
 
-/* The same of a polygon and a circle. A function of its own: that of polygons need not ask. */
+/* The same of a polygon and a circle, which have one point; a snapshot may claim two. A function of
+   its own: that of polygons need not ask. */
 static dem2di_tile *dem2di_tile_add_round(const dem2d_world *world, int i, const dem2d_shape *a,
                                           const dem2d_shape *b, dem2di_tile *corners) {
+    const dem2di_contacts *from = &world->list.contacts;
+    if (world->plan.faces && dem2di_has_two_points(&from->point_pairs[i - world->list.discs]))
+        return NULL;
     dem2di_tile *tile = dem2di_tile_add_corner(world, i, a, b, corners, corners);
     corners->round |= tile != NULL;
     return tile;
