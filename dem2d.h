@@ -1457,7 +1457,8 @@ typedef void dem2d_loads_fn(void *user, dem2d_world *world);
 /// another one, and images of itself. Centroids are kept in the cell:
 /// positions that you give are moved by whole cell vectors. Queries of space see all images, and
 /// tell which one they have found. OUT_OF_RANGE if b leans by more than 1024 a.x, or if one side is
-/// above 2^30 times the other.
+/// above 2^30 times the other. A particle is refused with it if a side is below a sixteenth of its
+/// radius.
 typedef struct dem2d_cell {
     dem2d_vec a;      ///< m, along x: a.x >= 0, a.y = 0; zero: not periodic along x
     dem2d_vec b;      ///< m, b.y > 0; zero: not periodic along b
@@ -14745,6 +14746,22 @@ static inline dem2d_vec dem2di_cell_shift(const dem2d_cell *cell, int along_a, i
 /* Cells along a box at most, and along b as it leans: a million images of each particle. */
 #define DEM2DI_CELLS_ALONG 1024
 
+/* Least width and height from which a flow may make a cell smaller, of the greatest radius: each
+   particle sees 33^2 images of each other one then, and overlaps with its own one by 15/16. And
+   those of any cell, which no flow comes to: in a step lengths change by 1.1 at most. */
+#define DEM2DI_CELL_LEAST 0.125
+#define DEM2DI_CELL_NARROW (DEM2DI_CELL_LEAST / 2)
+
+/* There is no memory for the images of particles that are much wider than the cell. */
+static dem2d_result dem2di_check_narrow(const dem2d_env *env, const dem2d_cell *cell,
+                                        double radius) {
+    const double width = cell->a.x, height = cell->b.y, least = DEM2DI_CELL_NARROW * radius;
+    if (!(width > 0 && width < least) && !(height > 0 && height < least)) return DEM2D_OK;
+    return dem2di_fail(env, DEM2D_OUT_OF_RANGE, -1,
+                       "the cell of %g by %g is below a sixteenth of the radius of a particle, %g",
+                       width, height, radius);
+}
+
 /* Points by fractions s, t of the cell vectors; 0 along one that is zero. */
 typedef struct dem2di_fractions {
     dem2d_vec origin;
@@ -15680,10 +15697,12 @@ static void dem2di_size_set(dem2d_world *world, int slot, double radius) {
     world->greatest_radius = dem2di_max(world->greatest_radius, radius);
 }
 
-/* Mass and inertia are normal numbers. */
+/* Mass and inertia are normal numbers, and the cell is not much narrower. */
 static dem2d_result dem2di_check_masses(const dem2d_world *world, const dem2di_body *body) {
     double mass = dem2di_body_mass(world, body), inertia = dem2di_body_inertia(world, body);
-    if (mass > 0 && inertia > 0 && dem2di_finite(mass) && dem2di_finite(inertia)) return DEM2D_OK;
+    if (mass > 0 && inertia > 0 && dem2di_finite(mass) && dem2di_finite(inertia))
+        return dem2di_check_narrow(&world->env, &world->cell,
+                                   dem2di_shape_of(world, body)->circumscribed * body->scale);
     return dem2di_fail(&world->env, DEM2D_OUT_OF_RANGE, -1, "scale = %g gives mass %g", body->scale,
                        mass);
 }
@@ -24284,10 +24303,6 @@ static double dem2di_flow_pass(dem2d_world *world) {
    contacts carry the stress, one of them makes errors of many s. */
 #define DEM2DI_CELL_LEARNS 0.05
 
-/* Least width and height from which a flow may make a cell smaller, of the greatest radius: each
-   particle sees 33^2 images of each other one then, and overlaps with its own one by 15/16. */
-#define DEM2DI_CELL_LEAST 0.125
-
 /* What holds for all contacts in a control of the cell. */
 typedef struct dem2di_cell_aim {
     dem2d_world *world;
@@ -24591,12 +24606,11 @@ static dem2d_result dem2di_check_flow(dem2d_world *world) {
                            width, height);
     if (!(side < DEM2DI_CELL_LEAST * world->greatest_radius)) return DEM2D_OK;
     dem2di_greatest_radius_find(world);
-    const double least = DEM2DI_CELL_LEAST * world->greatest_radius;
-    if (!(side < least)) return DEM2D_OK;
+    if (!(side < DEM2DI_CELL_LEAST * world->greatest_radius)) return DEM2D_OK;
     return dem2di_fail(&world->env, DEM2D_OUT_OF_RANGE, -1,
-                       "the cell of %g by %g shrinks below %g, an eighth of the greatest radius: "
+                       "the cell of %g by %g shrinks below an eighth of the greatest radius, %g: "
                        "its particles do not resist",
-                       width, height, least);
+                       width, height, world->greatest_radius);
 }
 
 /* The stress times the area: of the contacts, and of the fluctuations at the last force pass. A
@@ -30059,6 +30073,10 @@ static dem2d_result dem2di_growth_run(dem2d_world *world, const dem2d_growth_des
         double factor = dem2di_growth_factor(world, desc, &sample, part);
         int done = 0, left = steps - growth->steps;
         factor = dem2di_max(1 - DEM2DI_GROWTH_MOST, dem2di_min(1 + DEM2DI_GROWTH_MOST, factor));
+        dem2di_greatest_radius_find(world);
+        result =
+            dem2di_check_narrow(&world->env, &world->cell, factor * world->greatest_radius);
+        if (result != DEM2D_OK) return result;
         dem2di_sizes_multiply(world, factor);
         growth->factor *= factor;
         result =
@@ -30914,9 +30932,11 @@ static void dem2di_finish_body(dem2di_loader *loader, int slot) {
     dem2di_load_check(loader, dem2di_check_number(loader->env, "mass", mass, DEM2DI_POSITIVE));
     dem2di_load_check(loader,
                       dem2di_check_number(loader->env, "inertia", inertia, DEM2DI_POSITIVE));
+    const double radius = place->shape->circumscribed * body->scale;
+    dem2di_load_check(loader, dem2di_check_narrow(loader->env, &w->cell, radius));
     place->users++;
     w->inverse[slot] = dem2di_inverse_of(w, body);
-    dem2di_size_set(w, slot, place->shape->circumscribed * body->scale);
+    dem2di_size_set(w, slot, radius);
     if (w->plan.turns) w->lever[slot] = dem2di_lever_of(w, slot);
 }
 
@@ -32708,10 +32728,18 @@ DEM2D_API dem2d_result dem2d_world_write_csv(const dem2d_world *world, const dem
             Mended: a disc that became lighter by dem2d_world_set_material, or other by
             dem2d_world_set_shape, was not compared with the time step before the next list of
             contacts; witness points of GJK and EPA were off by 1e-12 of the size where GJK gives
-            the bound; a filling with a gap as wide as the periodic cell took for ever.
+            the bound; a filling with a gap as wide as the periodic cell took for ever; a pair that
+            lost its spring and dashpot against rolling or sliding beside others with such ones gave
+            NaN; a refused step could change the hash where segments are joined, or where two
+            contact points become one; a first hit of a ray in a cell was missed behind a row
+            without images; a step without memory in a sheared cell left another list.
+            Functions that change the world are refused while a step of it is on its way
+            (DEM2D_IN_USE), as are particles whose radius is above 16 times a side of the cell, and
+            walls over more than 1024 cells. Worlds with dashpots and faces may get other hashes.
+            Example: incline.
             Faster, with the same bits: discs with dashpots, rolling friction or a law of the
-            caller, discs on half-planes, polygons with two contact points, the list, discs in a
-            periodic cell, dem2d_pairs_contact.
+            caller, discs on half-planes, polygons with two contact points, circles at polygons,
+            smooth particles that turn, the list, periodic cells, dem2d_pairs_contact.
      0.9.0  Scenes of 0.8.0 run to the same bits, but packings by dem2d_world_grow; snapshots
             of 0.8.0 are read.
             Periodic cell: queries of space see images and tell which (dem2d_found.shift), as do

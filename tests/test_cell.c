@@ -572,8 +572,12 @@ static void test_refused(void **state) {
         dem2d_particle_id id;
         assert_result(dem2d_world_add_particle(s.world, &far, &id), DEM2D_OUT_OF_RANGE);
         assert_logged(&env, DEM2D_OUT_OF_RANGE, -1, "position");
-        far.position = vec(0.5, 0.5);
+        far.position = vec(0.5, 0.5), far.scale = 130; /* a radius of 65 in a cell of 4 */
+        assert_result(dem2d_world_add_particle(s.world, &far, &id), DEM2D_OUT_OF_RANGE);
+        assert_logged(&env, DEM2D_OUT_OF_RANGE, -1, "a sixteenth of the radius");
+        far.scale = 1;
         id = add_grain(&s, &far);
+        assert_result(dem2d_world_set_shape(s.world, id, far.shape, 130), DEM2D_OUT_OF_RANGE);
         assert_result(dem2d_world_move_particle(s.world, id, vec(1e10, 1e10), 0),
                       DEM2D_OUT_OF_RANGE);
         assert_true(inside_holds(s.world));
