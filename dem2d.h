@@ -550,12 +550,12 @@ in use is decided after an edit)
     fields added to a grid in every step              +31500    cells of a diameter, width two
     the ledger of energies                             +1580
     a periodic cell in place of a box                    +33    23 of it to find who has left it
-    a dashpot                                            +76    with friction; as the next rows:
-    a dashpot and rolling friction                      +112    in beds of bench-guard
-    a normal and a tangential dashpot                   +120
-    both dashpots and rolling friction                  +124
-    a law of your own, springs and friction             +295    called for up to 32 at once
-    the same, law_omits: all that it does without       +210
+    a dashpot                                            +15    with friction; as the next rows:
+    a dashpot and rolling friction                       +41    in beds of bench-guard
+    a normal and a tangential dashpot                    +57
+    both dashpots and rolling friction                   +58
+    a law of your own, springs and friction             +305    called for up to 32 at once
+    the same, law_omits: all that it does without       +224
     a pair of circles listed but apart                    64    same as in contact: no branch
     another pair listed but apart, known gap              62    colliding it costs 700 to 1500
     a region without particles, a pair of fixed ones       0
