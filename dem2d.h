@@ -538,18 +538,18 @@ THREADS
 COSTS (instructions per circle and step of a settled bed with 2.0 contacts each, gcc -O2, by
 `make -C tests bench-cost`; a feature that the scene does not use costs nothing: which features are
 in use is decided after an edit)
-    circles, no friction, no damping                     270    56 without a contact
-    the list rebuilt once in 100 steps                   +16
-    friction and its history                             +37
-    spinning without friction                             +6
+    circles, no friction, no damping                     257    57 without a contact
+    the list rebuilt once in 100 steps                   +13
+    friction and its history                             +35
+    spinning without friction                             +5
     local or global damping                               +7
     gravity                                               +1
     fixed particles, walls, segments, parallel_for        +1    present, but nothing touches them
-    polygons for a tenth of the circles                 +480
+    polygons for a tenth of the circles                 +410
     energy and stress queried in every step            +1030
-    fields added to a grid in every step              +31500    cells of a diameter, width two
+    fields added to a grid in every step              +31400    cells of a diameter, width two
     the ledger of energies                             +1580
-    a periodic cell in place of a box                    +33    23 of it to find who has left it
+    a periodic cell in place of a box                    +21    with one list more in 100 steps
     a dashpot                                            +15    with friction; as the next rows:
     a dashpot and rolling friction                       +41    in beds of bench-guard
     a normal and a tangential dashpot                    +57
