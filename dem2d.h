@@ -559,7 +559,7 @@ in use is decided after an edit)
     a pair of circles listed but apart                    64    same as in contact: no branch
     another pair listed but apart, known gap              62    colliding it costs 700 to 1500
     a region without particles, a pair of fixed ones       0
-    Vectors of four (AVX2) are in use here; without them circles with friction take 126 more.
+    Vectors of four (AVX2) are in use here; without them circles with friction take 112 more.
 
 MEMORY
     All memory comes through dem2d_env (malloc and free by default); release gets the size. A step

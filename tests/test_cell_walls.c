@@ -3,14 +3,10 @@
    which each grain and each wall has copies at all cell vectors nearby; copies of a grain get its
    forces. A floor that goes round is one long chain there. */
 #include "dem2d.h"
+#include "cell_grains.h"
 #include "inside.h"
-#include "testing.h"
-#include "world_scene.h"
 
 enum { GRAINS = 36, COPIES = 11 * 11, WALLS = 4, POINTS = 12 };
-
-#define KN 1000.0 /* of discs of diameter 1 and mass 1 */
-#define DT (0.02 / 31.622776601683793)
 
 /* A wall in the cell, by points in sides of the cell along x and y. */
 typedef struct wall_kind {
@@ -42,13 +38,6 @@ typedef struct packed {
     dem2d_wall_id walls[WALLS]; /* those in the middle */
 } packed;
 
-static dem2d_material_desc soft_desc(bool damped) {
-    dem2d_material_desc desc = material_desc(4 / (double)TEST_PI, KN, KN / 2, 0.4);
-    if (damped) desc.damping_ratio = 0.1, desc.rolling_friction = 0.05;
-    if (damped) desc.tangential_damping_ratio = 0.1;
-    return desc;
-}
-
 /* Copies get the sums of their grain, the one in the middle of its ids. */
 static void share(void *user, dem2d_sums *sums) {
     const packed *p = user;
@@ -57,31 +46,6 @@ static void share(void *user, dem2d_sums *sums) {
             const int row = i * p->copies + k, own = i * p->copies + p->copies / 2;
             sums->force[row] = sums->force[own], sums->torque[row] = sums->torque[own];
         }
-}
-
-static void make_shapes(const scene *s, dem2d_shape_id shapes[4]) {
-    static const dem2d_vec box[4] = {{-0.45, -0.4}, {0.45, -0.45}, {0.5, 0.4}, {-0.4, 0.5}};
-    static const double a[5] = {0.45, 0, 0.02, 0.01, 0.003}, b[5] = {0, 0, 0, 0.005, 0};
-    shapes[0] = give_shape(s, make_disc(0.5));
-    shapes[1] = give_shape(s, make_polygon(box, 4, 0.05));
-    shapes[2] = give_shape(s, make_ellipse(0.5, 0.4));
-    shapes[3] = give_shape(s, make_series(a, b, 4));
-}
-
-/* Grains on a lattice, displaced at random, with random speeds. */
-static dem2d_particle_desc grain_at(const packed *p, const filling *f,
-                                    const dem2d_shape_id shapes[4], int i, uint64_t *random) {
-    const int side = (int)ceil(sqrt(f->grains));
-    const double s = (i % side + 0.5 + random_between(random, 0, 0.1)) / side;
-    const double t = (i / side + 0.5 + random_between(random, 0, 0.1)) / side;
-    const dem2d_vec at = vec(s * p->a.x + t * p->b.x, t * p->b.y);
-    const double scale = random_between(random, 0.8, 1);
-    dem2d_particle_desc grain = grain_desc(&p->s, shapes[i % f->kinds], scale, at);
-    grain.angle = random_between(random, 0, 6);
-    grain.velocity.x = random_between(random, -f->speed, f->speed);
-    grain.velocity.y = random_between(random, -f->speed, f->speed);
-    grain.angular_velocity = random_between(random, -f->speed, f->speed);
-    return grain;
 }
 
 /* A wall at cell vectors; a floor by hand goes over all copies. */
@@ -140,8 +104,9 @@ static void fill(packed *p, const filling *f, const dem2d_world_desc *desc, bool
     p->s = open_scene(&made, &soft);
     make_shapes(&p->s, shapes);
     add_walls(p, f, cell);
+    const lattice at = {f->grains, f->kinds, f->speed, p->a, p->b};
     for (int i = 0; i < f->grains; i++) {
-        const dem2d_particle_desc grain = grain_at(p, f, shapes, i, &random);
+        const dem2d_particle_desc grain = grain_at(&p->s, &at, shapes, i, &random);
         for (int n = cell ? 0 : -up; n <= (cell ? 0 : up); n++)
             for (int m = cell ? 0 : -f->around; m <= (cell ? 0 : f->around); m++) {
                 dem2d_particle_desc copy = grain;
