@@ -6,7 +6,7 @@
        #define DEM2D_IMPLEMENTATION     #include "dem2d.h"
        #include "dem2d.h"
 
-   Link with -lm. Recommended: -O2 -fno-math-errno (same numbers, faster square roots).
+   Link with -lm; compile with -O2.
 
 CONTENTS (search for the anchor, ">>" and the word)
 
@@ -2905,6 +2905,15 @@ DEM2D_API dem2d_result dem2d_world_write_csv(const dem2d_world *world, const dem
 #define DEM2DI_INLINE inline
 #endif
 
+/* A square root that does not set errno: gcc and clang use no vectors where it may, which is what
+   they compile without -fno-math-errno. The sqrt of a program stays what it is. */
+#if defined(__GNUC__)
+double __builtin_sqrt(double) __attribute__((const));
+#define dem2di_sqrt(x) __builtin_sqrt(x)
+#else
+#define dem2di_sqrt(x) sqrt(x)
+#endif
+
 /* Around loops that are to use vector instructions: gcc 12 does not vectorise them at -O2, and with
    trapping math does not compute what a choice may leave out. Values are the same without. */
 #if defined(__GNUC__) && !defined(__clang__)
@@ -3030,7 +3039,7 @@ static dem2d_vec dem2di_right(dem2d_vec a) {
 }
 
 static DEM2DI_INLINE double dem2di_length(dem2d_vec a) {
-    return sqrt(dem2di_dot(a, a));
+    return dem2di_sqrt(dem2di_dot(a, a));
 }
 
 /* If a is NaN the result is b; if b is NaN it is NaN. */
@@ -3058,7 +3067,7 @@ static bool dem2di_vec_finite(dem2d_vec a) {
 static bool dem2di_unit(dem2d_vec v, dem2d_vec *unit) {
     double square = dem2di_dot(v, v);
     if (square > DEM2DI_LEAST_SQUARE && square < 1 / DEM2DI_LEAST_SQUARE) {
-        double length = sqrt(square);
+        double length = dem2di_sqrt(square);
         *unit = dem2di_vec(v.x / length, v.y / length);
         return true;
     }
@@ -4037,7 +4046,7 @@ static inline double dem2di_arc_parameter(double q0, double q1, double q2, doubl
         *bend = (q0 - q1) * (1 - end) + (q1 - q2) * end;
         return end;
     }
-    const double root = sqrt(q1 * q1 - q0 * q2), sum = root + fabs(q1);
+    const double root = dem2di_sqrt(q1 * q1 - q0 * q2), sum = root + fabs(q1);
     const double top[2] = {q0, sum}, rest[2] = {q0, -q2};
     const int falls = q1 > 0;
     const double bottom = sum + rest[falls];
@@ -4141,7 +4150,7 @@ static dem2d_vec dem2di_fourier_support(const dem2d_shape *shape, dem2d_vec u, d
 
 static inline dem2d_vec dem2di_ellipse_support(const dem2d_shape *shape, dem2d_vec u, double *rho) {
     dem2d_vec s = dem2di_vec(shape->a * u.x, shape->b * u.y);
-    double f = 1 / sqrt(s.x * u.x + s.y * u.y);
+    double f = 1 / dem2di_sqrt(s.x * u.x + s.y * u.y);
     if (rho != NULL) *rho = shape->a * f * (shape->b * f) * f;
     return dem2di_vec(s.x * f, s.y * f);
 }
@@ -5242,7 +5251,7 @@ static void dem2di_finish_bezier(dem2d_shape *shape) {
     bounds.attained[0] = 0;
     bounds.attained[1] = bounds.attained[2] = HUGE_VAL;
     /* 1e-9 of the size is below the tolerance of any contact; 40 halvings are enough for doubles */
-    bounds.tolerance = 1e-9 * sqrt(shape->mass.area);
+    bounds.tolerance = 1e-9 * dem2di_sqrt(shape->mass.area);
     for (int k = 0; k < shape->parts; k++) dem2di_bound_arc(&bounds, &shape->arcs[k], 40);
     shape->circumscribed = bounds.outer + shape->deviation;
     shape->inscribed = dem2di_max(0, bounds.inner - shape->deviation);
@@ -5493,7 +5502,7 @@ DEM2D_API dem2d_result dem2d_shape_create_custom(const dem2d_env *env,
     /* the circle around the box of the four supports */
     double x = dem2di_max(dem2di_half_width(made, 1, 0), dem2di_half_width(made, -1, 0));
     double y = dem2di_max(dem2di_half_width(made, 0, 1), dem2di_half_width(made, 0, -1));
-    made->circumscribed = sqrt(x * x + y * y);
+    made->circumscribed = dem2di_sqrt(x * x + y * y);
     made->inscribed = dem2di_min(desc->inscribed, dem2di_min(x, y));
     made->rho_min = desc->rho_min;
     if (!dem2di_finite(made->mass.area))
@@ -5522,7 +5531,7 @@ DEM2D_API dem2d_result dem2d_shape_get(const dem2d_shape *shape, dem2d_shape_inf
     info->rho_min = shape->rho_min;
     info->rho_max = shape->rho_max;
     info->deviation = shape->deviation;
-    info->equivalent = sqrt(shape->mass.area / DEM2DI_PI);
+    info->equivalent = dem2di_sqrt(shape->mass.area / DEM2DI_PI);
     info->bytes = shape->bytes;
     return DEM2D_OK;
 }
@@ -5563,7 +5572,7 @@ static bool dem2di_deviates(const dem2d_shape *shape) {
    the derivative in order, and 1. Returns their number. */
 static int dem2di_arc_extrema(const dem2di_arc *arc, dem2d_vec u, double t[4]) {
     double q0 = dem2di_dot(arc->d0, u), q1 = dem2di_dot(arc->d1, u), q2 = dem2di_dot(arc->d2, u);
-    double square = q1 * q1 - q0 * q2, root = square > 0 ? sqrt(square) : 0;
+    double square = q1 * q1 - q0 * q2, root = square > 0 ? dem2di_sqrt(square) : 0;
     double sum = q1 > 0 ? q1 + root : q1 - root;  /* nothing cancels */
     double part[2][2] = {{sum, -q2}, {q0, -sum}}; /* t : 1 - t for both roots */
     int count = 1;
@@ -5809,7 +5818,7 @@ static double dem2di_axis(const dem2d_shape *shape, double *ratio) {
     if (shape->type == DEM2D_CIRCLE) return 0;
     if (shape->type == DEM2D_ELLIPSE) { /* a and b are squares */
         bool wide = shape->a >= shape->b;
-        *ratio = sqrt(wide ? shape->a / shape->b : shape->b / shape->a);
+        *ratio = dem2di_sqrt(wide ? shape->a / shape->b : shape->b / shape->a);
         return wide ? 0 : DEM2DI_PI / 2;
     }
     dem2di_tensor sum = dem2di_second_moments(shape, dem2d_rot_make(0), &terms);
@@ -5818,7 +5827,7 @@ static double dem2di_axis(const dem2d_shape *shape, double *ratio) {
     sum = dem2di_second_moments(shape, dem2d_rot_make(principal.angle), &terms);
     dem2d_principal rest = dem2di_tensor_principal(sum);
     double least = sum.yy - sum.xy * (sum.xy / (sum.xx - sum.yy)); /* to the fourth order in xy */
-    *ratio = sqrt((rest.p + rest.q) / least);
+    *ratio = dem2di_sqrt((rest.p + rest.q) / least);
     double angle = principal.angle + rest.angle;
     if (angle > DEM2DI_PI / 2) angle -= DEM2DI_PI;
     return angle > -DEM2DI_PI / 2 ? angle : angle + DEM2DI_PI;
@@ -6801,7 +6810,7 @@ static void dem2di_calipers(const dem2d_vec *hull, int count, dem2d_outline_info
             ends[1] = other;
         }
     }
-    info->feret_max = sqrt(most);
+    info->feret_max = dem2di_sqrt(most);
 }
 
 /* Centre of the circle through 3 points, false if they are on one line, or of the smallest circle
@@ -6878,7 +6887,7 @@ static void dem2di_circumscribe(const dem2d_vec *hull, int count, const int ends
         centre = found;
         outer = around;
     }
-    info->circumscribed = sqrt(outer);
+    info->circumscribed = dem2di_sqrt(outer);
     info->circumscribed_at = centre;
 }
 
@@ -6924,7 +6933,7 @@ static bool dem2di_inside_of(const dem2di_inscribe *in, int k, dem2d_vec p) {
 static double dem2di_distance_bound(const dem2di_inscribe *in, int count, int nearest, double s,
                                     dem2d_vec *pull) {
     dem2d_vec sum = in->near[nearest].offset;
-    double square = in->near[nearest].square, bound = sqrt(square) + s;
+    double square = in->near[nearest].square, bound = dem2di_sqrt(square) + s;
     *pull = sum;
     for (int step = 0; step < 6 && bound > in->best + in->tolerance; step++) {
         double length = dem2di_length(sum), least = DBL_MAX;
@@ -6940,7 +6949,7 @@ static double dem2di_distance_bound(const dem2di_inscribe *in, int count, int ne
         if (w > 1) w = 1;
         sum = dem2di_along(sum, -w, apart);
         square += w * (in->near[chosen].square - square);
-        double lower = sqrt(square + 2 * s * dem2di_length(sum) + s * s);
+        double lower = dem2di_sqrt(square + 2 * s * dem2di_length(sum) + s * s);
         if (!(lower < bound)) break;
         bound = lower;
         *pull = sum;
@@ -6972,7 +6981,8 @@ static void dem2di_inscribe_cell(dem2di_inscribe *in, dem2d_vec centre, double h
         if (one->square < in->near[nearest].square) nearest = i;
     }
     /* 1.4143 is just above the square root of 2 */
-    double distance = sqrt(in->near[nearest].square), s = 1.4143 * half, bound = s - distance;
+    double distance = dem2di_sqrt(in->near[nearest].square), s = 1.4143 * half,
+           bound = s - distance;
     dem2d_vec uphill = dem2di_negate(in->near[nearest].offset);
     if (dem2di_inside_of(in, in->near[nearest].side, centre)) {
         if (distance > in->best) {
@@ -7436,7 +7446,7 @@ static bool dem2di_hausdorff(const dem2d_env *env, const dem2d_vec *a, int a_cou
     for (int i = 0; i < 2; i++) dem2di_side_groups_boxes(&grouped[i]);
     double most = dem2di_side_groups_farthest(&grouped[1], grouped[0].sides, grouped[0].count, 0);
     most = dem2di_side_groups_farthest(&grouped[0], grouped[1].sides, grouped[1].count, most);
-    *distance = sqrt(most);
+    *distance = dem2di_sqrt(most);
     dem2di_release(env, sides, room, size);
     return true;
 }
@@ -7501,7 +7511,7 @@ static dem2d_result dem2di_outline_make(const dem2d_env *env, const dem2d_vec *p
     }
     dem2d_mass mass = dem2di_polygon_mass(outline->hull, outline->hull_count);
     outline->centre = mass.centroid;
-    outline->radius = sqrt(mass.area / DEM2DI_PI);
+    outline->radius = dem2di_sqrt(mass.area / DEM2DI_PI);
     memcpy(outline->points, points, n * sizeof(dem2d_vec));
     if (dem2di_twice_area(points, count) < 0) dem2di_reverse(outline->points, count);
     for (int i = 0; i < count; i++)
@@ -7987,7 +7997,8 @@ static double dem2di_section_penalty(const dem2di_section *section, const dem2di
         dem2d_vec a = dem2di_along(dem2di_scale(dem2di_sub(arc->d1, arc->d0), s), t,
                                    dem2di_sub(arc->d2, arc->d1));
         double square = dem2di_dot(v, v), turn = dem2di_cross(v, a);
-        double unit = 1 / (1.5 * square * sqrt(square) * section->bend); /* see dem2di_arc_rho */
+        double unit =
+            1 / (1.5 * square * dem2di_sqrt(square) * section->bend); /* see dem2di_arc_rho */
         double missing = DEM2DI_BEND_MARGIN - turn * unit;
         if (!(missing > 0) || !(square > 0)) continue;
         sum += missing * missing;
@@ -8299,7 +8310,8 @@ static void dem2di_plan_fit(dem2di_bezier_plan *plan) {
         f[0] = f[1] = 1.0 / 3; /* straight: constant speed */
         bool curved = dem2di_plan_section(plan, i, &section);
         if (curved) {
-            double cosine = sqrt((1 + dem2di_dot(section.from->normal, section.to->normal)) / 2);
+            double cosine =
+                dem2di_sqrt((1 + dem2di_dot(section.from->normal, section.to->normal)) / 2);
             f[0] = f[1] = 4.0 / 3 * cosine / (1 + cosine);
             plan->iterations += dem2di_fit_curved(&section, f);
         }
@@ -8565,7 +8577,8 @@ static void dem2di_nearest_equal(dem2di_nearest_series *s, const bool *held, dou
                 row[j] = factor[j * room + j] > 0 ? sum / factor[j * room + j] : 0;
                 x[i] -= row[j] * x[j];
             } else {
-                row[i] = sum > 1e-12 * s->matrix[0] ? sqrt(sum) : 0; /* eps times a few hundred */
+                row[i] =
+                    sum > 1e-12 * s->matrix[0] ? dem2di_sqrt(sum) : 0; /* eps times a few hundred */
                 x[i] = row[i] > 0 ? x[i] / row[i] : 0;
             }
         }
@@ -8744,7 +8757,7 @@ static void dem2di_fit_resize(const dem2di_fit *fit, double *a, double *b, int o
     double area = a[0] * a[0] / 4;
     for (int n = 2; n <= order; n++) area += (1 - (double)n * n) * (a[n] * a[n] + b[n] * b[n]) / 2;
     if (!(area > 0)) return; /* creation will refuse it */
-    double factor = sqrt(target / (DEM2DI_PI * area));
+    double factor = dem2di_sqrt(target / (DEM2DI_PI * area));
     for (int n = 0; n <= order; n++) {
         if (n == 1) continue; /* about the Steiner point */
         a[n] *= factor;
@@ -8815,7 +8828,7 @@ static double dem2di_ellipse_objective(void *data, const double *x) {
     dem2di_fit *fit = (dem2di_fit *)data;
     if (!(x[2] > 0 && x[3] > 0)) return HUGE_VAL;
     dem2d_rot q = dem2d_rot_make(x[4]), step = dem2d_rot_make(2 * DEM2DI_PI / count);
-    double swell = sqrt(2 * DEM2DI_PI / count / step.s);
+    double swell = dem2di_sqrt(2 * DEM2DI_PI / count / step.s);
     dem2d_vec z = dem2di_vec(1, 0), centre = dem2di_vec(x[0], x[1]);
     for (int i = 0; i < count; i++) {
         dem2d_vec p = dem2di_vec(swell * x[2] * z.x, swell * x[3] * z.y);
@@ -8838,7 +8851,7 @@ static dem2d_result dem2di_fit_ellipse(dem2di_fit *fit) {
     }
     dem2d_vec twice = dem2di_vec(xx - yy, 2 * xy);
     double root = dem2di_length(twice);
-    double ratio = sqrt(sqrt((xx + yy + root) / (xx + yy - root)));
+    double ratio = dem2di_sqrt(dem2di_sqrt((xx + yy + root) / (xx + yy - root)));
     double x[5] = {0, 0, size * ratio, size / ratio, dem2d_rot_angle(dem2di_rot(twice)) / 2};
     double steps[5] = {0.1 * size, 0.1 * size, 0.1 * size, 0.1 * size, 0.2};
     fit->report.iterations += dem2di_compass(dem2di_ellipse_objective, fit, x, steps, 5, 1e-3);
@@ -8904,7 +8917,8 @@ static dem2d_result dem2di_fit_once(dem2di_fit *fit) {
     fit->shape = NULL;
     fit->report.pose = dem2d_pose_make(fit->mass.centroid.x, fit->mass.centroid.y, 0, 1);
     if (fit->desc.model == DEM2D_CIRCLE)
-        result = dem2d_shape_create_circle(fit->env, sqrt(fit->mass.area / DEM2DI_PI), &fit->shape);
+        result = dem2d_shape_create_circle(fit->env, dem2di_sqrt(fit->mass.area / DEM2DI_PI),
+                                           &fit->shape);
     if (fit->desc.model == DEM2D_ELLIPSE) result = dem2di_fit_ellipse(fit);
     if (fit->desc.model == DEM2D_POLYGON) result = dem2di_fit_polygon(fit);
     if (fit->desc.model == DEM2D_BEZIER) result = dem2di_fit_bezier(fit);
@@ -9126,7 +9140,7 @@ DEM2D_API dem2d_result dem2d_fourier_virtual(const dem2d_virtual_desc *desc, int
         b[n] *= factor;
         area += (1 - (double)n * n) * (a[n] * a[n] + b[n] * b[n]) / 2;
     }
-    double size = desc->radius / sqrt(area);
+    double size = desc->radius / dem2di_sqrt(area);
     a[0] = 2 * size;
     for (int n = 2; n <= order; n++) {
         a[n] *= size;
@@ -9576,7 +9590,7 @@ static bool dem2di_cone(const dem2di_pair *pair, double h, dem2d_vec end[2]) {
     double c = inner - h;
     if (!(pair->distance > 0) || !(c > -0.5 * pair->distance)) return false;
     c = dem2di_min(1, c / pair->distance);
-    double sine = sqrt(1 - c * c);
+    double sine = dem2di_sqrt(1 - c * c);
     dem2d_vec d = dem2di_scale(pair->d, 1 / pair->distance);
     end[0] = dem2di_along(dem2di_scale(d, c), -sine, dem2di_perp(d));
     end[1] = dem2di_along(dem2di_scale(d, c), sine, dem2di_perp(d));
@@ -10461,7 +10475,7 @@ static inline bool dem2di_stationary(const dem2di_pair *pair, const dem2di_brack
    replaced by its series, whose next term is below 5/16 e^6 = 3e-19. */
 static inline dem2d_vec dem2di_newton(const dem2di_eval *eval, double bend) {
     double e = -eval->slope[0] / bend, square = e * e, f;
-    f = square < 1e-6 ? 1 - square * (0.5 - 0.375 * square) : 1 / sqrt(1 + square);
+    f = square < 1e-6 ? 1 - square * (0.5 - 0.375 * square) : 1 / dem2di_sqrt(1 + square);
     double ux = eval->u.x, uy = eval->u.y;
     return dem2di_vec((ux - e * uy) * f, (uy + e * ux) * f);
 }
@@ -10631,7 +10645,7 @@ static void dem2di_finish_step(const dem2di_eval *eval, dem2di_search *search) {
     if (eval->no_step) e = fall = 0;
     double tangent = e;
     if (fall > DEM2DI_SMALL_FALL) {
-        double root = sqrt(1 + e * e);
+        double root = dem2di_sqrt(1 + e * e);
         half = 1 / (1 + root);
         fall = e * e * half / root;
         e /= root;
@@ -10864,7 +10878,7 @@ typedef struct dem2di_demand {
 } dem2di_demand;
 
 static inline double dem2di_rest_angle(double relative, bool detect) {
-    return (detect ? 0.3 : 0.1) * sqrt(dem2di_max(relative, DEM2DI_ROUNDOFF));
+    return (detect ? 0.3 : 0.1) * dem2di_sqrt(dem2di_max(relative, DEM2DI_ROUNDOFF));
 }
 
 static inline dem2di_demand dem2di_demand_of(const dem2di_pair *pair, double tolerance,
@@ -11192,7 +11206,7 @@ static DEM2DI_INLINE bool dem2di_second_place(const dem2di_face *a, const dem2di
     const double x = base ? xa : xb, rise = base ? b->rise : a->rise, length = side * (x - from);
     const double on_a = dem2di_face_height(a, x), gap = dem2di_face_height(b, x) - on_a;
     const double radii = a->rounding + b->rounding, square = 1 + rise * rise;
-    const double slope = sqrt(square), core = base ? on_a : on_a + gap;
+    const double slope = dem2di_sqrt(square), core = base ? on_a : on_a + gap;
     const double lean = side * (base ? -gap : gap) * rise;
     end->side = side;
     end->base = base ? 1 : -1;
@@ -11273,7 +11287,7 @@ static double dem2di_second_share(double square, double width, double depth, dou
     const double part = DEM2DI_FULL_WIDTH;
     *by_width = *by_depth = 0;
     if (dem2di_second_full(square, width, depth)) return 1;
-    double length = sqrt(square), left = dem2di_share_left(length, depth, by_depth), slope;
+    double length = dem2di_sqrt(square), left = dem2di_share_left(length, depth, by_depth), slope;
     if (width >= part * length) return left;
     double there = dem2di_ramp(width / (part * length), &slope);
     *by_width = left * slope / (part * length);
@@ -11336,7 +11350,7 @@ static DEM2DI_INLINE bool dem2di_two_points(const dem2di_second_point *end, doub
     const dem2d_vec across = dem2di_perp(u);
     const double x = (end->slide - end->press * end->rise) / end->slope; /* of the force on B */
     const double y = (end->press + end->slide * end->rise) / end->slope;
-    const double size = sqrt(x * x + y * y), up = end->y - end->core;
+    const double size = dem2di_sqrt(x * x + y * y), up = end->y - end->core;
     /* the force along the base acts at the corner: its moment moves the point of the deeper end */
     const double moved = end->x_deep + up * end->slope * end->slide / end->deep;
     const double place = end->deep > 0 ? moved : end->x_deep;
@@ -11937,15 +11951,15 @@ DEM2DI_AVX2_INLINE void dem2di_circles_put(dem2di_four row, double depth, double
 /* dem2di_overlap_circles of four pairs. False: a line of centres is too short. */
 DEM2DI_AVX2_INLINE bool dem2di_overlap_fours(const dem2d_body *bodies, const dem2d_body_pair *p,
                                              dem2d_overlap *to) {
-    const dem2di_four_circles a = dem2di_circles_fetch(&bodies[p[0].a], &bodies[p[1].a],
-                                                       &bodies[p[2].a], &bodies[p[3].a]);
-    const dem2di_four_circles b = dem2di_circles_fetch(&bodies[p[0].b], &bodies[p[1].b],
-                                                       &bodies[p[2].b], &bodies[p[3].b]);
+    const dem2di_four_circles a =
+        dem2di_circles_fetch(&bodies[p[0].a], &bodies[p[1].a], &bodies[p[2].a], &bodies[p[3].a]);
+    const dem2di_four_circles b =
+        dem2di_circles_fetch(&bodies[p[0].b], &bodies[p[1].b], &bodies[p[2].b], &bodies[p[3].b]);
     const dem2di_four dx = b.x - a.x, dy = b.y - a.y, square = dx * dx + dy * dy, reach = a.r + b.r;
     dem2di_four distance;
     double roots[4];
     dem2di_four_put(roots, square);
-    for (int k = 0; k < 4; k++) roots[k] = sqrt(roots[k]);
+    for (int k = 0; k < 4; k++) roots[k] = dem2di_sqrt(roots[k]);
     distance = dem2di_four_at(roots);
     const dem2di_four least = square - square + DEM2DI_LEAST_LINE;
     const dem2di_four_bits far = (dem2di_four_bits)(distance > least);
@@ -12137,7 +12151,7 @@ static DEM2DI_INLINE void dem2di_array_corners(dem2di_array_tile *DEM2DI_APART t
     DEM2DI_INDEPENDENT
     for (int k = 0; k < t->count; k++) {
         const double dx = t->bx[k] - t->ax[k], dy = t->by[k] - t->ay[k];
-        const double distance = sqrt(dx * dx + dy * dy), size = t->reach[k] + distance;
+        const double distance = dem2di_sqrt(dx * dx + dy * dy), size = t->reach[k] + distance;
         dem2di_search search;
         bool rests = dem2di_corner_rests(corners, k, dx, dy, distance, size, true, second, &search);
         t->found[k] = rests ? 1 : 0;
@@ -12155,7 +12169,7 @@ static DEM2DI_INLINE void dem2di_array_smooth(dem2di_array_tile *t, double toler
     for (int k = 0; k < t->count; k++) {
         const double dx = t->bx[k] - t->ax[k], dy = t->by[k] - t->ay[k];
         const double ux = t->ux[k], uy = t->uy[k];
-        const double distance = sqrt(dx * dx + dy * dy), size = t->reach[k] + distance;
+        const double distance = dem2di_sqrt(dx * dx + dy * dy), size = t->reach[k] + distance;
         const double wx = (t->sx_a[k] - t->sx_b[k]) - dx, wy = (t->sy_a[k] - t->sy_b[k]) - dy;
         dem2di_eval eval;
         dem2di_search search;
@@ -12921,7 +12935,7 @@ static inline void dem2di_arms_shift(dem2di_arms *arms, double by) {
 /* Coefficient of a dashpot beside a spring, N s/m (N m s for rolling), between two with the sum of
    inverse masses (inertias); 0 where neither can be moved. */
 static DEM2DI_INLINE double dem2di_dashpot(double ratio, double stiffness, double inverse) {
-    return inverse > 0 ? 2 * ratio * sqrt(1 / inverse * stiffness) : 0;
+    return inverse > 0 ? 2 * ratio * dem2di_sqrt(1 / inverse * stiffness) : 0;
 }
 
 /* Stiffness of the spring against rolling. */
@@ -12931,7 +12945,7 @@ static double dem2di_rolling_stiffness(const dem2d_pair_desc *law, double radius
 
 /* -ln e of a dashpot whose force is clipped: Schwager, Poeschel, Granular Matter 9 (2007) 465. */
 static double dem2di_damping_loss(double zeta) {
-    double away = sqrt(fabs(1 - zeta)) * sqrt(1 + zeta);
+    double away = dem2di_sqrt(fabs(1 - zeta)) * dem2di_sqrt(1 + zeta);
     dem2d_rot rotation = {zeta, away};
     if (!(away > 0)) return 2 * zeta; /* the limit of both */
     double angle = zeta < 1 ? dem2d_rot_angle(rotation) : dem2di_log_ratio(zeta + away, 1);
@@ -13212,7 +13226,8 @@ static void dem2di_stiffness_add(dem2di_stiffness *k, double stiffness, dem2d_ve
    monotonically. */
 static double dem2di_largest_eigenvalue(const dem2di_stiffness *k, double mass, double inertia) {
     double a = k->xx / mass, b = k->yy / mass, c = k->rr / inertia, trace = a + b + c;
-    double cross = 1 / (sqrt(mass) * sqrt(inertia) * trace); /* scaled to a trace of 1 */
+    double cross =
+        1 / (dem2di_sqrt(mass) * dem2di_sqrt(inertia) * trace); /* scaled to a trace of 1 */
     double d = k->xy / mass / trace, e = k->xr * cross, f = k->yr * cross;
     a /= trace, b /= trace, c /= trace;
     double p2 = a + b + c, p1 = a * b + b * c + c * a - d * d - e * e - f * f;
@@ -14883,7 +14898,7 @@ static inline bool dem2di_flows(const dem2di_flow *flow) {
 
 /* At least the greatest change of a vector of length 1. */
 static double dem2di_flow_size(const dem2di_flow *flow) {
-    return sqrt(flow->xx * flow->xx + flow->xy * flow->xy + flow->yy * flow->yy);
+    return dem2di_sqrt(flow->xx * flow->xx + flow->xy * flow->xy + flow->yy * flow->yy);
 }
 
 static dem2di_flow dem2di_flow_mean(const dem2di_flow *one, const dem2di_flow *other) {
@@ -15969,7 +15984,7 @@ static dem2d_pose dem2di_pose_of(const dem2d_world *world, const dem2di_state *s
 static double dem2di_equivalent(const dem2d_world *world, int slot) {
     const dem2di_body *body = &world->bodies[slot];
     if (dem2di_shape_of(world, body)->type == DEM2D_CIRCLE) return world->now[slot].radius;
-    return body->scale * sqrt(dem2di_shape_of(world, body)->mass.area / DEM2DI_PI);
+    return body->scale * dem2di_sqrt(dem2di_shape_of(world, body)->mass.area / DEM2DI_PI);
 }
 
 /* From the centre of one circle to another's, never so short that its square is no normal number.
@@ -15991,7 +16006,7 @@ typedef struct dem2di_round {
 static DEM2DI_INLINE dem2di_round dem2di_round_make(dem2d_vec d, double radius_a, double radius_b,
                                                     double stiffness) {
     dem2di_round round;
-    double square = d.x * d.x + d.y * d.y, distance = sqrt(square);
+    double square = d.x * d.x + d.y * d.y, distance = dem2di_sqrt(square);
     double f = distance * (1 / square); /* root and division side by side */
     round.normal.x = d.x * f;
     round.normal.y = d.y * f;
@@ -16295,7 +16310,7 @@ static void dem2di_moved(dem2d_world *world, int slot, dem2d_vec way) {
         dem2di_touch_end(world, list->adjacent[k]);
         dem2di_contact_end(world, list->adjacent[k]);
     }
-    world->list_displacement += dem2di_length(way) * sqrt(world->inverse_skin_squared[slot]);
+    world->list_displacement += dem2di_length(way) * dem2di_sqrt(world->inverse_skin_squared[slot]);
     world->list_stale = !(world->list_displacement <= 1 - DEM2DI_LIST_STEPS * DBL_EPSILON);
 }
 
@@ -18717,7 +18732,7 @@ static bool dem2di_arrange(dem2d_world *world) {
 static void dem2di_tune_skin(dem2d_world *world) {
     double steps = (double)(world->steps - world->listed_at);
     if (world->skin_fixed || !world->list_used_up || !(steps > 0)) return;
-    double speed = world->skin / steps, best = sqrt(DEM2DI_SKIN_COST * speed);
+    double speed = world->skin / steps, best = dem2di_sqrt(DEM2DI_SKIN_COST * speed);
     best = dem2di_max(world->skin / 2, dem2di_min(world->skin * 2, best));
     world->skin = dem2di_max(DEM2DI_SKIN_LEAST, dem2di_min(DEM2DI_SKIN_MOST, best));
     world->interval = world->skin / speed;
@@ -19749,7 +19764,7 @@ static void dem2di_keys_set(dem2di_build *build) {
 static double dem2di_lever_of(const dem2d_world *world, int slot) {
     const dem2d_shape *shape = dem2di_shape_of(world, &world->bodies[slot]);
     double radius = world->now[slot].radius, inner = shape->inscribed * world->bodies[slot].scale;
-    return shape->type == DEM2D_CIRCLE ? 0 : sqrt(radius * radius - inner * inner);
+    return shape->type == DEM2D_CIRCLE ? 0 : dem2di_sqrt(radius * radius - inner * inner);
 }
 
 /* Travels count from here. */
@@ -19792,7 +19807,7 @@ static bool dem2di_bounded(const dem2d_world *world, const dem2di_plan *plan, in
     double depth = 2 * (far + 2 * most->size), time = DEM2DI_LIST_STEPS * world->time_step;
     speed += belt + turn * depth + 4 * flow * depth;
     double closing = 2 * (speed + depth / world->time_step),
-           dashpot = 2 * ratio * sqrt(heavy * stiff);
+           dashpot = 2 * ratio * dem2di_sqrt(heavy * stiff);
     double force = (contacts + 1.0) * (stiff * depth + dashpot * closing); /* damping doubles */
     speed += 2 * time *
              (dem2di_max(DEM2DI_SPEED_SURE, dem2di_size_of(world->gravity)) +
@@ -19807,13 +19822,13 @@ static bool dem2di_bounded(const dem2d_world *world, const dem2di_plan *plan, in
 /* How far the rounding of a position moves a particle in a step, and the box that holds all centres
    while the list lasts. */
 static void dem2di_extent_set(dem2d_world *world, const dem2di_block_result *all) {
-    double skin = 1 / sqrt(all->least_inverse); /* the greatest */
+    double skin = 1 / dem2di_sqrt(all->least_inverse); /* the greatest */
     world->box.lower = dem2di_sub(all->box.lower, dem2di_vec(skin, skin));
     world->box.upper = dem2di_add(all->box.upper, dem2di_vec(skin, skin));
     world->rounding = 2 * DBL_EPSILON *
                       (all->extremes.far + all->extremes.size); /* half an ulp of both coordinates,
                                                                    and more */
-    world->roundoff_displacement = world->rounding * sqrt(all->most_inverse);
+    world->roundoff_displacement = world->rounding * dem2di_sqrt(all->most_inverse);
 }
 
 /* No eigenvalue of a particle is above the sum of the traces of its contacts. Of two circles a
@@ -20636,7 +20651,7 @@ static DEM2DI_INLINE double dem2di_batch_dashpot(const dem2di_batch *batch, int 
     const dem2di_dampers *dampers = &batch->dampers;
     double inverse = dampers->inverse[k] + r->arm_a * r->arm_a * dampers->inverse_a[k] +
                      r->arm_b * r->arm_b * dampers->inverse_b[k];
-    return 2 * ratio * sqrt(1 / inverse * kt);
+    return 2 * ratio * dem2di_sqrt(1 / inverse * kt);
 }
 
 /* Two circles by the law of dem2di_law_points, for all of a batch. Where they are apart the force
@@ -22656,7 +22671,7 @@ static DEM2DI_INLINE void dem2di_tile_corners(dem2di_tile *DEM2DI_APART t,
     DEM2DI_INDEPENDENT
     for (int k = 0; k < lanes; k++) {
         const double dx = t->dx[k], dy = t->dy[k];
-        const double distance = sqrt(dx * dx + dy * dy), size = t->reach[k] + distance;
+        const double distance = dem2di_sqrt(dx * dx + dy * dy), size = t->reach[k] + distance;
         dem2di_search search;
         bool rests = dem2di_corner_rests(corners, k, dx, dy, distance, size, true, true, &search);
         t->alone[k] = search.alone ? 1 : 0;
@@ -22733,7 +22748,7 @@ static DEM2DI_INLINE bool dem2di_tile_side(const dem2di_tile *t, const dem2di_ti
 static DEM2DI_INLINE bool dem2di_tile_second(const dem2di_tile *t, const dem2di_corners *e,
                                              const dem2di_tile_pairs *p, int k,
                                              dem2di_second_point *end) {
-    const double dx = t->dx[k], dy = t->dy[k], size = t->reach[k] + sqrt(dx * dx + dy * dy);
+    const double dx = t->dx[k], dy = t->dy[k], size = t->reach[k] + dem2di_sqrt(dx * dx + dy * dy);
     dem2di_tile_faces f;
     dem2di_second_point earlier, later;
     bool full_before, full_after;
@@ -22767,7 +22782,7 @@ static DEM2DI_INLINE void dem2di_tile_points(dem2di_tile *DEM2DI_APART t,
         const dem2d_vec push1 = dem2di_point_push(&points[1]);
         const double px = push0.x + push1.x, py = push0.y + push1.y, square = px * px + py * py;
         const bool measured = (square > DEM2DI_LEAST_SQUARE) & (square < 1 / DEM2DI_LEAST_SQUARE);
-        const double length = sqrt(square), nx = px / length, ny = py / length;
+        const double length = dem2di_sqrt(square), nx = px / length, ny = py / length;
         const dem2d_vec point = dem2di_point_pair_about(points, dem2di_vec(nx, ny), &pair);
         t->held[k] *= (two & measured) ? 1 : 0;
         dem2di_tile_arms(t, k, nx, ny, point.x, point.y);
@@ -22815,7 +22830,7 @@ static DEM2DI_INLINE void dem2di_tile_place(dem2di_tile *t, double tolerance) {
     const int lanes = dem2di_tile_lanes(t);
     for (int k = 0; k < lanes; k++) {
         const double dx = t->dx[k], dy = t->dy[k];
-        const double distance = sqrt(dx * dx + dy * dy), size = t->reach[k] + distance;
+        const double distance = dem2di_sqrt(dx * dx + dy * dy), size = t->reach[k] + distance;
         dem2di_eval eval;
         dem2di_search search;
         dem2di_tile_eval(t, k, &eval);
@@ -22989,7 +23004,7 @@ static bool dem2di_tile_step(const dem2d_world *world, dem2di_tile *tile, int k,
     const int i = tile->contact[k], slot_a = world->list.keys[i].a, slot_b = world->list.keys[i].b;
     const dem2d_shape *a = dem2di_shape_of(world, &world->bodies[slot_a]);
     const dem2d_shape *b = dem2di_shape_of(world, &world->bodies[slot_b]);
-    const double dx = tile->dx[k], dy = tile->dy[k], distance = sqrt(dx * dx + dy * dy);
+    const double dx = tile->dx[k], dy = tile->dy[k], distance = dem2di_sqrt(dx * dx + dy * dy);
     const double size = tile->reach[k] + distance;
     dem2di_eval eval;
     dem2di_pair pair;
@@ -23686,14 +23701,14 @@ static dem2di_state dem2di_foresee(const dem2d_world *world, int slot) {
 
 static double dem2di_servo_resistance(const dem2di_backing *backing, double time_step) {
     double least = DEM2DI_SERVO_MARGIN * backing->stiffness * time_step;
-    double loss = DEM2DI_SERVO_LOSS * sqrt(backing->stiffness * backing->mass);
+    double loss = DEM2DI_SERVO_LOSS * dem2di_sqrt(backing->stiffness * backing->mass);
     return dem2di_max(least, loss);
 }
 
 /* Part of what it remembers that a servo wall forgets in a step. */
 static double dem2di_servo_forgets(const dem2di_backing *backing, double time_step) {
     if (!(backing->mass > 0)) return DEM2DI_SERVO_MEMORY;
-    double times = time_step * sqrt(backing->stiffness / backing->mass);
+    double times = time_step * dem2di_sqrt(backing->stiffness / backing->mass);
     return DEM2DI_SERVO_MEMORY * dem2di_min(1, times);
 }
 
@@ -24127,7 +24142,8 @@ static double dem2di_integrate_pass(dem2d_world *world) {
     if (!world->foreseen)
         dem2di_run(world, DEM2D_PHASE_MOTION, blocks, dem2di_integrate_task, world);
     for (int k = 0; k < blocks; k++) most = dem2di_max(most, world->block_results[k].most);
-    return world->list_displacement + sqrt(most) * world->time_step + world->roundoff_displacement;
+    return world->list_displacement + dem2di_sqrt(most) * world->time_step +
+           world->roundoff_displacement;
 }
 
 /* --- the motion of a cell that deforms: see section cell ----------------------------------------
@@ -24529,7 +24545,7 @@ static void dem2di_held_solve(const bool hold[3], double a[3][3], double b[3]) {
 /* Greatest rate of a component that is held. */
 static double dem2di_cell_most(const dem2d_world *world, double scale, double mass) {
     double most = world->control.max_rate;
-    if (!(most > 0) && mass > 0) most = DEM2DI_CELL_RATE * sqrt(scale / mass);
+    if (!(most > 0) && mass > 0) most = DEM2DI_CELL_RATE * dem2di_sqrt(scale / mass);
     return dem2di_min(most, DEM2DI_FLOW_MOST / world->time_step);
 }
 
@@ -24766,7 +24782,7 @@ static dem2di_stiffness dem2di_stiffness_with(const dem2di_stiffness *k, const d
    the greatest eigenvalue of K + 2/dt D grows to it from any smaller step. */
 static double dem2di_lagging(const dem2di_stiffness *k, const dem2di_stiffness *d, double mass,
                              double inertia, double enough) {
-    const double at_once = sqrt(enough); /* 2/dt of the step that is asked about */
+    const double at_once = dem2di_sqrt(enough); /* 2/dt of the step that is asked about */
     dem2di_stiffness sum = dem2di_stiffness_with(k, d, at_once);
     double value = (sum.xx + sum.yy) / mass + sum.rr / inertia, least;
     if (!(value > 0) || value <= enough) return value;
@@ -24774,11 +24790,12 @@ static double dem2di_lagging(const dem2di_stiffness *k, const dem2di_stiffness *
     if (value <= enough || !(d->xx + d->yy + d->rr > 0)) return value;
     double stiff = dem2di_largest_eigenvalue(k, mass, inertia);
     double damped = dem2di_largest_eigenvalue(d, mass, inertia);
-    double dt = 4 / (damped + sqrt(damped * damped + 4 * stiff)); /* dt^2 K + 2 dt D = 4 for both */
-    for (int i = 0; i < 60; i++) {                                /* halves the error at least */
+    double dt =
+        4 / (damped + dem2di_sqrt(damped * damped + 4 * stiff)); /* dt^2 K + 2 dt D = 4 for both */
+    for (int i = 0; i < 60; i++) {                               /* halves the error at least */
         sum = dem2di_stiffness_with(k, d, 2 / dt);
         least = dt;
-        dt = 2 / sqrt(dem2di_largest_eigenvalue(&sum, mass, inertia));
+        dt = 2 / dem2di_sqrt(dem2di_largest_eigenvalue(&sum, mass, inertia));
         if (!(dt > least * (1 + 4 * DBL_EPSILON))) break;
     }
     return 4 / (dt * dt);
@@ -24992,12 +25009,12 @@ static dem2d_result dem2di_check_stiffness(const dem2d_world *world, bool *slow)
     if (dt * dt * all.value[0] > 4)
         return dem2di_fail(&world->env, DEM2D_TIME_STEP, particle[0],
                            "time_step = %g is above the limit %g of particle %d", dt,
-                           2 / sqrt(all.value[0]), particle[0]);
+                           2 / dem2di_sqrt(all.value[0]), particle[0]);
     *slow = dt * dt * all.value[1] > 4;
     if (*slow && world->slow_time_step == 0)
         (void)dem2di_fail(&world->env, DEM2D_WARNING, particle[1],
                           "time_step = %g may be unstable: %g is safe (particle %d)", dt,
-                          2 / sqrt(all.value[1]), particle[1]);
+                          2 / dem2di_sqrt(all.value[1]), particle[1]);
     return DEM2D_OK;
 }
 
@@ -25016,8 +25033,8 @@ DEM2D_API dem2d_result dem2d_world_time_step_bounds(const dem2d_world *world, do
     if (world == NULL || safe == NULL || limit == NULL) return DEM2D_NULL_ARGUMENT;
     dem2di_stiffest all;
     dem2di_stiffest_range(world, world->before, 0, world->body_count, true, 0, &all);
-    *safe = all.value[1] > 0 ? 2 / sqrt(all.value[1]) : HUGE_VAL;
-    *limit = all.value[0] > 0 ? 2 / sqrt(all.value[0]) : HUGE_VAL;
+    *safe = all.value[1] > 0 ? 2 / dem2di_sqrt(all.value[1]) : HUGE_VAL;
+    *limit = all.value[0] > 0 ? 2 / dem2di_sqrt(all.value[0]) : HUGE_VAL;
     if (limit_particle == NULL) return DEM2D_OK;
     limit_particle->index = limit_particle->generation = 0;
     if (all.at[0] >= 0) *limit_particle = dem2di_particle_id(world, all.at[0]);
@@ -25155,9 +25172,9 @@ static dem2d_pair_desc dem2di_strongest_law(const dem2d_world *world, const bool
     for (int other = 0; other < world->material_count; other++) {
         const dem2d_pair_desc *law = dem2di_law(world, material, other);
         if (!used[other]) continue;
-        double normal = law->damping_ratio * sqrt(law->normal_stiffness);
+        double normal = law->damping_ratio * dem2di_sqrt(law->normal_stiffness);
         double tangential = dem2di_max(law->tangential_damping_ratio, law->rolling_damping_ratio) *
-                            sqrt(law->tangential_stiffness);
+                            dem2di_sqrt(law->tangential_stiffness);
         most.normal_stiffness = dem2di_max(most.normal_stiffness, law->normal_stiffness);
         most.tangential_stiffness =
             dem2di_max(most.tangential_stiffness, law->tangential_stiffness);
@@ -25188,14 +25205,14 @@ DEM2D_API dem2d_result dem2d_world_choose_time_step(const dem2d_world *world, do
         double mass = dem2di_body_mass(world, body), inertia = dem2di_body_inertia(world, body);
         double radius = world->now[i].radius, lever = dem2di_lever_of(world, i);
         double points = shape->flat && world->faces == DEM2D_TWO_POINTS ? 2 : 1;
-        double count = 2 * points * DEM2DI_CHOSEN_PLACES, root = sqrt(mass);
+        double count = 2 * points * DEM2DI_CHOSEN_PLACES, root = dem2di_sqrt(mass);
         double normal = 1 / mass + lever * lever / inertia;
         double tangential = 1 / mass + radius * radius / inertia;
         double stiff =
             count * (law.normal_stiffness * normal + law.tangential_stiffness * tangential);
         double damped =
             count * root * (law.damping_ratio * normal + law.tangential_damping_ratio * tangential);
-        least = dem2di_min(least, 2 / (damped + sqrt(damped * damped + stiff)));
+        least = dem2di_min(least, 2 / (damped + dem2di_sqrt(damped * damped + stiff)));
     }
     *time_step = fraction * least;
     return DEM2D_OK;
@@ -26162,7 +26179,8 @@ DEM2D_API dem2d_result dem2d_world_inertial_number(const dem2d_world *world, dou
         area += dem2di_body_area(world, &world->bodies[slot]);
     }
     *number = 0;
-    if (count > 0) *number = fabs(strain_rate) * (diameters / count) * sqrt(mass / area / pressure);
+    if (count > 0)
+        *number = fabs(strain_rate) * (diameters / count) * dem2di_sqrt(mass / area / pressure);
     return DEM2D_OK;
 }
 
@@ -26362,7 +26380,7 @@ static double dem2di_circle_part(const dem2d_grid *grid, dem2d_vec p, dem2d_vec 
     double lever = dem2di_cross(d, b), square = bb * r * r - lever * lever;
     if (!(bb > 0)) return dem2di_dot(d, d) < r * r ? 1 : 0;
     if (!(square > 0)) return 0;
-    double half = sqrt(square) / bb;
+    double half = dem2di_sqrt(square) / bb;
     double from = dem2di_max(middle / bb - half, 0), to = dem2di_min(middle / bb + half, 1);
     return dem2di_max(to - from, 0);
 }
@@ -27114,7 +27132,7 @@ static bool dem2di_ellipse_entry(double a, double b, dem2d_vec p, dem2d_vec d,
     double square = d.x * d.x / a + d.y * d.y / b, middle = p.x * d.x / a + p.y * d.y / b;
     double arm = dem2di_cross(p, d), left = square - arm * arm / a / b;
     if (left < 0) return false;
-    entry->at = -(middle + sqrt(left)) / square;
+    entry->at = -(middle + dem2di_sqrt(left)) / square;
     dem2d_vec point = dem2di_along(p, entry->at, d);
     return dem2di_unit(dem2di_vec(point.x / a, point.y / b), &entry->normal);
 }
@@ -27206,7 +27224,8 @@ static bool dem2di_straddle_curve(const dem2di_straddle *both, dem2d_vec d, dem2
     double far = side / facing, beyond = 2 * far * far <= tolerance * rho ? side : 0;
     double sine = -(centre + beyond) / rho;
     if (!(fabs(sine) < 1)) return false;
-    dem2d_vec next = dem2di_along(dem2di_scale(dem2di_perp(d), sine), -sqrt(1 - sine * sine), d);
+    dem2d_vec next =
+        dem2di_along(dem2di_scale(dem2di_perp(d), sine), -dem2di_sqrt(1 - sine * sine), d);
     if (!(dem2di_cross(both->u[0], next) > 0 && dem2di_cross(next, both->u[1]) > 0)) return false;
     *u = next;
     return true;
@@ -27236,7 +27255,7 @@ static bool dem2di_support_entry(const dem2d_shape *shape, dem2d_vec p, dem2d_ve
     double left = shape->circumscribed * shape->circumscribed - square;
     bool sure = square < shape->inscribed * shape->inscribed && shape->type != DEM2D_CUSTOM;
     dem2d_vec u = dem2di_negate(d);
-    if (left > 0) (void)dem2di_unit(dem2di_along(p, -sqrt(left), d), &u); /* of the circle */
+    if (left > 0) (void)dem2di_unit(dem2di_along(p, -dem2di_sqrt(left), d), &u); /* of the circle */
     memset(&both, 0, sizeof both);
     both.u[0] = dem2di_perp(d);
     both.u[1] = dem2di_negate(both.u[0]);
@@ -27562,10 +27581,11 @@ static void dem2di_item_cast(dem2di_question *question, int item) {
     }
     double inner = shape->inscribed * body->scale, in = (inner - arm) * (inner + arm);
     double margin = DEM2DI_ROUNDOFF * (dem2di_size_of(from) + radius);
-    double nearest = foot - sqrt((radius - arm) * (radius + arm)) - margin;
+    double nearest = foot - dem2di_sqrt((radius - arm) * (radius + arm)) - margin;
     if (nearest > question->limit || !dem2di_item_wanted(question, item)) return;
     if (in > 0 && foot > 0)
-        question->limit = dem2di_min(question->limit, dem2di_max(0, foot - sqrt(in)) + margin);
+        question->limit =
+            dem2di_min(question->limit, dem2di_max(0, foot - dem2di_sqrt(in)) + margin);
     question->waiting[question->waits].from = nearest;
     question->waiting[question->waits++].item = item;
 }
@@ -28563,7 +28583,7 @@ DEM2D_API double dem2d_random_uniform(uint64_t *state) {
 DEM2D_API double dem2d_random_normal(uint64_t *state) {
     if (state == NULL) return 0;
     double u = 1 - dem2di_random(state), v = dem2di_random(state); /* u is not 0 */
-    return sqrt(2 * dem2di_log_ratio(1, u)) * dem2d_rot_make(2 * DEM2DI_PI * v).c;
+    return dem2di_sqrt(2 * dem2di_log_ratio(1, u)) * dem2d_rot_make(2 * DEM2DI_PI * v).c;
 }
 
 /* --- gradings ----------------------------------------------------------------------------------
@@ -28624,7 +28644,7 @@ static double dem2di_class_size(const dem2di_class *c, bool by_number, double u)
     double ratio = c->from / c->to;
     if (!(ratio < 1)) return c->from;
     if (by_number) return c->from * dem2di_exp(u * dem2di_log_ratio(c->to, c->from));
-    return dem2di_min(c->to, c->from / sqrt(1 - u * (1 - ratio * ratio)));
+    return dem2di_min(c->to, c->from / dem2di_sqrt(1 - u * (1 - ratio * ratio)));
 }
 
 static void dem2di_class_add(dem2di_curve *curve, double from, double to, double share) {
@@ -28859,7 +28879,7 @@ static void dem2di_kind_shares(const dem2d_world *world, const dem2d_grading_des
 static double dem2di_template_radius(const dem2d_world *world, dem2d_shape_id id) {
     const dem2d_shape *shape = world->templates[id.index].shape;
     if (shape->type == DEM2D_CIRCLE) return shape->circumscribed;
-    return sqrt(shape->mass.area / DEM2DI_PI);
+    return dem2di_sqrt(shape->mass.area / DEM2DI_PI);
 }
 
 /* A grain of a kind and a size. */
@@ -28879,7 +28899,8 @@ static void dem2di_draw_grains(const dem2d_world *world, const dem2d_draw_desc *
     uint64_t random = desc->seed;
     dem2di_kind_shares(world, grading, shares);
     for (int i = 0; i < count; i++) squares += sizes[i] * sizes[i];
-    if (desc->count > 0 && desc->area > 0) factor = sqrt(desc->area * (4 / DEM2DI_PI) / squares);
+    if (desc->count > 0 && desc->area > 0)
+        factor = dem2di_sqrt(desc->area * (4 / DEM2DI_PI) / squares);
     for (int i = 0; i < count; i++) {
         double weight = grading->measure == DEM2D_MEASURE_NUMBER ? 1 : sizes[i] * sizes[i];
         sum += weight;
@@ -29384,7 +29405,7 @@ static dem2d_result dem2di_fill_lattice(dem2di_filler *filler) {
         least = dem2di_max(least, 2 * dem2di_filler_radius(filler, i));
     least += filler->gap;
     const dem2d_vec edge = dem2di_filler_edge(filler);
-    double pitch = dem2di_max(least, sqrt(filler->area.area / filler->count));
+    double pitch = dem2di_max(least, dem2di_sqrt(filler->area.area / filler->count));
     double most = DEM2DI_LATTICE_CELLS * filler->count * (width * (height / filler->area.area));
     for (int placed = 0; result == DEM2D_OK; pitch = dem2di_max(least, pitch * 0.97)) {
         double columns = floor((width - 2 * edge.x) / pitch * (1 + 4 * DBL_EPSILON));
@@ -29932,7 +29953,7 @@ static void dem2di_sizes_multiply(dem2d_world *world, double factor) {
             world->displacement[i] += grown * (1 + 4 * DBL_EPSILON);
             world->lever[i] *= factor;
         }
-        most = dem2di_max(most, grown * sqrt(world->inverse_skin_squared[i]));
+        most = dem2di_max(most, grown * dem2di_sqrt(world->inverse_skin_squared[i]));
     }
     dem2di_images_make(world);
     world->tree.made = world->sums_fresh = false;
@@ -29968,17 +29989,17 @@ static double dem2di_growth_factor(const dem2d_world *world, const dem2d_growth_
     double change = 0, rate = desc->rate, time = DEM2DI_GROWTH_STEPS * world->time_step;
     if (!(desc->stress > 0)) {
         double aim = (desc->solid_fraction * desc->area - (sample->all - sample->free));
-        change = sqrt(dem2di_max(0, aim) / sample->free) - 1;
+        change = dem2di_sqrt(dem2di_max(0, aim) / sample->free) - 1;
         return 1 + dem2di_max(-rate * time, dem2di_min(rate * time, change));
     }
     double mass = sample->mass / sample->count, stiffness = dem2di_stiffest_spring(world);
-    if (!(rate > 0)) rate = DEM2DI_GROWTH_INERTIA * sqrt(desc->stress / mass);
+    if (!(rate > 0)) rate = DEM2DI_GROWTH_INERTIA * dem2di_sqrt(desc->stress / mass);
     if (part < DEM2DI_GROWTH_JAMS)
         change = rate;
     else if (part < 1)
         change = rate * 0.3 * dem2di_min(1, (1 - part) / 0.05);
     else
-        change = (1 - part) * (desc->stress / stiffness) / (3 * sqrt(mass / stiffness));
+        change = (1 - part) * (desc->stress / stiffness) / (3 * dem2di_sqrt(mass / stiffness));
     return 1 + dem2di_max(-rate, change) * time;
 }
 
@@ -30074,8 +30095,7 @@ static dem2d_result dem2di_growth_run(dem2d_world *world, const dem2d_growth_des
         int done = 0, left = steps - growth->steps;
         factor = dem2di_max(1 - DEM2DI_GROWTH_MOST, dem2di_min(1 + DEM2DI_GROWTH_MOST, factor));
         dem2di_greatest_radius_find(world);
-        result =
-            dem2di_check_narrow(&world->env, &world->cell, factor * world->greatest_radius);
+        result = dem2di_check_narrow(&world->env, &world->cell, factor * world->greatest_radius);
         if (result != DEM2D_OK) return result;
         dem2di_sizes_multiply(world, factor);
         growth->factor *= factor;

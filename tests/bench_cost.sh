@@ -14,7 +14,7 @@
 set -u
 cd "$(dirname "$0")" || exit 2
 program=build/bench_cost
-FLAGS=${FLAGS:--std=c99 -ffp-contract=off -I.. -O2 -fno-math-errno}
+FLAGS=${FLAGS:--std=c99 -ffp-contract=off -I.. -O2}
 
 command -v valgrind > /dev/null || { echo 'skipped: valgrind is not installed'; exit 0; }
 
