@@ -273,7 +273,7 @@ static bool differs(const feature *f, group kind, const path *p, const uint64_t 
 
 /* Returns how many of the paths differ. */
 static int compare(const feature *f, group kind) {
-    static const path simple = {"plain, two passes", false, true, false};
+    static const path simple = {"plain, two passes", false, true, false, false};
     uint64_t expected[ROUNDS];
     int differ = 0;
     run(f, kind, &simple, expected);
