@@ -12445,7 +12445,7 @@ typedef struct dem2di_disc {
    them. Finer cells may be far more than discs: they share a hash table, whose heads come behind
    these. The arrays are the caller's. */
 typedef struct dem2di_grid {
-    dem2di_disc *sorted; /* by cell */
+    dem2di_disc *sorted; /* by cell; there is room for four more */
     int *place; /* by slot: the head of the disc's cell; after the sort its index in sorted */
     int *heads; /* cells + 1: where each cell begins in sorted */
     int count, cells, table;       /* discs; heads of all cells, of the hash table */
@@ -12684,6 +12684,62 @@ static void dem2di_grid_partners(const dem2di_grid *grid, int place, dem2di_find
         }
     }
 }
+
+#if DEM2DI_FOURS
+/* Of four discs in sorted, the first `left` ones that are partners, as dem2di_grid_loop finds them.
+   mine: x, y and reach of its disc, in all lanes. */
+DEM2DI_AVX2_INLINE int dem2di_fours_find(const dem2di_disc *own, const dem2di_four mine[3],
+                                         const dem2di_disc *others, int left, dem2di_key *to) {
+    const dem2di_four_bits lanes = {0, 1, 2, 3};
+    dem2di_four of[4];
+    for (int j = 0; j < 4; j++) of[j] = dem2di_four_at(&others[j].centre.x);
+    dem2di_four_turn(of);
+    const dem2di_four x = of[0] - mine[0], y = of[1] - mine[1], both = of[2] + mine[2];
+    const dem2di_four_bits near =
+        (dem2di_four_bits)(x * x + y * y < both * both) & (dem2di_four_bits)(lanes < left);
+    int count = 0;
+    for (int j = 0; j < 4; j++) {
+        to[count].a = own->slot;
+        to[count].b = others[j].slot ^ (own->other | others[j].other);
+        count -= (int)near[j];
+    }
+    return count;
+}
+
+/* dem2di_grid_partners where all levels are dense and all particles meet, for slots from `slot` to
+   `last`: how many discs a range has differs from one to the next and cannot be foretold, but most
+   have up to four. */
+static DEM2DI_AVX2 void dem2di_fours_partners(const dem2di_grid *grid, int slot, int last,
+                                              dem2di_finds *finds) {
+    for (; slot < last; slot++) {
+        const int place = grid->place[slot];
+        const dem2di_disc *own = &grid->sorted[place];
+        const double x = own->centre.x, y = own->centre.y, r = own->reach;
+        const dem2di_four mine[3] = {{x, x, x, x}, {y, y, y, y}, {r, r, r, r}};
+        for (int level = 0; level <= own->level; level++) {
+            if (!(grid->levels >> level & 1)) continue;
+            const dem2di_cell cell = dem2di_cell_at(grid, own->centre, level);
+            const int *head = grid->heads + dem2di_cell_head(grid, cell.x, cell.y, level);
+            const bool same = level == own->level;
+            for (int row = same ? 0 : -1; row <= 1; row++) {
+                const int *cells = head + row * grid->width[level];
+                const int begin = same && row == 0 ? place + 1 : cells[-1];
+                int left = cells[2] - begin, count = finds->count;
+                if (own->fixed || finds->room - count < left + 4) {
+                    dem2di_grid_range(grid, own, begin, cells[2], level, finds);
+                    continue;
+                }
+                const dem2di_disc *others = grid->sorted + begin;
+                do {
+                    count += dem2di_fours_find(own, mine, others, left, finds->to + count);
+                    others += 4;
+                } while ((left -= 4) > 0);
+                finds->count = count;
+            }
+        }
+    }
+}
+#endif
 
 /* A key to sort by, and its item. */
 typedef struct dem2di_order {
@@ -18461,36 +18517,41 @@ static inline void dem2di_entries_sort_eight(uint64_t e[8]) {
     dem2di_entries_swap(&e[5], &e[6]);
 }
 
-static inline uint64_t dem2di_entry_at(const uint64_t *entries, int count, int i) {
-    return i < count ? entries[i] : UINT64_MAX;
+/* Entry i of a particle that has n: behind its last one, one behind all others. No branch could
+   foretell n. */
+static inline uint64_t dem2di_entry_at(const uint64_t *entries, int n, int i) {
+    return entries[i] | ((uint64_t)0 - ((uint32_t)(n - 1 - i) >> 31));
 }
 
-static inline void dem2di_entry_put(int *run, int count, int i, uint64_t entry) {
-    if (i < count) run[i] = dem2di_entry_contact(entry);
-}
-
-/* The few contacts of a particle in order. Without loops the entries stay in registers. */
-static DEM2DI_INLINE void dem2di_entries_sort_few(const uint64_t *entries, int n, bool six,
-                                                  int *run) {
+/* The few contacts of a particle in order; returns how many of them are before its own rank. There
+   is memory for six or eight entries, and what is behind the last of the run is written over.
+   Without loops the entries stay in registers. */
+static DEM2DI_INLINE int dem2di_entries_sort_few(const uint64_t *entries, int n, uint64_t own,
+                                                 bool six, int *run) {
     uint64_t e[DEM2DI_FEW_CONTACTS];
     e[0] = dem2di_entry_at(entries, n, 0), e[1] = dem2di_entry_at(entries, n, 1);
     e[2] = dem2di_entry_at(entries, n, 2), e[3] = dem2di_entry_at(entries, n, 3);
     e[4] = dem2di_entry_at(entries, n, 4), e[5] = dem2di_entry_at(entries, n, 5);
-    if (!six) e[6] = dem2di_entry_at(entries, n, 6), e[7] = dem2di_entry_at(entries, n, 7);
+    e[6] = six ? UINT64_MAX : dem2di_entry_at(entries, n, 6);
+    e[7] = six ? UINT64_MAX : dem2di_entry_at(entries, n, 7);
+    const int before = (e[0] < own) + (e[1] < own) + (e[2] < own) + (e[3] < own) + (e[4] < own) +
+                       (e[5] < own) + (e[6] < own) + (e[7] < own);
     if (six)
         dem2di_entries_sort_six(e);
     else
         dem2di_entries_sort_eight(e);
-    dem2di_entry_put(run, n, 0, e[0]), dem2di_entry_put(run, n, 1, e[1]);
-    dem2di_entry_put(run, n, 2, e[2]), dem2di_entry_put(run, n, 3, e[3]);
-    dem2di_entry_put(run, n, 4, e[4]), dem2di_entry_put(run, n, 5, e[5]);
-    if (!six) dem2di_entry_put(run, n, 6, e[6]), dem2di_entry_put(run, n, 7, e[7]);
+    run[0] = dem2di_entry_contact(e[0]), run[1] = dem2di_entry_contact(e[1]);
+    run[2] = dem2di_entry_contact(e[2]), run[3] = dem2di_entry_contact(e[3]);
+    run[4] = dem2di_entry_contact(e[4]), run[5] = dem2di_entry_contact(e[5]);
+    if (!six) run[6] = dem2di_entry_contact(e[6]), run[7] = dem2di_entry_contact(e[7]);
+    return before;
 }
 
-/* The same for many by Shell's sort (Ciura's gaps): a particle that is a hundred times larger than
-   its neighbours has hundreds. */
-static void dem2di_entries_sort_many(uint64_t *entries, int count, int *run) {
+/* The same for any number by Shell's sort (Ciura's gaps): a particle that is a hundred times larger
+   than its neighbours has hundreds. */
+static int dem2di_entries_sort_many(uint64_t *entries, int count, uint64_t own, int *run) {
     static const int gaps[] = {301, 132, 57, 23, 10, 4, 1};
+    int before = 0;
     for (int g = 0; g < 7; g++)
         for (int i = gaps[g]; i < count; i++) {
             const uint64_t entry = entries[i];
@@ -18499,7 +18560,11 @@ static void dem2di_entries_sort_many(uint64_t *entries, int count, int *run) {
                 entries[k] = entries[k - gaps[g]];
             entries[k] = entry;
         }
-    for (int i = 0; i < count; i++) run[i] = dem2di_entry_contact(entries[i]);
+    for (int i = 0; i < count; i++) {
+        run[i] = dem2di_entry_contact(entries[i]);
+        before += entries[i] < own;
+    }
+    return before;
 }
 
 /* Is contact i of a pair before contact k of the same two, by the shifts of their images? */
@@ -18554,17 +18619,17 @@ static void dem2di_adjacency_sort_task(void *context, int begin, int end) {
         for (int slot = first; slot < last; slot++) {
             uint64_t *entries = all + list->first[slot];
             int *run = list->adjacent + list->first[slot];
-            int count = list->first[slot + 1] - list->first[slot], as_b = 0;
+            const int count = list->first[slot + 1] - list->first[slot];
+            const int room = list->first[last] - list->first[slot]; /* to the end of the block */
             const uint64_t own = dem2di_entry_make(world->bodies[slot].rank, 0);
-            uint64_t bits = 0;
-            for (int i = 0; i < count; i++) as_b += entries[i] < own, bits |= entries[i];
-            if (count <= 6)
-                dem2di_entries_sort_few(entries, count, true, run);
-            else if (count <= DEM2DI_FEW_CONTACTS)
-                dem2di_entries_sort_few(entries, count, false, run);
+            int as_b;
+            if (count <= 6 && room >= 6)
+                as_b = dem2di_entries_sort_few(entries, count, own, true, run);
+            else if (count <= DEM2DI_FEW_CONTACTS && room >= DEM2DI_FEW_CONTACTS)
+                as_b = dem2di_entries_sort_few(entries, count, own, false, run);
             else
-                dem2di_entries_sort_many(entries, count, run);
-            if (bits & DEM2DI_ENTRY_IMAGE)
+                as_b = dem2di_entries_sort_many(entries, count, own, run);
+            if (world->image_count > 0)
                 as_b = dem2di_adjacency_images(world, slot, run, count, as_b);
             list->own[slot] = list->first[slot] + as_b;
             walls |= dem2di_has_walls(list, slot);
@@ -19096,7 +19161,12 @@ static void dem2di_search_particles(const dem2di_build *build, int block, dem2di
     const dem2di_grid *grid = &build->grid;
     int first = block * DEM2DI_BLOCK;
     int last = dem2di_block_end(first, DEM2DI_BLOCK, world->body_count);
-    for (int i = first; i < last; i++) dem2di_grid_partners(grid, grid->place[i], finds);
+#if DEM2DI_FOURS
+    const bool fours = world->fours && finds->groups == NULL && grid->levels >> grid->dense == 0;
+    if (fours) dem2di_fours_partners(grid, first, last, finds);
+    if (!fours)
+#endif
+        for (int i = first; i < last; i++) dem2di_grid_partners(grid, grid->place[i], finds);
     for (int k = 0; k < build->plane_count; k++) {
         int part = build->planes[k];
         dem2d_vec normal = dem2di_surface_normal(&world->surfaces[part]), nearest;
@@ -20005,7 +20075,7 @@ static bool dem2di_build_cut(dem2di_build *build) {
         dem2di_grid *grid = &build->grid;
         build->column = cutter.memory;
         build->reach = (double *)dem2di_cut(&cutter, n, sizeof *build->reach);
-        grid->sorted = (dem2di_disc *)dem2di_cut(&cutter, n, sizeof *grid->sorted);
+        grid->sorted = (dem2di_disc *)dem2di_cut(&cutter, n + 4, sizeof *grid->sorted);
         grid->place = (int *)dem2di_cut(&cutter, n, sizeof *grid->place);
         build->planes = (int *)dem2di_cut(&cutter, (size_t)world->part_count, sizeof(int));
         grid->heads = (int *)dem2di_cut(&cutter, (size_t)grid->cells + 1, sizeof *grid->heads);
