@@ -13615,6 +13615,14 @@ typedef struct dem2di_dampers {
     double *rolling;                         /* and the dashpot of that, N m s */
 } dem2di_dampers;
 
+/* The contacts of a particle as B and as A, for the sum of its forces. Their number can't be foreseen,
+   and a branch that the processor guesses wrong takes longer than all of the sum: three are added of
+   each, what is missing being a contact without force, behind all others. 96 % of discs at rest
+   have no more, 70 % of polygons. */
+typedef struct dem2di_summands {
+    int as_b[3], as_a[3]; /* as_b[0] < 0: there are more than three of one */
+} dem2di_summands;
+
 /* The listed pairs: of two circles, of two other particles, of particles and parts of walls (in the
    order of the part, then of the particle's rank), and their contacts as the last force pass left
    them. */
@@ -13628,6 +13636,7 @@ typedef struct dem2di_list {
                       of which it is B, as A has the lower rank, then as A */
     int *first;    /* of a slot's in adjacent; bodies + 1 */
     int *own;      /* of a slot's as A */
+    dem2di_summands *summands;
 } dem2di_list;
 
 /* How overlaps move a particle: where it was at first, the sum of the moves of a sweep and their
@@ -13853,7 +13862,6 @@ struct dem2d_world {
     void *loads_user;
     bool stepping; /* a step is on its way: callbacks can't start another */
     bool fours;    /* passes take the path with vectors: see dem2di_has_fours */
-    bool steady;   /* motion has branches for few contacts only: for tests, see DEM2DI_MANY */
     bool in_two;   /* steps never move particles during the force pass: for tests */
     bool foreseen; /* this step has: their next states are there before the walls move */
     double time_step, local_damping, global_damping, tolerance;
@@ -14438,6 +14446,7 @@ static const dem2di_column dem2di_columns[] = {
     DEM2DI_COLUMN("inverse_skins_squared", BODIES, inverse_skin_squared, 0, any_field),
     DEM2DI_UNSAVED(BODIES, inverse, DEM2DI_MOVES),
     DEM2DI_UNSAVED(BODIES, list.own, 0),
+    DEM2DI_UNSAVED(BODIES, list.summands, 0),
     DEM2DI_COLUMN("names", NAMES, names, DEM2DI_FIRST | DEM2DI_MOVES | DEM2DI_HASHED, name_field),
     DEM2DI_COLUMN("loads", LOADS, loads, DEM2DI_FIRST | DEM2DI_MOVES | DEM2DI_HASHED, load_fields),
     DEM2DI_COLUMN("groups", GROUPED, groups, DEM2DI_FIRST | DEM2DI_MOVES | DEM2DI_HASHED,
@@ -18458,10 +18467,6 @@ static void dem2di_order_commit(dem2d_world *world) {
 
 /* --- the contacts of each particle ------------------------------------------------------------ */
 
-/* Of up to so many contacts as A, and as B, the actions are summed without branches: 96 % of discs
-   at rest have no more, 70 % of polygons. Behind the last particle's there are as many entries. */
-#define DEM2DI_STEADY 3
-
 /* What the contacts of a particle are sorted by: their partners' ranks, walls behind. */
 static inline int dem2di_adjacency_rank(const dem2d_world *world, int slot, int contact) {
     const dem2di_key *key = &world->list.keys[contact];
@@ -18607,6 +18612,16 @@ static inline bool dem2di_has_walls(const dem2di_list *list, int slot) {
     return end > list->first[slot] && list->adjacent[end - 1] >= list->pairs;
 }
 
+/* The summands of a particle, whose run of contacts is sorted. */
+static inline void dem2di_summands_set(const dem2di_list *list, const int *run, int count, int as_b,
+                                       dem2di_summands *summands) {
+    for (int k = 0; k < 3; k++) {
+        summands->as_b[k] = k < as_b ? run[k] : list->count;
+        summands->as_a[k] = k < count - as_b ? run[as_b + k] : list->count;
+    }
+    if (as_b > 3 || count - as_b > 3) summands->as_b[0] = -1;
+}
+
 /* Each particle's contacts in order. */
 static void dem2di_adjacency_sort_task(void *context, int begin, int end) {
     const dem2d_world *world = (const dem2d_world *)context;
@@ -18632,6 +18647,7 @@ static void dem2di_adjacency_sort_task(void *context, int begin, int end) {
             if (world->image_count > 0)
                 as_b = dem2di_adjacency_images(world, slot, run, count, as_b);
             list->own[slot] = list->first[slot] + as_b;
+            dem2di_summands_set(list, run, count, as_b, &list->summands[slot]);
             walls |= dem2di_has_walls(list, slot);
         }
         world->block_results[block].walls = walls;
@@ -18706,14 +18722,12 @@ static void dem2di_adjacency_make(dem2d_world *world) {
     dem2di_run(world, DEM2D_PHASE_LIST, 1, dem2di_adjacency_fill_task, world);
     dem2di_run(world, DEM2D_PHASE_LIST, dem2di_blocks(world->body_count, DEM2DI_BLOCK),
                dem2di_adjacency_sort_task, world);
-    memset(world->list.adjacent + world->list.first[world->body_count], 0,
-           DEM2DI_STEADY * sizeof(int));
     if (world->parallel_for == NULL) dem2di_completions_find(world);
 }
 
-/* Room for two entries of each pair and one of each contact with a wall, and a few behind. */
+/* Room for two entries of each pair and one of each contact with a wall. */
 static bool dem2di_adjacency_reserve(dem2d_world *world, int pairs, int count) {
-    return dem2di_group_reserve(world, DEM2DI_ADJACENCY, pairs + count + DEM2DI_STEADY);
+    return dem2di_group_reserve(world, DEM2DI_ADJACENCY, pairs + count);
 }
 
 /* --- particles in the order of space ---------------------------------------------------------- */
@@ -19965,7 +19979,9 @@ static void dem2di_build_softness(dem2di_build *build) {
 static size_t dem2di_step_cut(dem2d_world *world, char *memory, int discs, int pairs, int count,
                               const dem2di_plan *plan, bool back) {
     dem2di_cutter cutter = {memory, 0};
-    world->actions = (dem2di_action *)dem2di_cut(&cutter, (size_t)count, sizeof *world->actions);
+    world->actions =
+        (dem2di_action *)dem2di_cut(&cutter, (size_t)count + 1, sizeof *world->actions);
+    if (memory != NULL) memset(&world->actions[count], 0, sizeof *world->actions);
     world->pushes =
         (dem2di_push *)dem2di_cut(&cutter, (size_t)(count - pairs), sizeof *world->pushes);
     if (plan->joints) {
@@ -23635,25 +23651,28 @@ static void dem2di_wall_sums(dem2d_world *world) {
     }
 }
 
+/* Adds what a contact does to its B, or to its A. */
+static DEM2DI_INLINE void dem2di_load_add(const dem2di_action *action, bool as_b, bool spin,
+                                          dem2di_load *sum) {
+    sum->force.x += as_b ? action->x : -action->x;
+    sum->force.y += as_b ? action->y : -action->y;
+    if (spin) sum->torque += as_b ? action->b : action->a;
+}
+
 /* Sum of the contact forces on a particle, one after the other in the order of the partners' ranks:
    contacts that are apart add nothing, so that it does not matter which of them are listed. */
 static DEM2DI_INLINE dem2di_load dem2di_gather(const dem2d_world *world, int slot, bool spin) {
     const dem2di_list *list = &world->list;
-    const int *entry = list->adjacent + list->first[slot], *own = list->adjacent + list->own[slot];
-    const int *end = list->adjacent + list->first[slot + 1];
+    const dem2di_action *actions = world->actions;
+    const dem2di_summands *few = &list->summands[slot];
     dem2di_load sum = {{0, 0}, 0};
-    for (; entry < own; entry++) { /* of which it is B */
-        const dem2di_action *action = &world->actions[*entry];
-        sum.force.x += action->x;
-        sum.force.y += action->y;
-        if (spin) sum.torque += action->b;
+    if (few->as_b[0] < 0) {
+        for (int k = list->first[slot]; k < list->first[slot + 1]; k++)
+            dem2di_load_add(&actions[list->adjacent[k]], k < list->own[slot], spin, &sum);
+        return sum;
     }
-    for (; entry < end; entry++) {
-        const dem2di_action *action = &world->actions[*entry];
-        sum.force.x -= action->x;
-        sum.force.y -= action->y;
-        if (spin) sum.torque += action->a;
-    }
+    for (int k = 0; k < 3; k++) dem2di_load_add(&actions[few->as_b[k]], true, spin, &sum);
+    for (int k = 0; k < 3; k++) dem2di_load_add(&actions[few->as_a[k]], false, spin, &sum);
     return sum;
 }
 
@@ -24017,9 +24036,38 @@ static DEM2DI_INLINE double dem2di_integrate_range(dem2d_world *world, int begin
 }
 
 #if DEM2DI_FOURS
+/* What a contact does to its B, or to its A: the lanes x, y and torque; the last one has no use. */
+DEM2DI_AVX2_INLINE dem2di_four dem2di_fours_action(const double *actions, int contact, bool as_b) {
+    const dem2di_four_bits flips = (dem2di_four_bits)dem2di_four_of(-0.0, -0.0, 0, 0);
+    const dem2di_four action = dem2di_four_at(actions + 4 * (size_t)contact);
+    if (as_b) return DEM2DI_SHUFFLE(action, action, 0, 1, 3, 3);
+    return (dem2di_four)((dem2di_four_bits)action ^ flips);
+}
+
+/* dem2di_gather. The few summands are written out: gcc keeps a loop over them. */
+DEM2DI_AVX2_INLINE dem2di_four dem2di_fours_gather(const dem2di_list *list, const double *actions,
+                                                   int slot) {
+    const dem2di_summands *few = &list->summands[slot];
+    dem2di_four sum = dem2di_four_of(0, 0, 0, 0);
+    if (few->as_b[0] < 0) {
+        const int own = list->own[slot], end = list->first[slot + 1];
+        int k = list->first[slot];
+        for (; k < own; k++) sum += dem2di_fours_action(actions, list->adjacent[k], true);
+        for (; k < end; k++) sum += dem2di_fours_action(actions, list->adjacent[k], false);
+        return sum;
+    }
+    sum += dem2di_fours_action(actions, few->as_b[0], true);
+    sum += dem2di_fours_action(actions, few->as_b[1], true);
+    sum += dem2di_fours_action(actions, few->as_b[2], true);
+    sum += dem2di_fours_action(actions, few->as_a[0], false);
+    sum += dem2di_fours_action(actions, few->as_a[1], false);
+    sum += dem2di_fours_action(actions, few->as_a[2], false);
+    return sum;
+}
+
 /* What the loops below read again and again. */
 typedef struct dem2di_fours_motion {
-    const int *adjacent, *first, *own;
+    dem2di_list list;
     const double *actions;
     dem2di_damping damping;
     double time_step;
@@ -24029,9 +24077,7 @@ typedef struct dem2di_fours_motion {
 DEM2DI_AVX2_INLINE dem2di_fours_motion dem2di_fours_motion_of(const dem2d_world *world) {
     const bool heavy = world->plan.heavy; /* -0 + a is a, also of a zero with a sign */
     dem2di_fours_motion motion;
-    motion.adjacent = world->list.adjacent;
-    motion.first = world->list.first;
-    motion.own = world->list.own;
+    motion.list = world->list; /* a copy: no store changes it */
     motion.actions = (const double *)(const void *)world->actions;
     motion.damping =
         dem2di_damping_make(world->local_damping, world->global_damping, world->time_step);
@@ -24041,60 +24087,13 @@ DEM2DI_AVX2_INLINE dem2di_fours_motion dem2di_fours_motion_of(const dem2d_world 
     return motion;
 }
 
-/* All bits of the contacts that there are, of the first few. */
-static const dem2di_four_bits dem2di_there[DEM2DI_STEADY + 1][DEM2DI_STEADY] = {
-    {{0, 0, 0, 0}, {0, 0, 0, 0}, {0, 0, 0, 0}},
-    {{-1, -1, -1, -1}, {0, 0, 0, 0}, {0, 0, 0, 0}},
-    {{-1, -1, -1, -1}, {-1, -1, -1, -1}, {0, 0, 0, 0}},
-    {{-1, -1, -1, -1}, {-1, -1, -1, -1}, {-1, -1, -1, -1}}};
-
-/* The action of a contact on its B or, with the other sign, on its A: the lanes x, y and torque; in
-   the last one is nothing of use. */
-DEM2DI_AVX2_INLINE dem2di_four dem2di_fours_action(const dem2di_fours_motion *motion, int contact,
-                                                   bool as_b) {
-    const dem2di_four_bits flips = (dem2di_four_bits)dem2di_four_of(-0.0, -0.0, 0, 0);
-    const dem2di_four action = dem2di_four_at(motion->actions + 4 * (size_t)contact);
-    if (as_b) return DEM2DI_SHUFFLE(action, action, 0, 1, 3, 3);
-    return (dem2di_four)((dem2di_four_bits)action ^ flips);
-}
-
-/* Adds the actions of `count` contacts. Steady: how many there are is known to no branch predictor,
-   so that there are no branches for the first few, nor loops, which gcc would keep: what is not
-   there adds 0. */
-DEM2DI_AVX2_INLINE dem2di_four dem2di_fours_add(const dem2di_fours_motion *motion, const int *entry,
-                                                int count, bool as_b, bool steady,
-                                                dem2di_four sum) {
-    int k = 0;
-    if (steady) {
-        const dem2di_four_bits *there = dem2di_there[count < DEM2DI_STEADY ? count : DEM2DI_STEADY];
-#define DEM2DI_ADD(k) \
-    (dem2di_four)((dem2di_four_bits)dem2di_fours_action(motion, entry[k], as_b) & there[k])
-        sum += DEM2DI_ADD(0);
-        sum += DEM2DI_ADD(1);
-        sum += DEM2DI_ADD(2);
-        k = DEM2DI_STEADY;
-#undef DEM2DI_ADD
-    }
-    for (; k < count; k++) sum += dem2di_fours_action(motion, entry[k], as_b);
-    return sum;
-}
-
-/* dem2di_gather of a particle. */
-DEM2DI_AVX2_INLINE dem2di_four dem2di_fours_gather(const dem2di_fours_motion *motion, int slot,
-                                                   bool steady) {
-    const int first = motion->first[slot], own = motion->own[slot], end = motion->first[slot + 1];
-    dem2di_four sum = dem2di_four_of(0, 0, 0, 0);
-    sum = dem2di_fours_add(motion, motion->adjacent + first, own - first, true, steady, sum);
-    return dem2di_fours_add(motion, motion->adjacent + own, end - own, false, steady, sum);
-}
-
 /* A half of a state, v, w and radius, a step later. */
 DEM2DI_AVX2_INLINE dem2di_four dem2di_fours_accelerate(const dem2di_fours_motion *motion, int slot,
                                                        dem2di_inverse inverse, bool damped,
-                                                       bool spin, bool steady, dem2di_four v) {
+                                                       bool spin, dem2di_four v) {
     const dem2di_four zero = dem2di_four_of(0, 0, 0, 0);
     const dem2di_four_bits sign = (dem2di_four_bits)dem2di_four_of(-0.0, -0.0, -0.0, -0.0);
-    dem2di_four sum = dem2di_fours_gather(motion, slot, steady), made;
+    dem2di_four sum = dem2di_fours_gather(&motion->list, motion->actions, slot), made;
     sum = motion->gravity +
           sum * dem2di_four_of(inverse.mass, inverse.mass, inverse.inertia, inverse.inertia);
     if (damped) {
@@ -24111,7 +24110,7 @@ DEM2DI_AVX2_INLINE dem2di_four dem2di_fours_accelerate(const dem2di_fours_motion
 /* dem2di_integrate_range for circles without external loads: the two halves of a state are a vector
    each, as in dem2di_fours_fetch. A lane that does not change is put back. */
 DEM2DI_AVX2_INLINE double dem2di_fours_integrate(const dem2d_world *world, int begin, int end,
-                                                 bool damped, bool spin, bool steady) {
+                                                 bool damped, bool spin) {
     const dem2di_fours_motion motion = dem2di_fours_motion_of(world);
     double most = 0;
     for (int i = begin; i < end; i++) {
@@ -24119,8 +24118,7 @@ DEM2DI_AVX2_INLINE double dem2di_fours_integrate(const dem2d_world *world, int b
         double *next = &world->before[i].x.x;
         dem2di_four x = dem2di_four_at(now), v = dem2di_four_at(now + 4);
         const dem2di_inverse inverse = world->inverse[i];
-        if (inverse.mass > 0)
-            v = dem2di_fours_accelerate(&motion, i, inverse, damped, spin, steady, v);
+        if (inverse.mass > 0) v = dem2di_fours_accelerate(&motion, i, inverse, damped, spin, v);
         dem2di_four moved = x + motion.time_step * v;
         x = spin ? DEM2DI_SHUFFLE(moved, x, 0, 1, 2, 7) : DEM2DI_SHUFFLE(moved, x, 0, 1, 6, 7);
         dem2di_four_put(next, x);
@@ -24170,7 +24168,7 @@ DEM2DI_AVX2_INLINE void dem2di_fours_displace(const dem2d_world *world, int slot
 
 /* dem2di_integrate_range for particles that turn, without external loads: four at a time. */
 DEM2DI_AVX2_INLINE double dem2di_fours_integrate_turning(dem2d_world *world, int begin, int end,
-                                                         bool damped, bool steady) {
+                                                         bool damped) {
     const dem2di_fours_motion motion = dem2di_fours_motion_of(world);
     double most = 0;
     int i = begin;
@@ -24182,7 +24180,7 @@ DEM2DI_AVX2_INLINE double dem2di_fours_integrate_turning(dem2d_world *world, int
             x[k] = dem2di_four_at(now);
             v[k] = dem2di_four_at(now + 4);
             if (inverse.mass > 0)
-                v[k] = dem2di_fours_accelerate(&motion, i + k, inverse, damped, true, steady, v[k]);
+                v[k] = dem2di_fours_accelerate(&motion, i + k, inverse, damped, true, v[k]);
             dem2di_four_put(&world->before[i + k].v.x, v[k]);
         }
         dem2di_four_turn(x);
@@ -24204,26 +24202,15 @@ DEM2DI_AVX2_INLINE double dem2di_fours_integrate_turning(dem2d_world *world, int
     return dem2di_max(most, rest);
 }
 
-/* With so many contacts a step is too long for branch predictors to know: from between 11,000 and
-   22,000 on an Intel Xeon of 2023, a branch that they can't know costs more than what it saves. */
-#define DEM2DI_MANY 12000
-
-DEM2DI_AVX2_INLINE double dem2di_fours_move(dem2d_world *world, int begin, int end, bool steady) {
+static DEM2DI_AVX2 double dem2di_integrate_block_fours(dem2d_world *world, int begin, int end) {
     const dem2di_plan *plan = &world->plan;
     if (plan->turns)
-        return plan->damped ? dem2di_fours_integrate_turning(world, begin, end, true, steady)
-                            : dem2di_fours_integrate_turning(world, begin, end, false, steady);
-    if (plan->damped)
-        return plan->spin ? dem2di_fours_integrate(world, begin, end, true, true, steady)
-                          : dem2di_fours_integrate(world, begin, end, true, false, steady);
-    return plan->spin ? dem2di_fours_integrate(world, begin, end, false, true, steady)
-                      : dem2di_fours_integrate(world, begin, end, false, false, steady);
-}
-
-static DEM2DI_AVX2 double dem2di_integrate_block_fours(dem2d_world *world, int begin, int end) {
-    return world->list.count < DEM2DI_MANY && !world->steady
-               ? dem2di_fours_move(world, begin, end, false)
-               : dem2di_fours_move(world, begin, end, true);
+        return plan->damped ? dem2di_fours_integrate_turning(world, begin, end, true)
+                            : dem2di_fours_integrate_turning(world, begin, end, false);
+    if (plan->damped && plan->spin) return dem2di_fours_integrate(world, begin, end, true, true);
+    if (plan->damped) return dem2di_fours_integrate(world, begin, end, true, false);
+    if (plan->spin) return dem2di_fours_integrate(world, begin, end, false, true);
+    return dem2di_fours_integrate(world, begin, end, false, false);
 }
 #endif
 

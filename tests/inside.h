@@ -48,8 +48,6 @@ bool inside_is_of_shapes(const char *column);
 size_t inside_chunk(void);
 /* Circles by vectors of four, where the machine has them, or in plain C99. */
 void inside_choose_fours(dem2d_world *world, bool fours);
-/* Sums of forces without branches, as in large worlds. */
-void inside_choose_steady(dem2d_world *world);
 /* Force pass and motion one after the other, or in turns where nothing hinders that. */
 void inside_choose_two_passes(dem2d_world *world, bool in_two);
 /* Do the invariants at the head of the world's section hold? Prints the first that does not. */
@@ -173,10 +171,6 @@ void inside_wake_wall(dem2d_world *world, int wall) {
 
 void inside_choose_fours(dem2d_world *world, bool fours) {
     world->fours = fours && dem2di_has_fours();
-}
-
-void inside_choose_steady(dem2d_world *world) {
-    world->steady = true;
 }
 
 void inside_choose_two_passes(dem2d_world *world, bool in_two) {
