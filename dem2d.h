@@ -13615,10 +13615,10 @@ typedef struct dem2di_dampers {
     double *rolling;                         /* and the dashpot of that, N m s */
 } dem2di_dampers;
 
-/* The contacts of a particle as B and as A, for the sum of its forces. Their number can't be foreseen,
-   and a branch that the processor guesses wrong takes longer than all of the sum: three are added of
-   each, what is missing being a contact without force, behind all others. 96 % of discs at rest
-   have no more, 70 % of polygons. */
+/* The contacts of a particle as B and as A, for the sum of its forces. Their number can't be
+   foreseen, and a branch that the processor guesses wrong takes longer than all of the sum: three
+   are added of each, what is missing being a contact without force, behind all others. 96 % of
+   discs at rest have no more, 70 % of polygons. */
 typedef struct dem2di_summands {
     int as_b[3], as_a[3]; /* as_b[0] < 0: there are more than three of one */
 } dem2di_summands;
