@@ -3264,7 +3264,37 @@ static DEM2DI_INLINE dem2di_two_lanes dem2di_lanes_at(const double *from) {
     memcpy(&lanes, from, sizeof lanes);
     return lanes;
 }
+
+/* {a0 + a1, b0 + b1} */
+static DEM2DI_INLINE dem2di_two_lanes dem2di_lanes_sums(dem2di_two_lanes a, dem2di_two_lanes b) {
+    const dem2di_two_lanes first = {a[0], b[0]}, second = {a[1], b[1]};
+    return first + second;
+}
 #endif
+
+/* Two numbers into a column. */
+static DEM2DI_INLINE void dem2di_put_two(double a, double b, double *to) {
+#if defined(__GNUC__)
+    const dem2di_two_lanes lanes = {a, b};
+    memcpy(to, &lanes, sizeof lanes);
+#else
+    to[0] = a;
+    to[1] = b;
+#endif
+}
+
+/* Two rows of two numbers into two columns. Stores into many columns take longer than all else of a
+   fetch: these are half as many. */
+static DEM2DI_INLINE void dem2di_turn_rows(const double *a, const double *b, double *x, double *y) {
+#if defined(__GNUC__)
+    const dem2di_two_lanes first = dem2di_lanes_at(a), second = dem2di_lanes_at(b);
+    dem2di_put_two(first[0], second[0], x);
+    dem2di_put_two(first[1], second[1], y);
+#else
+    dem2di_put_two(a[0], b[0], x);
+    dem2di_put_two(a[1], b[1], y);
+#endif
+}
 
 #if DEM2DI_FOURS
 DEM2DI_AVX2_INLINE dem2di_four dem2di_four_at(const double *from) {
@@ -3883,6 +3913,7 @@ struct dem2d_shape {
     int parts;        /* polygon: count; Bezier: repaired arcs and corners, for contacts */
     int sectors;      /* length of the sector table, a power of two, or 0 */
     bool flat;        /* has edges: a polygon, or a Bezier with straight arcs */
+    int lanes;        /* how dem2di_lanes takes it */
     double a, b;      /* circle: radius; ellipse: squared half axes; Fourier: a0/2 */
     double deviation; /* Bezier: greatest distance of the parts from the caller's arcs */
     double rounding;
@@ -3905,6 +3936,41 @@ struct dem2d_shape {
     double *least_rho; /* smooth, not a circle: least rho in the sectors k and k + 1 */
     int *sector;       /* first guess of the corner or arc for a range of directions */
 };
+
+/* How loops over many shapes take those of one kind: see dem2di_lanes. ALONE is for other shapes
+   without edges that the search knows, POLYGON and NONE for those with edges. */
+enum {
+    DEM2DI_LANES_ALONE,
+    DEM2DI_LANES_ELLIPSE,
+    DEM2DI_LANES_ARC,
+    DEM2DI_LANES_SERIES,
+    DEM2DI_LANES_KINDS,
+    DEM2DI_LANES_POLYGON = DEM2DI_LANES_KINDS,
+    DEM2DI_LANES_NONE
+};
+
+/* Series of higher orders, and of order 0, are not taken in lanes. */
+#define DEM2DI_LANES_ORDER 8
+
+static int dem2di_lanes_of(const dem2d_shape *shape) {
+    const bool low = shape->count > 0 && shape->count <= DEM2DI_LANES_ORDER;
+    switch (shape->type) {
+    case DEM2D_ELLIPSE:
+        return DEM2DI_LANES_ELLIPSE;
+    case DEM2D_POLYGON:
+        return DEM2DI_LANES_POLYGON;
+    case DEM2D_BEZIER:
+        return shape->flat ? DEM2DI_LANES_NONE : DEM2DI_LANES_ARC;
+    case DEM2D_FOURIER:
+        return low ? DEM2DI_LANES_SERIES : DEM2DI_LANES_ALONE;
+    case DEM2D_CIRCLE:
+        return DEM2DI_LANES_ALONE;
+    case DEM2D_CUSTOM:
+    case DEM2D_SHAPE_TYPE_COUNT:
+        break;
+    }
+    return DEM2DI_LANES_NONE;
+}
 
 static int dem2di_block_count(int order) {
     return (order + 3) / 4;
@@ -4072,13 +4138,61 @@ typedef struct dem2di_series_sums {
     double p, p_odd, q, q_odd, r, r_odd;
 } dem2di_series_sums;
 
-#if defined(__GNUC__)
-/* {a0 + a1, b0 + b1} */
-static DEM2DI_INLINE dem2di_two_lanes dem2di_lanes_sums(dem2di_two_lanes a, dem2di_two_lanes b) {
-    const dem2di_two_lanes first = {a[0], b[0]}, second = {a[1], b[1]};
-    return first + second;
+/* Four terms of a series: cosines and sines, those of the angle between two blocks, and the sums.
+   The terms are written out: compilers then keep them in registers, and loops over many series may
+   use vectors. */
+typedef struct dem2di_series_terms {
+    double x1, x2, x3, x4, y1, y2, y3, y4, fx, fy;
+    dem2di_series_sums sums;
+} dem2di_series_terms;
+
+/* The powers z .. z^4 of a unit vector. */
+static DEM2DI_INLINE void dem2di_series_powers(double x1, double y1, double x[4], double y[4]) {
+    const double x2 = x1 * x1 - y1 * y1, y2 = 2 * x1 * y1;
+    x[0] = x1;
+    x[1] = x2;
+    x[2] = x2 * x1 - y2 * y1;
+    x[3] = x2 * x2 - y2 * y2;
+    y[0] = y1;
+    y[1] = y2;
+    y[2] = x2 * y1 + y2 * x1;
+    y[3] = 2 * x2 * y2;
 }
 
+static DEM2DI_INLINE void dem2di_series_begin(const double x[4], const double y[4],
+                                              dem2di_series_terms *t) {
+    t->x1 = x[0], t->x2 = x[1], t->x3 = x[2], t->x4 = t->fx = x[3];
+    t->y1 = y[0], t->y2 = y[1], t->y3 = y[2], t->y4 = t->fy = y[3];
+    t->sums.p = t->sums.p_odd = t->sums.q = t->sums.q_odd = t->sums.r = t->sums.r_odd = 0;
+}
+
+/* Turns one term by the angle between two blocks. */
+static DEM2DI_INLINE void dem2di_series_turn(const dem2di_series_terms *t, double *x, double *y) {
+    const double turned = *x * t->fx - *y * t->fy;
+    *y = *x * t->fy + *y * t->fx;
+    *x = turned;
+}
+
+/* The terms from order n on, with their coefficients. */
+static DEM2DI_INLINE void dem2di_series_four(dem2di_series_terms *t, int n, double a1, double a2,
+                                             double a3, double a4, double b1, double b2, double b3,
+                                             double b4) {
+    const double n1 = n, n2 = n1 + 1, n3 = n1 + 2, n4 = n1 + 3;
+    const double e1 = a1 * t->x1 + b1 * t->y1, e2 = a2 * t->x2 + b2 * t->y2;
+    const double e3 = a3 * t->x3 + b3 * t->y3, e4 = a4 * t->x4 + b4 * t->y4;
+    t->sums.p += e1 + e2;
+    t->sums.p_odd += e3 + e4;
+    t->sums.r += n1 * n1 * e1 + n2 * n2 * e2;
+    t->sums.r_odd += n3 * n3 * e3 + n4 * n4 * e4;
+    t->sums.q += (n1 * b1 * t->x1 - n1 * a1 * t->y1) + (n2 * b2 * t->x2 - n2 * a2 * t->y2);
+    t->sums.q_odd += (n3 * b3 * t->x3 - n3 * a3 * t->y3) + (n4 * b4 * t->x4 - n4 * a4 * t->y4);
+    dem2di_series_turn(t, &t->x1, &t->y1);
+    dem2di_series_turn(t, &t->x2, &t->y2);
+    dem2di_series_turn(t, &t->x3, &t->y3);
+    dem2di_series_turn(t, &t->x4, &t->y4);
+}
+
+#if defined(__GNUC__)
 /* The sums of a series: the powers z, z^2 and z^3, z^4 side by side, the operations of the plain
    path. */
 static DEM2DI_INLINE dem2di_series_sums dem2di_series_add(const dem2d_shape *shape,
@@ -4106,53 +4220,50 @@ static DEM2DI_INLINE dem2di_series_sums dem2di_series_add(const dem2d_shape *sha
     return sums;
 }
 #else
-/* The same, plain. The four terms are written out: compilers then keep them in registers. */
 static dem2di_series_sums dem2di_series_add(const dem2d_shape *shape, const double x[4],
                                             const double y[4]) {
-    const dem2di_block *block = shape->blocks, *end = block + dem2di_block_count(shape->count);
-    const double fx = x[3], fy = y[3];
-    double x1 = x[0], x2 = x[1], x3 = x[2], x4 = x[3], y1 = y[0], y2 = y[1], y3 = y[2], y4 = y[3];
-    dem2di_series_sums s = {0, 0, 0, 0, 0, 0};
-    for (; block < end; block++) {
-        double e1 = block->a[0] * x1 + block->b[0] * y1, e2 = block->a[1] * x2 + block->b[1] * y2;
-        double e3 = block->a[2] * x3 + block->b[2] * y3, e4 = block->a[3] * x4 + block->b[3] * y4;
-        s.p += e1 + e2;
-        s.p_odd += e3 + e4;
-        s.r += block->square[0] * e1 + block->square[1] * e2;
-        s.r_odd += block->square[2] * e3 + block->square[3] * e4;
-        s.q += (block->nb[0] * x1 - block->na[0] * y1) + (block->nb[1] * x2 - block->na[1] * y2);
-        s.q_odd +=
-            (block->nb[2] * x3 - block->na[2] * y3) + (block->nb[3] * x4 - block->na[3] * y4);
-        double turned = x1 * fx - y1 * fy;
-        y1 = x1 * fy + y1 * fx, x1 = turned;
-        turned = x2 * fx - y2 * fy;
-        y2 = x2 * fy + y2 * fx, x2 = turned;
-        turned = x3 * fx - y3 * fy;
-        y3 = x3 * fy + y3 * fx, x3 = turned;
-        turned = x4 * fx - y4 * fy;
-        y4 = x4 * fy + y4 * fx, x4 = turned;
+    dem2di_series_terms terms;
+    dem2di_series_begin(x, y, &terms);
+    for (int n = 1; n <= shape->count; n += 4) {
+        const dem2di_block *block = &shape->blocks[(n - 1) / 4];
+        dem2di_series_four(&terms, n, block->a[0], block->a[1], block->a[2], block->a[3],
+                           block->b[0], block->b[1], block->b[2], block->b[3]);
     }
-    return s;
+    return terms.sums;
 }
 #endif
 
-/* s = p u + p' t and rho = p + p'' with the powers of z = ux + i uy: first z .. z^4, then four
-   terms at a time by z^4, so that the chain of dependent products is a quarter of the order. */
-static dem2d_vec dem2di_fourier_support(const dem2d_shape *shape, dem2d_vec u, double *rho) {
-    double x1 = u.x, y1 = u.y, x2 = x1 * x1 - y1 * y1, y2 = 2 * x1 * y1;
-    const double x[4] = {x1, x2, x2 * x1 - y2 * y1, x2 * x2 - y2 * y2};
-    const double y[4] = {y1, y2, x2 * y1 + y2 * x1, 2 * x2 * y2};
-    const dem2di_series_sums sums = dem2di_series_add(shape, x, y);
-    double value = shape->a + (sums.p + sums.p_odd), slope = sums.q + sums.q_odd;
-    if (rho != NULL) *rho = dem2di_max(0, value - (sums.r + sums.r_odd));
+/* s = p u + p' t and rho = p + p'' from the sums of a series, whose constant term is a. */
+static DEM2DI_INLINE dem2d_vec dem2di_series_point(double a, const dem2di_series_sums *sums,
+                                                   dem2d_vec u, double *rho) {
+    const double value = a + (sums->p + sums->p_odd), slope = sums->q + sums->q_odd;
+    *rho = dem2di_max(0, value - (sums->r + sums->r_odd));
     return dem2di_vec(value * u.x - slope * u.y, value * u.y + slope * u.x);
 }
 
+/* With the powers of z = ux + i uy: first z .. z^4, then four terms at a time by z^4, so that the
+   chain of dependent products is a quarter of the order. */
+static dem2d_vec dem2di_fourier_support(const dem2d_shape *shape, dem2d_vec u, double *rho) {
+    double x[4], y[4], radius;
+    dem2di_series_powers(u.x, u.y, x, y);
+    const dem2di_series_sums sums = dem2di_series_add(shape, x, y);
+    const dem2d_vec s = dem2di_series_point(shape->a, &sums, u, &radius);
+    if (rho != NULL) *rho = radius;
+    return s;
+}
+
+/* Support point of an ellipse, whose squared half axes are a and b. */
+static DEM2DI_INLINE dem2d_vec dem2di_ellipse_point(double a, double b, dem2d_vec u, double *rho) {
+    const double x = a * u.x, y = b * u.y, f = 1 / dem2di_sqrt(x * u.x + y * u.y);
+    *rho = a * f * (b * f) * f;
+    return dem2di_vec(x * f, y * f);
+}
+
 static inline dem2d_vec dem2di_ellipse_support(const dem2d_shape *shape, dem2d_vec u, double *rho) {
-    dem2d_vec s = dem2di_vec(shape->a * u.x, shape->b * u.y);
-    double f = 1 / dem2di_sqrt(s.x * u.x + s.y * u.y);
-    if (rho != NULL) *rho = shape->a * f * (shape->b * f) * f;
-    return dem2di_vec(s.x * f, s.y * f);
+    double radius;
+    const dem2d_vec s = dem2di_ellipse_point(shape->a, shape->b, u, &radius);
+    if (rho != NULL) *rho = radius;
+    return s;
 }
 
 /* Straight parts of a polybezier have three equal differences, to the bit. */
@@ -4173,6 +4284,7 @@ static void dem2di_find_edges(dem2d_shape *shape) {
         shape->edges_beside[i % n].before = last;
     }
     shape->flat = last >= 0;
+    shape->lanes = dem2di_lanes_of(shape);
     for (int i = 2 * n - 1; i >= 0; i--) {
         if (dem2di_arc_straight(&shape->arcs[i % n])) last = i % n;
         shape->edges_beside[i % n].after = last;
@@ -4239,6 +4351,128 @@ static inline dem2d_vec dem2di_support(const dem2d_shape *shape, dem2d_vec u, do
     if (rho != NULL) *rho = shape->rounding;
     s = shape->corners[dem2di_polygon_corner(shape, u)];
     return shape->rounding > 0 ? dem2di_along(s, shape->rounding, u) : s;
+}
+
+/* Support points of many shapes of one kind: directions in the coordinates of each, the numbers of
+   the templates, and the answers. */
+typedef struct dem2di_lanes {
+    double vx[DEM2DI_BATCH], vy[DEM2DI_BATCH];
+    double number[2 * DEM2DI_LANES_ORDER + 1][DEM2DI_BATCH];
+    double x[DEM2DI_BATCH], y[DEM2DI_BATCH], rho[DEM2DI_BATCH];
+} dem2di_lanes;
+
+/* Four numbers of each of two templates. */
+static DEM2DI_INLINE void dem2di_lanes_rows(const double *a, const double *b, int row, int k,
+                                            dem2di_lanes *l) {
+    dem2di_turn_rows(a, b, &l->number[row][k], &l->number[row + 1][k]);
+    dem2di_turn_rows(a + 2, b + 2, &l->number[row + 2][k], &l->number[row + 3][k]);
+}
+
+/* The arc that has the support point of place k. */
+static DEM2DI_INLINE const double *dem2di_lanes_find(const dem2d_shape *shape, int k,
+                                                     const dem2di_lanes *l) {
+    const dem2d_vec v = {l->vx[k], l->vy[k]};
+    return &shape->arcs[dem2di_sector_find(shape, v)].start.x;
+}
+
+/* The support point of place k, for shapes of the last kind. */
+static DEM2DI_INLINE void dem2di_lanes_alone(const dem2d_shape *shape, int k, dem2di_lanes *l) {
+    const dem2d_vec s = dem2di_support(shape, dem2di_vec(l->vx[k], l->vy[k]), &l->rho[k]);
+    l->x[k] = s.x;
+    l->y[k] = s.y;
+}
+
+/* Fetch the templates of places k and k + 1, whose directions are known. */
+static DEM2DI_INLINE void dem2di_lanes_fetch(const dem2d_shape *a, const dem2d_shape *b, int kind,
+                                             int k, dem2di_lanes *l) {
+    static const double none[8] = {0, 0, 0, 0, 0, 0, 0, 0};
+    if (kind == DEM2DI_LANES_ELLIPSE) {
+        dem2di_turn_rows(&a->a, &b->a, &l->number[0][k], &l->number[1][k]);
+    } else if (kind == DEM2DI_LANES_ARC) {
+        const double *on_a = dem2di_lanes_find(a, k, l), *on_b = dem2di_lanes_find(b, k + 1, l);
+        dem2di_lanes_rows(on_a, on_b, 0, k, l);
+        dem2di_lanes_rows(on_a + 4, on_b + 4, 4, k, l);
+    } else if (kind == DEM2DI_LANES_SERIES) {
+        const double *second_a = a->count > 4 ? a->blocks[1].a : none;
+        const double *second_b = b->count > 4 ? b->blocks[1].a : none;
+        dem2di_lanes_rows(a->blocks[0].a, b->blocks[0].a, 0, k, l);
+        dem2di_lanes_rows(second_a, second_b, 4, k, l);
+        dem2di_lanes_rows(a->blocks[0].b, b->blocks[0].b, 8, k, l);
+        dem2di_lanes_rows(second_a + 4, second_b + 4, 12, k, l);
+        dem2di_put_two(a->a, b->a, &l->number[16][k]);
+    } else {
+        dem2di_lanes_alone(a, k, l);
+        dem2di_lanes_alone(b, k + 1, l);
+    }
+}
+
+/* dem2di_arc_parameter with choices that loops can make by masks. */
+static DEM2DI_INLINE double dem2di_lanes_parameter(double q0, double q1, double q2, double *bend) {
+    const bool outside = !((q0 >= 0) & (q2 <= 0)), falls = q1 > 0;
+    const double end = q2 > 0 ? 1 : 0, at_end = (q0 - q1) * (1 - end) + (q1 - q2) * end;
+    const double root = dem2di_sqrt(q1 * q1 - q0 * q2), sum = root + fabs(q1);
+    const double top = falls ? sum : q0, bottom = sum + (falls ? -q2 : q0), t = top / bottom;
+    *bend = outside ? at_end : root;
+    return outside ? end : bottom > 0 ? t : 0;
+}
+
+/* dem2di_arc_support */
+static DEM2DI_INLINE void dem2di_lanes_arc(dem2di_lanes *l, int k) {
+    const double ux = l->vx[k], uy = l->vy[k];
+    const double d0x = l->number[2][k], d0y = l->number[3][k], d1x = l->number[4][k];
+    const double d1y = l->number[5][k], d2x = l->number[6][k], d2y = l->number[7][k];
+    double bend;
+    const double t = dem2di_lanes_parameter(d0x * ux + d0y * uy, d1x * ux + d1y * uy,
+                                            d2x * ux + d2y * uy, &bend);
+    const double f = 1.5 / bend, s = 1 - t;
+    const double speed = (ux * d0y - uy * d0x) * (s * s) + (ux * d1y - uy * d1x) * (2 * t * s) +
+                         (ux * d2y - uy * d2x) * (t * t);
+    const double w0 = t * (3 - t * (3 - t)), w1 = t * t * (3 - 2 * t), w2 = t * t * t;
+    const double radius = speed * speed * f;
+    const double bent = bend > 0 ? radius : HUGE_VAL;
+    l->rho[k] = speed <= 0 ? 0 : bent;
+    l->x[k] = l->number[0][k] + w0 * d0x + w1 * d1x + w2 * d2x;
+    l->y[k] = l->number[1][k] + w0 * d0y + w1 * d1y + w2 * d2y;
+}
+
+/* dem2di_fourier_support */
+static DEM2DI_INLINE void dem2di_lanes_series(dem2di_lanes *l, int k) {
+    const dem2d_vec u = {l->vx[k], l->vy[k]};
+    double x[4], y[4], radius;
+    dem2di_series_terms terms;
+    dem2di_series_powers(u.x, u.y, x, y);
+    dem2di_series_begin(x, y, &terms);
+    dem2di_series_four(&terms, 1, l->number[0][k], l->number[1][k], l->number[2][k],
+                       l->number[3][k], l->number[8][k], l->number[9][k], l->number[10][k],
+                       l->number[11][k]);
+    dem2di_series_four(&terms, 5, l->number[4][k], l->number[5][k], l->number[6][k],
+                       l->number[7][k], l->number[12][k], l->number[13][k], l->number[14][k],
+                       l->number[15][k]);
+    const dem2d_vec s = dem2di_series_point(l->number[16][k], &terms.sums, u, &radius);
+    l->x[k] = s.x;
+    l->y[k] = s.y;
+    l->rho[k] = radius;
+}
+
+/* The support points of all, as dem2di_support. */
+static DEM2DI_INLINE void dem2di_lanes_support(dem2di_lanes *l, int kind, int count) {
+    if (kind == DEM2DI_LANES_ELLIPSE) {
+        DEM2DI_INDEPENDENT
+        for (int k = 0; k < count; k++) {
+            double radius;
+            const dem2d_vec s = dem2di_ellipse_point(l->number[0][k], l->number[1][k],
+                                                     dem2di_vec(l->vx[k], l->vy[k]), &radius);
+            l->x[k] = s.x;
+            l->y[k] = s.y;
+            l->rho[k] = radius;
+        }
+    } else if (kind == DEM2DI_LANES_ARC) {
+        DEM2DI_INDEPENDENT
+        for (int k = 0; k < count; k++) dem2di_lanes_arc(l, k);
+    } else if (kind == DEM2DI_LANES_SERIES) {
+        DEM2DI_INDEPENDENT
+        for (int k = 0; k < count; k++) dem2di_lanes_series(l, k);
+    }
 }
 
 /* ============================================================================================
@@ -4468,6 +4702,7 @@ static dem2d_shape *dem2di_shape_allocate(const dem2d_env *env, dem2d_shape_type
     shape->count = count;
     shape->parts = parts;
     shape->sectors = plan.sectors;
+    shape->lanes = dem2di_lanes_of(shape);
     dem2di_shape_layout(shape);
     if (env != NULL) shape->env = *env;
     return shape;
@@ -11749,42 +11984,40 @@ static dem2d_result dem2di_check_body(const dem2d_env *env, const dem2d_body *bo
     return DEM2D_OK;
 }
 
-/* What is found of many bodies, to be compared once, at the end. */
-typedef struct dem2di_bodies_found {
-    double sum;   /* of all numbers that must be finite and in range: if one is not, this is not */
-    double least; /* radius */
-    double off;   /* by which the square of a rotation is not 1, at most */
-    int kinds;    /* 0: all are circles */
-} dem2di_bodies_found;
-
-static DEM2DI_INLINE void dem2di_body_find(const dem2d_body *body, dem2di_bodies_found *found) {
-    const dem2d_rot q = body->pose.rotation;
-    const double radius = dem2di_body_radius(body), off = fabs(q.c * q.c + q.s * q.s - 1);
-    const double place = fabs(body->pose.position.x) + fabs(body->pose.position.y);
-    found->sum += place + (radius + off);
-    found->least = dem2di_min(radius, found->least);
-    found->off = dem2di_max(off, found->off);
-    found->kinds |= (int)body->shape->type ^ (int)DEM2D_CIRCLE;
-}
-
-/* Are all bodies in range, with rotations of length 1? If their sum is too great, each may still
-   be. Every other one is summed apart: sums of all would wait for each other. */
+/* Are all bodies in range, with rotations of length 1? *round: all are circles. What is found is
+   compared once, at the end. If it is too great, or where the compiler has no vectors, each body
+   may still be in range. */
 static bool dem2di_bodies_good(const dem2d_body *bodies, int count, bool *round) {
-    dem2di_bodies_found one = {0, DEM2DI_BODY_MOST, 0, 0}, two = one;
-    int i = 0;
-    for (; i + 1 < count; i += 2) {
-        if ((bodies[i].shape == NULL) | (bodies[i + 1].shape == NULL)) return false;
-        dem2di_body_find(&bodies[i], &one);
-        dem2di_body_find(&bodies[i + 1], &two);
+    *round = false;
+#if defined(__GNUC__)
+    const dem2di_two_lanes one = {1, 1};
+    dem2di_two_lanes sum = {0, 0}, sum_off = {0, 0}; /* if a number is not finite, these are not */
+    double least = DEM2DI_BODY_MOST, off_a = 0, off_b = 0;
+    int kinds = 0;
+    for (int i = 0; i < count; i += 2) {
+        const dem2d_body *a = &bodies[i], *b = a + (i + 1 < count);
+        if ((a->shape == NULL) | (b->shape == NULL)) return false;
+        const dem2di_two_lanes at_a = dem2di_lanes_at(&a->pose.position.x);
+        const dem2di_two_lanes at_b = dem2di_lanes_at(&b->pose.position.x);
+        const dem2di_two_lanes turn_a = dem2di_lanes_at(&a->pose.rotation.c);
+        const dem2di_two_lanes turn_b = dem2di_lanes_at(&b->pose.rotation.c);
+        const dem2di_two_lanes radii = {dem2di_body_radius(a), dem2di_body_radius(b)};
+        const dem2di_two_lanes length = dem2di_lanes_sums(turn_a * turn_a, turn_b * turn_b);
+        const dem2di_two_lanes off = (length - one) * (length - one);
+        sum += (at_a * at_a + at_b * at_b) + radii;
+        sum_off += off;
+        off_a = dem2di_max(off[0], off_a);
+        off_b = dem2di_max(off[1], off_b);
+        least = dem2di_min(radii[1], dem2di_min(radii[0], least));
+        kinds |= ((int)a->shape->type ^ DEM2D_CIRCLE) | ((int)b->shape->type ^ DEM2D_CIRCLE);
     }
-    if (i < count) {
-        if (bodies[i].shape == NULL) return false;
-        dem2di_body_find(&bodies[i], &one);
-    }
-    *round = (one.kinds | two.kinds) == 0;
-    return one.sum + two.sum <= DEM2DI_BODY_MOST &&
-           dem2di_min(one.least, two.least) >= DEM2DI_BODY_LEAST &&
-           dem2di_max(one.off, two.off) <= DEM2DI_OFF_UNIT;
+    *round = kinds == 0;
+    return sum[0] + sum[1] <= DEM2DI_BODY_MOST && dem2di_finite(sum_off[0] + sum_off[1]) &&
+           least >= DEM2DI_BODY_LEAST &&
+           dem2di_max(off_a, off_b) <= DEM2DI_OFF_UNIT * DEM2DI_OFF_UNIT;
+#else
+    return bodies == NULL && count == 0;
+#endif
 }
 
 /* *unit: all rotations are of length 1; *round: it is known that all are circles. */
@@ -11887,6 +12120,7 @@ typedef struct dem2di_array_query {
     dem2d_contact_memory *memory;
     dem2d_overlap *overlaps;
     dem2d_contact *contacts;
+    double angle; /* see dem2di_rest_angle */
 } dem2di_array_query;
 
 /* Two circles: as dem2di_query_solve and the report, of which little is left. */
@@ -12027,61 +12261,65 @@ static void dem2di_pairs_query(const dem2di_array_query *query, int i, const dem
     dem2di_pairs_report(query, i, &pair, &search, &a->pose, &b->pose);
 }
 
-/* Pairs whose memory may hold the answer, in arrays: of shapes without edges, whose support points
-   along the last normal are fetched, or of polygons and circles with the feature of the last query.
-   Loops that compilers turn into vector instructions find which of them go on, as
-   dem2di_smooth_last and dem2di_edge_last, with the same bits. Others are for the search. */
-typedef struct dem2di_array_tile {
-    dem2di_corners *corners; /* NULL for pairs without edges */
-    bool second;             /* it is asked whether there may be a second contact point */
+/* Pairs of two kinds of shapes without edges that wait for an evaluation, along the normal of the
+   last query or one of Newton's steps on. */
+typedef struct dem2di_array_queue {
     int count;
     int pair[DEM2DI_BATCH];
-    double found[DEM2DI_BATCH]; /* 1: goes on, 0: does not */
-    double still[DEM2DI_BATCH]; /* without edges, 1: the search would end there, if it is proved */
-    double ax[DEM2DI_BATCH], ay[DEM2DI_BATCH], bx[DEM2DI_BATCH], by[DEM2DI_BATCH]; /* centres */
-    double reach[DEM2DI_BATCH];
-    double ux[DEM2DI_BATCH], uy[DEM2DI_BATCH]; /* last normal; support points along it: */
-    double sx_a[DEM2DI_BATCH], sy_a[DEM2DI_BATCH], sx_b[DEM2DI_BATCH], sy_b[DEM2DI_BATCH];
-    double rho_a[DEM2DI_BATCH], rho_b[DEM2DI_BATCH]; /* there; and bounds of it: */
-    double least_a[DEM2DI_BATCH], least_b[DEM2DI_BATCH], least_part[DEM2DI_BATCH];
-    double most[DEM2DI_BATCH];
-    double h[DEM2DI_BATCH], slope[DEM2DI_BATCH]; /* of the evaluation; and what follows: */
+    int steps[DEM2DI_BATCH];                   /* taken */
+    double ux[DEM2DI_BATCH], uy[DEM2DI_BATCH]; /* direction */
+} dem2di_array_queue;
+
+static DEM2DI_INLINE void dem2di_array_wait(int i, int steps, dem2d_vec u, dem2di_array_queue *q) {
+    const int k = q->count++;
+    q->pair[k] = i;
+    q->steps[k] = steps;
+    q->ux[k] = u.x;
+    q->uy[k] = u.y;
+}
+
+/* One body of each pair. */
+typedef struct dem2di_array_side {
+    double x[DEM2DI_BATCH], y[DEM2DI_BATCH], c[DEM2DI_BATCH], s[DEM2DI_BATCH], scale[DEM2DI_BATCH];
+    double circumscribed[DEM2DI_BATCH], least[DEM2DI_BATCH], most[DEM2DI_BATCH]; /* unscaled */
+    dem2di_lanes lanes;
+} dem2di_array_side;
+
+/* What follows from an evaluation: the search goes on elsewhere, by a step of Newton, ends here if
+   that stays on the same parts, or ends here. */
+enum { DEM2DI_ARRAY_SEARCH, DEM2DI_ARRAY_STEP, DEM2DI_ARRAY_PARTS, DEM2DI_ARRAY_FOUND };
+
+/* What is found of pairs. Loops that compilers turn into vector instructions find it, with the bits
+   of dem2di_contact_solve. */
+typedef struct dem2di_array_tile {
+    int count;
+    bool cores;  /* of polygons and circles */
+    bool second; /* it is asked whether these may have a second contact point */
+    dem2di_array_side side[2];
+    double way[DEM2DI_BATCH];                       /* see above */
+    double bend[DEM2DI_BATCH], slope[DEM2DI_BATCH]; /* of the evaluation */
     double x[DEM2DI_BATCH], y[DEM2DI_BATCH], upper[DEM2DI_BATCH], lower[DEM2DI_BATCH];
     double wx_a[DEM2DI_BATCH], wy_a[DEM2DI_BATCH], wx_b[DEM2DI_BATCH], wy_b[DEM2DI_BATCH];
     double px[DEM2DI_BATCH], py[DEM2DI_BATCH], error[DEM2DI_BATCH], state[DEM2DI_BATCH];
+    dem2di_corners corners;     /* of polygons and circles */
+    double alone[DEM2DI_BATCH]; /* of these, 1: there is no second contact point */
 } dem2di_array_tile;
 
-/* Support point of a body from its centre, and the radius of curvature. */
-static DEM2DI_INLINE dem2d_vec dem2di_body_support(const dem2d_body *body, dem2d_vec u,
-                                                   double *rho) {
-    const dem2d_pose *at = &body->pose;
-    dem2d_vec s = dem2di_support(body->shape, dem2di_turn_back(at->rotation, u), rho);
-    *rho *= at->scale;
-    return dem2di_scale(dem2di_turn(at->rotation, s), at->scale);
+static DEM2DI_INLINE void dem2di_array_place(const dem2d_body *a, const dem2d_body *b, int k,
+                                             bool cores, dem2di_array_side *to) {
+    dem2di_turn_rows(&a->pose.position.x, &b->pose.position.x, &to->x[k], &to->y[k]);
+    dem2di_put_two(a->pose.scale, b->pose.scale, &to->scale[k]);
+    dem2di_put_two(a->shape->circumscribed, b->shape->circumscribed, &to->circumscribed[k]);
+    if (cores) return; /* corners have all else */
+    dem2di_turn_rows(&a->pose.rotation.c, &b->pose.rotation.c, &to->c[k], &to->s[k]);
+    dem2di_turn_rows(&a->shape->rho_min, &b->shape->rho_min, &to->least[k], &to->most[k]);
 }
 
-static DEM2DI_INLINE void dem2di_array_add_smooth(const dem2d_body *a, const dem2d_body *b,
-                                                  dem2d_vec u, dem2di_array_tile *t) {
-    const int k = t->count;
-    const dem2d_vec on_a = dem2di_body_support(a, u, &t->rho_a[k]);
-    const dem2d_vec on_b = dem2di_body_support(b, dem2di_negate(u), &t->rho_b[k]);
-    const double least_a = a->shape->rho_min * a->pose.scale;
-    const double least_b = b->shape->rho_min * b->pose.scale;
-    t->ux[k] = u.x;
-    t->uy[k] = u.y;
-    t->sx_a[k] = on_a.x;
-    t->sy_a[k] = on_a.y;
-    t->sx_b[k] = on_b.x;
-    t->sy_b[k] = on_b.y;
-    t->least_a[k] = least_a;
-    t->least_b[k] = least_b;
-    t->least_part[k] = dem2di_least_part(a->shape, b->shape, least_a, least_b);
-    t->most[k] = a->shape->rho_max * a->pose.scale + b->shape->rho_max * b->pose.scale;
-}
-
-static DEM2DI_INLINE void dem2di_array_add_corner(const dem2d_body *a, const dem2d_body *b,
-                                                  const dem2di_feature *feature,
-                                                  dem2di_array_tile *t) {
+static DEM2DI_INLINE void dem2di_array_corner(const dem2di_array_query *query, int i, int k,
+                                              dem2di_array_tile *t) {
+    const dem2di_feature feature = dem2di_memory_feature(&query->memory[i]);
+    const dem2d_body *a = &query->bodies[query->pairs[i].a];
+    const dem2d_body *b = &query->bodies[query->pairs[i].b];
     dem2di_pair pair; /* without places */
     pair.a = a->shape;
     pair.b = b->shape;
@@ -12089,40 +12327,48 @@ static DEM2DI_INLINE void dem2di_array_add_corner(const dem2d_body *a, const dem
     pair.rb = b->pose.rotation;
     pair.scale_a = a->pose.scale;
     pair.scale_b = b->pose.scale;
-    dem2di_corners_set(&pair, feature, t->count, t->second, t->corners);
+    dem2di_corners_set(&pair, &feature, k, t->second, &t->corners);
 }
 
-/* Fetch a pair into its tile, which is returned; NULL if it is for the search. */
-static DEM2DI_INLINE dem2di_array_tile *dem2di_array_add(const dem2di_array_query *query, int i,
-                                                         dem2di_array_tile *smooth,
-                                                         dem2di_array_tile *corners) {
-    const dem2d_body *a = &query->bodies[query->pairs[i].a];
-    const dem2d_body *b = &query->bodies[query->pairs[i].b];
-    const dem2d_contact_memory *memory = &query->memory[i];
-    dem2di_array_tile *t = smooth;
-    if (!dem2di_is_unit(memory->normal.x, memory->normal.y)) return NULL;
-    if (dem2di_has_core(a->shape) && dem2di_has_core(b->shape)) {
-        const dem2di_feature feature = dem2di_memory_feature(memory);
-        if (!dem2di_is_feature(a->shape, b->shape, &feature)) return NULL;
-        t = corners;
-        dem2di_array_add_corner(a, b, &feature, t);
-    } else {
-        if (a->shape->flat || b->shape->flat || dem2di_edges_unknown(a->shape) ||
-            dem2di_edges_unknown(b->shape))
-            return NULL;
-        dem2di_array_add_smooth(a, b, memory->normal, t);
+/* The bodies of a queue. */
+static void dem2di_array_fetch(const dem2di_array_query *query, const dem2di_array_queue *q,
+                               dem2di_array_tile *t) {
+    const dem2d_body *bodies = query->bodies;
+    const bool cores = t->cores;
+    for (int k = 0; k < t->count; k += 2) {
+        const dem2d_body_pair *p0 = &query->pairs[q->pair[k]], *p1 = &query->pairs[q->pair[k + 1]];
+        dem2di_array_place(&bodies[p0->a], &bodies[p1->a], k, cores, &t->side[0]);
+        dem2di_array_place(&bodies[p0->b], &bodies[p1->b], k, cores, &t->side[1]);
     }
-    const int k = t->count++;
-    t->pair[k] = i;
-    t->ax[k] = a->pose.position.x;
-    t->ay[k] = a->pose.position.y;
-    t->bx[k] = b->pose.position.x;
-    t->by[k] = b->pose.position.y;
-    t->reach[k] = dem2di_body_radius(a) + dem2di_body_radius(b);
-    return t;
+    for (int k = 0; k < t->count && t->cores; k++) dem2di_array_corner(query, q->pair[k], k, t);
+}
+
+/* The templates of a queue, by the directions. */
+static void dem2di_array_fetch_shapes(const dem2di_array_query *query, const dem2di_array_queue *q,
+                                      int kind_a, int kind_b, dem2di_array_tile *t) {
+    const dem2d_body *bodies = query->bodies;
+    for (int k = 0; k < t->count; k += 2) {
+        const dem2d_body_pair *p0 = &query->pairs[q->pair[k]], *p1 = &query->pairs[q->pair[k + 1]];
+        dem2di_lanes_fetch(bodies[p0->a].shape, bodies[p1->a].shape, kind_a, k, &t->side[0].lanes);
+        dem2di_lanes_fetch(bodies[p0->b].shape, bodies[p1->b].shape, kind_b, k, &t->side[1].lanes);
+    }
 }
 
 DEM2DI_VECTORS_BEGIN
+/* Directions in the coordinates of the shapes. */
+static DEM2DI_INLINE void dem2di_array_turn(dem2di_array_tile *DEM2DI_APART t,
+                                            const dem2di_array_queue *DEM2DI_APART q) {
+    dem2di_array_side *a = &t->side[0], *b = &t->side[1];
+    DEM2DI_INDEPENDENT
+    for (int k = 0; k < t->count; k++) {
+        const double ux = q->ux[k], uy = q->uy[k];
+        a->lanes.vx[k] = a->c[k] * ux + a->s[k] * uy;
+        a->lanes.vy[k] = a->c[k] * uy - a->s[k] * ux;
+        b->lanes.vx[k] = b->c[k] * -ux + b->s[k] * -uy;
+        b->lanes.vy[k] = b->c[k] * -uy - b->s[k] * -ux;
+    }
+}
+
 /* What a search has found, as dem2di_overlap_report. */
 static DEM2DI_INLINE void dem2di_array_found(dem2di_array_tile *t, int k,
                                              const dem2di_search *search, double size) {
@@ -12136,189 +12382,258 @@ static DEM2DI_INLINE void dem2di_array_found(dem2di_array_tile *t, int k,
     t->wy_a[k] = search->a.y;
     t->wx_b[k] = search->b.x;
     t->wy_b[k] = search->b.y;
-    t->px[k] = ((t->ax[k] + search->a.x) + (t->bx[k] + search->b.x)) * 0.5;
-    t->py[k] = ((t->ay[k] + search->a.y) + (t->by[k] + search->b.y)) * 0.5;
+    t->px[k] = ((t->side[0].x[k] + search->a.x) + (t->side[1].x[k] + search->b.x)) * 0.5;
+    t->py[k] = ((t->side[0].y[k] + search->a.y) + (t->side[1].y[k] + search->b.y)) * 0.5;
     t->error[k] = (range < 0 ? 0 : range) + roundoff;
     t->state[k] = upper < -roundoff  ? (double)DEM2D_SEPARATED
                   : upper > roundoff ? (double)DEM2D_PENETRATING
                                      : (double)DEM2D_TOUCHING;
 }
 
-/* `second`: whether there may be a second point goes to h. */
-static DEM2DI_INLINE void dem2di_array_corners(dem2di_array_tile *DEM2DI_APART t,
-                                               const dem2di_corners *DEM2DI_APART corners,
-                                               bool second) {
-    DEM2DI_INDEPENDENT
-    for (int k = 0; k < t->count; k++) {
-        const double dx = t->bx[k] - t->ax[k], dy = t->by[k] - t->ay[k];
-        const double distance = dem2di_sqrt(dx * dx + dy * dy), size = t->reach[k] + distance;
-        dem2di_search search;
-        bool rests = dem2di_corner_rests(corners, k, dx, dy, distance, size, true, second, &search);
-        t->found[k] = rests ? 1 : 0;
-        t->still[k] = 0;
-        t->h[k] = search.alone ? 1 : 0;
-        dem2di_array_found(t, k, &search, size);
-    }
-}
-
-static DEM2DI_INLINE void dem2di_array_smooth(dem2di_array_tile *t, double tolerance) {
+static DEM2DI_INLINE void dem2di_array_smooth(dem2di_array_tile *DEM2DI_APART t,
+                                              const dem2di_array_queue *DEM2DI_APART q,
+                                              double angle, bool parts) {
+    const dem2di_array_side *a = &t->side[0], *b = &t->side[1];
     dem2di_demand demand;
     demand.detect = false;
     demand.tolerance = 0;
-    demand.angle = dem2di_rest_angle(tolerance, false);
+    demand.angle = angle;
+    DEM2DI_INDEPENDENT
     for (int k = 0; k < t->count; k++) {
-        const double dx = t->bx[k] - t->ax[k], dy = t->by[k] - t->ay[k];
-        const double ux = t->ux[k], uy = t->uy[k];
-        const double distance = dem2di_sqrt(dx * dx + dy * dy), size = t->reach[k] + distance;
-        const double wx = (t->sx_a[k] - t->sx_b[k]) - dx, wy = (t->sy_a[k] - t->sy_b[k]) - dy;
+        const double dx = b->x[k] - a->x[k], dy = b->y[k] - a->y[k];
+        const double ux = q->ux[k], uy = q->uy[k];
+        const double distance = dem2di_sqrt(dx * dx + dy * dy);
+        const double size =
+            a->circumscribed[k] * a->scale[k] + b->circumscribed[k] * b->scale[k] + distance;
+        const double ax = (a->c[k] * a->lanes.x[k] - a->s[k] * a->lanes.y[k]) * a->scale[k];
+        const double ay = (a->s[k] * a->lanes.x[k] + a->c[k] * a->lanes.y[k]) * a->scale[k];
+        const double bx = (b->c[k] * b->lanes.x[k] - b->s[k] * b->lanes.y[k]) * b->scale[k];
+        const double by = (b->s[k] * b->lanes.x[k] + b->c[k] * b->lanes.y[k]) * b->scale[k];
+        const double wx = (ax - bx) - dx, wy = (ay - by) - dy;
+        const double least_a = a->least[k] * a->scale[k], least_b = b->least[k] * b->scale[k];
+        const double most = a->most[k] * a->scale[k] + b->most[k] * b->scale[k];
+        const double least_part = least_a < least_b ? least_a : least_b;
         dem2di_eval eval;
         dem2di_search search;
         eval.u.x = ux;
         eval.u.y = uy;
-        eval.v[0].a.x = t->sx_a[k];
-        eval.v[0].a.y = t->sy_a[k];
-        eval.v[0].b.x = t->sx_b[k];
-        eval.v[0].b.y = t->sy_b[k];
-        eval.rho[0] = t->rho_a[k];
-        eval.rho[1] = t->rho_b[k];
+        eval.v[0].a.x = ax;
+        eval.v[0].a.y = ay;
+        eval.v[0].b.x = bx;
+        eval.v[0].b.y = by;
+        eval.rho[0] = a->lanes.rho[k] * a->scale[k];
+        eval.rho[1] = b->lanes.rho[k] * b->scale[k];
         eval.h = wx * ux + wy * uy;
         eval.slope[0] = ux * wy - uy * wx;
-        const double bend = eval.rho[0] + eval.rho[1] - eval.h;
-        const double by_bend = demand.angle * demand.angle * bend;
-        const double by_step = 1e-10 * t->least_part[k];
-        const bool still = dem2di_descent_ends(size, by_bend < by_step ? by_bend : by_step,
-                                               t->most[k], &eval, &demand, &search);
-        const bool rests = dem2di_rest_found(size, t->least_a[k] + t->least_b[k], t->least_part[k],
-                                             t->most[k], &eval, &demand, &search);
-        t->found[k] = rests ? 1 : 0;
-        t->still[k] = still ? 1 : 0;
-        t->h[k] = eval.h;
-        t->slope[k] = eval.slope[0];
+        const double bend = eval.rho[0] + eval.rho[1] - eval.h, slope = eval.slope[0];
+        const bool rests =
+            dem2di_rest_found(size, least_a + least_b, HUGE_VAL, most, &eval, &demand, &search);
+        const bool same = !parts | (slope * slope * (1 + 1e-9) <= 1e-10 * least_part * size);
+        const bool up = (bend > 0) & (bend * DEM2DI_ROUNDOFF < size);
+        const bool small = (fabs(slope) <= demand.angle * bend) &
+                           (slope * slope <= demand.angle * demand.angle * bend * size);
+        const bool steps = up & !small & (fabs(slope) < 0.2 * bend);
+        const double moves = steps ? DEM2DI_ARRAY_STEP : DEM2DI_ARRAY_SEARCH;
+        const double ends = same ? DEM2DI_ARRAY_FOUND : DEM2DI_ARRAY_PARTS;
+        t->way[k] = rests ? ends : moves;
+        t->bend[k] = bend;
+        t->slope[k] = slope;
         dem2di_array_found(t, k, &search, size);
     }
 }
 
-static DEM2DI_INLINE void dem2di_array_solve(dem2di_array_tile *t, double tolerance) {
-    if (t->corners != NULL && t->second)
-        dem2di_array_corners(t, t->corners, true);
-    else if (t->corners != NULL)
-        dem2di_array_corners(t, t->corners, false);
-    else
-        dem2di_array_smooth(t, tolerance);
+/* Features that hold, as dem2di_edge_last. */
+static DEM2DI_INLINE void dem2di_array_corners(dem2di_array_tile *DEM2DI_APART t, bool second) {
+    const dem2di_array_side *a = &t->side[0], *b = &t->side[1];
+    DEM2DI_INDEPENDENT
+    for (int k = 0; k < t->count; k++) {
+        const double dx = b->x[k] - a->x[k], dy = b->y[k] - a->y[k];
+        const double distance = dem2di_sqrt(dx * dx + dy * dy);
+        const double size =
+            a->circumscribed[k] * a->scale[k] + b->circumscribed[k] * b->scale[k] + distance;
+        dem2di_search search;
+        bool rests =
+            dem2di_corner_rests(&t->corners, k, dx, dy, distance, size, true, second, &search);
+        t->way[k] = rests ? (double)DEM2DI_ARRAY_FOUND : (double)DEM2DI_ARRAY_SEARCH;
+        t->alone[k] = search.alone ? 1 : 0;
+        dem2di_array_found(t, k, &search, size);
+    }
 }
 
-static void dem2di_array_solve_plain(dem2di_array_tile *t, double tolerance) {
-    dem2di_array_solve(t, tolerance);
+static DEM2DI_INLINE void dem2di_array_solve(dem2di_array_tile *t, const dem2di_array_queue *q,
+                                             int kind_a, int kind_b, double angle) {
+    if (t->cores && t->second) {
+        dem2di_array_corners(t, true);
+        return;
+    }
+    if (t->cores) {
+        dem2di_array_corners(t, false);
+        return;
+    }
+    dem2di_lanes_support(&t->side[0].lanes, kind_a, t->count);
+    dem2di_lanes_support(&t->side[1].lanes, kind_b, t->count);
+    dem2di_array_smooth(t, q, angle, kind_a == DEM2DI_LANES_ARC || kind_b == DEM2DI_LANES_ARC);
+}
+
+static void dem2di_array_turn_plain(dem2di_array_tile *t, const dem2di_array_queue *q) {
+    dem2di_array_turn(t, q);
+}
+
+static void dem2di_array_solve_plain(dem2di_array_tile *t, const dem2di_array_queue *q, int kind_a,
+                                     int kind_b, double angle) {
+    dem2di_array_solve(t, q, kind_a, kind_b, angle);
 }
 
 #if DEM2DI_FOURS
-static DEM2DI_AVX2 void dem2di_array_solve_fours(dem2di_array_tile *t, double tolerance) {
-    dem2di_array_solve(t, tolerance);
+static DEM2DI_AVX2 void dem2di_array_turn_fours(dem2di_array_tile *t, const dem2di_array_queue *q) {
+    dem2di_array_turn(t, q);
+}
+
+static DEM2DI_AVX2 void dem2di_array_solve_fours(dem2di_array_tile *t, const dem2di_array_queue *q,
+                                                 int kind_a, int kind_b, double angle) {
+    dem2di_array_solve(t, q, kind_a, kind_b, angle);
 }
 #else
+#define dem2di_array_turn_fours dem2di_array_turn_plain
 #define dem2di_array_solve_fours dem2di_array_solve_plain
 #endif
 DEM2DI_VECTORS_END
 
-/* The search of pair k of a tile, which has ended. */
-static void dem2di_array_search(const dem2di_array_tile *t, int k,
-                                const dem2d_contact_memory *memory, dem2di_search *search) {
-    const bool edges = t->corners != NULL;
-    search->state = (dem2d_contact_state)(int)t->state[k];
-    search->iterations = edges ? 0 : 1;
-    search->normal = dem2di_vec(t->x[k], t->y[k]);
-    search->upper = t->upper[k];
-    search->lower = t->lower[k];
-    search->residual = 0;
-    search->a = dem2di_vec(t->wx_a[k], t->wy_a[k]);
-    search->b = dem2di_vec(t->wx_b[k], t->wy_b[k]);
-    search->proof = edges ? DEM2D_BY_FORM : DEM2D_BY_RADIUS;
-    dem2di_feature_clear(search);
-    if (!edges) return;
-    search->feature = dem2di_memory_feature(memory);
-    search->alone = t->h[k] > 0;
-}
-
-/* Pair k of a tile, which is without edges and does not go on: the end of the search, if that is
-   proved, or the search from the evaluation that there is. */
-static void dem2di_array_certify(const dem2di_array_query *query, const dem2di_array_tile *t, int k,
-                                 dem2di_pair *pair, dem2di_search *search) {
-    const dem2d_contact_desc *used = &query->used;
-    const dem2di_demand demand = dem2di_demand_of(pair, used->tolerance, false);
-    const double roundoff = DEM2DI_ROUNDOFF * pair->size;
-    dem2di_eval eval;
-    eval.u = dem2di_vec(t->ux[k], t->uy[k]);
-    eval.edge = eval.no_step = false;
-    eval.h = t->h[k];
-    eval.slope[0] = eval.slope[1] = t->slope[k];
-    if (t->still[k] > 0 && dem2di_certify(pair, &eval, demand.tolerance, search) &&
-        !(eval.h >= -roundoff && search->lower < -roundoff))
-        return;
-    eval.rho[0] = t->rho_a[k];
-    eval.rho[1] = t->rho_b[k];
-    dem2di_vertex_set(pair, dem2di_vec(t->sx_a[k], t->sy_a[k]), dem2di_vec(t->sx_b[k], t->sy_b[k]),
-                      &eval.v[0]);
-    dem2di_certified(pair, eval.u, &demand, used->max_iterations, &eval, search);
-}
-
-/* The answer to pair k of a tile. */
-static void dem2di_array_put(const dem2di_array_query *query, const dem2di_array_tile *t, int k) {
-    const int i = t->pair[k];
+/* The whole search for a pair of a tile that is found. */
+static void dem2di_array_report(const dem2di_array_query *query, const dem2di_array_tile *t, int k,
+                                int i, int steps) {
     const dem2d_body *a = &query->bodies[query->pairs[i].a];
     const dem2d_body *b = &query->bodies[query->pairs[i].b];
-    dem2d_contact_memory *memory = &query->memory[i];
-    if (t->found[k] > 0 && query->contacts == NULL &&
-        !(a->shape->deviation + b->shape->deviation > 0)) {
-        dem2d_overlap *overlap = &query->overlaps[i];
-        overlap->normal.x = memory->normal.x = t->x[k];
-        overlap->normal.y = memory->normal.y = t->y[k];
-        overlap->point.x = t->px[k];
-        overlap->point.y = t->py[k];
-        overlap->depth = t->upper[k];
-        overlap->error = t->error[k];
-        overlap->state = (dem2d_contact_state)(int)t->state[k];
-        if (t->corners == NULL) memory->feature[0] = memory->feature[1] = memory->feature[2] = -1;
-        return;
-    }
     dem2di_pair pair;
     dem2di_search search;
     dem2di_pair_set(a->shape, &a->pose, b->shape, &b->pose, &pair);
-    dem2di_array_search(t, k, memory, &search);
-    pair.calls = 1;
-    if (!(t->found[k] > 0) && t->corners == NULL) dem2di_array_certify(query, t, k, &pair, &search);
-    if (t->found[k] > 0 || t->corners == NULL)
-        dem2di_pairs_report(query, i, &pair, &search, &a->pose, &b->pose);
-    else
-        dem2di_pairs_query(query, i, a, b);
+    pair.calls = 1 + steps;
+    dem2di_feature_clear(&search);
+    search.state = (dem2d_contact_state)(int)t->state[k];
+    search.proof = t->cores ? DEM2D_BY_FORM : DEM2D_BY_RADIUS;
+    search.iterations = t->cores ? 0 : 1 + steps;
+    search.normal = dem2di_vec(t->x[k], t->y[k]);
+    search.upper = t->upper[k];
+    search.lower = t->lower[k];
+    search.residual = 0;
+    search.a = dem2di_vec(t->wx_a[k], t->wy_a[k]);
+    search.b = dem2di_vec(t->wx_b[k], t->wy_b[k]);
+    if (t->cores) {
+        search.feature = dem2di_memory_feature(&query->memory[i]);
+        search.alone = t->alone[k] > 0;
+    }
+    dem2di_pairs_report(query, i, &pair, &search, &a->pose, &b->pose);
 }
 
-/* All pairs of a tile. */
-static void dem2di_array_apply(const dem2di_array_query *query, dem2di_array_tile *t) {
-    if (t->count == 0) return;
-    (dem2di_has_fours() ? dem2di_array_solve_fours
-                        : dem2di_array_solve_plain)(t, query->used.tolerance);
-    for (int k = 0; k < t->count; k++) dem2di_array_put(query, t, k);
-    t->count = 0;
+/* The answer to pair k of a tile, which is found. */
+static DEM2DI_INLINE void dem2di_array_put(const dem2di_array_query *query,
+                                           const dem2di_array_tile *t, int k, int i, int steps) {
+    const dem2d_body_pair *pair = &query->pairs[i];
+    const dem2d_shape *a = query->bodies[pair->a].shape, *b = query->bodies[pair->b].shape;
+    dem2d_contact_memory *memory = &query->memory[i];
+    if (query->contacts != NULL || a->deviation + b->deviation > 0) {
+        dem2di_array_report(query, t, k, i, steps);
+        return;
+    }
+    dem2d_overlap *overlap = &query->overlaps[i];
+    overlap->normal.x = memory->normal.x = t->x[k];
+    overlap->normal.y = memory->normal.y = t->y[k];
+    overlap->point.x = t->px[k];
+    overlap->point.y = t->py[k];
+    overlap->depth = t->upper[k];
+    overlap->error = t->error[k];
+    overlap->state = (dem2d_contact_state)(int)t->state[k];
+    if (!t->cores) memory->feature[0] = memory->feature[1] = memory->feature[2] = -1;
+}
+
+/* Pair k of a queue after an evaluation: its answer, or it waits for another evaluation, behind
+   those that do so already. */
+static DEM2DI_INLINE void dem2di_array_decide(const dem2di_array_query *query,
+                                              const dem2di_array_tile *t, int k,
+                                              dem2di_array_queue *q) {
+    const int i = q->pair[k], way = (int)t->way[k], steps = q->steps[k];
+    const dem2d_body *a = &query->bodies[query->pairs[i].a];
+    const dem2d_body *b = &query->bodies[query->pairs[i].b];
+    bool found = way == DEM2DI_ARRAY_FOUND;
+    dem2di_eval eval;
+    if (!found && way != DEM2DI_ARRAY_SEARCH) {
+        eval.u = dem2di_vec(q->ux[k], q->uy[k]);
+        eval.slope[0] = t->slope[k];
+    }
+    if (way == DEM2DI_ARRAY_PARTS) {
+        dem2di_pair pair;
+        dem2di_pair_set(a->shape, &a->pose, b->shape, &b->pose, &pair);
+        found = dem2di_step_stays(&pair, t->bend[k], &eval);
+    }
+    if (found) {
+        dem2di_array_put(query, t, k, i, steps);
+    } else if (way == DEM2DI_ARRAY_STEP && steps < DEM2DI_FREE_STEPS &&
+               steps + 1 < query->used.max_iterations) {
+        const dem2d_vec u = dem2di_newton(&eval, t->bend[k]);
+        dem2di_array_wait(i, steps + 1, u, q);
+    } else {
+        dem2di_pairs_query(query, i, a, b);
+    }
+}
+
+/* All pairs of a queue. Those that are to be evaluated again stay in it. */
+static void dem2di_array_apply(const dem2di_array_query *query, int kind_a, int kind_b,
+                               dem2di_array_queue *q, dem2di_array_tile *t) {
+    const bool fours = dem2di_has_fours();
+    const int count = q->count;
+    while (q->count % 4 != 0) /* whole vectors, so that loops have no rest */
+        dem2di_array_wait(q->pair[count - 1], 0, dem2di_vec(q->ux[count - 1], q->uy[count - 1]), q);
+    t->count = q->count;
+    q->count = 0;
+    t->cores = kind_a == DEM2DI_LANES_POLYGON;
+    t->second = query->contacts != NULL && !query->used.skip_points;
+    dem2di_array_fetch(query, q, t);
+    if (!t->cores) {
+        (fours ? dem2di_array_turn_fours : dem2di_array_turn_plain)(t, q);
+        dem2di_array_fetch_shapes(query, q, kind_a, kind_b, t);
+    }
+    (fours ? dem2di_array_solve_fours : dem2di_array_solve_plain)(t, q, kind_a, kind_b,
+                                                                  query->angle);
+    for (int k = 0; k < count; k++) dem2di_array_decide(query, t, k, q);
+}
+
+/* The kinds of a pair; false: the search takes it. Those of polygons and circles count as one. */
+static DEM2DI_INLINE bool dem2di_array_kinds(const dem2di_array_query *query, int i, int *kind_a,
+                                             int *kind_b) {
+    const dem2d_body_pair *pair = &query->pairs[i];
+    const dem2d_contact_memory *memory = &query->memory[i];
+    const dem2d_shape *a = query->bodies[pair->a].shape, *b = query->bodies[pair->b].shape;
+    *kind_a = a->lanes;
+    *kind_b = b->lanes;
+    if (!dem2di_is_unit(memory->normal.x, memory->normal.y)) return false;
+    if (a->lanes < DEM2DI_LANES_KINDS && b->lanes < DEM2DI_LANES_KINDS)
+        return a->type != DEM2D_CIRCLE || b->type != DEM2D_CIRCLE;
+    const dem2di_feature feature = dem2di_memory_feature(memory);
+    *kind_a = DEM2DI_LANES_POLYGON;
+    *kind_b = 0;
+    return dem2di_is_feature(a, b, &feature);
 }
 
 /* Pairs of bodies whose rotations are of length 1, each with its memory. */
 static void dem2di_array_tiles(const dem2di_array_query *query, int begin, int end) {
-    dem2di_corners features;
-    dem2di_array_tile smooth, corners;
-    smooth.corners = NULL;
-    corners.corners = &features;
-    smooth.second = corners.second = query->contacts != NULL && !query->used.skip_points;
-    smooth.count = corners.count = 0;
+    dem2di_array_queue queues[DEM2DI_LANES_POLYGON + 1][DEM2DI_LANES_KINDS];
+    dem2di_array_tile tile;
+    int a, b;
+    for (a = 0; a <= DEM2DI_LANES_POLYGON; a++)
+        for (b = 0; b < DEM2DI_LANES_KINDS; b++) queues[a][b].count = 0;
     for (int i = begin; i < end; i++) {
-        dem2di_array_tile *t = dem2di_array_add(query, i, &smooth, &corners);
-        if (t == NULL)
+        if (!dem2di_array_kinds(query, i, &a, &b)) {
             dem2di_pairs_query(query, i, &query->bodies[query->pairs[i].a],
                                &query->bodies[query->pairs[i].b]);
-        else if (t->count == DEM2DI_BATCH)
-            dem2di_array_apply(query, t);
+            continue;
+        }
+        dem2di_array_queue *q = &queues[a][b];
+        dem2di_array_wait(i, 0, query->memory[i].normal, q);
+        while (q->count == DEM2DI_BATCH) dem2di_array_apply(query, a, b, q, &tile);
     }
-    dem2di_array_apply(query, &smooth);
-    dem2di_array_apply(query, &corners);
+    for (a = 0; a <= DEM2DI_LANES_POLYGON; a++)
+        for (b = 0; b < DEM2DI_LANES_KINDS; b++)
+            while (queues[a][b].count > 0) dem2di_array_apply(query, a, b, &queues[a][b], &tile);
 }
 
 /* Pairs without memory, or whose rotations are of any length. */
@@ -12350,8 +12665,8 @@ DEM2D_API dem2d_result dem2d_pairs_contact(const dem2d_env *env, const dem2d_bod
         return dem2di_fail(env, DEM2D_OUT_OF_RANGE, -1, "%s: their count is %d",
                            body_count < 0 ? "bodies" : "pairs",
                            body_count < 0 ? body_count : pair_count);
-    dem2di_array_query query = {bodies, pairs,    {0, 0, {0, 0}, DEM2D_CERTIFIED, false},
-                                memory, overlaps, contacts};
+    dem2di_array_query query = {
+        bodies, pairs, {0, 0, {0, 0}, DEM2D_CERTIFIED, false}, memory, overlaps, contacts, 0};
     bool unit, round;
     dem2d_result result = dem2di_contact_desc_used(env, desc, &query.used);
     if (result == DEM2D_OK) result = dem2di_check_bodies(env, bodies, body_count, &unit, &round);
@@ -12359,6 +12674,7 @@ DEM2D_API dem2d_result dem2d_pairs_contact(const dem2d_env *env, const dem2d_bod
     if (result != DEM2D_OK) return result;
     const bool certified = query.used.solver == DEM2D_CERTIFIED, short_only = contacts == NULL;
     const bool tiles = certified && unit && memory != NULL;
+    query.angle = dem2di_rest_angle(query.used.tolerance, false);
     for (int i = 0; i < pair_count;) {
         int end = pair_count;
         const bool circles =
