@@ -13953,6 +13953,7 @@ typedef struct dem2di_list {
     int *first;    /* of a slot's in adjacent; bodies + 1 */
     int *own;      /* of a slot's as A */
     dem2di_summands *summands;
+    uint16_t *sorted; /* others, see dem2di_kinds_make */
 } dem2di_list;
 
 /* How overlaps move a particle: where it was at first, the sum of the moves of a sweep and their
@@ -14817,6 +14818,7 @@ static const dem2di_column dem2di_columns[] = {
     DEM2DI_CONTACT_COLUMN("arms", GENERAL, arms, arms_fields),
     DEM2DI_COLUMN("histories", GENERAL, list.contacts.history, DEM2DI_STORED | DEM2DI_KEPT,
                   history_fields),
+    DEM2DI_UNSAVED(GENERAL, list.sorted, 0),
     DEM2DI_CONTACT_COLUMN("two_points", POINT_PAIRS, point_pairs, point_pair_fields),
     DEM2DI_CONTACT_COLUMN("point_viscous_forces", POINT_VISCOUS, point_viscous, finite_two),
     DEM2DI_CONTACT_COLUMN("point_law_state", POINT_CALLERS, point_state, any_two),
@@ -15071,10 +15073,9 @@ static dem2d_result dem2di_out_of_memory(const dem2d_world *world, const char *w
 }
 
 /* Parallel work is cut into blocks of so many items: enough to pay for a call of the callback's,
-   few enough to share 10,000 particles out evenly. Contacts of other shapes take ten times longer
-   than those of circles. */
+   few enough to share 10,000 particles out evenly. Walls have fewer parts. */
 #define DEM2DI_BLOCK 256
-#define DEM2DI_BLOCK_OTHERS 64
+#define DEM2DI_BLOCK_PARTS 64
 
 static int dem2di_blocks(int items, int block) {
     return items / block + (items % block > 0);
@@ -18710,14 +18711,14 @@ static bool dem2di_scratch_reserve(dem2d_world *world, size_t bytes) {
 }
 
 static int dem2di_force_blocks(int discs, int count) {
-    return dem2di_blocks(discs, DEM2DI_BLOCK) + dem2di_blocks(count - discs, DEM2DI_BLOCK_OTHERS);
+    return dem2di_blocks(discs, DEM2DI_BLOCK) + dem2di_blocks(count - discs, DEM2DI_BLOCK);
 }
 
 /* Blocks of the search for the list: of particles, of parts of walls, one for contacts that have
    come apart, and one for the images in a cell. */
 static int dem2di_search_blocks(const dem2d_world *world) {
     return dem2di_blocks(world->body_count, DEM2DI_BLOCK) +
-           dem2di_blocks(world->part_count, DEM2DI_BLOCK_OTHERS) + 1 + world->periodic;
+           dem2di_blocks(world->part_count, DEM2DI_BLOCK_PARTS) + 1 + world->periodic;
 }
 
 /* Room for what the blocks find. */
@@ -19032,9 +19033,56 @@ static void dem2di_completions_find(dem2d_world *world) {
     }
 }
 
+/* How a closed contact of two that are not both circles may go on. */
+typedef enum dem2di_way {
+    DEM2DI_WAY_SMOOTH,  /* both without edges */
+    DEM2DI_WAY_CORNERS, /* two polygons */
+    DEM2DI_WAY_ROUND,   /* a polygon and a circle */
+    DEM2DI_WAY_SEARCH
+} dem2di_way;
+
+/* What sorts the contacts of two shapes: the way in two bits, then their types, three bits each. A
+   polybezier with edges counts as the type behind the others. */
+static int dem2di_kind_of(const dem2d_shape *a, const dem2d_shape *b) {
+    const bool cores = dem2di_has_core(a) && dem2di_has_core(b), edges = a->flat || b->flat;
+    const bool known = !dem2di_edges_unknown(a) && !dem2di_edges_unknown(b);
+    const int mixed_a = a->flat && a->type == DEM2D_BEZIER ? DEM2D_SHAPE_TYPE_COUNT : (int)a->type;
+    const int mixed_b = b->flat && b->type == DEM2D_BEZIER ? DEM2D_SHAPE_TYPE_COUNT : (int)b->type;
+    dem2di_way way = DEM2DI_WAY_SEARCH;
+    if (!edges && known) way = DEM2DI_WAY_SMOOTH;
+    if (edges && cores) way = a->type == b->type ? DEM2DI_WAY_CORNERS : DEM2DI_WAY_ROUND;
+    return (int)way << 6 | mixed_a << 3 | mixed_b;
+}
+
+/* Sort the pairs of each block that are not of two circles by kinds: steps take them in this order,
+   in which the kind of the next is nearly always that of the last. An entry has the kind in its
+   upper byte, and in the lower one the place in the block. */
+static void dem2di_kinds_task(void *context, int begin, int end) {
+    const dem2d_world *world = (const dem2d_world *)context;
+    const dem2di_list *list = &world->list;
+    for (int block = begin; block < end; block++) {
+        const int first = list->discs + block * DEM2DI_BLOCK;
+        const int count = dem2di_block_end(first, DEM2DI_BLOCK, list->pairs) - first;
+        int kinds[DEM2DI_BLOCK], place[257] = {0};
+        for (int k = 0; k < count; k++) {
+            const dem2di_key *key = &list->keys[first + k];
+            const bool there = key->a >= 0; /* not forgotten */
+            kinds[k] = there ? dem2di_kind_of(dem2di_shape_of(world, &world->bodies[key->a]),
+                                              dem2di_shape_of(world, &world->bodies[key->b]))
+                             : 0;
+            place[kinds[k] + 1]++;
+        }
+        for (int kind = 0; kind < 256; kind++) place[kind + 1] += place[kind];
+        for (int k = 0; k < count; k++)
+            list->sorted[first - list->discs + place[kinds[k]]++] = (uint16_t)(kinds[k] << 8 | k);
+    }
+}
+
 /* The contacts of each particle, for which there is room: the entries take less scratch memory than
    the actions of a step. */
 static void dem2di_adjacency_make(dem2d_world *world) {
+    const int others = dem2di_blocks(world->list.pairs - world->list.discs, DEM2DI_BLOCK);
+    dem2di_run(world, DEM2D_PHASE_LIST, others, dem2di_kinds_task, world);
     dem2di_run(world, DEM2D_PHASE_LIST, 1, dem2di_adjacency_fill_task, world);
     dem2di_run(world, DEM2D_PHASE_LIST, dem2di_blocks(world->body_count, DEM2DI_BLOCK),
                dem2di_adjacency_sort_task, world);
@@ -19912,7 +19960,7 @@ static void dem2di_search_task(void *context, int begin, int end) {
     int blocks = dem2di_search_blocks(world);
     for (int block = begin; block < end; block++) {
         dem2di_block_result *result = &world->block_results[block];
-        int first = (block - bodies) * DEM2DI_BLOCK_OTHERS;
+        int first = (block - bodies) * DEM2DI_BLOCK_PARTS;
         dem2di_finds finds = {build->finds + result->finds, result->room, 0, 0,
                               dem2di_groups_used(world)};
         if (block < bodies)
@@ -19922,7 +19970,7 @@ static void dem2di_search_task(void *context, int begin, int end) {
         else if (first >= world->part_count)
             dem2di_find_lost(build, &finds);
         else
-            for (int j = first; j < dem2di_block_end(first, DEM2DI_BLOCK_OTHERS, world->part_count);
+            for (int j = first; j < dem2di_block_end(first, DEM2DI_BLOCK_PARTS, world->part_count);
                  j++)
                 if (world->parts[j].extent > 0) dem2di_search_part(build, j, &finds);
         result->found = finds.count;
@@ -22855,6 +22903,7 @@ typedef struct dem2di_tile {
     double rho_a[DEM2DI_BATCH], rho_b[DEM2DI_BATCH];
     double least[DEM2DI_BATCH], most[DEM2DI_BATCH]; /* of the sum of rho */
     double least_part[DEM2DI_BATCH];                /* see dem2di_rest_found */
+    double round_a[DEM2DI_BATCH], round_b[DEM2DI_BATCH]; /* radii of circles, else 0; if round */
     double vx[DEM2DI_BATCH], vy[DEM2DI_BATCH], wa[DEM2DI_BATCH], wb[DEM2DI_BATCH];
     double kn[DEM2DI_BATCH], kt[DEM2DI_BATCH], mu[DEM2DI_BATCH];
     double last_x[DEM2DI_BATCH], last_y[DEM2DI_BATCH], last_shear[DEM2DI_BATCH];
@@ -22907,6 +22956,7 @@ static DEM2DI_INLINE void dem2di_tile_fetch(const dem2d_world *world, int i, dem
     tile->dx[k] = d.x;
     tile->dy[k] = d.y;
     tile->reach[k] = a->radius + b->radius;
+    tile->round_a[k] = tile->round_b[k] = 0;
     tile->kn[k] = law->normal_stiffness;
     tile->kt[k] = law->tangential_stiffness;
     tile->mu[k] = law->friction;
@@ -22926,6 +22976,15 @@ static DEM2DI_INLINE void dem2di_tile_fetch(const dem2d_world *world, int i, dem
     } else { /* the sliding velocity does not count */
         tile->vx[k] = tile->vy[k] = tile->wa[k] = tile->wb[k] = 0;
     }
+}
+
+/* Which of a fetched contact's two are circles. */
+static DEM2DI_INLINE void dem2di_tile_round_set(const dem2d_world *world, int i, int k,
+                                                dem2di_tile *tile) {
+    const dem2di_key *key = &world->list.keys[i];
+    tile->round_a[k] = world->lever[key->a] == 0 ? world->now[key->a].radius : 0;
+    tile->round_b[k] = world->lever[key->b] == 0 ? world->now[key->b].radius : 0;
+    tile->round |= (tile->round_a[k] > 0) | (tile->round_b[k] > 0);
 }
 
 /* The two of contact i as a pair, without places. */
@@ -22971,7 +23030,7 @@ static DEM2DI_INLINE void dem2di_tile_add_smooth(const dem2d_world *world, int i
     const double scale_a = world->bodies[a].scale, scale_b = world->bodies[b].scale;
     const dem2d_vec u = dem2di_vec(from->normal_x[i], from->normal_y[i]);
     dem2di_tile_fetch(world, i, tile);
-    tile->round |= !(world->lever[a] * world->lever[b] > 0);
+    dem2di_tile_round_set(world, i, k, tile);
     dem2di_tile_evaluate(world, a, b, shape_a, shape_b, u, k, tile);
     const double least_a = shape_a->rho_min * scale_a, least_b = shape_b->rho_min * scale_b;
     const bool parts = shape_a->type == DEM2D_BEZIER || shape_b->type == DEM2D_BEZIER;
@@ -23030,27 +23089,24 @@ static dem2di_tile *dem2di_tile_add_round(const dem2d_world *world, int i, const
     if (world->plan.faces && dem2di_has_two_points(&from->point_pairs[i - world->list.discs]))
         return NULL;
     dem2di_tile *tile = dem2di_tile_add_corner(world, i, a, b, corners, corners);
-    corners->round |= tile != NULL;
+    if (tile != NULL) dem2di_tile_round_set(world, i, tile->count - 1, tile);
     return tile;
 }
 
-/* Fetch contact i into its tile, if it may go on; else NULL. */
-static DEM2DI_INLINE dem2di_tile *dem2di_tile_add(const dem2d_world *world, int i,
+/* Fetch contact i into its tile, if it may go on that way; else NULL. */
+static DEM2DI_INLINE dem2di_tile *dem2di_tile_add(const dem2d_world *world, int i, int way,
                                                   dem2di_tile *smooth, dem2di_tile *corners,
                                                   dem2di_tile *pairs) {
     const dem2di_key *key = &world->list.keys[i];
-    if (!(world->list.contacts.depth[i] > 0)) return NULL;
     const dem2d_shape *a = dem2di_shape_of(world, &world->bodies[key->a]);
     const dem2d_shape *b = dem2di_shape_of(world, &world->bodies[key->b]);
-    if (a->type == DEM2D_POLYGON && b->type == DEM2D_POLYGON)
-        return dem2di_tile_add_corner(world, i, a, b, corners, pairs);
-    if (a->flat || b->flat) {
-        const bool cores = dem2di_has_core(a) && dem2di_has_core(b);
-        return cores ? dem2di_tile_add_round(world, i, a, b, corners) : NULL;
+    if (way == DEM2DI_WAY_SMOOTH) {
+        dem2di_tile_add_smooth(world, i, a, b, smooth);
+        return smooth;
     }
-    if (dem2di_edges_unknown(a) || dem2di_edges_unknown(b)) return NULL;
-    dem2di_tile_add_smooth(world, i, a, b, smooth);
-    return smooth;
+    if (way == DEM2DI_WAY_ROUND) return dem2di_tile_add_round(world, i, a, b, corners);
+    if (a->type != DEM2D_POLYGON || b->type != DEM2D_POLYGON) return NULL; /* for compilers */
+    return dem2di_tile_add_corner(world, i, a, b, corners, pairs);
 }
 
 DEM2DI_VECTORS_BEGIN
@@ -23256,6 +23312,25 @@ static DEM2DI_INLINE void dem2di_tile_place(dem2di_tile *t, double tolerance) {
     }
 }
 
+/* The arms of circles, as dem2di_contact_place; the others keep theirs. */
+static DEM2DI_INLINE void dem2di_tile_round(dem2di_tile *DEM2DI_APART t) {
+    const int lanes = dem2di_tile_lanes(t);
+    DEM2DI_INDEPENDENT
+    for (int k = 0; k < lanes; k++) {
+        const double x = t->x[k], y = t->y[k], dx = t->dx[k], dy = t->dy[k];
+        const double along = x * dx + y * dy, across = x * dy - y * dx, half = t->depth[k] / 2;
+        const double round_a = t->round_a[k], round_b = t->round_b[k];
+        const double by_b = round_b > 0 ? along - (round_b - half) : t->a_n[k];
+        const double aside = round_b > 0 ? across : t->a_t[k];
+        const double a_n = round_a > 0 ? round_a - half : by_b;
+        const double a_t = round_a > 0 ? 0 : aside;
+        t->a_n[k] = a_n;
+        t->a_t[k] = a_t;
+        t->b_n[k] = a_n - along;
+        t->b_t[k] = a_t - across;
+    }
+}
+
 /* Force and shear of one of two points, into `shear`, which has been that of the last step. */
 static DEM2DI_INLINE double dem2di_tile_spring(const dem2di_tile *t, int k, double weight,
                                                double depth, double slip, double time_step,
@@ -23311,6 +23386,7 @@ static DEM2DI_INLINE void dem2di_tile_solve(dem2di_tile *t, double tolerance, bo
     else
         dem2di_tile_place(t, tolerance);
     if (t->pairs != NULL) dem2di_tile_points(t, t->corners, t->pairs);
+    if (t->round) dem2di_tile_round(t);
 }
 
 /* Springs and friction of a tile. */
@@ -23352,25 +23428,6 @@ static inline void dem2di_tile_get(const dem2di_tile *tile, int k, dem2di_contac
     contact->arms.a_t = tile->a_t[k];
     contact->arms.b_n = tile->b_n[k];
     contact->arms.b_t = tile->b_t[k];
-}
-
-/* The arms of circles, which dem2di_tile_found does not know. */
-static void dem2di_tile_round(dem2d_world *world, dem2di_tile *tile) {
-    for (int k = 0; k < tile->count; k++) {
-        const int i = tile->contact[k];
-        const dem2di_key *key = &world->list.keys[i];
-        if (world->lever[key->a] != 0 && world->lever[key->b] != 0) continue;
-        dem2di_contact contact;
-        dem2d_contact_point points[2];
-        points[0].position = dem2di_vec(0, 0); /* does not count */
-        dem2di_tile_get(tile, k, &contact);
-        dem2di_contact_place(world, i, false, 1, points, dem2di_vec(tile->dx[k], tile->dy[k]),
-                             &contact);
-        tile->a_n[k] = contact.arms.a_n;
-        tile->a_t[k] = contact.arms.a_t;
-        tile->b_n[k] = contact.arms.b_n;
-        tile->b_t[k] = contact.arms.b_t;
-    }
 }
 
 /* The points of contact k: none, or two. Their shear forces are those of the springs. */
@@ -23459,7 +23516,6 @@ static int dem2di_tile_pass(dem2d_world *world, dem2di_tile *tile, dem2di_law_ro
     dem2di_tile_fill(tile);
     (world->fours ? dem2di_tile_solve_fours : dem2di_tile_solve_plain)(tile, world->tolerance,
                                                                        world->plan.faces);
-    if (tile->round) dem2di_tile_round(world, tile);
     if (!terms)
         (world->fours ? dem2di_tile_load_fours : dem2di_tile_load_plain)(tile, world->made_step);
     for (int k = 0; k < tile->count; k++) {
@@ -23526,6 +23582,8 @@ static void dem2di_others_range(dem2d_world *world, int begin, int end, dem2di_c
     const dem2di_plan *plan = &world->plan;
     const bool tiled = world->solver == DEM2D_CERTIFIED && plan->turns && !world->immovable;
     const bool planes = !plan->turns && !plan->joints && !world->immovable && world->law == NULL;
+    const int ends = tiled && world->list.pairs > begin ? world->list.pairs : begin;
+    const int last = ends < end ? ends : end; /* of those in tiles */
     dem2di_law_rows rows;
     dem2di_corners features[2];
     dem2di_tile_pairs points;
@@ -23537,18 +23595,27 @@ static void dem2di_others_range(dem2d_world *world, int begin, int end, dem2di_c
     corners.corners = &features[0];
     pairs.corners = &features[1];
     pairs.pairs = &points;
-    for (int i = begin; i < end; i++) {
+    for (int k = begin; k < last; k++) {
+        const int entry = world->list.sorted[k - world->list.discs], way = entry >> 14;
+        const int i = begin + ((k - begin) & -DEM2DI_BLOCK) + (entry & 255);
         dem2di_tile *tile = NULL;
-        if (planes && i >= world->list.pairs && dem2di_update_plane_contact(world, i, count))
-            continue;
-        if (tiled && i < world->list.pairs)
-            tile = dem2di_tile_add(world, i, &smooth, &corners, &pairs);
+        if (!(world->list.contacts.depth[i] > 0)) {
+            if (!dem2di_may_meet(world, i)) continue;
+        } else if (way != DEM2DI_WAY_SEARCH) {
+            tile = dem2di_tile_add(world, i, way, &smooth, &corners, &pairs);
+        }
         if (tile == NULL) {
             dem2di_law_room(world, &rows, count);
-            dem2di_collide(world, i, &rows, count);
+            dem2di_update_pair(world, i, &rows, count);
         } else if (tile->count == DEM2DI_BATCH) {
             dem2di_tile_apply(world, tile, &rows, count);
         }
+    }
+    for (int i = last; i < end; i++) {
+        if (planes && i >= world->list.pairs && dem2di_update_plane_contact(world, i, count))
+            continue;
+        dem2di_law_room(world, &rows, count);
+        dem2di_collide(world, i, &rows, count);
     }
     dem2di_tile_apply(world, &smooth, &rows, count);
     dem2di_tile_apply(world, &corners, &rows, count);
@@ -23899,10 +23966,10 @@ static void dem2di_force_task(void *context, int begin, int end) {
         dem2di_count *count = &world->block_results[block].count;
         const bool round = block < discs;
         next = round ? block + 1 : end;
-        const int size = round ? DEM2DI_BLOCK : DEM2DI_BLOCK_OTHERS;
-        const int first = round ? block * size : list->discs + (block - discs) * size;
-        const int last =
-            dem2di_block_end(first, (next - block) * size, round ? list->discs : list->count);
+        const int first =
+            round ? block * DEM2DI_BLOCK : list->discs + (block - discs) * DEM2DI_BLOCK;
+        const int last = dem2di_block_end(first, (next - block) * DEM2DI_BLOCK,
+                                          round ? list->discs : list->count);
         for (int k = block; k < next; k++) memset(&world->block_results[k].count, 0, sizeof *count);
         if (keeps)
             dem2di_contacts_keep(kept, columns, first > kept_from ? first : kept_from, last, false);
