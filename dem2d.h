@@ -13953,7 +13953,7 @@ typedef struct dem2di_list {
     int *first;    /* of a slot's in adjacent; bodies + 1 */
     int *own;      /* of a slot's as A */
     dem2di_summands *summands;
-    uint16_t *sorted; /* others, see dem2di_kinds_make */
+    uint16_t *sorted; /* others, see dem2di_kinds_task */
 } dem2di_list;
 
 /* How overlaps move a particle: where it was at first, the sum of the moves of a sweep and their
@@ -22956,7 +22956,6 @@ static DEM2DI_INLINE void dem2di_tile_fetch(const dem2d_world *world, int i, dem
     tile->dx[k] = d.x;
     tile->dy[k] = d.y;
     tile->reach[k] = a->radius + b->radius;
-    tile->round_a[k] = tile->round_b[k] = 0;
     tile->kn[k] = law->normal_stiffness;
     tile->kt[k] = law->tangential_stiffness;
     tile->mu[k] = law->friction;
@@ -22978,13 +22977,14 @@ static DEM2DI_INLINE void dem2di_tile_fetch(const dem2d_world *world, int i, dem
     }
 }
 
-/* Which of a fetched contact's two are circles. */
+/* Fetch which of contact k's two are circles. Elsewhere the radii are 0, see dem2di_tile_apply. */
 static DEM2DI_INLINE void dem2di_tile_round_set(const dem2d_world *world, int i, int k,
                                                 dem2di_tile *tile) {
-    const dem2di_key *key = &world->list.keys[i];
-    tile->round_a[k] = world->lever[key->a] == 0 ? world->now[key->a].radius : 0;
-    tile->round_b[k] = world->lever[key->b] == 0 ? world->now[key->b].radius : 0;
-    tile->round |= (tile->round_a[k] > 0) | (tile->round_b[k] > 0);
+    const int a = world->list.keys[i].a, b = world->list.keys[i].b;
+    if (world->lever[a] * world->lever[b] > 0) return;
+    tile->round = true;
+    if (!(world->lever[a] > 0)) tile->round_a[k] = world->now[a].radius;
+    if (!(world->lever[b] > 0)) tile->round_b[k] = world->now[b].radius;
 }
 
 /* The two of contact i as a pair, without places. */
@@ -23563,6 +23563,12 @@ static void dem2di_tile_remain(dem2d_world *world, dem2di_tile *tile, bool first
     tile->count = stay;
 }
 
+static void dem2di_tile_round_clear(dem2di_tile *tile) {
+    memset(tile->round_a, 0, sizeof tile->round_a);
+    memset(tile->round_b, 0, sizeof tile->round_b);
+    tile->round = false;
+}
+
 /* All contacts of a tile. */
 static void dem2di_tile_apply(dem2d_world *world, dem2di_tile *tile, dem2di_law_rows *rows,
                               dem2di_count *count) {
@@ -23573,7 +23579,7 @@ static void dem2di_tile_apply(dem2d_world *world, dem2di_tile *tile, dem2di_law_
         if (tile->count > 0) dem2di_tile_remain(world, tile, first, rows, count);
         first = false;
     }
-    tile->round = false;
+    if (tile->round) dem2di_tile_round_clear(tile);
 }
 
 /* The contacts of a block that are not of two circles: first their geometry, then the law, whenever
@@ -23589,7 +23595,9 @@ static void dem2di_others_range(dem2d_world *world, int begin, int end, dem2di_c
     dem2di_tile_pairs points;
     dem2di_tile smooth, corners, pairs;
     rows.count = smooth.count = corners.count = pairs.count = 0;
-    smooth.round = corners.round = pairs.round = false;
+    dem2di_tile_round_clear(&smooth);
+    dem2di_tile_round_clear(&corners);
+    pairs.round = false;
     smooth.corners = NULL;
     smooth.pairs = corners.pairs = NULL;
     corners.corners = &features[0];
