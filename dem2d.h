@@ -12845,6 +12845,13 @@ static inline int dem2di_cell_head(const dem2di_grid *grid, int64_t x, int64_t y
     return grid->cells - grid->table + (int)(slot & (uint64_t)(grid->table - 1));
 }
 
+/* The same of a point in the box on a level that is not in the hash table. */
+static inline int dem2di_dense_head(const dem2di_grid *grid, dem2d_vec point, int level) {
+    const int x = (int)((point.x - grid->box.lower.x) * grid->inverse[level]);
+    const int y = (int)((point.y - grid->box.lower.y) * grid->inverse[level]);
+    return grid->first[level] + (y + 1) * grid->width[level] + x + 1;
+}
+
 /* The level of a disc by its reach, and the head of its cell. */
 static inline int dem2di_grid_place(const dem2di_grid *grid, dem2di_disc *disc) {
     double size = grid->size;
@@ -12940,6 +12947,12 @@ static DEM2DI_INLINE void dem2di_grid_loop(const dem2di_grid *grid, const dem2di
     finds->count = count;
 }
 
+/* The same where anything may keep two discs apart, or the room is short. */
+static void dem2di_grid_checked(const dem2di_grid *grid, const dem2di_disc *own, int begin, int end,
+                                int level, dem2di_finds *finds) {
+    dem2di_grid_loop(grid, own, begin, end, level, false, false, finds);
+}
+
 static DEM2DI_INLINE void dem2di_grid_range(const dem2di_grid *grid, const dem2di_disc *own,
                                             int begin, int end, int level, dem2di_finds *finds) {
     const bool plain = level < grid->dense && finds->groups == NULL && !own->fixed &&
@@ -12949,7 +12962,7 @@ static DEM2DI_INLINE void dem2di_grid_range(const dem2di_grid *grid, const dem2d
     else if (plain)
         dem2di_grid_loop(grid, own, begin, end, level, true, false, finds);
     else
-        dem2di_grid_loop(grid, own, begin, end, level, false, false, finds);
+        dem2di_grid_checked(grid, own, begin, end, level, finds);
 }
 
 /* Cells of a row from x to `last`, as many as have their discs together: from begin to end in
@@ -13002,10 +13015,19 @@ static void dem2di_grid_partners(const dem2di_grid *grid, int place, dem2di_find
 }
 
 #if DEM2DI_FOURS
+/* One of the four discs below: writes its key to `to`, where it stays if it is a partner. */
+DEM2DI_AVX2_INLINE dem2di_key *dem2di_fours_put(const dem2di_disc *own, const dem2di_disc *other,
+                                                long long near, dem2di_key *to) {
+    to->a = own->slot;
+    to->b = other->slot ^ (own->other | other->other);
+    return to - near;
+}
+
 /* Of four discs in sorted, the first `left` ones that are partners, as dem2di_grid_loop finds them.
-   mine: x, y and reach of its disc, in all lanes. */
-DEM2DI_AVX2_INLINE int dem2di_fours_find(const dem2di_disc *own, const dem2di_four mine[3],
-                                         const dem2di_disc *others, int left, dem2di_key *to) {
+   mine: x, y and reach of its disc, in all lanes. Returns where the next key goes. */
+DEM2DI_AVX2_INLINE dem2di_key *dem2di_fours_find(const dem2di_disc *own, const dem2di_four mine[3],
+                                                 const dem2di_disc *others, int left,
+                                                 dem2di_key *to) {
     const dem2di_four_bits lanes = {0, 1, 2, 3};
     dem2di_four of[4];
     for (int j = 0; j < 4; j++) of[j] = dem2di_four_at(&others[j].centre.x);
@@ -13013,44 +13035,39 @@ DEM2DI_AVX2_INLINE int dem2di_fours_find(const dem2di_disc *own, const dem2di_fo
     const dem2di_four x = of[0] - mine[0], y = of[1] - mine[1], both = of[2] + mine[2];
     const dem2di_four_bits near =
         (dem2di_four_bits)(x * x + y * y < both * both) & (dem2di_four_bits)(lanes < left);
-    int count = 0;
-    for (int j = 0; j < 4; j++) {
-        to[count].a = own->slot;
-        to[count].b = others[j].slot ^ (own->other | others[j].other);
-        count -= (int)near[j];
-    }
-    return count;
+    to = dem2di_fours_put(own, &others[0], near[0], to);
+    to = dem2di_fours_put(own, &others[1], near[1], to);
+    to = dem2di_fours_put(own, &others[2], near[2], to);
+    return dem2di_fours_put(own, &others[3], near[3], to);
 }
 
 /* dem2di_grid_partners where all levels are dense and all particles meet, for slots from `slot` to
-   `last`: how many discs a range has differs from one to the next and cannot be foretold, but most
+   `last`: how many discs a row has differs from one to the next and cannot be foretold, but most
    have up to four. */
 static DEM2DI_AVX2 void dem2di_fours_partners(const dem2di_grid *grid, int slot, int last,
                                               dem2di_finds *finds) {
     for (; slot < last; slot++) {
-        const int place = grid->place[slot];
-        const dem2di_disc *own = &grid->sorted[place];
+        const dem2di_disc *own = &grid->sorted[grid->place[slot]];
         const double x = own->centre.x, y = own->centre.y, r = own->reach;
         const dem2di_four mine[3] = {{x, x, x, x}, {y, y, y, y}, {r, r, r, r}};
         for (int level = 0; level <= own->level; level++) {
             if (!(grid->levels >> level & 1)) continue;
-            const dem2di_cell cell = dem2di_cell_at(grid, own->centre, level);
-            const int *head = grid->heads + dem2di_cell_head(grid, cell.x, cell.y, level);
+            const int *head = grid->heads + dem2di_dense_head(grid, own->centre, level);
             const bool same = level == own->level;
             for (int row = same ? 0 : -1; row <= 1; row++) {
                 const int *cells = head + row * grid->width[level];
-                const int begin = same && row == 0 ? place + 1 : cells[-1];
-                int left = cells[2] - begin, count = finds->count;
-                if (own->fixed || finds->room - count < left + 4) {
-                    dem2di_grid_range(grid, own, begin, cells[2], level, finds);
+                const dem2di_disc *others = same && row == 0 ? own + 1 : grid->sorted + cells[-1];
+                int left = (int)(grid->sorted + cells[2] - others);
+                dem2di_key *to = finds->to + finds->count;
+                if (own->fixed || finds->room - finds->count < left + 4) {
+                    dem2di_grid_checked(grid, own, cells[2] - left, cells[2], level, finds);
                     continue;
                 }
-                const dem2di_disc *others = grid->sorted + begin;
                 do {
-                    count += dem2di_fours_find(own, mine, others, left, finds->to + count);
+                    to = dem2di_fours_find(own, mine, others, left, to);
                     others += 4;
                 } while ((left -= 4) > 0);
-                finds->count = count;
+                finds->count = (int)(to - finds->to);
             }
         }
     }
@@ -13990,7 +14007,8 @@ typedef struct dem2di_stiffest {
 typedef struct dem2di_extremes {
     double far, size;             /* m, of a position (dem2di_size_of); radius */
     double speed, spin, load;     /* of velocities (likewise), external loads */
-    double heavy, light, slender; /* mass of the free, 1/mass, 1/inertia */
+    double heavy;                 /* 1/mass of the heaviest that is free; 0: none is */
+    double light, slender;        /* 1/mass, 1/inertia */
     bool others;                  /* some are no circles */
 } dem2di_extremes;
 
@@ -14016,6 +14034,7 @@ typedef struct dem2di_block_result {
     int finds, found, room; /* of the search: the first of what it found, how many; room for the
                                next list's */
     int starts[3];          /* where these go in the list, by kinds */
+    int plain;              /* so many come first that are of two circles, none of them an image */
     uint32_t levels;        /* of the discs: bit mask */
     bool walls;             /* some particle has listed contacts with walls */
     int fast;               /* slot of the one of least rank that may pass through others, or -1 */
@@ -19016,6 +19035,20 @@ static void dem2di_adjacency_fill_task(void *context, int begin, int end) {
     }
 }
 
+DEM2DI_VECTORS_BEGIN
+
+/* The last contact of circles among some, which come in any order; or 0. */
+static int dem2di_last_disc(const int *contacts, int count, int discs) {
+    int last = 0;
+    for (int i = 0; i < count; i++) {
+        const int disc = contacts[i] < discs ? contacts[i] : 0;
+        last = disc > last ? disc : last;
+    }
+    return last;
+}
+
+DEM2DI_VECTORS_END
+
 /* Which blocks of particles have all of their contacts of circles once a block of these is done: in
    the order of space it is soon after their first. See dem2di_joint_pass. */
 static void dem2di_completions_find(dem2d_world *world) {
@@ -19024,10 +19057,10 @@ static void dem2di_completions_find(dem2d_world *world) {
     const int discs = dem2di_blocks(list->discs, DEM2DI_BLOCK);
     for (int k = 0; k < discs; k++) results[k].complete = -1;
     for (int k = dem2di_blocks(world->body_count, DEM2DI_BLOCK) - 1; k >= 0 && discs > 0; k--) {
-        int end = dem2di_block_end(k * DEM2DI_BLOCK, DEM2DI_BLOCK, world->body_count), last = 0;
-        for (int i = list->first[k * DEM2DI_BLOCK]; i < list->first[end]; i++)
-            if (list->adjacent[i] < list->discs && list->adjacent[i] > last)
-                last = list->adjacent[i];
+        const int begin = list->first[k * DEM2DI_BLOCK];
+        const int end = dem2di_block_end(k * DEM2DI_BLOCK, DEM2DI_BLOCK, world->body_count);
+        const int last =
+            dem2di_last_disc(list->adjacent + begin, list->first[end] - begin, list->discs);
         results[k].next = results[last / DEM2DI_BLOCK].complete;
         results[last / DEM2DI_BLOCK].complete = k;
     }
@@ -19327,7 +19360,13 @@ static bool dem2di_plan_fits(const dem2di_plan *one, const dem2di_plan *other) {
            one->joints == other->joints && one->events == other->events;
 }
 
-static inline void dem2di_extremes_add(const dem2d_world *world, int slot, dem2di_extremes *most) {
+/* The mass of another particle, whose inverse this is. */
+static inline void dem2di_heavier(dem2di_extremes *most, double inverse) {
+    if (inverse > 0 && !(most->heavy > 0 && most->heavy <= inverse)) most->heavy = inverse;
+}
+
+static DEM2DI_INLINE void dem2di_extremes_add(const dem2d_world *world, int slot,
+                                              dem2di_extremes *most) {
     const dem2di_state *now = &world->now[slot];
     const dem2di_inverse inverse = world->inverse[slot];
     if (world->loaded) most->load = dem2di_max(most->load, dem2di_load_size(&world->loads[slot]));
@@ -19337,7 +19376,7 @@ static inline void dem2di_extremes_add(const dem2d_world *world, int slot, dem2d
     most->spin = dem2di_max(most->spin, fabs(now->w));
     most->light = dem2di_max(most->light, inverse.mass);
     most->slender = dem2di_max(most->slender, inverse.inertia);
-    if (inverse.mass > 0) most->heavy = dem2di_max(most->heavy, 1 / inverse.mass);
+    dem2di_heavier(most, inverse.mass);
     most->others = most->others || !dem2di_is_circle(world, slot);
 }
 
@@ -19347,7 +19386,7 @@ static void dem2di_extremes_meet(dem2di_extremes *most, const dem2di_extremes *o
     most->speed = dem2di_max(most->speed, other->speed);
     most->spin = dem2di_max(most->spin, other->spin);
     most->load = dem2di_max(most->load, other->load);
-    most->heavy = dem2di_max(most->heavy, other->heavy);
+    dem2di_heavier(most, other->heavy);
     most->light = dem2di_max(most->light, other->light);
     most->slender = dem2di_max(most->slender, other->slender);
     most->others = most->others || other->others;
@@ -19975,6 +20014,8 @@ static void dem2di_search_task(void *context, int begin, int end) {
                 if (world->parts[j].extent > 0) dem2di_search_part(build, j, &finds);
         result->found = finds.count;
         dem2di_kinds_count(&finds, build->grid.circles, result->starts);
+        const bool plain = block < bodies && result->starts[DEM2DI_OTHERS] == 0;
+        result->plain = plain ? result->starts[DEM2DI_DISCS] : 0;
     }
 }
 
@@ -20111,9 +20152,41 @@ static void dem2di_carry_others(const dem2di_build *build, int discs, int pairs)
     }
 }
 
-/* What a block of the search found, the one of lower rank first, and their contacts in the old
-   list, by kinds. */
-static void dem2di_fill_block(const dem2di_build *build, dem2di_block_result *result) {
+/* The two of a pair that was found, the one of lower rank first, without a branch: half of them are
+   swapped. The second is here the owner of an image. */
+static inline dem2di_key dem2di_fill_key(const dem2di_body *bodies, int a, int b, int owner) {
+    const uint32_t turned = (uint32_t)(bodies[owner].rank - bodies[a].rank) >> 31;
+    const int swap = (a ^ b) & -(int)turned;
+    const dem2di_key key = {a ^ swap, b ^ swap};
+    return key;
+}
+
+/* What a block of the search found first, pairs of circles, and their contacts in the old list. */
+static void dem2di_fill_plain(const dem2di_build *build, dem2di_block_result *result) {
+    const dem2d_world *world = build->world;
+    const dem2di_list list = world->list;
+    const dem2di_body *bodies = world->bodies;
+    const int count = result->plain;
+    dem2di_key *finds = build->finds + result->finds;
+    int *old = build->old + result->starts[DEM2DI_DISCS], next = 0;
+    int64_t spread = 0;
+    for (int k = 0; k < count; k++) {
+        const int a = finds[k].a, b = finds[k].b;
+        const dem2di_key key = dem2di_fill_key(bodies, a, b, b);
+        const bool follows = dem2di_is_listed(&list, next, &key);
+        const int contact = follows ? next : dem2di_listed_before(build, &key, false);
+        if (contact >= 0) next = contact + 1;
+        old[k] = contact;
+        finds[k].a = key.a; /* one by one: both as one number would wait for key to be stored */
+        finds[k].b = key.b;
+        spread += abs(a - b);
+    }
+    result->starts[DEM2DI_DISCS] += count;
+    result->spread = spread;
+}
+
+/* What it found behind these: contacts of all kinds. */
+static void dem2di_fill_rest(const dem2di_build *build, dem2di_block_result *result) {
     const dem2d_world *world = build->world;
     const dem2di_list list = world->list;
     const dem2di_body *bodies = world->bodies;
@@ -20121,10 +20194,9 @@ static void dem2di_fill_block(const dem2di_build *build, dem2di_block_result *re
     dem2di_key *finds = build->finds + result->finds;
     dem2di_order *wall_contacts = build->wall_contacts + result->starts[DEM2DI_WALL_CONTACTS];
     int *old[2], next[2] = {0, 0};
-    int64_t spread = 0;
     old[DEM2DI_DISCS] = build->old + result->starts[DEM2DI_DISCS];
     old[DEM2DI_OTHERS] = build->old + result->starts[DEM2DI_OTHERS];
-    for (int k = 0; k < found; k++) {
+    for (int k = result->plain; k < found; k++) {
         const int a = finds[k].a, kind = finds[k].b < 0 ? DEM2DI_OTHERS : DEM2DI_DISCS;
         const int b = kind == DEM2DI_OTHERS ? ~finds[k].b : finds[k].b;
         if (a < 0) {
@@ -20134,26 +20206,26 @@ static void dem2di_fill_block(const dem2di_build *build, dem2di_block_result *re
             continue;
         }
         const int owner = b < base ? b : dem2di_build_owner(build, b);
-        const int turned = bodies[a].rank > bodies[owner].rank;
-        const int swap = (a ^ b) & -turned; /* without a branch: half of them are */
-        const dem2di_key key = {a ^ swap, b ^ swap};
+        const dem2di_key key = dem2di_fill_key(bodies, a, b, owner);
         const bool follows = b < base && dem2di_is_listed(&list, next[kind], &key);
         const int contact = follows ? next[kind] : dem2di_listed_before(build, &key, false);
         if (contact >= 0) next[kind] = contact + 1;
         *old[kind]++ = contact;
         finds[k].a = key.a;
         finds[k].b = kind == DEM2DI_OTHERS ? ~key.b : key.b;
-        spread += abs(a - owner);
+        result->spread += abs(a - owner);
     }
     for (int kind = 0; kind < 2; kind++) result->starts[kind] = (int)(old[kind] - build->old);
     result->starts[DEM2DI_WALL_CONTACTS] = (int)(wall_contacts - build->wall_contacts);
-    result->spread = spread;
 }
 
 static void dem2di_fill_task(void *context, int begin, int end) {
     const dem2di_build *build = (const dem2di_build *)context;
-    for (int block = begin; block < end; block++)
-        dem2di_fill_block(build, &build->world->block_results[block]);
+    for (int block = begin; block < end; block++) {
+        dem2di_block_result *result = &build->world->block_results[block];
+        dem2di_fill_plain(build, result);
+        dem2di_fill_rest(build, result);
+    }
 }
 
 /* Images of one particle at one part of a wall in the order of their shifts. */
@@ -20194,13 +20266,16 @@ static void dem2di_keys_task(void *context, int begin, int end) {
     for (int block = begin; block < end; block++) {
         dem2di_block_result *result = &build->world->block_results[block];
         const dem2di_key *finds = build->finds + result->finds;
-        for (int k = result->found - 1; k >= 0; k--) {
+        for (int k = result->found - 1; k >= result->plain; k--) {
             const dem2di_key found = finds[k];
             if (found.a < 0) continue; /* with walls */
             int at = --result->starts[found.b < 0 ? DEM2DI_OTHERS : DEM2DI_DISCS];
             keys[at].a = found.a;
             keys[at].b = found.b < 0 ? ~found.b : found.b;
         }
+        if (result->plain > 0)
+            memcpy(keys + result->starts[DEM2DI_DISCS] - result->plain, finds,
+                   (size_t)result->plain * sizeof *keys);
     }
 }
 
@@ -20238,7 +20313,8 @@ static void dem2di_displacement_task(void *context, int begin, int end) {
    gravity up to these values may be set without asking again. */
 static bool dem2di_bounded(const dem2d_world *world, const dem2di_plan *plan, int contacts,
                            const dem2di_extremes *most) {
-    double far = most->far, heavy = most->heavy, stiff = 0, ratio = 0, rolling = 0;
+    double heavy = most->heavy > 0 ? 1 / most->heavy : 0;
+    double far = most->far, stiff = 0, ratio = 0, rolling = 0;
     double speed = dem2di_max(DEM2DI_SPEED_SURE, most->speed);
     double spin = dem2di_max(DEM2DI_TURN_SURE / world->time_step, most->spin);
     double belt = 0, turn = 0, flow = dem2di_flow_size(&world->flow);
