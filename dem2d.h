@@ -19258,7 +19258,7 @@ typedef struct dem2di_build {
     dem2d_world *world;
     dem2di_plan plan;
     dem2di_grid grid;
-    double *reach;            /* of the discs, by slots */
+    double *reach;            /* of the discs, by slots; until the blocks search */
     int *planes, plane_count; /* parts that are half-planes */
     dem2di_key *finds;        /* of the search, block by block; then keys */
     int room;                 /* for these */
@@ -19266,7 +19266,8 @@ typedef struct dem2di_build {
     int total[DEM2DI_KINDS];
     int *old;                            /* of the new list: its contact in the old one, or -1 */
     dem2di_order *wall_contacts, *spare; /* part, rank of particle; slot */
-    char *column;                        /* room for a column of contacts, where the search was */
+    int *numbers;                        /* of contacts of each particle, for their softness */
+    char *column;                        /* room for a column of contacts */
     bool bounded, back; /* as in the world; whether the next step may look back on contacts */
     double softness, limit_softness; /* as in the world */
     int image_base;  /* an image that was found has this plus its number for a slot, */
@@ -20392,10 +20393,10 @@ static double dem2di_softness_for_safe(const dem2di_plan *plan, double limit_sof
     return plan->terms == 0 ? limit_softness : HUGE_VAL;
 }
 
-/* Softness of the contacts that were found, whose numbers come over what the search needed. */
+/* Softness of the contacts that were found. */
 static double dem2di_found_softness(const dem2di_build *build) {
     const dem2d_world *world = build->world;
-    int *numbers = (int *)(void *)build->reach;
+    int *numbers = build->numbers;
     if (!dem2di_softness_holds(&build->plan, build->total[DEM2DI_OTHERS])) return HUGE_VAL;
     memset(numbers, 0, (size_t)world->body_count * sizeof *numbers);
     for (int block = 0; block < dem2di_search_blocks(world); block++) {
@@ -20519,35 +20520,52 @@ static void dem2di_softness_set(dem2d_world *world) {
         world->softness = dem2di_softness_for_safe(&world->plan, world->limit_softness);
 }
 
-/* Scratch memory for the search and for what it finds, as far as is known. Contacts on their way
-   come over what the search needs. */
+/* Scratch memory for what was found on its way into the list, as far as is known. */
+static void dem2di_build_cut_found(dem2di_build *build, dem2di_cutter *cutter) {
+    const size_t walls = (size_t)build->total[DEM2DI_WALL_CONTACTS];
+    const int discs = build->total[DEM2DI_DISCS];
+    const int count = discs + build->total[DEM2DI_OTHERS] + (int)walls;
+    const size_t slots = (size_t)build->grid.count, order = sizeof(dem2di_order);
+    build->old = (int *)dem2di_cut(cutter, (size_t)count, sizeof *build->old);
+    build->numbers = (int *)dem2di_cut(cutter, slots, sizeof *build->numbers);
+    build->wall_contacts = (dem2di_order *)dem2di_cut(cutter, walls, order);
+    build->spare = (dem2di_order *)dem2di_cut(cutter, walls, order);
+}
+
+/* The same for all of a list that is being made. What was found on its way comes over what the
+   search needed, where this is large enough, and then a column of contacts over what it found, in
+   which the reaches were before. */
 static bool dem2di_build_cut(dem2di_build *build) {
     dem2d_world *world = build->world;
-    size_t n = (size_t)build->grid.count, walls = (size_t)build->total[DEM2DI_WALL_CONTACTS];
-    int discs = build->total[DEM2DI_DISCS], pairs = discs + build->total[DEM2DI_OTHERS];
-    int count = pairs + build->total[DEM2DI_WALL_CONTACTS];
+    dem2di_grid *grid = &build->grid;
+    const size_t n = (size_t)grid->count;
+    const int discs = build->total[DEM2DI_DISCS], pairs = discs + build->total[DEM2DI_OTHERS];
+    const int count = pairs + build->total[DEM2DI_WALL_CONTACTS];
     for (int pass = 0; pass < 2; pass++) {
-        dem2di_cutter cutter = {pass == 0 ? NULL : world->scratch, 0};
-        dem2di_grid *grid = &build->grid;
-        build->column = cutter.memory;
-        build->reach = (double *)dem2di_cut(&cutter, n, sizeof *build->reach);
-        grid->sorted = (dem2di_disc *)dem2di_cut(&cutter, n + 4, sizeof *grid->sorted);
-        grid->place = (int *)dem2di_cut(&cutter, n, sizeof *grid->place);
-        build->planes = (int *)dem2di_cut(&cutter, (size_t)world->part_count, sizeof(int));
-        grid->heads = (int *)dem2di_cut(&cutter, (size_t)grid->cells + 1, sizeof *grid->heads);
+        char *memory = pass == 0 ? NULL : world->scratch;
+        dem2di_cutter search = {memory, 0}, found = {NULL, 0};
+        grid->sorted = (dem2di_disc *)dem2di_cut(&search, n + 4, sizeof *grid->sorted);
+        grid->place = (int *)dem2di_cut(&search, n, sizeof *grid->place);
+        build->planes = (int *)dem2di_cut(&search, (size_t)world->part_count, sizeof(int));
+        grid->heads = (int *)dem2di_cut(&search, (size_t)grid->cells + 1, sizeof *grid->heads);
         build->image_of = NULL;
         if (world->periodic && world->line != NULL)
-            build->image_of = (int *)dem2di_cut(&cutter, n, sizeof *build->image_of);
-        build->finds = (dem2di_key *)dem2di_cut(&cutter, (size_t)build->room, sizeof(dem2di_key));
-        size_t column = dem2di_contacts_largest(&build->plan, discs, count);
-        if (column > cutter.used) (void)dem2di_cut(&cutter, column - cutter.used, 1);
-        build->old = (int *)dem2di_cut(&cutter, (size_t)count, sizeof *build->old);
-        build->wall_contacts =
-            (dem2di_order *)dem2di_cut(&cutter, walls, sizeof *build->wall_contacts);
-        build->spare = (dem2di_order *)dem2di_cut(&cutter, walls, sizeof *build->spare);
-        size_t step = dem2di_step_cut(world, NULL, discs, pairs, count, &build->plan, build->back);
-        if (pass == 0 && !dem2di_scratch_reserve(world, cutter.used > step ? cutter.used : step))
-            return false;
+            build->image_of = (int *)dem2di_cut(&search, n, sizeof *build->image_of);
+        dem2di_cutter reach = search;
+        build->reach = (double *)dem2di_cut(&reach, n, sizeof *build->reach);
+        dem2di_build_cut_found(build, &found);
+        const bool over = found.used <= search.used;
+        build->finds = (dem2di_key *)dem2di_cut(&search, (size_t)build->room, sizeof(dem2di_key));
+        found.memory = memory;
+        found.used = over ? 0 : search.used;
+        dem2di_build_cut_found(build, &found);
+        build->column =
+            (char *)dem2di_cut(&found, dem2di_contacts_largest(&build->plan, discs, count), 1);
+        size_t most = dem2di_step_cut(world, NULL, discs, pairs, count, &build->plan, build->back);
+        most = most > search.used ? most : search.used;
+        most = most > found.used ? most : found.used;
+        most = most > reach.used ? most : reach.used;
+        if (pass == 0 && !dem2di_scratch_reserve(world, most)) return false;
     }
     return true;
 }
@@ -20597,7 +20615,11 @@ static bool dem2di_build_search(dem2di_build *build) {
     if (!dem2di_build_cut(build)) return false;
     dem2di_run(world, DEM2D_PHASE_LIST, blocks, dem2di_reach_task, build);
     dem2di_discs_survey(build);
-    if (!dem2di_build_cut(build)) return false;
+    const size_t at = (size_t)((char *)build->reach - world->scratch);
+    if (!dem2di_build_cut(build)) return false; /* the heads come where the reaches are */
+    if (build->grid.count > 0)
+        memmove(build->reach, world->scratch + at,
+                (size_t)build->grid.count * sizeof *build->reach);
     dem2di_run(world, DEM2D_PHASE_LIST, blocks, dem2di_place_task, build);
     dem2di_run(world, DEM2D_PHASE_LIST, 1, dem2di_grid_task, build);
     dem2di_run(world, DEM2D_PHASE_LIST, blocks, dem2di_sorted_task, build);
