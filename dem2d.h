@@ -23695,7 +23695,7 @@ static void dem2di_others_range(dem2d_world *world, int begin, int end, dem2di_c
     rows.count = smooth.count = corners.count = pairs.count = 0;
     dem2di_tile_round_clear(&smooth);
     dem2di_tile_round_clear(&corners);
-    pairs.round = false;
+    dem2di_tile_round_clear(&pairs);
     smooth.corners = NULL;
     smooth.pairs = corners.pairs = NULL;
     corners.corners = &features[0];
