@@ -14878,7 +14878,7 @@ static void dem2di_column_set(dem2d_world *world, const dem2di_column *column, v
 
 /* As dem2di_growth, with little to spare: for what is renewed as a whole. */
 static int dem2di_room(int capacity, int needed) {
-    int spare = needed / 16;
+    int spare = needed / 32;
     return needed <= capacity ? capacity : needed < INT_MAX - spare ? needed + spare : needed;
 }
 
