@@ -16405,13 +16405,12 @@ typedef struct dem2di_round {
     double arm_a, arm_b; /* from the centres to the contact point */
 } dem2di_round;
 
-static DEM2DI_INLINE dem2di_round dem2di_round_make(dem2d_vec d, double radius_a, double radius_b,
-                                                    double stiffness) {
+/* Two circles whose centres have this distance. */
+static DEM2DI_INLINE dem2di_round dem2di_round_of(dem2d_vec normal, double distance,
+                                                  double radius_a, double radius_b,
+                                                  double stiffness) {
     dem2di_round round;
-    double square = d.x * d.x + d.y * d.y, distance = dem2di_sqrt(square);
-    double f = distance * (1 / square); /* root and division side by side */
-    round.normal.x = d.x * f;
-    round.normal.y = d.y * f;
+    round.normal = normal;
     round.depth = radius_a + radius_b - distance;
     round.force = stiffness * (round.depth > 0 ? round.depth : 0);
     round.arm_a = radius_a - round.depth / 2;
@@ -20985,16 +20984,19 @@ static DEM2DI_INLINE double dem2di_action_size(const dem2di_action *action) {
 
 /* CONTACTS OF CIRCLES
 
-   They are taken in batches: what the law needs of the particles is fetched into arrays, one loop
-   that compilers turn into vector instructions computes all, and writes the next contacts over the
+   They are taken in batches: what the law needs of the particles is fetched into arrays, and loops
+   that compilers turn into vector instructions compute all, and write the next contacts over the
    last, in their columns. There is no branch but for what the scene has: the force is 0 where two
    are apart, and with it the limit of the tangential spring. All of it is compiled twice, see
-   DEM2DI_AVX2: the loops are the same, only the fetch is written for vectors of four.
+   DEM2DI_AVX2: the loops are the same, only the fetch is written for vectors of four. Roots and
+   divisions take most of the time. A loop that does much with each of them has more instructions
+   waiting than the processor can look past: hence two loops, and lines in the fetch.
    Where the line of centres is taken: dem2di_batch_fetch and dem2di_fours_fetch. Where the relative
    velocity is: there, and in dem2di_batch_made. */
 typedef struct dem2di_batch {
     int count;
-    double dx[DEM2DI_BATCH], dy[DEM2DI_BATCH]; /* from A to B */
+    double x[DEM2DI_BATCH], y[DEM2DI_BATCH]; /* from A to B; by vectors of four the normal, with: */
+    double distance[DEM2DI_BATCH];
     double radius_a[DEM2DI_BATCH], radius_b[DEM2DI_BATCH];
     double vx[DEM2DI_BATCH], vy[DEM2DI_BATCH]; /* of B against A */
     double wa[DEM2DI_BATCH], wb[DEM2DI_BATCH];
@@ -21004,7 +21006,8 @@ typedef struct dem2di_batch {
     double *normal_x, *normal_y, *depth, *force, *shear, *moment, *viscous_shear, *viscous_moment;
     dem2di_dampers dampers;
     dem2di_action *actions;
-    double own[DEM2DI_BATCH]; /* see dem2di_batch_slider */
+    /* from one loop to the next: sliding velocity, tangential dashpot */
+    double slip[DEM2DI_BATCH], dashpot[DEM2DI_BATCH];
 } dem2di_batch;
 
 /* A batch of contacts from `first` on: where its columns are. */
@@ -21040,14 +21043,27 @@ static void dem2di_batch_begin(const dem2d_world *world, int first, int count,
     }
 }
 
-/* Contacts from `first` on of a batch whose contact 0 has these keys: places and motions. */
+/* From the centre of A to that of B. */
+typedef struct dem2di_line {
+    dem2d_vec normal;
+    double distance;
+} dem2di_line;
+
+static DEM2DI_INLINE dem2di_line dem2di_line_of(double x, double y) {
+    const double square = x * x + y * y, distance = dem2di_sqrt(square);
+    const double f = distance * (1 / square); /* root and division side by side */
+    const dem2di_line line = {{x * f, y * f}, distance};
+    return line;
+}
+
+/* Places and motions of the two of each contact. */
 static DEM2DI_INLINE void dem2di_batch_fetch(const dem2di_state *now, const dem2di_key *keys,
-                                             int first, bool friction, dem2di_batch *batch) {
-    for (int k = first; k < batch->count; k++) {
+                                             bool friction, dem2di_batch *batch) {
+    for (int k = 0; k < batch->count; k++) {
         const dem2di_state *a = &now[keys[k].a], *b = &now[keys[k].b];
         dem2d_vec d = dem2di_disc_line(a, b);
-        batch->dx[k] = d.x;
-        batch->dy[k] = d.y;
+        batch->x[k] = d.x;
+        batch->y[k] = d.y;
         batch->radius_a[k] = a->radius;
         batch->radius_b[k] = b->radius;
         if (!friction) continue;
@@ -21061,56 +21077,87 @@ static DEM2DI_INLINE void dem2di_batch_fetch(const dem2di_state *now, const dem2
 static void dem2di_batch_fetch_plain(const dem2d_world *world, int first, dem2di_batch *batch) {
     const dem2di_key *keys = world->list.keys + first;
     if (world->plan.friction || world->plan.terms != 0)
-        dem2di_batch_fetch(world->now, keys, 0, true, batch);
+        dem2di_batch_fetch(world->now, keys, true, batch);
     else
-        dem2di_batch_fetch(world->now, keys, 0, false, batch);
+        dem2di_batch_fetch(world->now, keys, false, batch);
 }
 
 #if DEM2DI_FOURS
-/* The two of contact k: of B against A the place and, behind it, the spin and the radius of B; of B
-   against A the velocity, and those of A. The two halves of a state are a vector each. */
-DEM2DI_AVX2_INLINE void dem2di_fours_two(const double *states, const dem2di_key *key,
-                                         dem2di_four *places, dem2di_four *speeds) {
-    const double *a = states + 8 * (size_t)key->a, *b = states + 8 * (size_t)key->b;
-    const dem2di_four va = dem2di_four_at(a + 4), vb = dem2di_four_at(b + 4), v = vb - va;
-    const dem2di_four d = dem2di_four_at(b) - dem2di_four_at(a);
-    *places = DEM2DI_SHUFFLE(d, vb, 0, 1, 6, 7);
-    *speeds = DEM2DI_SHUFFLE(v, va, 0, 1, 6, 7);
+/* Two numbers of four states, from `at` on: of 0 and 2 in one vector, of 1 and 3 in the other. */
+typedef struct dem2di_four_twos {
+    dem2di_four even, odd;
+} dem2di_four_twos;
+
+DEM2DI_AVX2_INLINE dem2di_four_twos dem2di_fours_twos(const double *const states[4], int at) {
+    dem2di_four_twos twos;
+    twos.even = DEM2DI_SHUFFLE(dem2di_lanes_at(states[0] + at), dem2di_lanes_at(states[2] + at), 0,
+                               1, 2, 3);
+    twos.odd = DEM2DI_SHUFFLE(dem2di_lanes_at(states[1] + at), dem2di_lanes_at(states[3] + at), 0,
+                              1, 2, 3);
+    return twos;
 }
 
-/* dem2di_batch_fetch for all contacts, four at a time. */
+/* The same of B less A. */
+DEM2DI_AVX2_INLINE dem2di_four_twos dem2di_fours_between(const double *const a[4],
+                                                         const double *const b[4], int at) {
+    const dem2di_four_twos from = dem2di_fours_twos(a, at);
+    dem2di_four_twos to = dem2di_fours_twos(b, at);
+    to.even -= from.even;
+    to.odd -= from.odd;
+    return to;
+}
+
+DEM2DI_AVX2_INLINE dem2di_four dem2di_fours_first(dem2di_four_twos twos) {
+    return DEM2DI_SHUFFLE(twos.even, twos.odd, 0, 4, 2, 6);
+}
+
+DEM2DI_AVX2_INLINE dem2di_four dem2di_fours_second(dem2di_four_twos twos) {
+    return DEM2DI_SHUFFLE(twos.even, twos.odd, 1, 5, 3, 7);
+}
+
+/* dem2di_line_of for contacts k to k + 3. Returns the squares of their distances. */
+DEM2DI_AVX2_INLINE dem2di_four dem2di_fours_line(dem2di_batch *batch, int k, dem2di_four x,
+                                                 dem2di_four y) {
+    const dem2di_four square = x * x + y * y, one = dem2di_four_of(1, 1, 1, 1);
+    const dem2di_four distance = __builtin_ia32_sqrtpd256(square), f = distance * (one / square);
+    dem2di_four_put(batch->x + k, x * f);
+    dem2di_four_put(batch->y + k, y * f);
+    dem2di_four_put(batch->distance + k, distance);
+    return square;
+}
+
+/* dem2di_batch_fetch and dem2di_line_of for all contacts, whose number is a multiple of four. */
 DEM2DI_AVX2_INLINE void dem2di_fours_fetch(const dem2di_state *now, const dem2di_key *keys,
                                            dem2di_batch *batch) {
-    const double *states = &now->x.x;
     const double square = DEM2DI_LEAST_SQUARE;
     const dem2di_four least = dem2di_four_of(square, square, square, square);
     dem2di_four_bits near = {0, 0, 0, 0};
-    int k = 0;
-    for (; k + 4 <= batch->count; k += 4) {
-        dem2di_four p[4], s[4];
-        dem2di_fours_two(states, &keys[k], &p[0], &s[0]);
-        dem2di_fours_two(states, &keys[k + 1], &p[1], &s[1]);
-        dem2di_fours_two(states, &keys[k + 2], &p[2], &s[2]);
-        dem2di_fours_two(states, &keys[k + 3], &p[3], &s[3]);
-        dem2di_four_turn(p);
-        dem2di_four_turn(s);
-        dem2di_four_put(batch->dx + k, p[0]);
-        dem2di_four_put(batch->dy + k, p[1]);
-        dem2di_four_put(batch->wb + k, p[2]);
-        dem2di_four_put(batch->radius_b + k, p[3]);
-        dem2di_four_put(batch->vx + k, s[0]);
-        dem2di_four_put(batch->vy + k, s[1]);
-        dem2di_four_put(batch->wa + k, s[2]);
-        dem2di_four_put(batch->radius_a + k, s[3]);
-        near |= ~(dem2di_four_bits)(p[0] * p[0] + p[1] * p[1] > least);
+    for (int k = 0; k < batch->count; k += 4) {
+        const dem2di_key *key = keys + k;
+        const double *const a[4] = {&now[key[0].a].x.x, &now[key[1].a].x.x, &now[key[2].a].x.x,
+                                    &now[key[3].a].x.x};
+        const double *const b[4] = {&now[key[0].b].x.x, &now[key[1].b].x.x, &now[key[2].b].x.x,
+                                    &now[key[3].b].x.x};
+        const dem2di_four_twos d = dem2di_fours_between(a, b, 0), v = dem2di_fours_between(a, b, 4);
+        const dem2di_four_twos of_a = dem2di_fours_twos(a, 6), of_b = dem2di_fours_twos(b, 6);
+        dem2di_four_put(batch->vx + k, dem2di_fours_first(v));
+        dem2di_four_put(batch->vy + k, dem2di_fours_second(v));
+        dem2di_four_put(batch->wa + k, dem2di_fours_first(of_a));
+        dem2di_four_put(batch->radius_a + k, dem2di_fours_second(of_a));
+        dem2di_four_put(batch->wb + k, dem2di_fours_first(of_b));
+        dem2di_four_put(batch->radius_b + k, dem2di_fours_second(of_b));
+        near |= ~(dem2di_four_bits)(dem2di_fours_line(batch, k, dem2di_fours_first(d),
+                                                      dem2di_fours_second(d)) > least);
     }
     if ((near[0] | near[1] | near[2] | near[3]) != 0)
-        for (int j = 0; j < k; j++) { /* as in dem2di_disc_line: nearly never */
-            const dem2d_vec line = dem2di_disc_line(&now[keys[j].a], &now[keys[j].b]);
-            batch->dx[j] = line.x;
-            batch->dy[j] = line.y;
+        for (int k = 0; k < batch->count; k++) /* nearly never */
+        {
+            const dem2d_vec d = dem2di_disc_line(&now[keys[k].a], &now[keys[k].b]);
+            const dem2di_line line = dem2di_line_of(d.x, d.y);
+            batch->x[k] = line.normal.x;
+            batch->y[k] = line.normal.y;
+            batch->distance[k] = line.distance;
         }
-    dem2di_batch_fetch(now, keys, k, true, batch);
 }
 
 /* All that the law needs of the two of each contact. A function of its own, as all that use vectors
@@ -21158,29 +21205,44 @@ static void dem2di_batch_hold(const dem2d_world *world, int first, dem2di_batch 
         if (dem2di_immovable(world, first + k)) batch->radius_a[k] = batch->radius_b[k] = 0;
 }
 
+/* A value where a condition holds, else 0. By its bits: gcc makes a branch of a choice whose value
+   nothing else needs, and then no vectors. */
+static DEM2DI_INLINE double dem2di_where(bool holds, double value) {
+    uint64_t bits;
+    memcpy(&bits, &value, sizeof bits);
+    bits &= holds ? ~(uint64_t)0 : 0;
+    memcpy(&value, &bits, sizeof value);
+    return value;
+}
+
 DEM2DI_VECTORS_BEGIN
+/* Velocity of B against A along the tangent, where the two of a contact touch. */
+static DEM2DI_INLINE double dem2di_batch_sliding(const dem2di_batch *batch, int k, dem2d_vec normal,
+                                                 double depth) {
+    const double arm_a = batch->radius_a[k] - depth / 2, arm_b = batch->radius_b[k] - depth / 2;
+    return normal.x * batch->vy[k] - normal.y * batch->vx[k] -
+           (arm_a * batch->wa[k] + arm_b * batch->wb[k]);
+}
+
 /* dem2di_slip for two circles, whose last normal and depth are given. */
 static DEM2DI_INLINE double dem2di_batch_slip(const dem2di_batch *batch, int k,
                                               const dem2di_round *now, dem2d_vec last_normal,
                                               double last_depth) {
-    double vx = batch->vx[k], vy = batch->vy[k], wa = batch->wa[k], wb = batch->wb[k];
-    double closed = last_depth > 0 ? 1 : 0; /* no branch: for vectors */
-    double arm_a = batch->radius_a[k] - last_depth / 2;
-    double arm_b = batch->radius_b[k] - last_depth / 2;
-    double slip = now->normal.x * vy - now->normal.y * vx - (now->arm_a * wa + now->arm_b * wb);
-    double before = last_normal.x * vy - last_normal.y * vx - (arm_a * wa + arm_b * wb);
+    const double closed = last_depth > 0 ? 1 : 0; /* no branch: for vectors */
+    const double slip = dem2di_batch_sliding(batch, k, now->normal, now->depth);
+    const double before = dem2di_batch_sliding(batch, k, last_normal, last_depth);
     return slip + (before - slip) * (closed / 2);
 }
 
 /* Two circles, and their normal force. */
 static DEM2DI_INLINE dem2di_round dem2di_batch_normal(const dem2di_batch *batch, int k,
                                                       const dem2d_pair_desc *law, bool one_law,
-                                                      int terms) {
+                                                      int terms, bool lines) {
     const double kn = one_law ? law->normal_stiffness : batch->kn[k];
-    dem2d_vec d;
-    d.x = batch->dx[k];
-    d.y = batch->dy[k];
-    dem2di_round r = dem2di_round_make(d, batch->radius_a[k], batch->radius_b[k], kn);
+    dem2di_line line = {{batch->x[k], batch->y[k]}, batch->distance[k]};
+    if (!lines) line = dem2di_line_of(batch->x[k], batch->y[k]);
+    dem2di_round r =
+        dem2di_round_of(line.normal, line.distance, batch->radius_a[k], batch->radius_b[k], kn);
     if (!(terms & DEM2DI_DASHPOT)) return r;
     double approach = -(r.normal.x * batch->vx[k] + r.normal.y * batch->vy[k]);
     double damped = dem2di_damped(r.force, batch->dampers.normal[k], approach);
@@ -21188,23 +21250,16 @@ static DEM2DI_INLINE dem2di_round dem2di_batch_normal(const dem2di_batch *batch,
     return r;
 }
 
-static DEM2DI_INLINE void dem2di_batch_act(dem2di_action *action, dem2d_vec normal, double force,
-                                           double shear, double arm_a, double arm_b) {
-    action->x = normal.x * force - normal.y * shear;
-    action->y = normal.y * force + normal.x * shear;
-    action->a = -(arm_a * shear);
-    action->b = -(arm_b * shear);
-}
-
-/* dem2di_slider. A dashpot's own force is stored: gcc makes a branch of a product that one choice
-   alone needs, and then no vectors. */
-static DEM2DI_INLINE double dem2di_batch_slider(dem2di_batch *batch, int k, double stiffness,
-                                                double dashpot, double rate, double time_step,
-                                                double limit, double last, double *viscous) {
-    dem2di_slid slid = dem2di_slider_sum(stiffness, dashpot, rate, time_step, limit, last);
-    batch->own[k] = slid.own;
-    *viscous = dem2di_slider_viscous(&slid);
-    return slid.held;
+/* What acts on the two, but for a moment against rolling. */
+static DEM2DI_INLINE dem2di_action dem2di_batch_action(const dem2di_batch *batch, int k,
+                                                       dem2d_vec normal, double depth, double force,
+                                                       double shear) {
+    dem2di_action action;
+    action.x = normal.x * force - normal.y * shear;
+    action.y = normal.y * force + normal.x * shear;
+    action.a = -((batch->radius_a[k] - depth / 2) * shear);
+    action.b = -((batch->radius_b[k] - depth / 2) * shear);
+    return action;
 }
 
 /* Coefficient of the tangential dashpot. */
@@ -21216,105 +21271,76 @@ static DEM2DI_INLINE double dem2di_batch_dashpot(const dem2di_batch *batch, int 
     return 2 * ratio * dem2di_sqrt(1 / inverse * kt);
 }
 
-/* Two circles by the law of dem2di_law_points, for all of a batch. Where they are apart the force
-   is 0, and with it all that it limits. */
+/* Two circles by the law of dem2di_law_points, for all of a batch: normal forces, and what
+   dem2di_batch_act goes on with. */
 static DEM2DI_INLINE void
-dem2di_batch_points(dem2di_batch *batch, double time_step, const dem2d_pair_desc *law,
-                    bool friction, int terms, bool one_law, double *DEM2DI_APART normal_x,
+dem2di_batch_points(dem2di_batch *batch, int count, const dem2d_pair_desc *law, bool friction,
+                    int terms, bool one_law, bool lines, double *DEM2DI_APART normal_x,
                     double *DEM2DI_APART normal_y, double *DEM2DI_APART depth,
-                    double *DEM2DI_APART force, double *DEM2DI_APART shear,
-                    double *DEM2DI_APART viscous_shear, dem2di_action *DEM2DI_APART actions) {
-    const int count = batch->count;
+                    double *DEM2DI_APART force) {
     DEM2DI_INDEPENDENT
     for (int k = 0; k < count; k++) {
-        dem2di_round r = dem2di_batch_normal(batch, k, law, one_law, terms);
-        double next = 0;
-        if (friction) {
+        const dem2d_vec last = {normal_x[k], normal_y[k]};
+        const dem2di_round r = dem2di_batch_normal(batch, k, law, one_law, terms, lines);
+        if (friction) batch->slip[k] = dem2di_batch_slip(batch, k, &r, last, depth[k]);
+        if (terms & DEM2DI_TANGENTIAL_DASHPOT) {
             const double kt = one_law ? law->tangential_stiffness : batch->kt[k];
-            const double limit = (one_law ? law->friction : batch->mu[k]) * r.force;
-            const dem2d_vec last = {normal_x[k], normal_y[k]};
-            const double slip = dem2di_batch_slip(batch, k, &r, last, depth[k]);
-            if (terms & DEM2DI_TANGENTIAL_DASHPOT) {
-                double ratio = one_law ? law->tangential_damping_ratio : batch->zeta_t[k];
-                double viscous, last_shear = shear[k] - viscous_shear[k];
-                next =
-                    dem2di_batch_slider(batch, k, kt, dem2di_batch_dashpot(batch, k, kt, ratio, &r),
-                                        slip, time_step, limit, last_shear, &viscous);
-                viscous_shear[k] = viscous;
-            } else {
-                next = dem2di_held(limit, shear[k] - kt * slip * time_step);
-            }
+            const double ratio = one_law ? law->tangential_damping_ratio : batch->zeta_t[k];
+            batch->dashpot[k] = dem2di_batch_dashpot(batch, k, kt, ratio, &r);
         }
         normal_x[k] = r.normal.x;
         normal_y[k] = r.normal.y;
         depth[k] = r.depth;
         force[k] = r.force;
-        shear[k] = next;
-        if (terms & (DEM2DI_TANGENTIAL_DASHPOT | DEM2DI_ROLLING)) continue;
-        dem2di_action action = {r.normal.x * r.force, r.normal.y * r.force, 0, 0};
-        if (friction) dem2di_batch_act(&action, r.normal, r.force, next, r.arm_a, r.arm_b);
-        actions[k].x = action.x;
-        actions[k].y = action.y;
-        actions[k].a = action.a;
-        actions[k].b = action.b;
     }
 }
 
-/* Against rolling, as dem2di_law_rolling, as if all were closed. */
-static DEM2DI_INLINE void dem2di_batch_rolling(dem2di_batch *batch, double time_step,
-                                               const dem2d_pair_desc *law, bool dashpots,
-                                               bool one_law, const double *DEM2DI_APART force,
-                                               double *DEM2DI_APART moment,
-                                               double *DEM2DI_APART viscous_moment) {
-    const int count = batch->count;
-    DEM2DI_INDEPENDENT
-    for (int k = 0; k < count; k++) {
-        const double kt = one_law ? law->tangential_stiffness : batch->kt[k];
-        const double radius = batch->dampers.radius[k];
-        const double limit = (one_law ? law->rolling_friction : batch->mu_r[k]) * radius * force[k];
-        const double spin = batch->wb[k] - batch->wa[k], stiffness = kt * radius * radius;
-        if (!dashpots) {
-            moment[k] = dem2di_held(limit, moment[k] - stiffness * spin * time_step);
-            continue;
-        }
-        double viscous, last = moment[k] - viscous_moment[k];
-        moment[k] = dem2di_batch_slider(batch, k, stiffness, batch->dampers.rolling[k], spin,
-                                        time_step, limit, last, &viscous);
-        viscous_moment[k] = viscous;
-    }
-}
-
-/* What has been made as if all were closed: 0 where they are apart. */
-static DEM2DI_INLINE void dem2di_batch_part(int count, const double *DEM2DI_APART depth,
-                                            double *DEM2DI_APART force) {
-    DEM2DI_INDEPENDENT
-    for (int k = 0; k < count; k++) {
-        const double closed = force[k];
-        force[k] = depth[k] > 0 ? closed : 0;
-    }
-}
-
-/* Actions where dem2di_batch_points does not write them: they are written once, moments included.
-   To add a moment to one that has just been stored would wait for that. Writes their sizes where
-   size is not NULL. */
+/* The rest of the law: shear, and moments against rolling as dem2di_law_rolling has them. Where two
+   are apart the force is 0, and with it the limits; what dashpots have made is set to 0. Actions
+   are written once, moments included: to add a moment to one that has just been stored would wait
+   for that. */
 static DEM2DI_INLINE void
-dem2di_batch_actions(const dem2di_batch *batch, bool rolls, const double *DEM2DI_APART normal_x,
-                     const double *DEM2DI_APART normal_y, const double *DEM2DI_APART depth,
-                     const double *DEM2DI_APART force, const double *DEM2DI_APART shear,
-                     const double *DEM2DI_APART moment, double *DEM2DI_APART size,
-                     dem2di_action *DEM2DI_APART actions) {
-    const int count = batch->count;
+dem2di_batch_act(const dem2di_batch *batch, int count, double time_step, const dem2d_pair_desc *law,
+                 bool friction, int terms, bool one_law, const double *DEM2DI_APART normal_x,
+                 const double *DEM2DI_APART normal_y, const double *DEM2DI_APART depth,
+                 const double *DEM2DI_APART force, double *DEM2DI_APART shear,
+                 double *DEM2DI_APART moment, double *DEM2DI_APART viscous_shear,
+                 double *DEM2DI_APART viscous_moment, dem2di_action *DEM2DI_APART actions) {
+    const bool parts = (terms & (DEM2DI_TANGENTIAL_DASHPOT | DEM2DI_ROLLING_DASHPOT)) != 0;
     DEM2DI_INDEPENDENT
     for (int k = 0; k < count; k++) {
-        const dem2d_vec normal = {normal_x[k], normal_y[k]};
-        dem2di_action action;
-        dem2di_batch_act(&action, normal, force[k], shear[k], batch->radius_a[k] - depth[k] / 2,
-                         batch->radius_b[k] - depth[k] / 2);
-        if (rolls) {
-            action.a -= moment[k];
-            action.b += moment[k];
+        const bool closed = depth[k] > 0;
+        const double kt = one_law ? law->tangential_stiffness : batch->kt[k];
+        const double limit = (one_law ? law->friction : batch->mu[k]) * force[k];
+        double next = 0, viscous;
+        if (terms & DEM2DI_TANGENTIAL_DASHPOT) {
+            next = dem2di_slider(kt, batch->dashpot[k], batch->slip[k], time_step, limit,
+                                 shear[k] - viscous_shear[k], &viscous);
+            viscous_shear[k] = dem2di_where(closed, viscous);
+        } else if (friction) {
+            next = dem2di_held(limit, shear[k] - kt * batch->slip[k] * time_step);
         }
-        if (size != NULL) size[k] = dem2di_action_size(&action);
+        if (parts) next = dem2di_where(closed, next);
+        shear[k] = next;
+        const dem2d_vec normal = {normal_x[k], normal_y[k]};
+        dem2di_action action = {normal.x * force[k], normal.y * force[k], 0, 0};
+        if (friction) action = dem2di_batch_action(batch, k, normal, depth[k], force[k], next);
+        if (terms & DEM2DI_ROLLING) {
+            const double radius = batch->dampers.radius[k];
+            const double most =
+                (one_law ? law->rolling_friction : batch->mu_r[k]) * radius * force[k];
+            const double spin = batch->wb[k] - batch->wa[k], stiffness = kt * radius * radius;
+            if (terms & DEM2DI_ROLLING_DASHPOT) {
+                next = dem2di_slider(stiffness, batch->dampers.rolling[k], spin, time_step, most,
+                                     moment[k] - viscous_moment[k], &viscous);
+                viscous_moment[k] = dem2di_where(closed, viscous);
+            } else {
+                next = dem2di_held(most, moment[k] - stiffness * spin * time_step);
+            }
+            moment[k] = next = dem2di_where(closed, next);
+            action.a -= next;
+            action.b += next;
+        }
         actions[k].x = action.x;
         actions[k].y = action.y;
         actions[k].a = action.a;
@@ -21322,57 +21348,44 @@ dem2di_batch_actions(const dem2di_batch *batch, bool rolls, const double *DEM2DI
     }
 }
 
-/* The loops for what the scene has, as constants. Terms are taken with friction, and with those
-   before them, which may be 0. */
-static DEM2DI_INLINE void dem2di_batch_solve(dem2di_batch *b, double time_step,
-                                             const dem2d_pair_desc *law, const dem2di_plan *plan) {
-    const int terms = plan->terms, both = DEM2DI_DASHPOT | DEM2DI_TANGENTIAL_DASHPOT;
-    const bool sliders = (terms & ~(DEM2DI_DASHPOT | DEM2DI_ROLLING)) != 0;
-#define DEM2DI_POINTS(friction, terms)                                                             \
-    (plan->one_law                                                                                 \
-         ? dem2di_batch_points(b, time_step, law, friction, terms, true, b->normal_x, b->normal_y, \
-                               b->depth, b->force, b->shear, b->viscous_shear, b->actions)         \
-         : dem2di_batch_points(b, time_step, law, friction, terms, false, b->normal_x,             \
-                               b->normal_y, b->depth, b->force, b->shear, b->viscous_shear,        \
-                               b->actions))
-#define DEM2DI_ROLLING_OF(dashpots)                                                                \
-    (plan->one_law ? dem2di_batch_rolling(b, time_step, law, dashpots, true, b->force, b->moment,  \
-                                          b->viscous_moment)                                       \
-                   : dem2di_batch_rolling(b, time_step, law, dashpots, false, b->force, b->moment, \
-                                          b->viscous_moment))
-#define DEM2DI_ACTIONS(rolls)                                                              \
-    dem2di_batch_actions(b, rolls, b->normal_x, b->normal_y, b->depth, b->force, b->shear, \
-                         b->moment, NULL, b->actions)
-    if (terms & DEM2DI_TANGENTIAL_DASHPOT)
-        DEM2DI_POINTS(true, both);
-    else if (terms & DEM2DI_ROLLING)
-        DEM2DI_POINTS(true, DEM2DI_DASHPOT | DEM2DI_ROLLING);
-    else if (terms != 0)
-        DEM2DI_POINTS(true, DEM2DI_DASHPOT);
+/* Both loops, with these terms as constants. */
+static DEM2DI_INLINE void dem2di_batch_law(dem2di_batch *b, int count, double time_step,
+                                           const dem2d_pair_desc *law, bool friction, int terms,
+                                           bool one_law, bool lines) {
+    dem2di_batch_points(b, count, law, friction, terms, one_law, lines, b->normal_x, b->normal_y,
+                        b->depth, b->force);
+    dem2di_batch_act(b, count, time_step, law, friction, terms, one_law, b->normal_x, b->normal_y,
+                     b->depth, b->force, b->shear, b->moment, b->viscous_shear, b->viscous_moment,
+                     b->actions);
+}
+
+/* The loops for what the scene has. Terms are taken with friction, and with a normal dashpot, which
+   may be 0. */
+static DEM2DI_INLINE void dem2di_batch_solve(dem2di_batch *b, int count, double time_step,
+                                             const dem2d_pair_desc *law, const dem2di_plan *plan,
+                                             bool lines) {
+    const int rolls = plan->terms & (DEM2DI_ROLLING | DEM2DI_ROLLING_DASHPOT);
+    const bool rubs = (plan->terms & DEM2DI_TANGENTIAL_DASHPOT) != 0;
+#define DEM2DI_LAW(friction, terms)                                                           \
+    (plan->one_law ? dem2di_batch_law(b, count, time_step, law, friction, terms, true, lines) \
+                   : dem2di_batch_law(b, count, time_step, law, friction, terms, false, lines))
+    if (rolls & DEM2DI_ROLLING_DASHPOT && rubs)
+        DEM2DI_LAW(true, DEM2DI_ROLLING | DEM2DI_ALL_DASHPOTS);
+    else if (rolls & DEM2DI_ROLLING_DASHPOT)
+        DEM2DI_LAW(true, DEM2DI_DASHPOT | DEM2DI_ROLLING | DEM2DI_ROLLING_DASHPOT);
+    else if (rolls && rubs)
+        DEM2DI_LAW(true, DEM2DI_DASHPOT | DEM2DI_ROLLING | DEM2DI_TANGENTIAL_DASHPOT);
+    else if (rolls)
+        DEM2DI_LAW(true, DEM2DI_DASHPOT | DEM2DI_ROLLING);
+    else if (rubs)
+        DEM2DI_LAW(true, DEM2DI_DASHPOT | DEM2DI_TANGENTIAL_DASHPOT);
+    else if (plan->terms != 0)
+        DEM2DI_LAW(true, DEM2DI_DASHPOT);
     else if (plan->friction)
-        DEM2DI_POINTS(true, 0);
+        DEM2DI_LAW(true, 0);
     else
-        DEM2DI_POINTS(false, 0);
-    if (sliders) {
-        dem2di_batch_part(b->count, b->depth, b->shear);
-        if (terms & DEM2DI_TANGENTIAL_DASHPOT)
-            dem2di_batch_part(b->count, b->depth, b->viscous_shear);
-    }
-    if (terms & DEM2DI_ROLLING_DASHPOT) {
-        DEM2DI_ROLLING_OF(true);
-        dem2di_batch_part(b->count, b->depth, b->viscous_moment);
-    } else if (terms & DEM2DI_ROLLING) {
-        DEM2DI_ROLLING_OF(false);
-    }
-    if (terms & DEM2DI_ROLLING) {
-        dem2di_batch_part(b->count, b->depth, b->moment);
-        DEM2DI_ACTIONS(true);
-    } else if (sliders) {
-        DEM2DI_ACTIONS(false);
-    }
-#undef DEM2DI_POINTS
-#undef DEM2DI_ROLLING_OF
-#undef DEM2DI_ACTIONS
+        DEM2DI_LAW(false, 0);
+#undef DEM2DI_LAW
 }
 
 /* How many contacts of a batch are closed. */
@@ -21384,7 +21397,7 @@ static DEM2DI_INLINE int64_t dem2di_batch_count(const dem2di_batch *batch) {
 
 static int64_t dem2di_batch_solve_plain(dem2di_batch *batch, double time_step,
                                         const dem2d_pair_desc *law, const dem2di_plan *plan) {
-    dem2di_batch_solve(batch, time_step, law, plan);
+    dem2di_batch_solve(batch, batch->count, time_step, law, plan, false);
     return dem2di_batch_count(batch);
 }
 
@@ -21392,7 +21405,7 @@ static int64_t dem2di_batch_solve_plain(dem2di_batch *batch, double time_step,
 static DEM2DI_AVX2 int64_t dem2di_batch_solve_fours(dem2di_batch *batch, double time_step,
                                                     const dem2d_pair_desc *law,
                                                     const dem2di_plan *plan) {
-    dem2di_batch_solve(batch, time_step, law, plan);
+    dem2di_batch_solve(batch, batch->count - batch->count % 4, time_step, law, plan, true);
     return dem2di_batch_count(batch);
 }
 #endif
@@ -21421,16 +21434,21 @@ static inline void dem2di_batch_end(const dem2d_world *world, const dem2di_batch
     count->proofs[DEM2D_BY_FORM] += closed;
 }
 
-/* A batch of contacts from `first` on, up to `end`, before the law. */
-static void dem2di_batch_make(const dem2d_world *world, int first, int end, dem2di_batch *batch) {
-    dem2di_batch_begin(world, first, dem2di_block_end(first, DEM2DI_BATCH, end) - first, batch);
+/* A batch of contacts from `first` on, up to `end`, before the law. Returns whether it is taken by
+   vectors of four: the few contacts that are left over at the end of the list are a batch of their
+   own, which is not. */
+static bool dem2di_batch_make(const dem2d_world *world, int first, int end, dem2di_batch *batch) {
+    const int count = dem2di_block_end(first, DEM2DI_BATCH, end) - first;
+    const bool fours = world->fours && count >= 4;
+    dem2di_batch_begin(world, first, fours ? count - count % 4 : count, batch);
 #if DEM2DI_FOURS
-    if (world->fours)
+    if (fours)
         dem2di_batch_fetch_fours(world, first, batch);
     else
 #endif
         dem2di_batch_fetch_plain(world, first, batch);
     dem2di_batch_amend(world, first, batch);
+    return fours;
 }
 
 /* Contacts of circles from begin to end. */
@@ -21438,11 +21456,11 @@ static void dem2di_disc_range(const dem2d_world *world, int begin, int end, dem2
     const dem2di_plan *plan = &world->plan;
     const dem2d_pair_desc *law = dem2di_law(world, plan->material, plan->material);
     dem2di_batch batch;
-    for (int first = begin; first < end; first += DEM2DI_BATCH) {
+    for (int first = begin; first < end; first += batch.count) {
         int64_t closed;
-        dem2di_batch_make(world, first, end, &batch);
+        const bool fours = dem2di_batch_make(world, first, end, &batch);
 #if DEM2DI_FOURS
-        if (world->fours)
+        if (fours)
             closed = dem2di_batch_solve_fours(&batch, world->made_step, law, plan);
         else
 #endif
@@ -23747,7 +23765,7 @@ DEM2DI_VECTORS_BEGIN
    the law does without them, 1 where they are 0, and 2 otherwise. */
 static DEM2DI_INLINE void
 dem2di_batch_rows(const dem2di_batch *b, const dem2d_pair_desc *law, bool one_law, int dashpots,
-                  double *DEM2DI_APART normal_x, double *DEM2DI_APART normal_y,
+                  bool lines, double *DEM2DI_APART normal_x, double *DEM2DI_APART normal_y,
                   double *DEM2DI_APART depth, const double *DEM2DI_APART shear,
                   const double *DEM2DI_APART viscous_shear, const double *DEM2DI_APART moment,
                   const double *DEM2DI_APART viscous_moment, double *DEM2DI_APART stiffness,
@@ -23762,7 +23780,7 @@ dem2di_batch_rows(const dem2di_batch *b, const dem2d_pair_desc *law, bool one_la
         const double radius = b->radius_a[k] * (b->radius_b[k] / (b->radius_a[k] + b->radius_b[k]));
         const double rolling = kt * radius * radius;
         const dem2d_vec last = {normal_x[k], normal_y[k]};
-        const dem2di_round r = dem2di_batch_normal(b, k, law, one_law, 0);
+        const dem2di_round r = dem2di_batch_normal(b, k, law, one_law, 0, lines);
         rows->sliding[k] = dem2di_batch_slip(b, k, &r, last, depth[k]);
         rows->approach[k] = -(r.normal.x * b->vx[k] + r.normal.y * b->vy[k]);
         rows->spin[k] = b->wb[k] - b->wa[k];
@@ -23802,14 +23820,14 @@ typedef struct dem2di_law_range {
 
 /* The loop for the laws that the scene has. */
 static DEM2DI_INLINE void dem2di_rows_make(const dem2d_world *world, const dem2di_batch *b,
-                                           int first, dem2di_law_range *range) {
+                                           int first, dem2di_law_range *range, bool lines) {
     const dem2d_pair_desc *law = range->law;
     double *stiffness = world->list.contacts.stiffness + first, *dashpot = range->rows.dashpot;
     if (range->dashpots > 0) dashpot = world->list.contacts.dashpot + first;
-#define DEM2DI_ROWS(one_law, dashpots)                                                         \
-    dem2di_batch_rows(b, law, one_law, dashpots, b->normal_x, b->normal_y, b->depth, b->shear, \
-                      b->viscous_shear, b->moment, b->viscous_moment, stiffness, dashpot,      \
-                      &range->rows)
+#define DEM2DI_ROWS(one_law, dashpots)                                                      \
+    dem2di_batch_rows(b, law, one_law, dashpots, lines, b->normal_x, b->normal_y, b->depth, \
+                      b->shear, b->viscous_shear, b->moment, b->viscous_moment, stiffness,  \
+                      dashpot, &range->rows)
     if (!world->plan.one_law && range->dashpots == 2)
         DEM2DI_ROWS(false, 2);
     else if (!world->plan.one_law && range->dashpots == 1)
@@ -23823,6 +23841,32 @@ static DEM2DI_INLINE void dem2di_rows_make(const dem2d_world *world, const dem2d
     else
         DEM2DI_ROWS(true, 0);
 #undef DEM2DI_ROWS
+}
+
+/* Actions where dem2di_batch_points does not write them: they are written once, moments included.
+   To add a moment to one that has just been stored would wait for that. Writes their sizes where
+   size is not NULL. */
+static DEM2DI_INLINE void
+dem2di_batch_actions(const dem2di_batch *batch, bool rolls, const double *DEM2DI_APART normal_x,
+                     const double *DEM2DI_APART normal_y, const double *DEM2DI_APART depth,
+                     const double *DEM2DI_APART force, const double *DEM2DI_APART shear,
+                     const double *DEM2DI_APART moment, double *DEM2DI_APART size,
+                     dem2di_action *DEM2DI_APART actions) {
+    const int count = batch->count;
+    DEM2DI_INDEPENDENT
+    for (int k = 0; k < count; k++) {
+        const dem2d_vec normal = {normal_x[k], normal_y[k]};
+        dem2di_action action = dem2di_batch_action(batch, k, normal, depth[k], force[k], shear[k]);
+        if (rolls) {
+            action.a -= moment[k];
+            action.b += moment[k];
+        }
+        if (size != NULL) size[k] = dem2di_action_size(&action);
+        actions[k].x = action.x;
+        actions[k].y = action.y;
+        actions[k].a = action.a;
+        actions[k].b = action.b;
+    }
 }
 
 /* A force whose viscous part is not finite is not either: no step is made. */
@@ -23853,7 +23897,7 @@ static DEM2DI_INLINE void dem2di_rows_act(const dem2d_world *world, const dem2di
 
 static void dem2di_rows_make_plain(const dem2d_world *world, const dem2di_batch *batch, int first,
                                    dem2di_law_range *range) {
-    dem2di_rows_make(world, batch, first, range);
+    dem2di_rows_make(world, batch, first, range, false);
 }
 
 static void dem2di_rows_act_plain(const dem2d_world *world, const dem2di_batch *batch, int first,
@@ -23864,7 +23908,7 @@ static void dem2di_rows_act_plain(const dem2d_world *world, const dem2di_batch *
 #if DEM2DI_FOURS
 static DEM2DI_AVX2 void dem2di_rows_make_fours(const dem2d_world *world, const dem2di_batch *batch,
                                                int first, dem2di_law_range *range) {
-    dem2di_rows_make(world, batch, first, range);
+    dem2di_rows_make(world, batch, first, range, true);
 }
 
 static DEM2DI_AVX2 void dem2di_rows_act_fours(const dem2d_world *world, const dem2di_batch *batch,
@@ -24036,18 +24080,18 @@ static void dem2di_discs_by_rows(dem2d_world *world, int begin, int end, dem2di_
     dem2di_law_range range;
     double size[DEM2DI_BATCH];
     dem2di_law_range_begin(world, &range);
-    for (int first = begin; first < end; first += DEM2DI_BATCH) {
-        dem2di_batch_make(world, first, end, &batch);
+    for (int first = begin; first < end; first += batch.count) {
+        const bool fours = dem2di_batch_make(world, first, end, &batch);
         dem2di_law_range_fill(&range, &batch);
 #if DEM2DI_FOURS
-        if (world->fours)
+        if (fours)
             dem2di_rows_make_fours(world, &batch, first, &range);
         else
 #endif
             dem2di_rows_make_plain(world, &batch, first, &range);
         const int closed = dem2di_rows_ask(world, first, &batch, &range);
 #if DEM2DI_FOURS
-        if (world->fours)
+        if (fours)
             dem2di_rows_act_fours(world, &batch, first, size);
         else
 #endif
