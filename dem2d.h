@@ -18707,7 +18707,7 @@ static dem2d_vec dem2di_vertex_place(const dem2d_world *world, int number) {
 
 /* ============================================================================================
    >>list  The list of contacts: particles in the order of space, partners, what they remember
-   uses: config, math, broad, law, motion, world, cell, objects, walls, joints
+   uses: config, math, edges, minimum, broad, law, motion, world, cell, objects, walls, joints
    ============================================================================================ */
 
 /* Scratch memory, cut up from its start: places to fit into, or NULL to count only. */
