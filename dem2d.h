@@ -3953,23 +3953,13 @@ enum {
 #define DEM2DI_LANES_ORDER 8
 
 static int dem2di_lanes_of(const dem2d_shape *shape) {
+    static const int kinds[DEM2D_SHAPE_TYPE_COUNT] = {DEM2DI_LANES_ALONE,   DEM2DI_LANES_ELLIPSE,
+                                                      DEM2DI_LANES_POLYGON, DEM2DI_LANES_ARC,
+                                                      DEM2DI_LANES_SERIES,  DEM2DI_LANES_NONE};
     const bool low = shape->count > 0 && shape->count <= DEM2DI_LANES_ORDER;
-    switch (shape->type) {
-    case DEM2D_ELLIPSE:
-        return DEM2DI_LANES_ELLIPSE;
-    case DEM2D_POLYGON:
-        return DEM2DI_LANES_POLYGON;
-    case DEM2D_BEZIER:
-        return shape->flat ? DEM2DI_LANES_NONE : DEM2DI_LANES_ARC;
-    case DEM2D_FOURIER:
-        return low ? DEM2DI_LANES_SERIES : DEM2DI_LANES_ALONE;
-    case DEM2D_CIRCLE:
-        return DEM2DI_LANES_ALONE;
-    case DEM2D_CUSTOM:
-    case DEM2D_SHAPE_TYPE_COUNT:
-        break;
-    }
-    return DEM2DI_LANES_NONE;
+    if (shape->type == DEM2D_BEZIER && shape->flat) return DEM2DI_LANES_NONE;
+    if (shape->type == DEM2D_FOURIER && !low) return DEM2DI_LANES_ALONE;
+    return kinds[shape->type];
 }
 
 static int dem2di_block_count(int order) {
@@ -12039,11 +12029,23 @@ static inline bool dem2di_body_pair_good(const dem2d_body_pair *pair, int bodies
     return (a < all) & (b < all) & (a != b);
 }
 
+DEM2DI_VECTORS_BEGIN
+/* The same of all pairs: the first bit of a number is set if it is negative. */
+static bool dem2di_body_pairs_good(const dem2d_body_pair *pairs, int count, int bodies) {
+    const unsigned last = (unsigned)bodies - 1;
+    unsigned bits = 0;
+    for (int i = 0; i < count; i++) {
+        const unsigned a = (unsigned)pairs[i].a, b = (unsigned)pairs[i].b;
+        bits |= a | (last - a) | b | (last - b) | ((a ^ b) - 1);
+    }
+    return bits <= INT_MAX;
+}
+DEM2DI_VECTORS_END
+
 static dem2d_result dem2di_check_body_pairs(const dem2d_env *env, const dem2d_body_pair *pairs,
                                             int count, int bodies) {
-    bool bad = false;
-    for (int i = 0; i < count; i++) bad |= !dem2di_body_pair_good(&pairs[i], bodies);
-    for (int i = 0; i < count && bad; i++)
+    const bool good = dem2di_body_pairs_good(pairs, count, bodies);
+    for (int i = 0; i < count && !good; i++)
         if (!dem2di_body_pair_good(&pairs[i], bodies))
             return dem2di_fail(env, DEM2D_OUT_OF_RANGE, i,
                                "pairs[%d] = {%d, %d}: not two of %d bodies", i, pairs[i].a,
@@ -12173,18 +12175,17 @@ DEM2DI_AVX2_INLINE dem2di_four_circles dem2di_circles_fetch(const dem2d_body *b0
     return c;
 }
 
-/* One answer: the normal and the point are in a row. */
-DEM2DI_AVX2_INLINE void dem2di_circles_put(dem2di_four row, double depth, double error,
-                                           long long state, dem2d_overlap *overlap) {
+/* One answer: the normal and the point are in a row, the depth and the error in the next. */
+DEM2DI_AVX2_INLINE void dem2di_circles_put(dem2di_four row, dem2di_two_lanes next, long long state,
+                                           dem2d_overlap *overlap) {
     dem2di_four_put(&overlap->normal.x, row);
-    overlap->depth = depth;
-    overlap->error = error;
+    memcpy(&overlap->depth, &next, sizeof next);
     overlap->state = (dem2d_contact_state)state;
 }
 
-/* dem2di_overlap_circles of four pairs. False: a line of centres is too short. */
-DEM2DI_AVX2_INLINE bool dem2di_overlap_fours(const dem2d_body *bodies, const dem2d_body_pair *p,
-                                             dem2d_overlap *to) {
+/* dem2di_overlap_circles of four pairs. Clears bits of *far if a line of centres is too short. */
+DEM2DI_AVX2_INLINE void dem2di_overlap_fours(const dem2d_body *bodies, const dem2d_body_pair *p,
+                                             dem2d_overlap *to, dem2di_four_bits *far) {
     const dem2di_four_circles a =
         dem2di_circles_fetch(&bodies[p[0].a], &bodies[p[1].a], &bodies[p[2].a], &bodies[p[3].a]);
     const dem2di_four_circles b =
@@ -12196,8 +12197,7 @@ DEM2DI_AVX2_INLINE bool dem2di_overlap_fours(const dem2d_body *bodies, const dem
     for (int k = 0; k < 4; k++) roots[k] = dem2di_sqrt(roots[k]);
     distance = dem2di_four_at(roots);
     const dem2di_four least = square - square + DEM2DI_LEAST_LINE;
-    const dem2di_four_bits far = (dem2di_four_bits)(distance > least);
-    if ((far[0] & far[1] & far[2] & far[3]) == 0) return false;
+    *far &= (dem2di_four_bits)(distance > least);
     const dem2di_four nx = dx / distance, ny = dy / distance, depth = reach - distance;
     const dem2di_four error = DEM2DI_ROUNDOFF * (reach + distance);
     const dem2di_four_bits deep = (dem2di_four_bits)(depth > error);
@@ -12206,19 +12206,21 @@ DEM2DI_AVX2_INLINE bool dem2di_overlap_fours(const dem2d_body *bodies, const dem
     dem2di_four rows[4] = {nx, ny, ((a.x + nx * a.r) + (b.x - nx * b.r)) * 0.5,
                            ((a.y + ny * a.r) + (b.y - ny * b.r)) * 0.5};
     dem2di_four_turn(rows);
-    dem2di_circles_put(rows[0], depth[0], error[0], state[0], &to[0]);
-    dem2di_circles_put(rows[1], depth[1], error[1], state[1], &to[1]);
-    dem2di_circles_put(rows[2], depth[2], error[2], state[2], &to[2]);
-    dem2di_circles_put(rows[3], depth[3], error[3], state[3], &to[3]);
-    return true;
+    const dem2di_four even = DEM2DI_SHUFFLE(depth, error, 0, 4, 2, 6);
+    const dem2di_four odd = DEM2DI_SHUFFLE(depth, error, 1, 5, 3, 7);
+    dem2di_circles_put(rows[0], DEM2DI_SHUFFLE(even, even, 0, 1), state[0], &to[0]);
+    dem2di_circles_put(rows[1], DEM2DI_SHUFFLE(odd, odd, 0, 1), state[1], &to[1]);
+    dem2di_circles_put(rows[2], DEM2DI_SHUFFLE(even, even, 2, 3), state[2], &to[2]);
+    dem2di_circles_put(rows[3], DEM2DI_SHUFFLE(odd, odd, 2, 3), state[3], &to[3]);
 }
 
 static DEM2DI_AVX2 void dem2di_circles_fours(const dem2di_array_query *query, int begin, int end) {
+    dem2di_four_bits far = {-1, -1, -1, -1};
     int i = begin;
     for (; i + 4 <= end; i += 4)
-        if (!dem2di_overlap_fours(query->bodies, query->pairs + i, query->overlaps + i))
-            dem2di_circles_plain(query, i, i + 4);
-    dem2di_circles_plain(query, i, end);
+        dem2di_overlap_fours(query->bodies, query->pairs + i, query->overlaps + i, &far);
+    const bool all_far = (far[0] & far[1] & far[2] & far[3]) != 0;
+    dem2di_circles_plain(query, all_far ? i : begin, end);
 }
 #else
 #define dem2di_circles_fours dem2di_circles_plain
@@ -12280,6 +12282,7 @@ static DEM2DI_INLINE void dem2di_array_wait(int i, int steps, dem2d_vec u, dem2d
 
 /* One body of each pair. */
 typedef struct dem2di_array_side {
+    int kind; /* of all: see dem2di_lanes */
     double x[DEM2DI_BATCH], y[DEM2DI_BATCH], c[DEM2DI_BATCH], s[DEM2DI_BATCH], scale[DEM2DI_BATCH];
     double circumscribed[DEM2DI_BATCH], least[DEM2DI_BATCH], most[DEM2DI_BATCH]; /* unscaled */
     dem2di_lanes lanes;
@@ -12295,6 +12298,7 @@ typedef struct dem2di_array_tile {
     int count;
     bool cores;  /* of polygons and circles */
     bool second; /* it is asked whether these may have a second contact point */
+    bool brief;  /* no contacts are asked for, and no shape has a deviation */
     dem2di_array_side side[2];
     double way[DEM2DI_BATCH];                       /* see above */
     double bend[DEM2DI_BATCH], slope[DEM2DI_BATCH]; /* of the evaluation */
@@ -12345,8 +12349,9 @@ static void dem2di_array_fetch(const dem2di_array_query *query, const dem2di_arr
 
 /* The templates of a queue, by the directions. */
 static void dem2di_array_fetch_shapes(const dem2di_array_query *query, const dem2di_array_queue *q,
-                                      int kind_a, int kind_b, dem2di_array_tile *t) {
+                                      dem2di_array_tile *t) {
     const dem2d_body *bodies = query->bodies;
+    const int kind_a = t->side[0].kind, kind_b = t->side[1].kind;
     for (int k = 0; k < t->count; k += 2) {
         const dem2d_body_pair *p0 = &query->pairs[q->pair[k]], *p1 = &query->pairs[q->pair[k + 1]];
         dem2di_lanes_fetch(bodies[p0->a].shape, bodies[p1->a].shape, kind_a, k, &t->side[0].lanes);
@@ -12392,8 +12397,9 @@ static DEM2DI_INLINE void dem2di_array_found(dem2di_array_tile *t, int k,
 
 static DEM2DI_INLINE void dem2di_array_smooth(dem2di_array_tile *DEM2DI_APART t,
                                               const dem2di_array_queue *DEM2DI_APART q,
-                                              double angle, bool parts) {
+                                              double angle) {
     const dem2di_array_side *a = &t->side[0], *b = &t->side[1];
+    const bool parts = a->kind == DEM2DI_LANES_ARC || b->kind == DEM2DI_LANES_ARC;
     dem2di_demand demand;
     demand.detect = false;
     demand.tolerance = 0;
@@ -12460,41 +12466,33 @@ static DEM2DI_INLINE void dem2di_array_corners(dem2di_array_tile *DEM2DI_APART t
     }
 }
 
+/* The directions of a tile, or what follows from the evaluation. */
 static DEM2DI_INLINE void dem2di_array_solve(dem2di_array_tile *t, const dem2di_array_queue *q,
-                                             int kind_a, int kind_b, double angle) {
-    if (t->cores && t->second) {
+                                             bool turn, double angle) {
+    if (turn) {
+        dem2di_array_turn(t, q);
+    } else if (t->cores && t->second) {
         dem2di_array_corners(t, true);
-        return;
-    }
-    if (t->cores) {
+    } else if (t->cores) {
         dem2di_array_corners(t, false);
-        return;
+    } else {
+        for (int i = 0; i < 2; i++)
+            dem2di_lanes_support(&t->side[i].lanes, t->side[i].kind, t->count);
+        dem2di_array_smooth(t, q, angle);
     }
-    dem2di_lanes_support(&t->side[0].lanes, kind_a, t->count);
-    dem2di_lanes_support(&t->side[1].lanes, kind_b, t->count);
-    dem2di_array_smooth(t, q, angle, kind_a == DEM2DI_LANES_ARC || kind_b == DEM2DI_LANES_ARC);
 }
 
-static void dem2di_array_turn_plain(dem2di_array_tile *t, const dem2di_array_queue *q) {
-    dem2di_array_turn(t, q);
-}
-
-static void dem2di_array_solve_plain(dem2di_array_tile *t, const dem2di_array_queue *q, int kind_a,
-                                     int kind_b, double angle) {
-    dem2di_array_solve(t, q, kind_a, kind_b, angle);
+static void dem2di_array_solve_plain(dem2di_array_tile *t, const dem2di_array_queue *q, bool turn,
+                                     double angle) {
+    dem2di_array_solve(t, q, turn, angle);
 }
 
 #if DEM2DI_FOURS
-static DEM2DI_AVX2 void dem2di_array_turn_fours(dem2di_array_tile *t, const dem2di_array_queue *q) {
-    dem2di_array_turn(t, q);
-}
-
 static DEM2DI_AVX2 void dem2di_array_solve_fours(dem2di_array_tile *t, const dem2di_array_queue *q,
-                                                 int kind_a, int kind_b, double angle) {
-    dem2di_array_solve(t, q, kind_a, kind_b, angle);
+                                                 bool turn, double angle) {
+    dem2di_array_solve(t, q, turn, angle);
 }
 #else
-#define dem2di_array_turn_fours dem2di_array_turn_plain
 #define dem2di_array_solve_fours dem2di_array_solve_plain
 #endif
 DEM2DI_VECTORS_END
@@ -12531,7 +12529,7 @@ static DEM2DI_INLINE void dem2di_array_put(const dem2di_array_query *query,
     const dem2d_body_pair *pair = &query->pairs[i];
     const dem2d_shape *a = query->bodies[pair->a].shape, *b = query->bodies[pair->b].shape;
     dem2d_contact_memory *memory = &query->memory[i];
-    if (query->contacts != NULL || a->deviation + b->deviation > 0) {
+    if (!t->brief && (query->contacts != NULL || a->deviation + b->deviation > 0)) {
         dem2di_array_report(query, t, k, i, steps);
         return;
     }
@@ -12579,21 +12577,24 @@ static DEM2DI_INLINE void dem2di_array_decide(const dem2di_array_query *query,
 /* All pairs of a queue. Those that are to be evaluated again stay in it. */
 static void dem2di_array_apply(const dem2di_array_query *query, int kind_a, int kind_b,
                                dem2di_array_queue *q, dem2di_array_tile *t) {
-    const bool fours = dem2di_has_fours();
+    void (*solve)(dem2di_array_tile *, const dem2di_array_queue *, bool, double) =
+        dem2di_has_fours() ? dem2di_array_solve_fours : dem2di_array_solve_plain;
     const int count = q->count;
     while (q->count % 4 != 0) /* whole vectors, so that loops have no rest */
         dem2di_array_wait(q->pair[count - 1], 0, dem2di_vec(q->ux[count - 1], q->uy[count - 1]), q);
     t->count = q->count;
     q->count = 0;
+    t->side[0].kind = kind_a;
+    t->side[1].kind = kind_b;
     t->cores = kind_a == DEM2DI_LANES_POLYGON;
     t->second = query->contacts != NULL && !query->used.skip_points;
+    t->brief = query->contacts == NULL && kind_a != DEM2DI_LANES_ARC && kind_b != DEM2DI_LANES_ARC;
     dem2di_array_fetch(query, q, t);
     if (!t->cores) {
-        (fours ? dem2di_array_turn_fours : dem2di_array_turn_plain)(t, q);
-        dem2di_array_fetch_shapes(query, q, kind_a, kind_b, t);
+        solve(t, q, true, query->angle);
+        dem2di_array_fetch_shapes(query, q, t);
     }
-    (fours ? dem2di_array_solve_fours : dem2di_array_solve_plain)(t, q, kind_a, kind_b,
-                                                                  query->angle);
+    solve(t, q, false, query->angle);
     for (int k = 0; k < count; k++) dem2di_array_decide(query, t, k, q);
 }
 
