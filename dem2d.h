@@ -12249,8 +12249,9 @@ static void dem2di_pairs_report(const dem2di_array_query *query, int i, const de
     }
 }
 
+/* The search for pair i. `tried`: the feature in its memory is known not to hold. */
 static void dem2di_pairs_query(const dem2di_array_query *query, int i, const dem2d_body *a,
-                               const dem2d_body *b) {
+                               const dem2d_body *b, bool tried) {
     const dem2d_contact_desc *used = &query->used;
     dem2d_contact_memory *memory = query->memory != NULL ? &query->memory[i] : NULL;
     dem2di_pair pair;
@@ -12259,7 +12260,7 @@ static void dem2di_pairs_query(const dem2di_array_query *query, int i, const dem
     dem2di_pair_set(a->shape, &a->pose, b->shape, &b->pose, &pair);
     dem2d_vec start = dem2di_memory_start(&pair, memory, used->start, &feature);
     dem2di_feature_clear(&search);
-    dem2di_query_solve(&pair, used, &feature, start, &search);
+    dem2di_query_solve(&pair, used, tried ? NULL : &feature, start, &search);
     dem2di_pairs_report(query, i, &pair, &search, &a->pose, &b->pose);
 }
 
@@ -12570,7 +12571,7 @@ static DEM2DI_INLINE void dem2di_array_decide(const dem2di_array_query *query,
         const dem2d_vec u = dem2di_newton(&eval, t->bend[k]);
         dem2di_array_wait(i, steps + 1, u, q);
     } else {
-        dem2di_pairs_query(query, i, a, b);
+        dem2di_pairs_query(query, i, a, b, t->cores);
     }
 }
 
@@ -12625,7 +12626,7 @@ static void dem2di_array_tiles(const dem2di_array_query *query, int begin, int e
     for (int i = begin; i < end; i++) {
         if (!dem2di_array_kinds(query, i, &a, &b)) {
             dem2di_pairs_query(query, i, &query->bodies[query->pairs[i].a],
-                               &query->bodies[query->pairs[i].b]);
+                               &query->bodies[query->pairs[i].b], false);
             continue;
         }
         dem2di_array_queue *q = &queues[a][b];
@@ -12642,7 +12643,7 @@ static void dem2di_array_singles(const dem2di_array_query *query, int begin, int
     for (int i = begin; i < end; i++) {
         const dem2d_body a = dem2di_body_normal(&query->bodies[query->pairs[i].a]);
         const dem2d_body b = dem2di_body_normal(&query->bodies[query->pairs[i].b]);
-        dem2di_pairs_query(query, i, &a, &b);
+        dem2di_pairs_query(query, i, &a, &b, false);
     }
 }
 
