@@ -16469,18 +16469,29 @@ static double dem2di_normal_dashpot(const dem2d_world *world, int i) {
     return dem2di_max(0, world->list.contacts.dashpot[i]);
 }
 
+/* Damping ratios of a law. Where the limit of spring and dashpot is 0 there is no dashpot: a spring
+   that another law has left ends at once, and does not push it. A caller's law has its own limits.
+   */
+static DEM2DI_INLINE double dem2di_sliding_ratio(const dem2d_pair_desc *law, bool callers) {
+    return callers || law->friction > 0 ? law->tangential_damping_ratio : 0;
+}
+
+static DEM2DI_INLINE double dem2di_rolling_ratio(const dem2d_pair_desc *law, bool callers) {
+    return callers || law->rolling_friction > 0 ? law->rolling_damping_ratio : 0;
+}
+
 static double dem2di_tangential_dashpot(const dem2d_world *world, int i, const dem2di_arms *arms) {
     const dem2d_pair_desc *law = dem2di_law_of(world, i);
-    if (!(law->tangential_damping_ratio > 0)) return 0;
-    return dem2di_dashpot(law->tangential_damping_ratio, law->tangential_stiffness,
-                          dem2di_sliding_inverse(world, i, arms));
+    const double ratio = dem2di_sliding_ratio(law, world->law != NULL);
+    if (!(ratio > 0)) return 0;
+    return dem2di_dashpot(ratio, law->tangential_stiffness, dem2di_sliding_inverse(world, i, arms));
 }
 
 static double dem2di_rolling_dashpot(const dem2d_world *world, int i) {
     const dem2d_pair_desc *law = dem2di_law_of(world, i);
-    if (!(law->rolling_damping_ratio > 0)) return 0;
-    return dem2di_dashpot(law->rolling_damping_ratio,
-                          dem2di_rolling_stiffness(law, dem2di_reduced_radius(world, i)),
+    const double ratio = dem2di_rolling_ratio(law, world->law != NULL);
+    if (!(ratio > 0)) return 0;
+    return dem2di_dashpot(ratio, dem2di_rolling_stiffness(law, dem2di_reduced_radius(world, i)),
                           dem2di_rolling_inverse(world, i));
 }
 
@@ -18645,23 +18656,11 @@ static bool dem2di_joints_find(dem2d_world *world, dem2di_joining *joining) {
     return joined;
 }
 
-/* Contacts with vertices that are not those of before, but have their numbers, are forgotten. The
-   others stay: what they had in the last force pass must outlast a step that is refused. */
-static void dem2di_forget_vertices(dem2d_world *world, const dem2di_wall_joint *before) {
-    const dem2di_list *list = &world->list;
-    for (int i = list->pairs; i < list->count; i++) {
-        const int end = dem2di_vertex_of(list->keys[i].b), part = dem2di_part_of(list->keys[i].b);
-        if (list->keys[i].a < 0 || end < 0) continue;
-        if (dem2di_partner_of(&before[part], end) != dem2di_partner_of(&world->joints[part], end))
-            dem2di_contact_forget(world, i);
-    }
-    world->list_stale = true;
-}
-
-/* The joints that were found are those of the next step; the vertices may be the same. */
-static void dem2di_joints_set(dem2d_world *world, const dem2di_wall_joint *before, bool joined,
-                              bool same) {
-    if (!same) dem2di_forget_vertices(world, before);
+/* The joints that were found are those of the next step; the vertices may be the same. Contacts
+   with those of before stay for now: what they had in the last force pass must outlast a step that
+   is refused. */
+static void dem2di_joints_set(dem2d_world *world, bool joined, bool same) {
+    if (!same) world->list_stale = true;
     for (int k = 0; k < world->part_count; k++) dem2di_face_place(world, k);
     if (joined != world->plan.joints) dem2di_edited(world);
     world->joined = joined;
@@ -18687,7 +18686,7 @@ static dem2d_result dem2di_join(dem2d_world *world) {
         for (int k = 0; k < 2 * parts && joining.parted < 0; k++)
             same = same && dem2di_partner_of(&before[k / 2], k % 2) ==
                                dem2di_partner_of(&world->joints[k / 2], k % 2);
-        if (joining.parted < 0) dem2di_joints_set(world, before, joined, same);
+        if (joining.parted < 0) dem2di_joints_set(world, joined, same);
     }
     dem2di_release(&world->env, before, (size_t)parts + 1, old);
     dem2di_release(&world->env, joining.ends, ends + 1, size);
@@ -19295,10 +19294,8 @@ static bool dem2di_has_discs(const dem2d_world *world) {
 static int dem2di_terms_of(const dem2d_pair_desc *law) {
     return (law->damping_ratio > 0 ? DEM2DI_DASHPOT : 0) |
            (law->rolling_friction > 0 ? DEM2DI_ROLLING : 0) |
-           (law->tangential_damping_ratio > 0 && law->friction > 0 ? DEM2DI_TANGENTIAL_DASHPOT
-                                                                   : 0) |
-           (law->rolling_damping_ratio > 0 && law->rolling_friction > 0 ? DEM2DI_ROLLING_DASHPOT
-                                                                        : 0);
+           (dem2di_sliding_ratio(law, false) > 0 ? DEM2DI_TANGENTIAL_DASHPOT : 0) |
+           (dem2di_rolling_ratio(law, false) > 0 ? DEM2DI_ROLLING_DASHPOT : 0);
 }
 
 /* Had vertices a part of some contact's normal force in the last force pass? Only an edit is a
@@ -21186,7 +21183,7 @@ static void dem2di_batch_laws(const dem2d_world *world, int first, dem2di_batch 
         batch->mu[k] = dem2di_slides(law, law->friction);
         if (!terms) continue;
         batch->mu_r[k] = dem2di_slides(law, law->rolling_friction);
-        batch->zeta_t[k] = law->tangential_damping_ratio;
+        batch->zeta_t[k] = dem2di_sliding_ratio(law, world->law != NULL);
     }
 }
 
@@ -21287,7 +21284,7 @@ dem2di_batch_points(dem2di_batch *batch, int count, const dem2d_pair_desc *law, 
         if (friction) batch->slip[k] = dem2di_batch_slip(batch, k, &r, last, depth[k]);
         if (terms & DEM2DI_TANGENTIAL_DASHPOT) {
             const double kt = one_law ? law->tangential_stiffness : batch->kt[k];
-            const double ratio = one_law ? law->tangential_damping_ratio : batch->zeta_t[k];
+            const double ratio = one_law ? dem2di_sliding_ratio(law, false) : batch->zeta_t[k];
             batch->dashpot[k] = dem2di_batch_dashpot(batch, k, kt, ratio, &r);
         }
         normal_x[k] = r.normal.x;
@@ -21673,9 +21670,7 @@ static void dem2di_law_add_terms(const dem2d_world *world, int i, const dem2d_pa
     rows->approach[first] = approach;
     rows->dashpot[first] = dashpot;
     rows->tangential_dashpot[first] =
-        law->tangential_damping_ratio > 0 && (terms & DEM2DI_ALL_DASHPOTS)
-            ? dem2di_tangential_dashpot(world, i, &contact->arms)
-            : 0;
+        terms & DEM2DI_ALL_DASHPOTS ? dem2di_tangential_dashpot(world, i, &contact->arms) : 0;
     if (rows->count - first == 2) {
         const dem2di_point_pair *pair = &world->list.contacts.point_pairs[i - world->list.discs];
         double sliding = rows->tangential_dashpot[first];
@@ -22554,7 +22549,7 @@ static void dem2di_resolve_vertex(dem2d_world *world, const dem2di_wall_rows *ro
                                   dem2di_count *count) {
     int number = world->list.keys[vertex].b, end = dem2di_vertex_of(number), row[2], part[2];
     const dem2di_wall_joint *joint = &world->joints[dem2di_part_of(number)];
-    if (joint->partner[end] < 0) return; /* no more, in a damaged snapshot */
+    if (joint->partner[end] < 0) return; /* no more */
     dem2di_rows_of_vertex(world, rows, vertex, row);
     part[0] = dem2di_part_of(number);
     part[1] = joint->partner[end];
@@ -22755,7 +22750,7 @@ static int dem2di_part_beyond(const dem2d_world *world, const dem2di_wall_rows *
         const int part = dem2di_part_of(number);
         const dem2di_wall_joint *joint = &world->joints[part];
         const int other = joint->partner[at];
-        if (other < 0) continue; /* in a damaged snapshot */
+        if (other < 0) continue;
         const int parts[2] = {part, other};
         dem2di_wall_face faces[2];
         dem2di_faces_of_vertex(world, rows->contact[k], faces);
@@ -31051,7 +31046,7 @@ static void dem2di_hash_fields(dem2di_hashing *hashing) {
 typedef union dem2di_row {
     dem2di_state state;
     dem2di_key key;
-    double number;
+    dem2di_two two;
 } dem2di_row;
 
 /* Has a column a row for each body? */
@@ -31064,8 +31059,8 @@ static bool dem2di_one_part_described(const dem2d_world *w, int wall) {
     return w->walls[wall].count == 1 && !w->walls[wall].turns;
 }
 
-/* Row of a hashed column for a place in the order of ids; NULL: nothing is there. Poses are as a
-   caller sees them: a refused step may have changed how rotations are held. */
+/* Row of a hashed column for a place in the order of ids; NULL: nothing is there. A refused step
+   may have changed how rotations are held, and moved particles into the cell that were due to. */
 static const void *dem2di_hashed_row(const dem2d_world *w, const dem2di_column *column, int place,
                                      dem2di_row *made) {
     dem2di_group group = column->group;
@@ -31081,6 +31076,8 @@ static const void *dem2di_hashed_row(const dem2d_world *w, const dem2di_column *
     if (column->fields != dem2di_state_fields) return row;
     memcpy(&made->state, row, sizeof made->state);
     made->state.q = dem2di_pose_of(w, (const dem2di_state *)(const void *)start, slot).rotation;
+    if (w->wrap_due && start == (const char *)w->now)
+        made->state.x = dem2di_wrapped(&w->cell, made->state.x);
     return made;
 }
 
@@ -31097,9 +31094,12 @@ static const void *dem2di_contact_row(const dem2d_world *w, const dem2di_column 
         const char *start = (const char *)dem2di_column_get(w, column);
         if (iterator->number < begin) return NULL;
         const char *row = start + (size_t)(iterator->number - begin) * column->size;
-        if (column->fields != dem2di_finite_field) return row;
-        memcpy(&made->number, row, sizeof made->number);
-        made->number += 0; /* not -0: a spring may have been there or not */
+        if (column->fields != dem2di_finite_field && column->fields != dem2di_finite_two)
+            return row;
+        made->two.at[1] = 0;
+        memcpy(made, row, column->size);
+        for (int k = 0; k < 2; k++)
+            made->two.at[k] += 0; /* not -0: springs and dashpots may have been there or not */
         return made;
     }
     made->key.a = w->bodies[key->a].index;

@@ -47,6 +47,8 @@ enum {
 enum {
     WITH_DASHPOT,
     WITH_ROLLING,
+    WITH_SLIDING_DASHPOT,
+    WITH_ROLLING_DASHPOT,
     WITH_LAW,
     WITH_TWO_POINTS,
     WITH_ONE_POINT,
@@ -96,15 +98,15 @@ enum {
 };
 
 static const char *const world_features[WITH_COUNT] = {
-    "dashpot",   "rolling",    "caller's law", "two points", "one point", "GJK, EPA",
-    "servo",     "moving",     "turned wall",  "segment",    "chain",     "driven",
-    "fixed",     "added",      "removed",      "moved",      "loads",     "walls come",
-    "set_pair",  "time step",  "gravity",      "damping",    "refused",   "skin",
-    "ledger",    "new list",   "no memory",    "snapshot",   "threads",   "queries",
-    "groups",    "sensor",     "events",       "load calls", "rows",      "relax",
-    "set_shape", "set scale",  "set_material", "chain wall", "one-sided", "turning",
-    "belt",      "cell",       "flow",         "held",       "circle",    "ellipse",
-    "polygon",   "polybezier", "Fourier",      "custom"};
+    "dashpot",   "rolling",    "slide damper", "roll damper", "caller's law", "two points",
+    "one point", "GJK, EPA",   "servo",        "moving",      "turned wall",  "segment",
+    "chain",     "driven",     "fixed",        "added",       "removed",      "moved",
+    "loads",     "walls come", "set_pair",     "time step",   "gravity",      "damping",
+    "refused",   "skin",       "ledger",       "new list",    "no memory",    "snapshot",
+    "threads",   "queries",    "groups",       "sensor",      "events",       "load calls",
+    "rows",      "relax",      "set_shape",    "set scale",   "set_material", "chain wall",
+    "one-sided", "turning",    "belt",         "cell",        "flow",         "held",
+    "circle",    "ellipse",    "polygon",      "polybezier",  "Fourier",      "custom"};
 
 /* --- sizes: of radii and forces of 1 -----------------------------------------------------------
  */
@@ -256,6 +258,9 @@ static dem2d_pair_desc world_make_pair(uint64_t *r) {
     if (!world_once_in(r, 4)) pair.friction = random_between(r, 0.1, 1);
     if (world_once_in(r, 3)) pair.damping_ratio = random_between(r, 0.05, 0.5);
     if (world_once_in(r, 3)) pair.rolling_friction = random_between(r, 0.05, 0.3);
+    uint64_t random = *r * 0x9e3779b97f4a7c15u + 13, *own = &random; /* as world_make_more */
+    if (world_once_in(own, 3)) pair.tangential_damping_ratio = random_between(own, 0.05, 0.5);
+    if (world_once_in(own, 3)) pair.rolling_damping_ratio = random_between(own, 0.05, 0.5);
     return pair;
 }
 
@@ -269,6 +274,8 @@ static dem2d_material_desc world_make_material(uint64_t *r) {
     m.friction = pair.friction;
     m.damping_ratio = pair.damping_ratio;
     m.rolling_friction = pair.rolling_friction;
+    m.tangential_damping_ratio = pair.tangential_damping_ratio;
+    m.rolling_damping_ratio = pair.rolling_damping_ratio;
     return m;
 }
 
@@ -2066,6 +2073,8 @@ static uint64_t world_uses(const world_script *s) {
     for (int i = 0; i < s->material_count; i++) {
         if (s->materials[i].damping_ratio > 0) uses |= one << WITH_DASHPOT;
         if (s->materials[i].rolling_friction > 0) uses |= one << WITH_ROLLING;
+        if (s->materials[i].tangential_damping_ratio > 0) uses |= one << WITH_SLIDING_DASHPOT;
+        if (s->materials[i].rolling_damping_ratio > 0) uses |= one << WITH_ROLLING_DASHPOT;
     }
     if (s->law) uses |= one << WITH_LAW;
     if (s->desc.faces == DEM2D_ONE_POINT) uses |= one << WITH_ONE_POINT;

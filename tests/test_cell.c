@@ -446,6 +446,47 @@ static void test_memory(void **state) {
     assert_true(failed > 5);
 }
 
+static bool refuses;
+
+static dem2d_result refuse(void *user, dem2d_result result) {
+    (void)user;
+    return refuses ? DEM2D_STATE : result;
+}
+
+/* A disc that leaves the cell and has a partner finds no memory for its way back: it goes back in the
+   next step, also if this is refused, and the hash stays the same. */
+static void test_late_wrap(void **state) {
+    (void)state;
+    bool late = false;
+    for (int call = 1, refused = 1; refused > 0 && !late; call++) {
+        const dem2d_material_desc soft = soft_desc(false);
+        dem2d_world_desc desc = {0};
+        test_env env;
+        test_env_init(&env);
+        desc.env = &env.env, desc.commit = refuse;
+        desc.time_step = DT, desc.cell.a = vec(40, 0), desc.cell.b = vec(0, 40);
+        const scene s = open_scene(&desc, &soft);
+        const dem2d_shape_id disc = give_shape(&s, make_disc(0.5));
+        dem2d_particle_id ids[2];
+        for (int i = 0; i < 2; i++) {
+            dem2d_particle_desc grain = grain_desc(&s, disc, 1, vec(0.05 + 0.9 * i, 20));
+            grain.velocity.x = -0.1 / DT;
+            ids[i] = add_grain(&s, &grain);
+        }
+        test_env_fail(&env, call);
+        refused = test_steps_fail(s.world, 1);
+        late = refused == 0 && grain_of(&s, ids[0]).pose.position.x < 0;
+        const uint64_t hash = dem2d_world_hash(s.world);
+        refuses = true;
+        assert_result(dem2d_world_step(s.world, 1, NULL), DEM2D_STATE);
+        refuses = false;
+        assert_true(dem2d_world_hash(s.world) == hash);
+        close_scene(&s);
+        assert_clean(&env);
+    }
+    assert_true(late);
+}
+
 /* --- walls, and what is refused ---------------------------------------------------------------- */
 
 /* Grains in a shear cell: servo wall above, floor below, periodic along x. */
@@ -558,8 +599,9 @@ int main(void) {
         cmocka_unit_test(test_other_cells), cmocka_unit_test(test_lattice),
         cmocka_unit_test(test_porosity),    cmocka_unit_test(test_grid),
         cmocka_unit_test(test_conserved),   cmocka_unit_test(test_edits),
-        cmocka_unit_test(test_memory),      cmocka_unit_test(test_servo),
-        cmocka_unit_test(test_refused),     cmocka_unit_test(test_flung),
+        cmocka_unit_test(test_memory),      cmocka_unit_test(test_late_wrap),
+        cmocka_unit_test(test_servo),       cmocka_unit_test(test_refused),
+        cmocka_unit_test(test_flung),
     };
     return cmocka_run_group_tests_name("periodic cell", tests, NULL, NULL);
 }

@@ -682,8 +682,19 @@ static void test_springs(void **state) {
 /* A step that is refused after an edit leaves the state as the edit left it: a disc in a valley of
    two segments, whose vertex takes a part of both forces. Joints come or go elsewhere, one of the
    two is named anew and gets another place among the walls, or goes; or both go, while a third
-   contact remains. */
-enum { JOINTS_COME, JOINTS_GO, VALLEY_NAMED, VALLEY_ENDS, ONE_FACE, VALLEY_EDITS };
+   contact remains; one of the two is moved a little, or sets out: they are no longer joined; or a
+   third segment comes between them, at the same vertex. */
+enum {
+    JOINTS_COME,
+    JOINTS_GO,
+    VALLEY_NAMED,
+    VALLEY_ENDS,
+    ONE_FACE,
+    VALLEY_PARTS,
+    VALLEY_SETS_OUT,
+    VALLEY_FILLED,
+    VALLEY_EDITS
+};
 
 static void test_refused_after_edits(void **state) {
     (void)state;
@@ -702,16 +713,19 @@ static void test_refused_after_edits(void **state) {
         assert_true(list[0].sign + list[1].sign + list[2].sign + list[3].sign == 2);
         if (edit == JOINTS_COME) add_segment(&s, vec(7, 0.1), vec(8, 0));
         if (edit == JOINTS_GO) assert_ok(dem2d_world_remove_wall(s.world, far));
-        if (edit == VALLEY_NAMED) {
+        if (edit == VALLEY_FILLED) add_segment(&s, vec(0, 0), vec(1, -0.1));
+        if (edit == VALLEY_NAMED || edit == VALLEY_PARTS || edit == VALLEY_SETS_OUT) {
             dem2d_wall_desc desc;
             assert_ok(dem2d_world_get_wall_desc(s.world, right, &desc));
-            desc.name = 7;
+            if (edit == VALLEY_NAMED) desc.name = 7;
+            if (edit == VALLEY_PARTS) desc.point.x += 1e-5, desc.end.x += 1e-5;
+            if (edit == VALLEY_SETS_OUT) desc.mode = DEM2D_WALL_MOVING, desc.velocity.x = 1e-3;
             assert_ok(dem2d_world_set_wall(s.world, right, &desc));
         }
         if (edit == VALLEY_ENDS || edit == ONE_FACE)
             assert_ok(dem2d_world_remove_wall(s.world, right));
         const int left = contacts_of(&s, list, 8);
-        const int expected[VALLEY_EDITS] = {4, 3, 4, 2, 2};
+        const int expected[VALLEY_EDITS] = {4, 3, 4, 2, 2, 4, 4, 4};
         assert_int_equal(left, expected[edit]);
         assert_ok(dem2d_world_set_time_step(s.world, 1));
         const uint64_t hash = dem2d_world_hash(s.world);
@@ -723,7 +737,8 @@ static void test_refused_after_edits(void **state) {
         }
         assert_ok(dem2d_world_set_time_step(s.world, 1e-5));
         step(&s, 3);
-        assert_int_equal(contacts_of(&s, list, 8), expected[edit]);
+        const bool apart = edit == VALLEY_PARTS || edit == VALLEY_SETS_OUT;
+        assert_int_equal(contacts_of(&s, list, 8), expected[edit] - apart);
         close_scene(&s);
     }
 }
