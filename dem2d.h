@@ -23194,13 +23194,10 @@ static DEM2DI_INLINE dem2di_tile *dem2di_tile_add_corner(const dem2d_world *worl
     return tile;
 }
 
-/* The same of a polygon and a circle, which have one point; a snapshot may claim two. A function of
-   its own: that of polygons need not ask. */
+/* The same of a polygon and a circle, which have one point. A function of its own: that of polygons
+   need not ask. */
 static dem2di_tile *dem2di_tile_add_round(const dem2d_world *world, int i, const dem2d_shape *a,
                                           const dem2d_shape *b, dem2di_tile *corners) {
-    const dem2di_contacts *from = &world->list.contacts;
-    if (world->plan.faces && dem2di_has_two_points(&from->point_pairs[i - world->list.discs]))
-        return NULL;
     dem2di_tile *tile = dem2di_tile_add_corner(world, i, a, b, corners, corners);
     if (tile != NULL) dem2di_tile_round_set(world, i, tile->count - 1, tile);
     return tile;
@@ -31795,6 +31792,17 @@ static void dem2di_finish_images(dem2di_loader *loader) {
     dem2di_images_make(w);
 }
 
+/* Only shapes that have faces meet in two points. */
+static bool dem2di_points_sound(const dem2d_world *w, int contact) {
+    const int at = contact - w->list.discs;
+    const dem2di_key *key = &w->list.keys[contact];
+    if (at < 0 || !w->plan.faces || !dem2di_has_two_points(&w->list.contacts.point_pairs[at]))
+        return true;
+    return dem2di_shape_of(w, &w->bodies[dem2di_owner(w, key->a)])->flat &&
+           (contact >= w->list.pairs ||
+            dem2di_shape_of(w, &w->bodies[dem2di_owner(w, key->b)])->flat);
+}
+
 /* Is a key of two that exist, and listed with its kind? A forgotten key may be anything. */
 static bool dem2di_key_sound(const dem2d_world *w, int contact) {
     const dem2di_key *key = &w->list.keys[contact];
@@ -31837,6 +31845,9 @@ static void dem2di_finish_list(dem2di_loader *loader) {
     dem2di_list *list = &w->list;
     for (int i = 0; i < list->count && dem2di_load_good(loader); i++)
         dem2di_load_expect(loader, dem2di_key_sound(w, i), "no such contact");
+    for (int i = 0; i < list->count && dem2di_load_good(loader); i++)
+        dem2di_load_expect(loader, list->keys[i].a < 0 || dem2di_points_sound(w, i),
+                           "two contact points of shapes without faces");
     if (!dem2di_load_good(loader)) return;
     dem2di_load_expect(loader, dem2di_plan_holds(w), "the plan is of another scene");
     if (!dem2di_load_good(loader)) return;

@@ -1197,6 +1197,27 @@ static void test_order(void **state) {
     check_refused(&moved, DEM2D_FORMAT, "rows");
 }
 
+/* A disc on a box on a floor: only the box and the floor may have two contact points. */
+static void test_two_points(void **state) {
+    (void)state;
+    const dem2d_material_desc stone = stone_desc(1e6, 0.5);
+    dem2d_world_desc desc = {0};
+    desc.time_step = 1e-5;
+    const scene s = open_scene(&desc, &stone);
+    add_plane(&s, 0, 0, 0, 1);
+    add_shape(&s, make_box(0.1, 0.1), DEM2D_FREE, vec(0, 0.0499), 0, vec(0, 0), 0);
+    add_shape(&s, make_disc(0.05), DEM2D_FREE, vec(0, 0.1497), 0, vec(0, 0), 0);
+    step(&s, 1);
+    scene_bytes bytes = scene_save(s.world);
+    const record r = record_named(&bytes, "two_points");
+    const double whole = 1;
+    char *weights = field_of(&bytes, &r, "weights");
+    assert_true(r.rows >= 2);
+    for (uint64_t k = 0; k < r.rows; k++) memcpy(weights + 8 * r.width * k, &whole, sizeof whole);
+    close_scene(&s);
+    check_refused(&bytes, DEM2D_FORMAT, "two contact points");
+}
+
 /* Any byte changed and the checksum made right: refused, or a world that can be stepped. */
 static void test_crafted(void **state) {
     (void)state;
@@ -1533,6 +1554,7 @@ int main(void) {
         cmocka_unit_test(test_hash_ids),
         cmocka_unit_test(test_golden),
         cmocka_unit_test(test_flipped),
+        cmocka_unit_test(test_two_points),
         cmocka_unit_test(test_cut),
         cmocka_unit_test(test_appended),
         cmocka_unit_test(test_layout),
