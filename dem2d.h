@@ -19843,11 +19843,14 @@ static inline bool dem2di_is_inner(const dem2d_cell *cell, const dem2d_box *box,
 static bool dem2di_build_images(dem2di_build *build) {
     dem2d_world *world = build->world;
     const dem2di_grid *grid = &build->grid;
+    const dem2d_vec low = grid->box.lower, high = grid->box.upper;
+    double far = 0; /* a particle may be anywhere where the cell is not periodic */
+    if (world->cell.a.x > 0) far += fabs(low.x) + fabs(high.x);
+    if (world->cell.b.y > 0) far += fabs(low.y) + fabs(high.y);
     build->image_base = world->body_count;
     if (build->image_of != NULL)
         memset(build->image_of, 0, (size_t)grid->count * sizeof *build->image_of);
     for (int i = 0; i < world->body_count && world->periodic; i++) {
-        const double far = dem2di_size_of(grid->box.lower) + dem2di_size_of(grid->box.upper);
         const double reach = build->reach[i] + grid->size / 2 + DEM2DI_ROUNDOFF * far;
         dem2d_box box = grid->box;
         if (dem2di_is_inner(&world->cell, &box, world->now[i].x, reach)) continue;

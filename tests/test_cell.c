@@ -531,6 +531,37 @@ static void test_flung(void **state) {
     close_scene(&s);
 }
 
+/* Two discs in contact across the border, and one as far away as it can be where the cell is not
+   periodic: it needs no more images than any other. */
+static void test_far_away(void **state) {
+    (void)state;
+    static const double places[] = {1e6, 1e16, 1e20, 1e100, 1e300};
+    for (int k = 0; k < 4 * COUNT_OF(places); k++) {
+        const bool along_a = k % 2;
+        const double far = (k & 2 ? -1 : 1) * places[k / 4];
+        const dem2d_material_desc soft = soft_desc(false);
+        dem2d_world_desc desc = {0};
+        test_env env;
+        test_env_init(&env);
+        desc.env = &env.env, desc.time_step = DT;
+        *(along_a ? &desc.cell.a.x : &desc.cell.b.y) = 4;
+        const scene s = open_scene(&desc, &soft);
+        const dem2d_shape_id disc = give_shape(&s, make_disc(0.5));
+        for (int i = 0; i < 3; i++) {
+            const double along = i ? 3.7 : 0.3, across = i == 2 ? far : 0;
+            const dem2d_vec at = along_a ? vec(along, across) : vec(across, along);
+            const dem2d_particle_desc grain = grain_desc(&s, disc, 1, at);
+            (void)add_grain(&s, &grain);
+        }
+        step(&s, 3);
+        dem2d_contact_info contact;
+        assert_int_equal(contacts_of(&s, &contact, 1), 1);
+        assert_true(inside_holds(s.world) && env.peak < 1 << 20);
+        close_scene(&s);
+        assert_clean(&env);
+    }
+}
+
 static void expect_refused_cell(dem2d_vec a, dem2d_vec b, const char *word) {
     test_env env;
     dem2d_world_desc desc = {0};
@@ -601,7 +632,7 @@ int main(void) {
         cmocka_unit_test(test_conserved),   cmocka_unit_test(test_edits),
         cmocka_unit_test(test_memory),      cmocka_unit_test(test_late_wrap),
         cmocka_unit_test(test_servo),       cmocka_unit_test(test_refused),
-        cmocka_unit_test(test_flung),
+        cmocka_unit_test(test_flung),       cmocka_unit_test(test_far_away),
     };
     return cmocka_run_group_tests_name("periodic cell", tests, NULL, NULL);
 }
