@@ -21280,6 +21280,7 @@ dem2di_batch_points(dem2di_batch *batch, int count, const dem2d_pair_desc *law, 
                     int terms, bool one_law, bool lines, double *DEM2DI_APART normal_x,
                     double *DEM2DI_APART normal_y, double *DEM2DI_APART depth,
                     double *DEM2DI_APART force) {
+    const double zeta_t = one_law ? dem2di_sliding_ratio(law, false) : 0;
     DEM2DI_INDEPENDENT
     for (int k = 0; k < count; k++) {
         const dem2d_vec last = {normal_x[k], normal_y[k]};
@@ -21287,7 +21288,7 @@ dem2di_batch_points(dem2di_batch *batch, int count, const dem2d_pair_desc *law, 
         if (friction) batch->slip[k] = dem2di_batch_slip(batch, k, &r, last, depth[k]);
         if (terms & DEM2DI_TANGENTIAL_DASHPOT) {
             const double kt = one_law ? law->tangential_stiffness : batch->kt[k];
-            const double ratio = one_law ? dem2di_sliding_ratio(law, false) : batch->zeta_t[k];
+            const double ratio = one_law ? zeta_t : batch->zeta_t[k];
             batch->dashpot[k] = dem2di_batch_dashpot(batch, k, kt, ratio, &r);
         }
         normal_x[k] = r.normal.x;
