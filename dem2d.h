@@ -54,7 +54,17 @@ CONTENTS (search for the anchor, ">>" and the word)
                     faces and vertices of walls whose segments are joined   >>joints
                     the neighbour list, particles sorted in space           >>list
                     the ledger of energies                                  >>ledger
-                    contacts, sums, motion; the stable time step            >>step
+                    contacts of circles, in batches                         >>discs
+                    other contacts, one by one                              >>collide
+                    contacts at joined segments: which count, and how       >>resolve
+                    contacts that go on, many at a time                     >>tiles
+                    circles and a caller's law                              >>rows
+                    the force pass; sums on walls and particles             >>forces
+                    servo walls, and the motion of all walls                >>servo
+                    the motion of particles, also in a cell                 >>integrate
+                    the rates of a cell whose stresses are held             >>held
+                    the stable time step, and the check of it               >>stability
+                    events of contacts; the step, pass by pass              >>step
                     energy, stress, fabric, packing, distance from rest     >>measures
                     coarse-grained fields on grids                          >>grids
                     overlaps, rays, the nearest                             >>queries
@@ -14007,11 +14017,11 @@ typedef struct dem2di_stiffest {
 
 /* Greatest values of some particles: how large and fast they are, and how easily they move. */
 typedef struct dem2di_extremes {
-    double far, size;             /* m, of a position (dem2di_size_of); radius */
-    double speed, spin, load;     /* of velocities (likewise), external loads */
-    double heavy;                 /* 1/mass of the heaviest that is free; 0: none is */
-    double light, slender;        /* 1/mass, 1/inertia */
-    bool others;                  /* some are no circles */
+    double far, size;         /* m, of a position (dem2di_size_of); radius */
+    double speed, spin, load; /* of velocities (likewise), external loads */
+    double heavy;             /* 1/mass of the heaviest that is free; 0: none is */
+    double light, slender;    /* 1/mass, 1/inertia */
+    bool others;              /* some are no circles */
 } dem2di_extremes;
 
 /* Sums over the contacts of a cell for the control of its stresses; all times the area. */
@@ -15144,7 +15154,7 @@ static void dem2di_run(const dem2d_world *world, dem2d_phase phase, int count, d
    with - and + for the half steps before and after the force pass. The velocity with which a
    contact moves, (d - d-)/dt for the line d from A to B now and a step ago, is the difference of
        u = (1 + dt/2 L-)^-1 (c- + L- x)
-   of the two (section step). The flow brings the partners at a distance d together by at most
+   of the two (section stability). The flow brings the partners at a distance d together by at most
    |L| dt d in a step: this uses up the list and the separation bounds besides the paths of c. */
 
 /* The particle that a slot shows. */
@@ -20974,9 +20984,8 @@ static double dem2di_ledger_turnover(const dem2di_ledger *ledger, const dem2di_l
 }
 
 /* ============================================================================================
-   >>step  Contacts, their sums, walls, motion; the stable time step
-   uses: config, math, memory, fields, support, shapes, gjk, edges, minimum, faces, contact, broad,
-         law, motion, world, cell, objects, walls, joints, list, ledger
+   >>discs  Contacts of circles: geometry and law in one, in batches
+   uses: config, math, broad, law, motion, world, objects, ledger
    ============================================================================================ */
 
 /* Bound of the force and the torques of a contact. */
@@ -21471,6 +21480,14 @@ static void dem2di_disc_range(const dem2d_world *world, int begin, int end, dem2
         dem2di_batch_end(world, &batch, closed, count);
     }
 }
+
+/* ============================================================================================
+   >>collide  Other contacts, one by one: geometry, rows for the law, forces
+   uses: config, math, support, shapes, gjk, faces, contact, broad, law, motion, world, objects,
+         walls, joints, ledger, discs
+   Positions, the last contact and its history -> the next geometry, in the columns; with velocities
+   the rows that the law reads; from what it writes, forces in the columns, and actions.
+   ============================================================================================ */
 
 /* Part of a gap that proves nothing: nearer to each other than this (m), two shapes may be found in
    contact by one search and apart by another. */
@@ -22311,9 +22328,12 @@ static void dem2di_update_wall_contact(dem2d_world *world, int i, dem2di_law_row
     dem2di_geometry_put(list, i, &contact);
 }
 
-/* --- joints: of the contacts at joined segments, which count, and how
- * -----------------------------------------
- */
+/* ============================================================================================
+   >>resolve  Of the contacts at joined segments, which count, and how
+   uses: config, math, broad, law, world, cell, objects, walls, joints, list, collide
+   The geometry of all contacts of a particle with segments -> which of them carry it, each alone or
+   sharing with others, before the law sees them.
+   ============================================================================================ */
 
 /* A corner (sine) this small is rounding: the contact is along the face. */
 #define DEM2DI_CORNER 1e-8
@@ -22977,7 +22997,10 @@ static inline void dem2di_collide(dem2d_world *world, int i, dem2di_law_rows *ro
     }
 }
 
-/* --- contacts that go on -------------------------------------------------------------------------
+/* ============================================================================================
+   >>tiles  Contacts that go on, many at a time
+   uses: config, math, support, gjk, edges, minimum, faces, broad, law, motion, world, objects,
+         list, ledger, collide, resolve
    Most contacts of particles without edges are where they were in the last step, see
    dem2di_smooth_last, and most of two polygons, or of a polygon and a circle, are of the same
    corner and edge, see dem2di_edge_last. They are taken in tiles: fetched with their support
@@ -22987,7 +23010,8 @@ static inline void dem2di_collide(dem2d_world *world, int i, dem2di_law_rows *ro
    turns by more than Newton's last step may, the tile keeps the contact for another pass, with the
    support points along the normal of a Newton step, see dem2di_tile_step. Polygons that had two
    points are in a tile of their own: they go on if they have two again, the second one with its
-   full weight. */
+   full weight.
+   ============================================================================================ */
 
 /* What contacts of two points have beside the rest. Numbers of corners as in dem2d_contact_point;
    they are doubles as all that is in the loops. */
@@ -23018,8 +23042,8 @@ typedef struct dem2di_tile {
     double ax[DEM2DI_BATCH], ay[DEM2DI_BATCH]; /* support point of A along it, of B against it; */
     double bx[DEM2DI_BATCH], by[DEM2DI_BATCH]; /* each from its centre */
     double rho_a[DEM2DI_BATCH], rho_b[DEM2DI_BATCH];
-    double least[DEM2DI_BATCH], most[DEM2DI_BATCH]; /* of the sum of rho */
-    double least_part[DEM2DI_BATCH];                /* see dem2di_rest_found */
+    double least[DEM2DI_BATCH], most[DEM2DI_BATCH];      /* of the sum of rho */
+    double least_part[DEM2DI_BATCH];                     /* see dem2di_rest_found */
     double round_a[DEM2DI_BATCH], round_b[DEM2DI_BATCH]; /* radii of circles, else 0; if round */
     double vx[DEM2DI_BATCH], vy[DEM2DI_BATCH], wa[DEM2DI_BATCH], wb[DEM2DI_BATCH];
     double kn[DEM2DI_BATCH], kt[DEM2DI_BATCH], mu[DEM2DI_BATCH];
@@ -23745,11 +23769,14 @@ static void dem2di_others_range(dem2d_world *world, int begin, int end, dem2di_c
     dem2di_law_apply(world, &rows, count);
 }
 
-/* --- circles and a caller's law ------------------------------------------------------------------
+/* ============================================================================================
+   >>rows  Circles and a caller's law
+   uses: config, math, broad, law, world, objects, discs, collide
    A loop over a batch computes what the law reads, of closed contacts and of those that are apart,
    as in the passes over circles. Nothing is moved then: the law is called for each run of closed
    contacts, with rows that begin where the run does, and writes into the columns of the contacts
-   themselves. Another loop makes the actions. Contacts get the same bits as from dem2di_law_add. */
+   themselves. Another loop makes the actions. Contacts get the same bits as from dem2di_law_add.
+   ============================================================================================ */
 
 /* Has a law dashpots? */
 static DEM2DI_INLINE bool dem2di_has_dampers(const dem2d_pair_desc *law) {
@@ -24100,6 +24127,13 @@ static void dem2di_discs_by_rows(dem2d_world *world, int begin, int end, dem2di_
     }
 }
 
+/* ============================================================================================
+   >>forces  The force pass; sums on walls and particles
+   uses: config, math, law, motion, world, objects, list, discs, resolve, tiles, rows
+   All contacts, in blocks that threads may share: circles in batches or rows, others in tiles. Then
+   actions -> forces on walls, and on particles in the order of their partners' ranks.
+   ============================================================================================ */
+
 /* Blocks of the three kinds of contacts, one kind after the other. All blocks that are not of
    circles go as one, so that their tiles are full. */
 static void dem2di_force_task(void *context, int begin, int end) {
@@ -24309,7 +24343,9 @@ static dem2di_state dem2di_foresee(const dem2d_world *world, int slot) {
     return dem2di_integrate(world, slot, &damping, true, true, true, world->plan.turns, true);
 }
 
-/* --- servo walls --------------------------------------------------------------------------------
+/* ============================================================================================
+   >>servo  Servo walls, and the motion of all walls
+   uses: config, math, law, motion, world, cell, objects, walls, forces
    A wall's new speed V along its normal moves it to where the next force pass finds it, and is the
    speed that the dashpots meet there. A contact whose spring presses with f now presses then with
        max(0, f + (k dt + c) (V - u)),
@@ -24319,7 +24355,8 @@ static dem2di_state dem2di_foresee(const dem2d_world *world, int slot) {
        target - b (V - drift).
    So the force is right in every step, whatever the dashpots, and no feedback can become unstable.
    The resistance b takes energy from the vibration of the contacts; as the drift follows V, it
-   does not bias the mean force when the particles yield steadily. */
+   does not bias the mean force when the particles yield steadily.
+   ============================================================================================ */
 
 /* b over sqrt(k m), of the contacts and the particles at the wall: a tenth of the critical damping
    of one of them, which takes half of the energy of a wave that meets the wall: 1 - (0.8/1.2)^2. */
@@ -24545,6 +24582,13 @@ static bool dem2di_control_pass(dem2d_world *world) {
     }
     return stale;
 }
+
+/* ============================================================================================
+   >>integrate  The motion of particles, also in a cell that deforms
+   uses: config, math, motion, world, cell, forces
+   States, sums of actions, loads -> next states; four particles at a time where the machine has
+   vectors.
+   ============================================================================================ */
 
 /* New velocities and positions of the particles from begin to end, over the states of the last
    force pass. Returns the greatest square of speed over skin. */
@@ -24927,7 +24971,9 @@ static double dem2di_flow_pass(dem2d_world *world) {
     return used + 1.25 * (1 + strain) * path + dem2di_max(10, 1.06 / world->skin) * strain;
 }
 
-/* --- stresses that are held ---------------------------------------------------------------------
+/* ============================================================================================
+   >>held  The rates of a cell whose stresses are held
+   uses: config, math, memory, law, motion, world, cell, objects, servo
    The rates L of a cell move its contacts to where the next force pass finds them, as the speed of
    a servo wall does. The forces of this pass alone decide the velocities c+ of the particles, but
    for terms of second order, so that they are known: an integrate pass without a flow has left them
@@ -24943,7 +24989,8 @@ static double dem2di_flow_pass(dem2d_world *world) {
    with the greatest target s. R limits what a step makes up for, and takes energy out of
    vibrations. Of other shapes it is not known which contacts will close, so that the stress comes
    out too high where contacts come and go. The rates D sum up the errors, so that their mean is 0:
-       R dD = 0.05 (stress - target) in each step. */
+       R dD = 0.05 (stress - target) in each step.
+   ============================================================================================ */
 
 /* R over the slope. A step makes up for 1/1.05 of what will be missing: this is stable while the
    stiffness is up to 2.1 times what is known of it. By trial (100 discs, kn/P from 1e2 to 1e6): a
@@ -25309,96 +25356,10 @@ static void dem2di_cell_work(const dem2d_world *world, double power[2][DEM2DI_HA
         power[k][DEM2DI_BY_CELL] -= xx * flow[k]->xx + yx * flow[k]->xy + yy * flow[k]->yy;
 }
 
-/* Force pass and motion in turns, in a step that nothing can refuse: each block of particles moves
-   as soon as its contacts are done, while these and its own states are in the cache. The next
-   states come over those before, which the force pass does not read where no segments are joined.
-   With threads the two passes are one after the other: a block may have contacts of several
-   threads. */
-static void dem2di_joint_pass(dem2d_world *world, dem2di_count *count) {
-    const dem2di_list *list = &world->list;
-    const int discs = dem2di_blocks(list->discs, DEM2DI_BLOCK);
-    const int blocks = dem2di_force_blocks(list->discs, list->count);
-    dem2di_force_task(world, discs, blocks);
-    for (int k = 0; k < discs; k++) {
-        dem2di_force_task(world, k, k + 1);
-        for (int b = world->block_results[k].complete; b >= 0; b = world->block_results[b].next)
-            dem2di_integrate_task(world, b, b + 1);
-    }
-    count->load = 0;
-    for (int k = 0; k < blocks; k++) dem2di_count_add(count, &world->block_results[k].count);
-    world->foreseen = true;
-}
-
-/* The rest of the ledger, after the motion: work at the velocities before and behind. */
-static void dem2di_observe_motion(dem2d_world *world, const dem2di_ledger *last) {
-    dem2di_ledger *ledger = &world->ledger;
-    double power[2][DEM2DI_HALVES] = {{0}};
-    ledger->kinetic = 0;
-    for (int place = 0; place < world->id_count; place++) {
-        int slot = dem2di_slot_at(world, place);
-        if (slot < 0) continue;
-        dem2di_load load = dem2di_sum_of(world, slot, world->plan.spin);
-        dem2di_observe_particle(world, slot, load, power, &ledger->kinetic);
-    }
-    dem2di_cell_work(world, power);
-    for (int place = 0; place < world->wall_count; place++) {
-        int j = world->walls[place].placed;
-        const dem2di_wall_state *old = &world->wall_now[j], *made = &world->wall_next[j];
-        if (!world->walls[j].alive) continue;
-        for (int k = 0; k < 2; k++) {
-            const dem2di_wall_state *half = k == 0 ? old : made;
-            power[k][DEM2DI_BY_WALLS] -= dem2di_dot(made->force, half->velocity) +
-                                         made->torque * half->w + made->shear * half->surface;
-        }
-    }
-    for (int k = 0; k < DEM2DI_HALVES; k++) {
-        ledger->sum[k] += ledger->half[k] + power[0][k] * world->made_step / 2;
-        ledger->half[k] = power[1][k] * world->time_step / 2;
-    }
-    double error = dem2di_ledger_error(ledger);
-    if (ledger->edited) {
-        ledger->given += error - ledger->closure;
-    } else {
-        ledger->turnover += dem2di_ledger_turnover(ledger, last);
-        ledger->closure = error;
-    }
-    ledger->edited = false;
-}
-
-/* Is the next state of each particle finite if no load exceeds the greatest of this pass? */
-static bool dem2di_surely_finite(const dem2d_world *world, const dem2di_count *count) {
-    const double dt = world->time_step, pushed = count->load * (world->list.count + 1.0);
-    double x = 0, y = 0, vx = 0, vy = 0, w = 0, light = 0, slender = 0, load = 0;
-    if (count->unsound > world->count.unsound) return false;
-    for (int i = 0; i < world->body_count; i++) {
-        const dem2di_state *now = &world->now[i];
-        x = dem2di_max(x, fabs(now->x.x));
-        y = dem2di_max(y, fabs(now->x.y));
-        vx = dem2di_max(vx, fabs(now->v.x));
-        vy = dem2di_max(vy, fabs(now->v.y));
-        w = dem2di_max(w, fabs(now->w));
-        light = dem2di_max(light, world->inverse[i].mass);
-        slender = dem2di_max(slender, world->inverse[i].inertia);
-    }
-    for (int i = 0; i < world->body_count && world->loaded; i++)
-        load = dem2di_max(load, dem2di_load_size(&world->loads[i]));
-    load += pushed;
-    const double gravity = fabs(world->gravity.x) + fabs(world->gravity.y);
-    const double speed = vx + vy + dt * (load * light + gravity); /* damping doubles at most */
-    return x + y + 4 * dt * speed < 1e300 && 4 * dt * (w + dt * (load * slender)) < 1e50;
-}
-
-/* A particle that the step would give a state that is not finite, or -1. */
-static int dem2di_unsound(const dem2d_world *world) {
-    for (int i = 0; i < world->body_count; i++) {
-        dem2di_state next = dem2di_foresee(world, i);
-        if (!dem2di_state_finite(&next)) return i;
-    }
-    return -1;
-}
-
-/* --- the stable time step -----------------------------------------------------------------------
- */
+/* ============================================================================================
+   >>stability  The stable time step, and the check of it
+   uses: config, math, memory, support, broad, law, motion, world, objects, list
+   ============================================================================================ */
 
 /* Stiffness of one contact on one of its particles, at one point, arm_n and arm_t from its centre.
  */
@@ -25686,6 +25647,12 @@ DEM2D_API dem2d_result dem2d_world_time_step_bounds(const dem2d_world *world, do
     return DEM2D_OK;
 }
 
+/* ============================================================================================
+   >>step  Events of contacts; the step, pass by pass
+   uses: config, math, memory, fields, broad, law, motion, world, cell, objects, walls, list,
+         ledger, resolve, forces, servo, integrate, held, stability
+   ============================================================================================ */
+
 /* --- events -------------------------------------------------------------------------------------
    The observe pass of contacts that close and open, after the checks and before the motion: blocks
    add up the impulses of those that stay closed and count the others. These are few; they are
@@ -25865,6 +25832,94 @@ DEM2D_API dem2d_result dem2d_world_choose_time_step(const dem2d_world *world, do
 
 /* --- the step ------------------------------------------------------------------------------------
  */
+
+/* Force pass and motion in turns, in a step that nothing can refuse: each block of particles moves
+   as soon as its contacts are done, while these and its own states are in the cache. The next
+   states come over those before, which the force pass does not read where no segments are joined.
+   With threads the two passes are one after the other: a block may have contacts of several
+   threads. */
+static void dem2di_joint_pass(dem2d_world *world, dem2di_count *count) {
+    const dem2di_list *list = &world->list;
+    const int discs = dem2di_blocks(list->discs, DEM2DI_BLOCK);
+    const int blocks = dem2di_force_blocks(list->discs, list->count);
+    dem2di_force_task(world, discs, blocks);
+    for (int k = 0; k < discs; k++) {
+        dem2di_force_task(world, k, k + 1);
+        for (int b = world->block_results[k].complete; b >= 0; b = world->block_results[b].next)
+            dem2di_integrate_task(world, b, b + 1);
+    }
+    count->load = 0;
+    for (int k = 0; k < blocks; k++) dem2di_count_add(count, &world->block_results[k].count);
+    world->foreseen = true;
+}
+
+/* The rest of the ledger, after the motion: work at the velocities before and behind. */
+static void dem2di_observe_motion(dem2d_world *world, const dem2di_ledger *last) {
+    dem2di_ledger *ledger = &world->ledger;
+    double power[2][DEM2DI_HALVES] = {{0}};
+    ledger->kinetic = 0;
+    for (int place = 0; place < world->id_count; place++) {
+        int slot = dem2di_slot_at(world, place);
+        if (slot < 0) continue;
+        dem2di_load load = dem2di_sum_of(world, slot, world->plan.spin);
+        dem2di_observe_particle(world, slot, load, power, &ledger->kinetic);
+    }
+    dem2di_cell_work(world, power);
+    for (int place = 0; place < world->wall_count; place++) {
+        int j = world->walls[place].placed;
+        const dem2di_wall_state *old = &world->wall_now[j], *made = &world->wall_next[j];
+        if (!world->walls[j].alive) continue;
+        for (int k = 0; k < 2; k++) {
+            const dem2di_wall_state *half = k == 0 ? old : made;
+            power[k][DEM2DI_BY_WALLS] -= dem2di_dot(made->force, half->velocity) +
+                                         made->torque * half->w + made->shear * half->surface;
+        }
+    }
+    for (int k = 0; k < DEM2DI_HALVES; k++) {
+        ledger->sum[k] += ledger->half[k] + power[0][k] * world->made_step / 2;
+        ledger->half[k] = power[1][k] * world->time_step / 2;
+    }
+    double error = dem2di_ledger_error(ledger);
+    if (ledger->edited) {
+        ledger->given += error - ledger->closure;
+    } else {
+        ledger->turnover += dem2di_ledger_turnover(ledger, last);
+        ledger->closure = error;
+    }
+    ledger->edited = false;
+}
+
+/* Is the next state of each particle finite if no load exceeds the greatest of this pass? */
+static bool dem2di_surely_finite(const dem2d_world *world, const dem2di_count *count) {
+    const double dt = world->time_step, pushed = count->load * (world->list.count + 1.0);
+    double x = 0, y = 0, vx = 0, vy = 0, w = 0, light = 0, slender = 0, load = 0;
+    if (count->unsound > world->count.unsound) return false;
+    for (int i = 0; i < world->body_count; i++) {
+        const dem2di_state *now = &world->now[i];
+        x = dem2di_max(x, fabs(now->x.x));
+        y = dem2di_max(y, fabs(now->x.y));
+        vx = dem2di_max(vx, fabs(now->v.x));
+        vy = dem2di_max(vy, fabs(now->v.y));
+        w = dem2di_max(w, fabs(now->w));
+        light = dem2di_max(light, world->inverse[i].mass);
+        slender = dem2di_max(slender, world->inverse[i].inertia);
+    }
+    for (int i = 0; i < world->body_count && world->loaded; i++)
+        load = dem2di_max(load, dem2di_load_size(&world->loads[i]));
+    load += pushed;
+    const double gravity = fabs(world->gravity.x) + fabs(world->gravity.y);
+    const double speed = vx + vy + dt * (load * light + gravity); /* damping doubles at most */
+    return x + y + 4 * dt * speed < 1e300 && 4 * dt * (w + dt * (load * slender)) < 1e50;
+}
+
+/* A particle that the step would give a state that is not finite, or -1. */
+static int dem2di_unsound(const dem2d_world *world) {
+    for (int i = 0; i < world->body_count; i++) {
+        dem2di_state next = dem2di_foresee(world, i);
+        if (!dem2di_state_finite(&next)) return i;
+    }
+    return -1;
+}
 
 /* A step has been made, and nobody has been given other velocities since. */
 static void dem2di_made(dem2d_world *world) {
@@ -28870,7 +28925,8 @@ DEM2D_API dem2d_result dem2d_world_particle_contacts(const dem2d_world *world, d
 
 /* ============================================================================================
    >>bulk  Particles and contacts from and into arrays of a caller
-   uses: config, math, memory, fields, law, motion, world, cell, objects, list, step, measures
+   uses: config, math, memory, fields, law, motion, world, cell, objects, list, rows, forces,
+         measures
    ============================================================================================ */
 
 /* Rows are read in the order of ids, block by block, each block array by array: its lines of the
@@ -29207,8 +29263,8 @@ DEM2D_API dem2d_result dem2d_world_read_contacts(const dem2d_world *world,
 
 /* ============================================================================================
    >>generators  Gradings, filling, growth, inlets and outlets
-   uses: config, math, memory, fields, shapes, outlines, broad, world, cell, objects,
-         walls, step, measures, queries
+   uses: config, math, memory, fields, shapes, outlines, broad, world, cell, objects, walls,
+         held, stability, step, measures, queries
    ============================================================================================ */
 
 /* HOW A PACKING IS MADE
