@@ -2952,7 +2952,8 @@ double __builtin_sqrt(double) __attribute__((const));
 
 /* Loops over contacts and particles are compiled twice: in plain C99, and for processors with AVX2,
    where compiler and machine are known to have it. Vectors of four doubles are used in functions
-   with DEM2DI_AVX2 only; without FMA every result has the bits of the plain path. */
+   with DEM2DI_AVX2 only; without FMA every result has the bits of the plain path. PATH chooses
+   between NAME_fours and NAME_plain. */
 #if defined(__x86_64__) && !defined(DEM2DI_NO_FOURS) && \
     (defined(__clang__) || (defined(__GNUC__) && __GNUC__ >= 12))
 #define DEM2DI_FOURS 1
@@ -2961,8 +2962,10 @@ double __builtin_sqrt(double) __attribute__((const));
 typedef double dem2di_four __attribute__((vector_size(32)));
 typedef long long dem2di_four_bits __attribute__((vector_size(32)));
 #define DEM2DI_SHUFFLE __builtin_shufflevector
+#define DEM2DI_PATH(fours, name) ((fours) ? name##_fours : name##_plain)
 #else
 #define DEM2DI_FOURS 0
+#define DEM2DI_PATH(fours, name) ((void)(fours), name##_plain)
 #endif
 
 /* Does the processor have what the second way is compiled for? */
@@ -12232,8 +12235,6 @@ static DEM2DI_AVX2 void dem2di_circles_fours(const dem2di_array_query *query, in
     const bool all_far = (far[0] & far[1] & far[2] & far[3]) != 0;
     dem2di_circles_plain(query, all_far ? i : begin, end);
 }
-#else
-#define dem2di_circles_fours dem2di_circles_plain
 #endif
 DEM2DI_VECTORS_END
 
@@ -12503,8 +12504,6 @@ static DEM2DI_AVX2 void dem2di_array_solve_fours(dem2di_array_tile *t, const dem
                                                  bool turn, double angle) {
     dem2di_array_solve(t, q, turn, angle);
 }
-#else
-#define dem2di_array_solve_fours dem2di_array_solve_plain
 #endif
 DEM2DI_VECTORS_END
 
@@ -12589,7 +12588,7 @@ static DEM2DI_INLINE void dem2di_array_decide(const dem2di_array_query *query,
 static void dem2di_array_apply(const dem2di_array_query *query, int kind_a, int kind_b,
                                dem2di_array_queue *q, dem2di_array_tile *t) {
     void (*solve)(dem2di_array_tile *, const dem2di_array_queue *, bool, double) =
-        dem2di_has_fours() ? dem2di_array_solve_fours : dem2di_array_solve_plain;
+        DEM2DI_PATH(dem2di_has_fours(), dem2di_array_solve);
     const int count = q->count;
     while (q->count % 4 != 0) /* whole vectors, so that loops have no rest */
         dem2di_array_wait(q->pair[count - 1], 0, dem2di_vec(q->ux[count - 1], q->uy[count - 1]), q);
@@ -12694,7 +12693,7 @@ DEM2D_API dem2d_result dem2d_pairs_contact(const dem2d_env *env, const dem2d_bod
         if (certified && short_only && !round)
             end = dem2di_array_run(&query, i, pair_count, circles);
         if (circles)
-            (dem2di_has_fours() ? dem2di_circles_fours : dem2di_circles_plain)(&query, i, end);
+            DEM2DI_PATH(dem2di_has_fours(), dem2di_circles)(&query, i, end);
         else
             (tiles ? dem2di_array_tiles : dem2di_array_singles)(&query, i, end);
         i = end;
@@ -21453,12 +21452,7 @@ static bool dem2di_batch_make(const dem2d_world *world, int first, int end, dem2
     const int count = dem2di_block_end(first, DEM2DI_BATCH, end) - first;
     const bool fours = world->fours && count >= 4;
     dem2di_batch_begin(world, first, fours ? count - count % 4 : count, batch);
-#if DEM2DI_FOURS
-    if (fours)
-        dem2di_batch_fetch_fours(world, first, batch);
-    else
-#endif
-        dem2di_batch_fetch_plain(world, first, batch);
+    DEM2DI_PATH(fours, dem2di_batch_fetch)(world, first, batch);
     dem2di_batch_amend(world, first, batch);
     return fours;
 }
@@ -21469,14 +21463,9 @@ static void dem2di_disc_range(const dem2d_world *world, int begin, int end, dem2
     const dem2d_pair_desc *law = dem2di_law(world, plan->material, plan->material);
     dem2di_batch batch;
     for (int first = begin; first < end; first += batch.count) {
-        int64_t closed;
         const bool fours = dem2di_batch_make(world, first, end, &batch);
-#if DEM2DI_FOURS
-        if (fours)
-            closed = dem2di_batch_solve_fours(&batch, world->made_step, law, plan);
-        else
-#endif
-            closed = dem2di_batch_solve_plain(&batch, world->made_step, law, plan);
+        const int64_t closed =
+            DEM2DI_PATH(fours, dem2di_batch_solve)(&batch, world->made_step, law, plan);
         dem2di_batch_end(world, &batch, closed, count);
     }
 }
@@ -23551,9 +23540,6 @@ static DEM2DI_AVX2 void dem2di_tile_solve_fours(dem2di_tile *t, double tolerance
 static DEM2DI_AVX2 void dem2di_tile_load_fours(dem2di_tile *t, double time_step) {
     dem2di_tile_load(t, time_step);
 }
-#else
-#define dem2di_tile_solve_fours dem2di_tile_solve_plain
-#define dem2di_tile_load_fours dem2di_tile_load_plain
 #endif
 DEM2DI_VECTORS_END
 
@@ -23652,10 +23638,8 @@ static int dem2di_tile_pass(dem2d_world *world, dem2di_tile *tile, dem2di_law_ro
     dem2di_last last;
     int left = 0;
     dem2di_tile_fill(tile);
-    (world->fours ? dem2di_tile_solve_fours : dem2di_tile_solve_plain)(tile, world->tolerance,
-                                                                       world->plan.faces);
-    if (!terms)
-        (world->fours ? dem2di_tile_load_fours : dem2di_tile_load_plain)(tile, world->made_step);
+    DEM2DI_PATH(world->fours, dem2di_tile_solve)(tile, world->tolerance, world->plan.faces);
+    if (!terms) DEM2DI_PATH(world->fours, dem2di_tile_load)(tile, world->made_step);
     for (int k = 0; k < tile->count; k++) {
         const int i = tile->contact[k];
         dem2di_history *history = &world->list.contacts.history[i - discs];
@@ -24108,19 +24092,9 @@ static void dem2di_discs_by_rows(dem2d_world *world, int begin, int end, dem2di_
     for (int first = begin; first < end; first += batch.count) {
         const bool fours = dem2di_batch_make(world, first, end, &batch);
         dem2di_law_range_fill(&range, &batch);
-#if DEM2DI_FOURS
-        if (fours)
-            dem2di_rows_make_fours(world, &batch, first, &range);
-        else
-#endif
-            dem2di_rows_make_plain(world, &batch, first, &range);
+        DEM2DI_PATH(fours, dem2di_rows_make)(world, &batch, first, &range);
         const int closed = dem2di_rows_ask(world, first, &batch, &range);
-#if DEM2DI_FOURS
-        if (fours)
-            dem2di_rows_act_fours(world, &batch, first, size);
-        else
-#endif
-            dem2di_rows_act_plain(world, &batch, first, size);
+        DEM2DI_PATH(fours, dem2di_rows_act)(world, &batch, first, size);
         dem2di_rows_check(batch.count, size, count);
         count->collisions += closed;
         count->proofs[DEM2D_BY_FORM] += closed;
