@@ -33434,9 +33434,9 @@ DEM2D_API dem2d_result dem2d_world_write_csv(const dem2d_world *world, const dem
             their kind, and refused steps; snapshots of 0.10.0 are read.
             Square roots of the header never set errno: -O2 alone is as fast as it was with
             -fno-math-errno, up to twice as fast as without it.
-            Faster, with the same bits: sums of forces do not branch on the number of contacts, which
-            processors guess wrong in worlds of thousands of particles; so do not the search for
-            neighbours and the order of contacts; kernels of circles with dashpots and rolling
+            Faster, with the same bits: sums of forces, the search for neighbours and the order of
+            contacts do not branch on numbers of contacts, which processors guess wrong in worlds of
+            thousands of particles; kernels of circles with dashpots and rolling
             friction; worlds of mixed shapes, whose contacts are taken by kinds of their pairs;
             dem2d_pairs_contact, above all ellipses, polybeziers and Fourier series.
             Mended: a refused step could change the hash after dem2d_world_set_pair took friction or
