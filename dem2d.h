@@ -18957,12 +18957,18 @@ static inline bool dem2di_has_walls(const dem2di_list *list, int slot) {
     return end > list->first[slot] && list->adjacent[end - 1] >= list->pairs;
 }
 
-/* The summands of a particle, whose run of contacts is sorted. */
-static inline void dem2di_summands_set(const dem2di_list *list, const int *run, int count, int as_b,
+/* Contact k of those in a run, or what is missing: no branch could foretell how many there are. */
+static inline int dem2di_summand(const int *run, int count, int k, int missing) {
+    const int mask = -(int)((uint32_t)(k - count) >> 31);
+    return (run[k] & mask) | (missing & ~mask);
+}
+
+/* The summands of a particle, whose run of contacts is sorted; there is memory for three more. */
+static inline void dem2di_summands_set(const int *run, int count, int as_b, int missing,
                                        dem2di_summands *summands) {
     for (int k = 0; k < 3; k++) {
-        summands->as_b[k] = k < as_b ? run[k] : list->count;
-        summands->as_a[k] = k < count - as_b ? run[as_b + k] : list->count;
+        summands->as_b[k] = dem2di_summand(run, as_b, k, missing);
+        summands->as_a[k] = dem2di_summand(run + as_b, count - as_b, k, missing);
     }
     if (as_b > 3 || count - as_b > 3) summands->as_b[0] = -1;
 }
@@ -18992,7 +18998,15 @@ static void dem2di_adjacency_sort_task(void *context, int begin, int end) {
             if (world->image_count > 0)
                 as_b = dem2di_adjacency_images(world, slot, run, count, as_b);
             list->own[slot] = list->first[slot] + as_b;
-            dem2di_summands_set(list, run, count, as_b, &list->summands[slot]);
+            if (room >= count + 3) {
+                dem2di_summands_set(run, count, as_b, list->count, &list->summands[slot]);
+            } else { /* at the end of the block: from a copy with room behind it */
+                int few[4 + 4 + 3] = {0}, most = as_b < 4 ? as_b : 4, others = count - as_b;
+                others = others < 4 ? others : 4;
+                for (int k = 0; k < most; k++) few[k] = run[k];
+                for (int k = 0; k < others; k++) few[most + k] = run[as_b + k];
+                dem2di_summands_set(few, most + others, most, list->count, &list->summands[slot]);
+            }
             walls |= dem2di_has_walls(list, slot);
         }
         world->block_results[block].walls = walls;
