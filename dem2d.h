@@ -24652,13 +24652,13 @@ DEM2DI_AVX2_INLINE dem2di_fours_motion dem2di_fours_motion_of(const dem2d_world 
 
 /* A half of a state, v, w and radius, a step later. */
 DEM2DI_AVX2_INLINE dem2di_four dem2di_fours_accelerate(const dem2di_fours_motion *motion, int slot,
-                                                       dem2di_inverse inverse, bool damped,
+                                                       const dem2di_inverse *inverse, bool damped,
                                                        bool spin, dem2di_four v) {
     const dem2di_four zero = dem2di_four_of(0, 0, 0, 0);
     const dem2di_four_bits sign = (dem2di_four_bits)dem2di_four_of(-0.0, -0.0, -0.0, -0.0);
+    const dem2di_two_lanes light = dem2di_lanes_at(&inverse->mass); /* and the moment of inertia */
     dem2di_four sum = dem2di_fours_gather(&motion->list, motion->actions, slot), made;
-    sum = motion->gravity +
-          sum * dem2di_four_of(inverse.mass, inverse.mass, inverse.inertia, inverse.inertia);
+    sum = motion->gravity + sum * DEM2DI_SHUFFLE(light, light, 0, 0, 1, 1);
     if (damped) {
         dem2di_four drag = motion->damping.local * (dem2di_four)((dem2di_four_bits)sum & ~sign);
         drag = (dem2di_four)((dem2di_four_bits)drag & (dem2di_four_bits)(v != zero));
@@ -24675,20 +24675,28 @@ DEM2DI_AVX2_INLINE dem2di_four dem2di_fours_accelerate(const dem2di_fours_motion
 DEM2DI_AVX2_INLINE double dem2di_fours_integrate(const dem2d_world *world, int begin, int end,
                                                  bool damped, bool spin) {
     const dem2di_fours_motion motion = dem2di_fours_motion_of(world);
+    const dem2di_four_bits sign = (dem2di_four_bits)dem2di_four_of(-0.0, -0.0, -0.0, -0.0);
+    const double turn = 2 * DEM2DI_PI;
+    const dem2di_four whole = dem2di_four_of(turn, turn, turn, turn);
+    dem2di_four_bits turned = {0, 0, 0, 0}; /* has somebody, in the lane of rotations? */
     double most = 0;
     for (int i = begin; i < end; i++) {
         const double *now = &world->now[i].x.x;
         double *next = &world->before[i].x.x;
         dem2di_four x = dem2di_four_at(now), v = dem2di_four_at(now + 4);
-        const dem2di_inverse inverse = world->inverse[i];
-        if (inverse.mass > 0) v = dem2di_fours_accelerate(&motion, i, inverse, damped, spin, v);
+        const dem2di_inverse *inverse = &world->inverse[i];
+        if (inverse->mass > 0) v = dem2di_fours_accelerate(&motion, i, inverse, damped, spin, v);
         dem2di_four moved = x + motion.time_step * v;
         x = spin ? DEM2DI_SHUFFLE(moved, x, 0, 1, 2, 7) : DEM2DI_SHUFFLE(moved, x, 0, 1, 6, 7);
         dem2di_four_put(next, x);
         dem2di_four_put(next + 4, v);
-        if (spin && fabs(x[2]) >= 2 * DEM2DI_PI) next[2] = fmod(x[2], 2 * DEM2DI_PI);
+        turned |= (dem2di_four_bits)((dem2di_four)((dem2di_four_bits)x & ~sign) >= whole);
         dem2di_four square = v * v;
         most = dem2di_max(most, (square[0] + square[1]) * world->inverse_skin_squared[i]);
+    }
+    for (int i = begin; i < end && spin && turned[2] != 0; i++) {
+        double *angle = &world->before[i].q.c;
+        if (fabs(*angle) >= turn) *angle = fmod(*angle, turn);
     }
     return most;
 }
@@ -24739,10 +24747,10 @@ DEM2DI_AVX2_INLINE double dem2di_fours_integrate_turning(dem2d_world *world, int
         dem2di_four x[4], v[4];
         for (int k = 0; k < 4; k++) {
             const double *now = &world->now[i + k].x.x;
-            const dem2di_inverse inverse = world->inverse[i + k];
+            const dem2di_inverse *inverse = &world->inverse[i + k];
             x[k] = dem2di_four_at(now);
             v[k] = dem2di_four_at(now + 4);
-            if (inverse.mass > 0)
+            if (inverse->mass > 0)
                 v[k] = dem2di_fours_accelerate(&motion, i + k, inverse, damped, true, v[k]);
             dem2di_four_put(&world->before[i + k].v.x, v[k]);
         }
