@@ -2952,8 +2952,8 @@ double __builtin_sqrt(double) __attribute__((const));
 
 /* Loops over contacts and particles are compiled twice: in plain C99, and for processors with AVX2,
    where compiler and machine are known to have it. Vectors of four doubles are used in functions
-   with DEM2DI_AVX2 only; without FMA every result has the bits of the plain path. PATH chooses
-   between NAME_fours and NAME_plain. */
+   with DEM2DI_AVX2 only; without FMA every result has the bits of the plain path. BOTH makes
+   of a function NAME, which is inlined, NAME_plain and NAME_fours; PATH calls one of them. */
 #if defined(__x86_64__) && !defined(DEM2DI_NO_FOURS) && \
     (defined(__clang__) || (defined(__GNUC__) && __GNUC__ >= 12))
 #define DEM2DI_FOURS 1
@@ -2962,10 +2962,21 @@ double __builtin_sqrt(double) __attribute__((const));
 typedef double dem2di_four __attribute__((vector_size(32)));
 typedef long long dem2di_four_bits __attribute__((vector_size(32)));
 #define DEM2DI_SHUFFLE __builtin_shufflevector
-#define DEM2DI_PATH(fours, name) ((fours) ? name##_fours : name##_plain)
+#define DEM2DI_BOTH(name, parameters, of)             \
+    static void name##_plain parameters {             \
+        name of;                                      \
+    }                                                 \
+    static DEM2DI_AVX2 void name##_fours parameters { \
+        name of;                                      \
+    }
+#define DEM2DI_PATH(fours, name, of) ((fours) ? name##_fours of : name##_plain of)
 #else
 #define DEM2DI_FOURS 0
-#define DEM2DI_PATH(fours, name) ((void)(fours), name##_plain)
+#define DEM2DI_BOTH(name, parameters, of) \
+    static void name##_plain parameters { \
+        name of;                          \
+    }
+#define DEM2DI_PATH(fours, name, of) ((void)(fours), name##_plain of)
 #endif
 
 /* Does the processor have what the second way is compiled for? */
@@ -3335,6 +3346,28 @@ DEM2DI_AVX2_INLINE void dem2di_four_turn(dem2di_four rows[4]) {
     rows[1] = DEM2DI_SHUFFLE(b, d, 0, 1, 4, 5);
     rows[2] = DEM2DI_SHUFFLE(a, c, 2, 3, 6, 7);
     rows[3] = DEM2DI_SHUFFLE(b, d, 2, 3, 6, 7);
+}
+
+/* Two numbers of four rows, from `at` on: of 0 and 2 in one vector, of 1 and 3 in the other. */
+typedef struct dem2di_four_twos {
+    dem2di_four even, odd;
+} dem2di_four_twos;
+
+DEM2DI_AVX2_INLINE dem2di_four_twos dem2di_fours_twos(const double *const rows[4], int at) {
+    dem2di_four_twos twos;
+    twos.even =
+        DEM2DI_SHUFFLE(dem2di_lanes_at(rows[0] + at), dem2di_lanes_at(rows[2] + at), 0, 1, 2, 3);
+    twos.odd =
+        DEM2DI_SHUFFLE(dem2di_lanes_at(rows[1] + at), dem2di_lanes_at(rows[3] + at), 0, 1, 2, 3);
+    return twos;
+}
+
+DEM2DI_AVX2_INLINE dem2di_four dem2di_fours_first(dem2di_four_twos twos) {
+    return DEM2DI_SHUFFLE(twos.even, twos.odd, 0, 4, 2, 6);
+}
+
+DEM2DI_AVX2_INLINE dem2di_four dem2di_fours_second(dem2di_four_twos twos) {
+    return DEM2DI_SHUFFLE(twos.even, twos.odd, 1, 5, 3, 7);
 }
 #endif
 
@@ -4081,7 +4114,7 @@ static inline int dem2di_polygon_corner(const dem2d_shape *shape, dem2d_vec u) {
 }
 
 /* Point of an arc at t: start + 3 times the integral of (1-t)^2 d0 + 2t(1-t) d1 + t^2 d2. */
-static inline dem2d_vec dem2di_arc_point(const dem2di_arc *arc, double t) {
+static DEM2DI_INLINE dem2d_vec dem2di_arc_point(const dem2di_arc *arc, double t) {
     double w0 = t * (3 - t * (3 - t)), w1 = t * t * (3 - 2 * t), w2 = t * t * t;
     return dem2di_vec(arc->start.x + w0 * arc->d0.x + w1 * arc->d1.x + w2 * arc->d2.x,
                       arc->start.y + w0 * arc->d0.y + w1 * arc->d1.y + w2 * arc->d2.y);
@@ -4123,17 +4156,38 @@ static inline double dem2di_arc_parameter(double q0, double q1, double q2, doubl
     return bottom > 0 ? top[falls] / bottom : 0;
 }
 
-/* Support point of an arc. rho = |B'|^2 / (-B''.u) = 3/2 speed^2 / bend, with speed = |B'|/3. */
-static inline dem2d_vec dem2di_arc_support(const dem2di_arc *arc, dem2d_vec u, double *rho) {
-    double bend, t = dem2di_arc_parameter(dem2di_dot(arc->d0, u), dem2di_dot(arc->d1, u),
-                                          dem2di_dot(arc->d2, u), &bend);
+/* The same with choices that loops over many arcs can make by masks. */
+static DEM2DI_INLINE double dem2di_lanes_parameter(double q0, double q1, double q2, double *bend) {
+    const bool outside = !((q0 >= 0) & (q2 <= 0)), falls = q1 > 0;
+    const double end = q2 > 0 ? 1 : 0, at_end = (q0 - q1) * (1 - end) + (q1 - q2) * end;
+    const double root = dem2di_sqrt(q1 * q1 - q0 * q2), sum = root + fabs(q1);
+    const double top = falls ? sum : q0, bottom = sum + (falls ? -q2 : q0), t = top / bottom;
+    *bend = outside ? at_end : root;
+    return outside ? end : bottom > 0 ? t : 0;
+}
+
+/* Support point of an arc, with one or the other. rho = |B'|^2 / (-B''.u) = 3/2 speed^2 / bend,
+   with speed = |B'|/3. */
+static DEM2DI_INLINE dem2d_vec dem2di_arc_support_by(const dem2di_arc *arc, dem2d_vec u, bool masks,
+                                                     double *rho) {
+    const double q0 = dem2di_dot(arc->d0, u), q1 = dem2di_dot(arc->d1, u);
+    const double q2 = dem2di_dot(arc->d2, u);
+    double bend;
+    const double t =
+        masks ? dem2di_lanes_parameter(q0, q1, q2, &bend) : dem2di_arc_parameter(q0, q1, q2, &bend);
     if (rho != NULL) {
-        double f = 1.5 / bend, s = 1 - t; /* does not wait for the division that gives t */
-        double speed = dem2di_cross(u, arc->d0) * (s * s) + dem2di_cross(u, arc->d1) * (2 * t * s) +
-                       dem2di_cross(u, arc->d2) * (t * t);
-        *rho = speed <= 0 ? 0 : bend > 0 ? speed * speed * f : HUGE_VAL;
+        const double f = 1.5 / bend, s = 1 - t; /* does not wait for the division that gives t */
+        const double speed = dem2di_cross(u, arc->d0) * (s * s) +
+                             dem2di_cross(u, arc->d1) * (2 * t * s) +
+                             dem2di_cross(u, arc->d2) * (t * t);
+        const double radius = speed * speed * f, bent = bend > 0 ? radius : HUGE_VAL;
+        *rho = speed <= 0 ? 0 : bent;
     }
     return dem2di_arc_point(arc, t);
+}
+
+static inline dem2d_vec dem2di_arc_support(const dem2di_arc *arc, dem2d_vec u, double *rho) {
+    return dem2di_arc_support_by(arc, u, false, rho);
 }
 
 /* Sums over the terms 1 and 2 of each block of a Fourier series, and over 3 and 4. */
@@ -4409,39 +4463,19 @@ static DEM2DI_INLINE void dem2di_lanes_fetch(const dem2d_shape *a, const dem2d_s
     }
 }
 
-/* dem2di_arc_parameter with choices that loops can make by masks. */
-static DEM2DI_INLINE double dem2di_lanes_parameter(double q0, double q1, double q2, double *bend) {
-    const bool outside = !((q0 >= 0) & (q2 <= 0)), falls = q1 > 0;
-    const double end = q2 > 0 ? 1 : 0, at_end = (q0 - q1) * (1 - end) + (q1 - q2) * end;
-    const double root = dem2di_sqrt(q1 * q1 - q0 * q2), sum = root + fabs(q1);
-    const double top = falls ? sum : q0, bottom = sum + (falls ? -q2 : q0), t = top / bottom;
-    *bend = outside ? at_end : root;
-    return outside ? end : bottom > 0 ? t : 0;
+/* The arc of place k. */
+static DEM2DI_INLINE dem2di_arc dem2di_lanes_arc(const dem2di_lanes *l, int k) {
+    const dem2di_arc arc = {{l->number[0][k], l->number[1][k]},
+                            {l->number[2][k], l->number[3][k]},
+                            {l->number[4][k], l->number[5][k]},
+                            {l->number[6][k], l->number[7][k]}};
+    return arc;
 }
 
-/* dem2di_arc_support */
-static DEM2DI_INLINE void dem2di_lanes_arc(dem2di_lanes *l, int k) {
-    const double ux = l->vx[k], uy = l->vy[k];
-    const double d0x = l->number[2][k], d0y = l->number[3][k], d1x = l->number[4][k];
-    const double d1y = l->number[5][k], d2x = l->number[6][k], d2y = l->number[7][k];
-    double bend;
-    const double t = dem2di_lanes_parameter(d0x * ux + d0y * uy, d1x * ux + d1y * uy,
-                                            d2x * ux + d2y * uy, &bend);
-    const double f = 1.5 / bend, s = 1 - t;
-    const double speed = (ux * d0y - uy * d0x) * (s * s) + (ux * d1y - uy * d1x) * (2 * t * s) +
-                         (ux * d2y - uy * d2x) * (t * t);
-    const double w0 = t * (3 - t * (3 - t)), w1 = t * t * (3 - 2 * t), w2 = t * t * t;
-    const double radius = speed * speed * f;
-    const double bent = bend > 0 ? radius : HUGE_VAL;
-    l->rho[k] = speed <= 0 ? 0 : bent;
-    l->x[k] = l->number[0][k] + w0 * d0x + w1 * d1x + w2 * d2x;
-    l->y[k] = l->number[1][k] + w0 * d0y + w1 * d1y + w2 * d2y;
-}
-
-/* dem2di_fourier_support */
-static DEM2DI_INLINE void dem2di_lanes_series(dem2di_lanes *l, int k) {
-    const dem2d_vec u = {l->vx[k], l->vy[k]};
-    double x[4], y[4], radius;
+/* dem2di_fourier_support of place k, whose direction is u. */
+static DEM2DI_INLINE dem2d_vec dem2di_lanes_series(const dem2di_lanes *l, int k, dem2d_vec u,
+                                                   double *rho) {
+    double x[4], y[4];
     dem2di_series_terms terms;
     dem2di_series_powers(u.x, u.y, x, y);
     dem2di_series_begin(x, y, &terms);
@@ -4451,31 +4485,33 @@ static DEM2DI_INLINE void dem2di_lanes_series(dem2di_lanes *l, int k) {
     dem2di_series_four(&terms, 5, l->number[4][k], l->number[5][k], l->number[6][k],
                        l->number[7][k], l->number[12][k], l->number[13][k], l->number[14][k],
                        l->number[15][k]);
-    const dem2d_vec s = dem2di_series_point(l->number[16][k], &terms.sums, u, &radius);
-    l->x[k] = s.x;
-    l->y[k] = s.y;
-    l->rho[k] = radius;
+    return dem2di_series_point(l->number[16][k], &terms.sums, u, rho);
 }
 
-/* The support points of all, as dem2di_support. */
-static DEM2DI_INLINE void dem2di_lanes_support(dem2di_lanes *l, int kind, int count) {
-    if (kind == DEM2DI_LANES_ELLIPSE) {
-        DEM2DI_INDEPENDENT
-        for (int k = 0; k < count; k++) {
-            double radius;
-            const dem2d_vec s = dem2di_ellipse_point(l->number[0][k], l->number[1][k],
-                                                     dem2di_vec(l->vx[k], l->vy[k]), &radius);
-            l->x[k] = s.x;
-            l->y[k] = s.y;
-            l->rho[k] = radius;
-        }
-    } else if (kind == DEM2DI_LANES_ARC) {
-        DEM2DI_INDEPENDENT
-        for (int k = 0; k < count; k++) dem2di_lanes_arc(l, k);
-    } else if (kind == DEM2DI_LANES_SERIES) {
-        DEM2DI_INDEPENDENT
-        for (int k = 0; k < count; k++) dem2di_lanes_series(l, k);
+/* The support points of all, as dem2di_support. `kind` is constant in each copy of the loop. */
+static DEM2DI_INLINE void dem2di_lanes_loop(dem2di_lanes *l, int kind, int count) {
+    DEM2DI_INDEPENDENT
+    for (int k = 0; k < count; k++) {
+        const dem2d_vec u = {l->vx[k], l->vy[k]};
+        const dem2di_arc arc = dem2di_lanes_arc(l, k);
+        double rho;
+        const dem2d_vec s = kind == DEM2DI_LANES_ELLIPSE
+                                ? dem2di_ellipse_point(l->number[0][k], l->number[1][k], u, &rho)
+                            : kind == DEM2DI_LANES_ARC ? dem2di_arc_support_by(&arc, u, true, &rho)
+                                                       : dem2di_lanes_series(l, k, u, &rho);
+        l->x[k] = s.x;
+        l->y[k] = s.y;
+        l->rho[k] = rho;
     }
+}
+
+static DEM2DI_INLINE void dem2di_lanes_support(dem2di_lanes *l, int kind, int count) {
+    if (kind == DEM2DI_LANES_ELLIPSE)
+        dem2di_lanes_loop(l, DEM2DI_LANES_ELLIPSE, count);
+    else if (kind == DEM2DI_LANES_ARC)
+        dem2di_lanes_loop(l, DEM2DI_LANES_ARC, count);
+    else if (kind == DEM2DI_LANES_SERIES)
+        dem2di_lanes_loop(l, DEM2DI_LANES_SERIES, count);
 }
 
 /* ============================================================================================
@@ -11129,6 +11165,32 @@ static inline dem2di_demand dem2di_demand_of(const dem2di_pair *pair, double tol
     return demand;
 }
 
+/* Where dem2di_rest_found decides. */
+static DEM2DI_INLINE dem2di_demand dem2di_demand_last(double angle, bool detect) {
+    dem2di_demand demand;
+    demand.detect = detect;
+    demand.tolerance = 0;
+    demand.angle = angle;
+    return demand;
+}
+
+/* What dem2di_rest_found needs of an evaluation at u, from support points a and b; d is from A's
+   centre to B's. */
+static DEM2DI_INLINE void dem2di_eval_last(dem2d_vec u, dem2d_vec a, dem2d_vec b, dem2d_vec d,
+                                           double rho_a, double rho_b, dem2di_eval *eval) {
+    const double wx = (a.x - b.x) - d.x, wy = (a.y - b.y) - d.y;
+    eval->u.x = u.x;
+    eval->u.y = u.y;
+    eval->v[0].a.x = a.x;
+    eval->v[0].a.y = a.y;
+    eval->v[0].b.x = b.x;
+    eval->v[0].b.y = b.y;
+    eval->rho[0] = rho_a;
+    eval->rho[1] = rho_b;
+    eval->h = wx * u.x + wy * u.y;
+    eval->slope[0] = u.x * wy - u.y * wx;
+}
+
 /* Would dem2di_descend and dem2di_descend_finish end at this evaluation of a pair without edges,
    with the bits of *search? The conditions are theirs, or imply them. With e the angle, S the size,
    q the greatest radius, r the least of shapes with parts, b the curvature of h and s its slope,
@@ -12176,13 +12238,12 @@ DEM2DI_AVX2_INLINE dem2di_four_circles dem2di_circles_fetch(const dem2d_body *b0
                                                             const dem2d_body *b1,
                                                             const dem2d_body *b2,
                                                             const dem2d_body *b3) {
-    const dem2di_four even = DEM2DI_SHUFFLE(dem2di_lanes_at(&b0->pose.position.x),
-                                            dem2di_lanes_at(&b2->pose.position.x), 0, 1, 2, 3);
-    const dem2di_four odd = DEM2DI_SHUFFLE(dem2di_lanes_at(&b1->pose.position.x),
-                                           dem2di_lanes_at(&b3->pose.position.x), 0, 1, 2, 3);
+    const double *const rows[4] = {&b0->pose.position.x, &b1->pose.position.x, &b2->pose.position.x,
+                                   &b3->pose.position.x};
+    const dem2di_four_twos centres = dem2di_fours_twos(rows, 0);
     dem2di_four_circles c;
-    c.x = DEM2DI_SHUFFLE(even, odd, 0, 4, 2, 6);
-    c.y = DEM2DI_SHUFFLE(even, odd, 1, 5, 3, 7);
+    c.x = dem2di_fours_first(centres);
+    c.y = dem2di_fours_second(centres);
     c.r = dem2di_four_of(dem2di_body_radius(b0), dem2di_body_radius(b1), dem2di_body_radius(b2),
                          dem2di_body_radius(b3));
     return c;
@@ -12412,14 +12473,10 @@ static DEM2DI_INLINE void dem2di_array_smooth(dem2di_array_tile *DEM2DI_APART t,
                                               double angle) {
     const dem2di_array_side *a = &t->side[0], *b = &t->side[1];
     const bool parts = a->kind == DEM2DI_LANES_ARC || b->kind == DEM2DI_LANES_ARC;
-    dem2di_demand demand;
-    demand.detect = false;
-    demand.tolerance = 0;
-    demand.angle = angle;
+    const dem2di_demand demand = dem2di_demand_last(angle, false);
     DEM2DI_INDEPENDENT
     for (int k = 0; k < t->count; k++) {
         const double dx = b->x[k] - a->x[k], dy = b->y[k] - a->y[k];
-        const double ux = q->ux[k], uy = q->uy[k];
         const double distance = dem2di_sqrt(dx * dx + dy * dy);
         const double size =
             a->circumscribed[k] * a->scale[k] + b->circumscribed[k] * b->scale[k] + distance;
@@ -12427,22 +12484,14 @@ static DEM2DI_INLINE void dem2di_array_smooth(dem2di_array_tile *DEM2DI_APART t,
         const double ay = (a->s[k] * a->lanes.x[k] + a->c[k] * a->lanes.y[k]) * a->scale[k];
         const double bx = (b->c[k] * b->lanes.x[k] - b->s[k] * b->lanes.y[k]) * b->scale[k];
         const double by = (b->s[k] * b->lanes.x[k] + b->c[k] * b->lanes.y[k]) * b->scale[k];
-        const double wx = (ax - bx) - dx, wy = (ay - by) - dy;
         const double least_a = a->least[k] * a->scale[k], least_b = b->least[k] * b->scale[k];
         const double most = a->most[k] * a->scale[k] + b->most[k] * b->scale[k];
         const double least_part = least_a < least_b ? least_a : least_b;
         dem2di_eval eval;
         dem2di_search search;
-        eval.u.x = ux;
-        eval.u.y = uy;
-        eval.v[0].a.x = ax;
-        eval.v[0].a.y = ay;
-        eval.v[0].b.x = bx;
-        eval.v[0].b.y = by;
-        eval.rho[0] = a->lanes.rho[k] * a->scale[k];
-        eval.rho[1] = b->lanes.rho[k] * b->scale[k];
-        eval.h = wx * ux + wy * uy;
-        eval.slope[0] = ux * wy - uy * wx;
+        dem2di_eval_last(dem2di_vec(q->ux[k], q->uy[k]), dem2di_vec(ax, ay), dem2di_vec(bx, by),
+                         dem2di_vec(dx, dy), a->lanes.rho[k] * a->scale[k],
+                         b->lanes.rho[k] * b->scale[k], &eval);
         const double bend = eval.rho[0] + eval.rho[1] - eval.h, slope = eval.slope[0];
         const bool rests =
             dem2di_rest_found(size, least_a + least_b, HUGE_VAL, most, &eval, &demand, &search);
@@ -12494,17 +12543,9 @@ static DEM2DI_INLINE void dem2di_array_solve(dem2di_array_tile *t, const dem2di_
     }
 }
 
-static void dem2di_array_solve_plain(dem2di_array_tile *t, const dem2di_array_queue *q, bool turn,
-                                     double angle) {
-    dem2di_array_solve(t, q, turn, angle);
-}
-
-#if DEM2DI_FOURS
-static DEM2DI_AVX2 void dem2di_array_solve_fours(dem2di_array_tile *t, const dem2di_array_queue *q,
-                                                 bool turn, double angle) {
-    dem2di_array_solve(t, q, turn, angle);
-}
-#endif
+DEM2DI_BOTH(dem2di_array_solve,
+            (dem2di_array_tile * t, const dem2di_array_queue *q, bool turn, double angle),
+            (t, q, turn, angle))
 DEM2DI_VECTORS_END
 
 /* The whole search for a pair of a tile that is found. */
@@ -12587,8 +12628,7 @@ static DEM2DI_INLINE void dem2di_array_decide(const dem2di_array_query *query,
 /* All pairs of a queue. Those that are to be evaluated again stay in it. */
 static void dem2di_array_apply(const dem2di_array_query *query, int kind_a, int kind_b,
                                dem2di_array_queue *q, dem2di_array_tile *t) {
-    void (*solve)(dem2di_array_tile *, const dem2di_array_queue *, bool, double) =
-        DEM2DI_PATH(dem2di_has_fours(), dem2di_array_solve);
+    const bool fours = dem2di_has_fours();
     const int count = q->count;
     while (q->count % 4 != 0) /* whole vectors, so that loops have no rest */
         dem2di_array_wait(q->pair[count - 1], 0, dem2di_vec(q->ux[count - 1], q->uy[count - 1]), q);
@@ -12601,10 +12641,10 @@ static void dem2di_array_apply(const dem2di_array_query *query, int kind_a, int 
     t->brief = query->contacts == NULL && kind_a != DEM2DI_LANES_ARC && kind_b != DEM2DI_LANES_ARC;
     dem2di_array_fetch(query, q, t);
     if (!t->cores) {
-        solve(t, q, true, query->angle);
+        DEM2DI_PATH(fours, dem2di_array_solve, (t, q, true, query->angle));
         dem2di_array_fetch_shapes(query, q, t);
     }
-    solve(t, q, false, query->angle);
+    DEM2DI_PATH(fours, dem2di_array_solve, (t, q, false, query->angle));
     for (int k = 0; k < count; k++) dem2di_array_decide(query, t, k, q);
 }
 
@@ -12693,7 +12733,7 @@ DEM2D_API dem2d_result dem2d_pairs_contact(const dem2d_env *env, const dem2d_bod
         if (certified && short_only && !round)
             end = dem2di_array_run(&query, i, pair_count, circles);
         if (circles)
-            DEM2DI_PATH(dem2di_has_fours(), dem2di_circles)(&query, i, end);
+            DEM2DI_PATH(dem2di_has_fours(), dem2di_circles, (&query, i, end));
         else
             (tiles ? dem2di_array_tiles : dem2di_array_singles)(&query, i, end);
         i = end;
@@ -21107,20 +21147,6 @@ static void dem2di_batch_fetch_plain(const dem2d_world *world, int first, dem2di
 }
 
 #if DEM2DI_FOURS
-/* Two numbers of four states, from `at` on: of 0 and 2 in one vector, of 1 and 3 in the other. */
-typedef struct dem2di_four_twos {
-    dem2di_four even, odd;
-} dem2di_four_twos;
-
-DEM2DI_AVX2_INLINE dem2di_four_twos dem2di_fours_twos(const double *const states[4], int at) {
-    dem2di_four_twos twos;
-    twos.even = DEM2DI_SHUFFLE(dem2di_lanes_at(states[0] + at), dem2di_lanes_at(states[2] + at), 0,
-                               1, 2, 3);
-    twos.odd = DEM2DI_SHUFFLE(dem2di_lanes_at(states[1] + at), dem2di_lanes_at(states[3] + at), 0,
-                              1, 2, 3);
-    return twos;
-}
-
 /* The same of B less A. */
 DEM2DI_AVX2_INLINE dem2di_four_twos dem2di_fours_between(const double *const a[4],
                                                          const double *const b[4], int at) {
@@ -21129,14 +21155,6 @@ DEM2DI_AVX2_INLINE dem2di_four_twos dem2di_fours_between(const double *const a[4
     to.even -= from.even;
     to.odd -= from.odd;
     return to;
-}
-
-DEM2DI_AVX2_INLINE dem2di_four dem2di_fours_first(dem2di_four_twos twos) {
-    return DEM2DI_SHUFFLE(twos.even, twos.odd, 0, 4, 2, 6);
-}
-
-DEM2DI_AVX2_INLINE dem2di_four dem2di_fours_second(dem2di_four_twos twos) {
-    return DEM2DI_SHUFFLE(twos.even, twos.odd, 1, 5, 3, 7);
 }
 
 /* dem2di_line_of for contacts k to k + 3. Returns the squares of their distances. */
@@ -21466,7 +21484,7 @@ static bool dem2di_batch_make(const dem2d_world *world, int first, int end, dem2
     const int count = dem2di_block_end(first, DEM2DI_BATCH, end) - first;
     const bool fours = world->fours && count >= 4;
     dem2di_batch_begin(world, first, fours ? count - count % 4 : count, batch);
-    DEM2DI_PATH(fours, dem2di_batch_fetch)(world, first, batch);
+    DEM2DI_PATH(fours, dem2di_batch_fetch, (world, first, batch));
     dem2di_batch_amend(world, first, batch);
     return fours;
 }
@@ -21479,7 +21497,7 @@ static void dem2di_disc_range(const dem2d_world *world, int begin, int end, dem2
     for (int first = begin; first < end; first += batch.count) {
         const bool fours = dem2di_batch_make(world, first, end, &batch);
         const int64_t closed =
-            DEM2DI_PATH(fours, dem2di_batch_solve)(&batch, world->made_step, law, plan);
+            DEM2DI_PATH(fours, dem2di_batch_solve, (&batch, world->made_step, law, plan));
         dem2di_batch_end(world, &batch, closed, count);
     }
 }
@@ -23413,33 +23431,15 @@ static DEM2DI_INLINE void dem2di_tile_points(dem2di_tile *DEM2DI_APART t,
     }
 }
 
-/* The evaluation of a smooth contact. */
 static DEM2DI_INLINE void dem2di_tile_eval(const dem2di_tile *t, int k, dem2di_eval *eval) {
-    const double ux = t->ux[k], uy = t->uy[k];
-    const double wx = (t->ax[k] - t->bx[k]) - t->dx[k], wy = (t->ay[k] - t->by[k]) - t->dy[k];
-    eval->u.x = ux;
-    eval->u.y = uy;
-    eval->v[0].a.x = t->ax[k];
-    eval->v[0].a.y = t->ay[k];
-    eval->v[0].b.x = t->bx[k];
-    eval->v[0].b.y = t->by[k];
-    eval->rho[0] = t->rho_a[k];
-    eval->rho[1] = t->rho_b[k];
-    eval->h = wx * ux + wy * uy;
-    eval->slope[0] = ux * wy - uy * wx;
-}
-
-static DEM2DI_INLINE dem2di_demand dem2di_tile_demand(double tolerance) {
-    dem2di_demand demand;
-    demand.detect = true;
-    demand.tolerance = 0;
-    demand.angle = dem2di_rest_angle(tolerance, true);
-    return demand;
+    const dem2d_vec u = {t->ux[k], t->uy[k]}, d = {t->dx[k], t->dy[k]};
+    const dem2d_vec a = {t->ax[k], t->ay[k]}, b = {t->bx[k], t->by[k]};
+    dem2di_eval_last(u, a, b, d, t->rho_a[k], t->rho_b[k], eval);
 }
 
 /* Geometry of smooth contacts, as dem2di_smooth_last. */
 static DEM2DI_INLINE void dem2di_tile_place(dem2di_tile *t, double tolerance) {
-    const dem2di_demand demand = dem2di_tile_demand(tolerance);
+    const dem2di_demand demand = dem2di_demand_last(dem2di_rest_angle(tolerance, true), true);
     const int lanes = dem2di_tile_lanes(t);
     for (int k = 0; k < lanes; k++) {
         const double dx = t->dx[k], dy = t->dy[k];
@@ -23538,23 +23538,9 @@ static DEM2DI_INLINE void dem2di_tile_load(dem2di_tile *t, double time_step) {
         dem2di_tile_springs(t, NULL, time_step);
 }
 
-static void dem2di_tile_solve_plain(dem2di_tile *t, double tolerance, bool faces) {
-    dem2di_tile_solve(t, tolerance, faces);
-}
-
-static void dem2di_tile_load_plain(dem2di_tile *t, double time_step) {
-    dem2di_tile_load(t, time_step);
-}
-
-#if DEM2DI_FOURS
-static DEM2DI_AVX2 void dem2di_tile_solve_fours(dem2di_tile *t, double tolerance, bool faces) {
-    dem2di_tile_solve(t, tolerance, faces);
-}
-
-static DEM2DI_AVX2 void dem2di_tile_load_fours(dem2di_tile *t, double time_step) {
-    dem2di_tile_load(t, time_step);
-}
-#endif
+DEM2DI_BOTH(dem2di_tile_solve, (dem2di_tile * t, double tolerance, bool faces),
+            (t, tolerance, faces))
+DEM2DI_BOTH(dem2di_tile_load, (dem2di_tile * t, double time_step), (t, time_step))
 DEM2DI_VECTORS_END
 
 /* Geometry of contact k of a tile. */
@@ -23611,7 +23597,8 @@ static DEM2DI_INLINE void dem2di_tile_put(dem2d_world *world, const dem2di_tile 
 static bool dem2di_tile_step(const dem2d_world *world, dem2di_tile *tile, int k, int taken,
                              int to) {
     const size_t first = offsetof(dem2di_tile, dx), end = offsetof(dem2di_tile, held);
-    const dem2di_demand demand = dem2di_tile_demand(world->tolerance);
+    const dem2di_demand demand =
+        dem2di_demand_last(dem2di_rest_angle(world->tolerance, true), true);
     const int i = tile->contact[k], slot_a = world->list.keys[i].a, slot_b = world->list.keys[i].b;
     const dem2d_shape *a = dem2di_shape_of(world, &world->bodies[slot_a]);
     const dem2d_shape *b = dem2di_shape_of(world, &world->bodies[slot_b]);
@@ -23652,8 +23639,8 @@ static int dem2di_tile_pass(dem2d_world *world, dem2di_tile *tile, dem2di_law_ro
     dem2di_last last;
     int left = 0;
     dem2di_tile_fill(tile);
-    DEM2DI_PATH(world->fours, dem2di_tile_solve)(tile, world->tolerance, world->plan.faces);
-    if (!terms) DEM2DI_PATH(world->fours, dem2di_tile_load)(tile, world->made_step);
+    DEM2DI_PATH(world->fours, dem2di_tile_solve, (tile, world->tolerance, world->plan.faces));
+    if (!terms) DEM2DI_PATH(world->fours, dem2di_tile_load, (tile, world->made_step));
     for (int k = 0; k < tile->count; k++) {
         const int i = tile->contact[k];
         dem2di_history *history = &world->list.contacts.history[i - discs];
@@ -24106,9 +24093,9 @@ static void dem2di_discs_by_rows(dem2d_world *world, int begin, int end, dem2di_
     for (int first = begin; first < end; first += batch.count) {
         const bool fours = dem2di_batch_make(world, first, end, &batch);
         dem2di_law_range_fill(&range, &batch);
-        DEM2DI_PATH(fours, dem2di_rows_make)(world, &batch, first, &range);
+        DEM2DI_PATH(fours, dem2di_rows_make, (world, &batch, first, &range));
         const int closed = dem2di_rows_ask(world, first, &batch, &range);
-        DEM2DI_PATH(fours, dem2di_rows_act)(world, &batch, first, size);
+        DEM2DI_PATH(fours, dem2di_rows_act, (world, &batch, first, size));
         dem2di_rows_check(batch.count, size, count);
         count->collisions += closed;
         count->proofs[DEM2D_BY_FORM] += closed;
