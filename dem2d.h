@@ -23910,20 +23910,14 @@ static void dem2di_rows_make_plain(const dem2d_world *world, const dem2di_batch 
     dem2di_rows_make(world, batch, first, range, false);
 }
 
-static void dem2di_rows_act_plain(const dem2d_world *world, const dem2di_batch *batch, int first,
-                                  double size[DEM2DI_BATCH]) {
-    dem2di_rows_act(world, batch, first, size);
-}
+DEM2DI_BOTH(dem2di_rows_act,
+            (const dem2d_world *world, const dem2di_batch *batch, int first, double *size),
+            (world, batch, first, size))
 
 #if DEM2DI_FOURS
 static DEM2DI_AVX2 void dem2di_rows_make_fours(const dem2d_world *world, const dem2di_batch *batch,
                                                int first, dem2di_law_range *range) {
     dem2di_rows_make(world, batch, first, range, true);
-}
-
-static DEM2DI_AVX2 void dem2di_rows_act_fours(const dem2d_world *world, const dem2di_batch *batch,
-                                              int first, double size[DEM2DI_BATCH]) {
-    dem2di_rows_act(world, batch, first, size);
 }
 #endif
 DEM2DI_VECTORS_END
