@@ -4104,11 +4104,10 @@ static inline int dem2di_polygon_corner(const dem2d_shape *shape, dem2d_vec u) {
     int best = 0;
     double value = dem2di_dot(shape->corners[0], u);
     for (int k = 1; k < shape->count; k++) {
-        double other = dem2di_dot(shape->corners[k], u);
-        if (other > value) {
-            value = other;
-            best = k;
-        }
+        /* no branch, which could not be predicted */
+        const double other = dem2di_dot(shape->corners[k], u);
+        best = other > value ? k : best;
+        value = other > value ? other : value;
     }
     return best;
 }
@@ -4363,6 +4362,19 @@ static inline double dem2di_least_part(const dem2d_shape *a, const dem2d_shape *
 static inline int dem2di_part_find(const dem2d_shape *shape, dem2d_vec u) {
     return shape->type == DEM2D_POLYGON ? dem2di_polygon_corner(shape, u)
                                         : dem2di_sector_find(shape, u);
+}
+
+/* With this sine between a tangent and a right angle, ends of edges as short as 1e-9 of the size
+   have support values that differ by more than rounding errors. */
+#define DEM2DI_PART_MARGIN 1e-6
+
+/* Is it certain that dem2di_part_find finds part k? The tangents at its ends are then so far (sine)
+   from a right angle with u that rounding errors decide nothing. */
+static DEM2DI_INLINE bool dem2di_part_holds(const dem2d_shape *shape, int k, dem2d_vec u) {
+    const dem2d_vec *tangents = shape->tangents;
+    const bool rises = dem2di_dot(tangents[dem2di_before(shape->parts, k)], u) > DEM2DI_PART_MARGIN;
+    const bool falls = dem2di_dot(tangents[k], u) < -DEM2DI_PART_MARGIN;
+    return rises & falls;
 }
 
 /* The edge before (-1) or after (1) a part. An edge of a polygon has the number of its first
@@ -10459,7 +10471,7 @@ typedef struct dem2di_member {
     int own; /* 0 for A, 1 for B */
 } dem2di_member;
 
-static dem2di_member dem2di_member_of(const dem2di_pair *pair, int own) {
+static DEM2DI_INLINE dem2di_member dem2di_member_of(const dem2di_pair *pair, int own) {
     dem2di_member m;
     m.own = own;
     m.shape = own == 0 ? pair->a : pair->b;
@@ -10473,7 +10485,7 @@ static DEM2DI_INLINE dem2d_vec dem2di_member_direction(const dem2di_member *m, d
     return dem2di_turn_back(m->q, m->own == 0 ? u : dem2di_negate(u));
 }
 
-static dem2d_vec dem2di_member_normal(const dem2di_member *m, int edge) {
+static DEM2DI_INLINE dem2d_vec dem2di_member_normal(const dem2di_member *m, int edge) {
     dem2d_vec u = dem2di_turn(m->q, dem2di_right(m->shape->tangents[edge]));
     return m->own == 0 ? u : dem2di_negate(u);
 }
@@ -10526,9 +10538,16 @@ static DEM2DI_INLINE void dem2di_eval_parts(dem2di_pair *pair, const dem2di_memb
 }
 
 /* The part of a member that has its support point in u; 0 if the member has no parts. */
-static inline int dem2di_member_part(const dem2di_member *m, dem2d_vec u) {
+static DEM2DI_INLINE int dem2di_member_part(const dem2di_member *m, dem2d_vec u) {
     if (!dem2di_has_parts(m->shape)) return 0;
     return dem2di_part_find(m->shape, dem2di_member_direction(m, u));
+}
+
+/* The same where a part is known that had it in a direction nearby. */
+static DEM2DI_INLINE int dem2di_member_again(const dem2di_member *m, dem2d_vec u, int part) {
+    if (!dem2di_has_parts(m->shape)) return 0;
+    const dem2d_vec v = dem2di_member_direction(m, u);
+    return dem2di_part_holds(m->shape, part, v) ? part : dem2di_part_find(m->shape, v);
 }
 
 /* The edge beside a part whose normal is nearest to u, with a sine below *sine, which gets the sine
@@ -10552,15 +10571,16 @@ static DEM2DI_INLINE int dem2di_member_near(const dem2di_member *m, dem2d_vec u,
 /* Edges are parallel if the sine between their normals is below this. */
 #define DEM2DI_PARALLEL (8 * DBL_EPSILON)
 
-/* Evaluation at the normal of an edge of one member, with the other's edge if that is parallel. */
-static void dem2di_eval_edge(dem2di_pair *pair, const dem2di_member member[2], int own, int found,
-                             dem2di_eval *eval) {
+/* Evaluation at the normal of an edge of one member, with the other's edge if that is parallel. In
+   a direction nearby the other's part is `beside`. */
+static DEM2DI_INLINE void dem2di_eval_own(dem2di_pair *pair, const dem2di_member member[2], int own,
+                                          int found, int beside, dem2di_eval *eval) {
     const dem2di_member *other = &member[1 - own];
     const dem2d_vec u = dem2di_member_normal(&member[own], found);
     double parallel = DEM2DI_PARALLEL;
     dem2d_vec s[2], t[2];
     dem2di_member_edge(&member[own], u, found, eval, s);
-    const int part = dem2di_member_part(other, u);
+    const int part = dem2di_member_again(other, u, beside);
     const int edge = dem2di_member_near(other, u, part, &parallel);
     if (edge >= 0) {
         dem2di_member_edge(other, u, edge, eval, t);
@@ -10580,18 +10600,27 @@ static void dem2di_eval_edge(dem2di_pair *pair, const dem2di_member member[2], i
     pair->calls++;
 }
 
+/* The same with the parts of both in a direction nearby; compiled for each member. */
+static DEM2DI_INLINE void dem2di_eval_edge(dem2di_pair *pair, const dem2di_member member[2],
+                                           int own, int found, const int part[2],
+                                           dem2di_eval *eval) {
+    if (own == 0)
+        dem2di_eval_own(pair, member, 0, found, part[1], eval);
+    else
+        dem2di_eval_own(pair, member, 1, found, part[0], eval);
+}
+
 /* The first evaluation: at u, or at the normal of an edge nearby. */
-static void dem2di_eval_first(dem2di_pair *pair, const dem2di_member member[2], dem2d_vec u,
-                              dem2di_eval *eval) {
-    int part[2], own = -1, found = -1;
+static DEM2DI_INLINE void dem2di_eval_first(dem2di_pair *pair, const dem2di_member member[2],
+                                            dem2d_vec u, dem2di_eval *eval) {
     double sine = DEM2DI_SNAP;
-    for (int i = 0; i < 2; i++) {
-        part[i] = dem2di_member_part(&member[i], u);
-        int edge = dem2di_member_near(&member[i], u, part[i], &sine);
-        if (edge >= 0) own = i, found = edge;
-    }
-    if (found >= 0)
-        dem2di_eval_edge(pair, member, own, found, eval);
+    const int part[2] = {dem2di_member_part(&member[0], u), dem2di_member_part(&member[1], u)};
+    const int first = dem2di_member_near(&member[0], u, part[0], &sine);
+    const int second = dem2di_member_near(&member[1], u, part[1], &sine);
+    if (second >= 0)
+        dem2di_eval_edge(pair, member, 1, second, part, eval);
+    else if (first >= 0)
+        dem2di_eval_edge(pair, member, 0, first, part, eval);
     else
         dem2di_eval_parts(pair, member, u, part, eval);
 }
@@ -10631,7 +10660,7 @@ static void dem2di_eval_towards(dem2di_pair *pair, const dem2di_member member[2]
     for (int i = 0; i < 2; i++) part[i] = dem2di_member_part(&member[i], u);
     int found = dem2di_edge_passed(member, u, part, eval, &own);
     if (found >= 0)
-        dem2di_eval_edge(pair, member, own, found, eval);
+        dem2di_eval_edge(pair, member, own, found, part, eval);
     else
         dem2di_eval_parts(pair, member, u, part, eval);
 }
@@ -10847,8 +10876,8 @@ static inline bool dem2di_descend_next(const dem2di_pair *pair, const dem2di_eva
 }
 
 /* Descend from a direction to a local minimum of h by Newton's steps inside a bracket. With
-   `detect` it stops at the first separating direction. The caller may have evaluated u already, of
-   a pair without edges. False if `cap` evaluations do not suffice. */
+   `detect` it stops at the first separating direction. The caller may have evaluated u already.
+   False if `cap` evaluations do not suffice. */
 static bool dem2di_descend(dem2di_pair *pair, dem2d_vec u, bool evaluated, double angle, int cap,
                            bool detect, dem2di_eval *eval, dem2di_search *search) {
     dem2di_bracket bracket;
@@ -10856,12 +10885,11 @@ static bool dem2di_descend(dem2di_pair *pair, dem2d_vec u, bool evaluated, doubl
     dem2di_member member[2];
     bracket.known = bracket.evaluated[0] = bracket.evaluated[1] = bracket.chord = false;
     bracket.turned[0] = bracket.turned[1] = HUGE_VAL;
-    if (edges) {
-        for (int i = 0; i < 2; i++) member[i] = dem2di_member_of(pair, i);
+    for (int i = 0; edges && i < 2; i++) member[i] = dem2di_member_of(pair, i);
+    if (!evaluated && edges)
         dem2di_eval_first(pair, member, u, eval);
-    } else if (!evaluated) {
+    else if (!evaluated)
         dem2di_eval_smooth(pair, u, eval);
-    }
     for (int i = 0; i < cap; i++) {
         search->iterations++;
         if (eval->h < search->upper) {
@@ -11276,8 +11304,41 @@ static DEM2DI_INLINE bool dem2di_smooth_last(dem2di_pair *pair, dem2d_vec start,
     return false;
 }
 
-/* Least overlap or greatest gap, certified, where neither dem2di_edge_last nor dem2di_smooth_last
-   found it; for pairs without edges the latter has evaluated the start. */
+/* The same for a pair with edges of which not both have cores, with any proof of dem2di_certify.
+   Newton's step must stay on the parts, see dem2di_step_known. */
+static bool dem2di_flat_last(dem2di_pair *pair, dem2d_vec start, const dem2di_demand *demand,
+                             dem2di_eval *eval, dem2di_search *search) {
+    const dem2d_shape *a = pair->a, *b = pair->b;
+    const double roundoff = DEM2DI_ROUNDOFF * pair->size;
+    dem2di_member member[2];
+    member[0] = dem2di_member_of(pair, 0);
+    member[1] = dem2di_member_of(pair, 1);
+    dem2di_eval_first(pair, member, start, eval);
+    eval->no_step = false;
+    search->iterations = 1;
+    dem2di_feature_clear(search);
+    if (demand->detect && eval->h < -roundoff) return false;
+    if (eval->edge) {
+        if (!(eval->slope[0] <= 0 && eval->slope[1] >= 0)) return false;
+        dem2di_descend_finish(eval, search);
+    } else {
+        const double bend = eval->rho[0] + eval->rho[1] - eval->h;
+        const double most = a->rho_max * pair->scale_a + b->rho_max * pair->scale_b;
+        const double flat = demand->angle * demand->angle * bend;
+        if (dem2di_edges_unknown(a) || dem2di_edges_unknown(b) ||
+            !dem2di_descent_ends(pair->size, flat, most, eval, demand, search))
+            return false;
+        const dem2d_vec u = dem2di_newton(eval, bend);
+        if (dem2di_member_again(&member[0], u, eval->part[0][0]) != eval->part[0][0] ||
+            dem2di_member_again(&member[1], u, eval->part[1][0]) != eval->part[1][0])
+            return false;
+    }
+    return dem2di_certify(pair, eval, demand->tolerance, search) &&
+           !(eval->h >= -roundoff && search->lower < -roundoff);
+}
+
+/* Least overlap or greatest gap, certified, where none of dem2di_edge_last, dem2di_smooth_last and
+   dem2di_flat_last found it; of pairs that have not both cores the last two evaluated the start. */
 static void dem2di_certified(dem2di_pair *pair, dem2d_vec start, const dem2di_demand *demand,
                              int cap, dem2di_eval *eval, dem2di_search *search) {
     /* 64 evaluations are more than bisection of the cone needs */
@@ -11796,7 +11857,9 @@ static DEM2DI_INLINE void dem2di_contact_solve(dem2di_pair *pair, dem2d_solver s
     search->iterations = 0;
     if (!(edges && dem2di_edge_last(pair, last, search))) {
         dem2di_demand demand = dem2di_demand_of(pair, tolerance, detect);
-        if (edges || !dem2di_smooth_last(pair, start, &demand, &eval, search)) {
+        const bool cores = dem2di_has_core(pair->a) && dem2di_has_core(pair->b);
+        if (edges ? cores || !dem2di_flat_last(pair, start, &demand, &eval, search)
+                  : !dem2di_smooth_last(pair, start, &demand, &eval, search)) {
             dem2di_certified(pair, start, &demand, cap, &eval, search);
             return;
         }
