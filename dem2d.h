@@ -14155,6 +14155,7 @@ typedef struct dem2di_block_result {
     int64_t spread;         /* sum of the distances in memory of the partners found */
     int64_t images;         /* that may be needed for particles that have left the cell */
     int changes;            /* contacts that close or open */
+    uint32_t blank;         /* of circles: see dem2di_contacts_keep */
     /* Some blocks of particles have their last contact of circles in this block of contacts:
        complete is the first of them. Of a block of particles, next is the next one. -1: none. */
     int complete, next;
@@ -15187,17 +15188,26 @@ static int dem2di_kept_find(const dem2d_world *world, dem2di_kept *kept) {
 }
 
 /* Contacts from `first` to before `end` as they are into list.last, or (`back`) as they were from
-   there. */
+   there. Columns of zeros alone, which a caller's law leaves of what it does without, are not
+   copied if `blank` is not NULL, but noted there, a bit for each (there are less than 32): to copy
+   all takes a quarter of a step of 10,000 circles. */
 static void dem2di_contacts_keep(const dem2di_kept *kept, int columns, int first, int end,
-                                 bool back) {
+                                 bool back, uint32_t *blank) {
     for (int k = 0; k < columns; k++) {
+        const uint32_t bit = (uint32_t)1 << k;
         const size_t size = kept[k].size;
         const int from = first > kept[k].begin ? first : kept[k].begin;
         if (end <= from) continue;
         const size_t at = (size_t)(from - kept[k].begin) * size,
                      bytes = (size_t)(end - from) * size;
-        memcpy((back ? kept[k].now : kept[k].last) + at, (back ? kept[k].last : kept[k].now) + at,
-               bytes);
+        char *now = kept[k].now + at, *last = kept[k].last + at;
+        if (!back && blank != NULL && now[0] == 0 && memcmp(now, now + 1, bytes - 1) == 0)
+            *blank |= bit;
+        const bool zeros = blank != NULL && (*blank & bit);
+        if (zeros && back)
+            memset(now, 0, bytes);
+        else if (!zeros)
+            memcpy(back ? now : last, back ? last : now, bytes);
     }
 }
 
@@ -23834,12 +23844,13 @@ static DEM2DI_INLINE bool dem2di_has_dampers(const dem2d_pair_desc *law) {
 
 DEM2DI_VECTORS_BEGIN
 /* Geometry of all contacts of a batch into the columns, with the stiffness and the dashpot that the
-   law may change, and all else that it reads into the rows of the same places. Dashpots are 0 where
-   the law does without them, 1 where they are 0, and 2 otherwise. */
+   law may change, and all else that it reads into the rows of the same places; no force yet.
+   Dashpots are 0 where the law does without them, 1 where they are 0, and 2 otherwise. */
 static DEM2DI_INLINE void
 dem2di_batch_rows(const dem2di_batch *b, const dem2d_pair_desc *law, bool one_law, int dashpots,
                   bool lines, double *DEM2DI_APART normal_x, double *DEM2DI_APART normal_y,
-                  double *DEM2DI_APART depth, const double *DEM2DI_APART shear,
+                  double *DEM2DI_APART depth, double *DEM2DI_APART force,
+                  double *DEM2DI_APART shear, double *DEM2DI_APART energy,
                   const double *DEM2DI_APART viscous_shear, const double *DEM2DI_APART moment,
                   const double *DEM2DI_APART viscous_moment, double *DEM2DI_APART stiffness,
                   double *DEM2DI_APART dashpot, dem2di_law_rows *DEM2DI_APART rows) {
@@ -23879,6 +23890,7 @@ dem2di_batch_rows(const dem2di_batch *b, const dem2d_pair_desc *law, bool one_la
         normal_y[k] = rows->normal_y[k] = r.normal.y;
         depth[k] = rows->depth[k] = r.depth;
         rows->compression[k] = r.depth * r.depth / 2;
+        force[k] = shear[k] = energy[k] = 0;
     }
 }
 
@@ -23896,11 +23908,12 @@ static DEM2DI_INLINE void dem2di_rows_make(const dem2d_world *world, const dem2d
                                            int first, dem2di_law_range *range, bool lines) {
     const dem2d_pair_desc *law = range->law;
     double *stiffness = world->list.contacts.stiffness + first, *dashpot = range->rows.dashpot;
+    double *energy = world->list.contacts.energy + first;
     if (range->dashpots > 0) dashpot = world->list.contacts.dashpot + first;
-#define DEM2DI_ROWS(one_law, dashpots)                                                      \
-    dem2di_batch_rows(b, law, one_law, dashpots, lines, b->normal_x, b->normal_y, b->depth, \
-                      b->shear, b->viscous_shear, b->moment, b->viscous_moment, stiffness,  \
-                      dashpot, &range->rows)
+#define DEM2DI_ROWS(one_law, dashpots)                                                            \
+    dem2di_batch_rows(b, law, one_law, dashpots, lines, b->normal_x, b->normal_y, b->depth,       \
+                      b->force, b->shear, energy, b->viscous_shear, b->moment, b->viscous_moment, \
+                      stiffness, dashpot, &range->rows)
     if (!world->plan.one_law && range->dashpots == 2)
         DEM2DI_ROWS(false, 2);
     else if (!world->plan.one_law && range->dashpots == 1)
@@ -24006,12 +24019,11 @@ static void dem2di_rows_batch(const dem2d_world *world, int first, const dem2di_
     if (dem2di_has_state(terms)) law->state = &to->state[first].at;
 }
 
-/* The law has written nothing yet. */
+/* Nothing yet in what few laws write; dem2di_batch_rows clears the rest. */
 static void dem2di_rows_clear(int count, const dem2d_law_batch *law) {
-    double *const zero[] = {law->normal_force,      law->tangential_force, law->energy,
-                            law->viscous_normal,    law->moment,           law->viscous_moment,
+    double *const zero[] = {law->viscous_normal, law->moment, law->viscous_moment,
                             law->viscous_tangential};
-    for (int z = 0; z < 7; z++)
+    for (int z = 0; z < 4; z++)
         if (zero[z] != NULL) memset(zero[z], 0, (size_t)count * sizeof(double));
 }
 
@@ -24099,14 +24111,17 @@ static int dem2di_rows_ask(const dem2d_world *world, int first, const dem2di_bat
 }
 
 /* The actions of a batch: are they finite, and which is the greatest? */
-static void dem2di_rows_check(int count, const double size[DEM2DI_BATCH], dem2di_count *to) {
-    double most = to->load, sum = 0;
-    for (int k = 0; k < count; k++) {
+static void dem2di_rows_check(int count, double size[DEM2DI_BATCH], dem2di_count *to) {
+    double most = to->load, other = 0, sum = 0; /* two that do not wait for each other */
+    if (count & 1) size[count] = 0;
+    for (int k = 0; k < count; k += 2) {
         most = dem2di_max(size[k], most);
-        sum += size[k] - size[k];
+        other = dem2di_max(size[k + 1], other);
+        sum += size[k] + size[k + 1];
     }
-    to->load = most;
-    for (int k = 0; k < count && !(sum == 0); k++) to->unsound += !dem2di_finite(size[k]);
+    to->load = dem2di_max(other, most);
+    if (dem2di_finite(sum)) return;
+    for (int k = 0; k < count; k++) to->unsound += !dem2di_finite(size[k]);
 }
 
 /* Has a law of the world dashpots? */
@@ -24179,14 +24194,17 @@ static void dem2di_force_task(void *context, int begin, int end) {
     for (int block = begin, next; block < end; block = next) {
         dem2di_count *count = &world->block_results[block].count;
         const bool round = block < discs;
+        uint32_t *blank = &world->block_results[block].blank;
         next = round ? block + 1 : end;
         const int first =
             round ? block * DEM2DI_BLOCK : list->discs + (block - discs) * DEM2DI_BLOCK;
         const int last = dem2di_block_end(first, (next - block) * DEM2DI_BLOCK,
                                           round ? list->discs : list->count);
         for (int k = block; k < next; k++) memset(&world->block_results[k].count, 0, sizeof *count);
+        *blank = 0;
         if (keeps)
-            dem2di_contacts_keep(kept, columns, first > kept_from ? first : kept_from, last, false);
+            dem2di_contacts_keep(kept, columns, first > kept_from ? first : kept_from, last, false,
+                                 round && !world->ledger.kept ? blank : NULL);
         if (round && world->law != NULL)
             dem2di_discs_by_rows(world, first, last, count);
         else if (round)
@@ -24194,6 +24212,18 @@ static void dem2di_force_task(void *context, int begin, int end) {
         else
             dem2di_others_range(world, first, last, count);
     }
+}
+
+/* The contacts of the last force pass again: the step is refused. */
+static void dem2di_force_undo(dem2d_world *world) {
+    const dem2di_list *list = &world->list;
+    dem2di_kept kept[DEM2DI_COLUMNS];
+    const int columns = dem2di_kept_find(world, kept);
+    for (int first = 0; first < list->discs; first += DEM2DI_BLOCK)
+        dem2di_contacts_keep(kept, columns, first,
+                             dem2di_block_end(first, DEM2DI_BLOCK, list->discs), true,
+                             &world->block_results[first / DEM2DI_BLOCK].blank);
+    dem2di_contacts_keep(kept, columns, list->discs, list->count, true, NULL);
 }
 
 static void dem2di_count_add(dem2di_count *sum, const dem2di_count *part) {
@@ -26069,9 +26099,7 @@ static dem2d_result dem2di_step(dem2d_world *world) {
     if (world->commit != NULL) agreed = world->commit(world->exchange_user, result);
     if (result == DEM2D_OK) result = agreed;
     if (result != DEM2D_OK) {
-        dem2di_kept kept[DEM2DI_COLUMNS];
-        if (trial.back)
-            dem2di_contacts_keep(kept, dem2di_kept_find(world, kept), 0, world->list.count, true);
+        if (trial.back) dem2di_force_undo(world);
         return result;
     }
     const dem2di_ledger ledger = world->ledger;
