@@ -13039,17 +13039,18 @@ static inline bool dem2di_discs_meet(const dem2di_disc *a, const dem2di_disc *b)
 }
 
 /* Find partners among the sorted discs from begin to end: without branches, as a third of these
-   discs are partners. Plain: there is room for all of them, they are all of the level, and no two
-   are kept apart by groups or because both are fixed. Circles: as in the grid. */
+   discs are partners. Plain: there is room for all of them, and no two are kept apart by groups or
+   because both are fixed. Dense: they are all of the level. Circles: as in the grid. */
 static DEM2DI_INLINE void dem2di_grid_loop(const dem2di_grid *grid, const dem2di_disc *own,
-                                           int begin, int end, int level, bool plain, bool circles,
-                                           dem2di_finds *finds) {
+                                           int begin, int end, int level, bool plain, bool dense,
+                                           bool circles, dem2di_finds *finds) {
     const int slot = own->slot, own_other = own->other;
     int count = finds->count;
     for (int k = begin; k < end; k++) {
         const dem2di_disc *other = &grid->sorted[k];
         bool near = dem2di_discs_meet(own, other);
-        if (!plain) near = near && other->level == level && !(own->fixed && other->fixed);
+        if (!dense) near = near && other->level == level;
+        if (!plain) near = near && !(own->fixed && other->fixed);
         if (!plain && near && finds->groups != NULL)
             near = dem2di_meet(&finds->groups[slot], &finds->groups[other->slot]);
         dem2di_key *to = &finds->to[plain || count < finds->room ? count : finds->room];
@@ -13064,17 +13065,20 @@ static DEM2DI_INLINE void dem2di_grid_loop(const dem2di_grid *grid, const dem2di
 /* The same where anything may keep two discs apart, or the room is short. */
 static void dem2di_grid_checked(const dem2di_grid *grid, const dem2di_disc *own, int begin, int end,
                                 int level, dem2di_finds *finds) {
-    dem2di_grid_loop(grid, own, begin, end, level, false, false, finds);
+    dem2di_grid_loop(grid, own, begin, end, level, false, false, false, finds);
 }
 
 static DEM2DI_INLINE void dem2di_grid_range(const dem2di_grid *grid, const dem2di_disc *own,
                                             int begin, int end, int level, dem2di_finds *finds) {
-    const bool plain = level < grid->dense && finds->groups == NULL && !own->fixed &&
-                       end - begin <= finds->room - finds->count;
-    if (plain && grid->circles)
-        dem2di_grid_loop(grid, own, begin, end, level, true, true, finds);
-    else if (plain)
-        dem2di_grid_loop(grid, own, begin, end, level, true, false, finds);
+    const bool dense = level < grid->dense, circles = grid->circles;
+    const bool plain =
+        finds->groups == NULL && !own->fixed && end - begin <= finds->room - finds->count;
+    if (plain && dense && circles)
+        dem2di_grid_loop(grid, own, begin, end, level, true, true, true, finds);
+    else if (plain && dense)
+        dem2di_grid_loop(grid, own, begin, end, level, true, true, false, finds);
+    else if (plain && circles)
+        dem2di_grid_loop(grid, own, begin, end, level, true, false, true, finds);
     else
         dem2di_grid_checked(grid, own, begin, end, level, finds);
 }
@@ -16631,8 +16635,10 @@ static inline bool dem2di_immovable(const dem2d_world *world, int i) {
 static bool dem2di_some_immovable(const dem2d_world *world) {
     const dem2di_list *list = &world->list;
     if (!world->plan.held) return false;
-    for (int i = 0; i < list->count; i++)
-        if (list->keys[i].a >= 0 && dem2di_immovable(world, i)) return true;
+    for (int i = 0; i < list->count; i++) {
+        const int a = list->keys[i].a;
+        if (a >= 0 && !(world->inverse[a].mass > 0) && dem2di_immovable(world, i)) return true;
+    }
     return false;
 }
 
