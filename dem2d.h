@@ -12928,10 +12928,10 @@ static void dem2di_grid_plan(dem2di_grid *grid, double least, double most) {
     grid->cells += grid->table;
 }
 
-/* Cell number of a coordinate in the box, in widths of a cell. From 2^62 cells on all coordinates
-   share a cell: slow but correct. */
+/* Cell number of a coordinate in the box, in widths of a cell. From 2^42 cells on, where cells are
+   too narrow for the rounding errors, all coordinates share a cell: slow but correct. */
 static inline int64_t dem2di_cell_of(double cell) {
-    return cell < 4611686018427387904.0 ? (int64_t)cell : (int64_t)1 << 62;
+    return cell < 4398046511104.0 ? (int64_t)cell : (int64_t)1 << 42;
 }
 
 typedef struct dem2di_cell {

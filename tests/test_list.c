@@ -652,6 +652,29 @@ static void test_quiet_walls(void **state) {
     dem2d_world_destroy(other.s.world);
 }
 
+/* Discs that overlap are found, however far away another one is: cells are counted from there. */
+static void test_far_away(void **state) {
+    (void)state;
+    static const double far[] = {1e3, 1e12, 1e14, 1e16, 1e17, 1e18, 1e20, 1e25};
+    const dem2d_world_desc desc = quiet_desc();
+    for (int k = 0; k < 8; k++) {
+        scene s = open_scene(&desc, 1e4, 0);
+        for (int i = 0; i <= 256; i++) {
+            dem2d_particle_desc grain = {0};
+            dem2d_particle_id id;
+            grain.scale = 1, grain.shape = s.shapes[0], grain.material = s.material;
+            grain.position = vec(0.7 + 1.9 * (i % 16), 0.7 + 1.9 * (i / 16));
+            if (i == 256) grain.position = vec(-far[k], -2.7 * far[k]);
+            assert_ok(dem2d_world_add_particle(s.world, &grain, &id));
+        }
+        assert_ok(dem2d_world_step(s.world, 1, NULL));
+        dem2d_stats stats;
+        assert_ok(dem2d_world_stats(s.world, &stats));
+        assert_int_equal(stats.contacts, 2 * 15 * 16);
+        dem2d_world_destroy(s.world);
+    }
+}
+
 int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(test_clouds),      cmocka_unit_test(test_far_crawl),
@@ -662,7 +685,7 @@ int main(void) {
         cmocka_unit_test(test_deep_lever),  cmocka_unit_test(test_fast),
         cmocka_unit_test(test_falls_fast),  cmocka_unit_test(test_checks),
         cmocka_unit_test(test_fast_custom), cmocka_unit_test(test_segments_listed),
-        cmocka_unit_test(test_quiet_walls),
+        cmocka_unit_test(test_quiet_walls), cmocka_unit_test(test_far_away),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }
