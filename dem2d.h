@@ -33531,7 +33531,9 @@ DEM2D_API dem2d_result dem2d_world_write_csv(const dem2d_world *world, const dem
 
    CHANGES
      0.11.0 Scenes of 0.10.0 run to the same bits, but those with damping ratios and no friction of
-            their kind, and refused steps; snapshots of 0.10.0 are read.
+            their kind, those with a particle 2^42 cells of the list away, and refused steps. Hashes
+            may differ while one of two contact points has a force of -0. Snapshots of 0.10.0 are
+            read.
             Square roots of the header never set errno: -O2 alone is as fast as it was with
             -fno-math-errno, up to twice as fast as without it.
             Faster, with the same bits: sums of forces, the search for neighbours and the order of
@@ -33544,7 +33546,8 @@ DEM2D_API dem2d_result dem2d_world_write_csv(const dem2d_world *world, const dem
             segment gave a vertex of joined segments another partner, with forces of -0 in two
             points, and in a cell without memory for a particle on its way back. Without friction
             there is no tangential dashpot, without rolling friction no rolling dashpot. A particle
-            far away, in a direction that is not periodic, made a cell ask for images without end.
+            far away, in a direction that is not periodic, made a cell ask for images without end;
+            one 2^42 cells away, to the left or below, kept others from being found.
             A snapshot with two contact points of shapes without faces is refused.
      0.10.0 Scenes of 0.9.0 run to the same bits, but cells that hold stresses; snapshots of 0.9.0
             are read.
