@@ -548,33 +548,33 @@ THREADS
 COSTS (instructions per circle and step of a settled bed with 2.0 contacts each, gcc -O2, by
 `make -C tests bench-cost`; a feature that the scene does not use costs nothing: which features are
 in use is decided after an edit)
-    circles, no friction, no damping                     257    57 without a contact
-    the list rebuilt once in 100 steps                   +13
+    circles, no friction, no damping                     215    69 without a contact
+    the list rebuilt once in 100 steps                   +15
     friction and its history                             +35
-    spinning without friction                             +5
-    local or global damping                               +7
+    spinning without friction                             +3
+    local or global damping                               +9
     gravity                                               +1
     fixed particles, walls, segments, parallel_for        +1    present, but nothing touches them
-    polygons for a tenth of the circles                 +410
+    polygons for a tenth of the circles                 +420
     energy and stress queried in every step            +1030
     fields added to a grid in every step              +31400    cells of a diameter, width two
     the ledger of energies                             +1580
-    a periodic cell in place of a box                    +21    with one list more in 100 steps
-    a dashpot                                            +15    with friction; as the next rows:
-    a dashpot and rolling friction                       +41    in beds of bench-guard
-    a normal and a tangential dashpot                    +57
-    both dashpots and rolling friction                   +58
+    a periodic cell in place of a box                    +29    with one list more in 100 steps
+    a dashpot                                            +14    with friction; as the next rows:
+    a dashpot and rolling friction                       +31    in beds of bench-guard
+    a normal and a tangential dashpot                    +22    in beds of bench-world, 500
+    both dashpots and rolling friction                   +60
     a law of your own, springs and friction             +305    called for up to 32 at once
-    the same, law_omits: all that it does without       +224
-    a pair of circles listed but apart                    64    same as in contact: no branch
+    the same, law_omits: all that it does without       +213
+    a pair of circles listed but apart                    43    same as in contact: no branch
     another pair listed but apart, known gap              62    colliding it costs 700 to 1500
     a region without particles, a pair of fixed ones       0
-    Vectors of four (AVX2) are in use here; without them circles with friction take 112 more.
+    Vectors of four (AVX2) are in use here; without them circles with friction take 176 more.
 
 MEMORY
     All memory comes through dem2d_env (malloc and free by default); release gets the size. A step
     allocates nothing once the neighbour list has stopped growing; dem2d_world_stats gives the bytes
-    in use. Capacities reserve memory at creation. A circle takes about 420 bytes with its contacts
+    in use. Capacities reserve memory at creation. A circle takes about 430 bytes with its contacts
     if particle_capacity is given, else up to a half more; another shape 300 bytes more for each
     listed pair. Particles are now and then sorted in memory by their place in space; this changes
     no id, no order and no result.
