@@ -2915,8 +2915,8 @@ DEM2D_API dem2d_result dem2d_world_write_csv(const dem2d_world *world, const dem
 #define DEM2DI_INLINE inline
 #endif
 
-/* A square root that does not set errno: gcc and clang use no vectors where it may, which is what
-   they compile without -fno-math-errno. The sqrt of a program stays what it is. */
+/* A square root that never sets errno. Where sqrt may set it, which is so without -fno-math-errno,
+   gcc and clang do not use vectors. The program's own sqrt is not changed. */
 #if defined(__GNUC__)
 double __builtin_sqrt(double) __attribute__((const));
 #define dem2di_sqrt(x) __builtin_sqrt(x)
@@ -2962,6 +2962,11 @@ double __builtin_sqrt(double) __attribute__((const));
 typedef double dem2di_four __attribute__((vector_size(32)));
 typedef long long dem2di_four_bits __attribute__((vector_size(32)));
 #define DEM2DI_SHUFFLE __builtin_shufflevector
+#if __has_builtin(__builtin_elementwise_sqrt) /* clang, which may drop the other name */
+#define DEM2DI_ROOTS(four) __builtin_elementwise_sqrt(four)
+#else
+#define DEM2DI_ROOTS(four) __builtin_ia32_sqrtpd256(four)
+#endif
 #define DEM2DI_BOTH(name, parameters, of)             \
     static void name##_plain parameters {             \
         name of;                                      \
@@ -4437,7 +4442,7 @@ static DEM2DI_INLINE void dem2di_lanes_rows(const double *a, const double *b, in
     dem2di_turn_rows(a + 2, b + 2, &l->number[row + 2][k], &l->number[row + 3][k]);
 }
 
-/* The arc that has the support point of place k. */
+/* The arc that has the support point in direction k. */
 static DEM2DI_INLINE const double *dem2di_lanes_find(const dem2d_shape *shape, int k,
                                                      const dem2di_lanes *l) {
     const dem2d_vec v = {l->vx[k], l->vy[k]};
@@ -12144,7 +12149,9 @@ static bool dem2di_bodies_good(const dem2d_body *bodies, int count, bool *round)
            least >= DEM2DI_BODY_LEAST &&
            dem2di_max(off_a, off_b) <= DEM2DI_OFF_UNIT * DEM2DI_OFF_UNIT;
 #else
-    return bodies == NULL && count == 0;
+    (void)bodies;
+    (void)count;
+    return false;
 #endif
 }
 
@@ -14159,7 +14166,7 @@ typedef struct dem2di_block_result {
     int64_t spread;         /* sum of the distances in memory of the partners found */
     int64_t images;         /* that may be needed for particles that have left the cell */
     int changes;            /* contacts that close or open */
-    uint32_t blank;         /* of circles: see dem2di_contacts_keep */
+    uint32_t blank;         /* which columns of circles are 0: see dem2di_contacts_keep */
     /* Some blocks of particles have their last contact of circles in this block of contacts:
        complete is the first of them. Of a block of particles, next is the next one. -1: none. */
     int complete, next;
@@ -21240,7 +21247,7 @@ DEM2DI_AVX2_INLINE dem2di_four_twos dem2di_fours_between(const double *const a[4
 DEM2DI_AVX2_INLINE dem2di_four dem2di_fours_line(dem2di_batch *batch, int k, dem2di_four x,
                                                  dem2di_four y) {
     const dem2di_four square = x * x + y * y, one = dem2di_four_of(1, 1, 1, 1);
-    const dem2di_four distance = __builtin_ia32_sqrtpd256(square), f = distance * (one / square);
+    const dem2di_four distance = DEM2DI_ROOTS(square), f = distance * (one / square);
     dem2di_four_put(batch->x + k, x * f);
     dem2di_four_put(batch->y + k, y * f);
     dem2di_four_put(batch->distance + k, distance);
@@ -21270,9 +21277,9 @@ DEM2DI_AVX2_INLINE void dem2di_fours_fetch(const dem2di_state *now, const dem2di
         near |= ~(dem2di_four_bits)(dem2di_fours_line(batch, k, dem2di_fours_first(d),
                                                       dem2di_fours_second(d)) > least);
     }
+    /* nearly never: centres so near to each other that there is no line */
     if ((near[0] | near[1] | near[2] | near[3]) != 0)
-        for (int k = 0; k < batch->count; k++) /* nearly never */
-        {
+        for (int k = 0; k < batch->count; k++) {
             const dem2d_vec d = dem2di_disc_line(&now[keys[k].a], &now[keys[k].b]);
             const dem2di_line line = dem2di_line_of(d.x, d.y);
             batch->x[k] = line.normal.x;
@@ -23343,7 +23350,8 @@ static DEM2DI_INLINE dem2di_tile *dem2di_tile_add(const dem2d_world *world, int 
         return smooth;
     }
     if (way == DEM2DI_WAY_ROUND) return dem2di_tile_add_round(world, i, a, b, corners);
-    if (a->type != DEM2D_POLYGON || b->type != DEM2D_POLYGON) return NULL; /* for compilers */
+    if (a->type != DEM2D_POLYGON || b->type != DEM2D_POLYGON)
+        return NULL; /* known: compilers leave out the rest */
     return dem2di_tile_add_corner(world, i, a, b, corners, pairs);
 }
 
@@ -23935,9 +23943,7 @@ static DEM2DI_INLINE void dem2di_rows_make(const dem2d_world *world, const dem2d
 #undef DEM2DI_ROWS
 }
 
-/* Actions where dem2di_batch_points does not write them: they are written once, moments included.
-   To add a moment to one that has just been stored would wait for that. Writes their sizes where
-   size is not NULL. */
+/* What acts on the two of each contact, by a caller's law, and the size of it. */
 static DEM2DI_INLINE void
 dem2di_batch_actions(const dem2di_batch *batch, bool rolls, const double *DEM2DI_APART normal_x,
                      const double *DEM2DI_APART normal_y, const double *DEM2DI_APART depth,
@@ -23953,7 +23959,7 @@ dem2di_batch_actions(const dem2di_batch *batch, bool rolls, const double *DEM2DI
             action.a -= moment[k];
             action.b += moment[k];
         }
-        if (size != NULL) size[k] = dem2di_action_size(&action);
+        size[k] = dem2di_action_size(&action);
         actions[k].x = action.x;
         actions[k].y = action.y;
         actions[k].a = action.a;
@@ -24758,7 +24764,7 @@ DEM2DI_AVX2_INLINE double dem2di_fours_integrate(const dem2d_world *world, int b
     const dem2di_four_bits sign = (dem2di_four_bits)dem2di_four_of(-0.0, -0.0, -0.0, -0.0);
     const double turn = 2 * DEM2DI_PI;
     const dem2di_four whole = dem2di_four_of(turn, turn, turn, turn);
-    dem2di_four_bits turned = {0, 0, 0, 0}; /* has somebody, in the lane of rotations? */
+    dem2di_four_bits turned = {0, 0, 0, 0}; /* lane 2: by a whole turn */
     double most = 0;
     for (int i = begin; i < end; i++) {
         const double *now = &world->now[i].x.x;
@@ -33538,8 +33544,8 @@ DEM2D_API dem2d_result dem2d_world_write_csv(const dem2d_world *world, const dem
             -fno-math-errno, up to twice as fast as without it.
             Faster, with the same bits: sums of forces, the search for neighbours and the order of
             contacts do not branch on numbers of contacts, which processors guess wrong in worlds of
-            thousands of particles; kernels of circles with dashpots and rolling
-            friction; worlds of mixed shapes, whose contacts are taken by kinds of their pairs;
+            thousands of particles; circles with dashpots and rolling friction; worlds of mixed
+            shapes, whose contacts are taken in the order of their kinds; a caller's law;
             dem2d_pairs_contact, above all ellipses, polybeziers and Fourier series.
             Mended: a refused step could change the hash after dem2d_world_set_pair took friction or
             rolling friction away and left damping ratios, after dem2d_world_set_wall or a new
