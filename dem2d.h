@@ -567,7 +567,7 @@ in use is decided after an edit)
     a law of your own, springs and friction             +305    called for up to 32 at once
     the same, law_omits: all that it does without       +213
     a pair of circles listed but apart                    43    same as in contact: no branch
-    another pair listed but apart, known gap              62    colliding it costs 700 to 1500
+    another pair listed but apart, known gap              38    colliding it costs 650 to 1600
     a region without particles, a pair of fixed ones       0
     Vectors of four (AVX2) are in use here; without them circles with friction take 176 more.
 
